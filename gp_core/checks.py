@@ -1,0 +1,60 @@
+"""Small validators; each names the argument, what was got and what is allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gp_core.errors import GpError
+
+__all__ = ["FloatArray", "as_points", "check_option", "near_matches"]
+
+FloatArray = NDArray[np.float64]
+
+
+def as_points(value: ArrayLike, name: str, *, missing_allowed: bool = False) -> FloatArray:
+    """Return `value` as an (N, 3) float64 array.
+
+    Parameters
+    ----------
+    value : (N, 3) array_like
+        Points, mm.
+    name : str
+        What the caller calls them; stands in the message.
+    missing_allowed : bool
+        Whether rows of NaN may stand for missing points. Infinite values never may.
+
+    Raises
+    ------
+    GpError
+        Not numbers, not of shape (N, 3), or not finite.
+    """
+    try:
+        points = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise GpError(f"{name} must be numbers in (N, 3), got {type(value).__name__}") from None
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise GpError(f"{name} must have the shape (N, 3), got {points.shape}")
+    bad = np.isinf(points) if missing_allowed else ~np.isfinite(points)
+    if bad.any():
+        row = int(np.flatnonzero(bad.any(axis=1))[0])
+        raise GpError(f"{name} must be finite, got {points[row].tolist()} in row {row}")
+    return points
+
+
+def check_option(value: Any, name: str, allowed: Iterable[Any]) -> None:
+    """Raise `GpError` unless `value` is one of `allowed`."""
+    options = list(allowed)
+    if value not in options:
+        shown = ", ".join(str(o) for o in options)
+        raise GpError(f"{name} must be one of {shown}, got {value!r}{near_matches(str(value), options)}")
+
+
+def near_matches(text: str, allowed: Iterable[Any]) -> str:
+    """Return ``" (did you mean A or B?)"``, or an empty string where nothing is near."""
+    near = get_close_matches(text.upper(), [str(a).upper() for a in allowed], n=3, cutoff=0.5)
+    return f" (did you mean {' or '.join(near)}?)" if near else ""

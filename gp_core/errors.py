@@ -1,0 +1,64 @@
+"""What a user can cause, said in one line: what is wrong, in which file and landmark, and what to do."""
+
+from __future__ import annotations
+
+from os import PathLike, fspath
+
+__all__ = ["FeatureError", "FileFormatError", "FrameError", "GeometryError", "GpError"]
+
+
+class GpError(Exception):
+    """Base of every error that a user can cause and mend.
+
+    Parameters
+    ----------
+    problem : str
+        What is wrong, with what was got and what is allowed.
+    file : path, optional
+        The file it is in.
+    specimen, landmark : str, optional
+        Whose and which.
+    remedy : str, optional
+        What to do about it.
+    """
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        file: str | PathLike[str] | None = None,
+        specimen: str | None = None,
+        landmark: str | None = None,
+        remedy: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.file = None if file is None else fspath(file)
+        self.specimen = specimen
+        self.landmark = landmark
+        self.remedy = remedy
+        super().__init__(self._one_line())
+
+    def _one_line(self) -> str:
+        specimen = self.specimen and f"specimen {self.specimen}"
+        landmark = self.landmark and f"landmark {self.landmark}"
+        where = ", ".join(part for part in (self.file, specimen, landmark) if part)
+        text = f"{where}: {self.problem}" if where else self.problem
+        if self.remedy:
+            text = f"{text.rstrip('.')}. {self.remedy}"
+        return " ".join(text.split())
+
+
+class FileFormatError(GpError):
+    """A file cannot be read as what it should be."""
+
+
+class FeatureError(GpError):
+    """A feature code is unknown, doubled, missing, or not fit for its use."""
+
+
+class GeometryError(GpError):
+    """Points do not determine what is asked of them (too few, collinear, not finite, out of scale)."""
+
+
+class FrameError(GpError):
+    """Coordinates of different frames meet."""

@@ -1,0 +1,120 @@
+"""Rigid transforms that know their frames, and the mirror between the two sides.
+
+Points are (N, 3) rows in mm; matrices act on columns, ``p_dst = T_dst_src @ p_src``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.checks import FloatArray, as_points
+from gp_core.errors import FrameError
+
+__all__ = ["FRAMES", "RigidTransform", "mirror_x"]
+
+FRAMES = ("scan", "tracker", "cochlea", "window", "atlas")
+
+_ORTHONORMAL_TOLERANCE = 1e-6
+
+
+@dataclass(frozen=True)
+class RigidTransform:
+    """A proper rigid motion from frame `src` to frame `dst`.
+
+    Parameters
+    ----------
+    matrix : (4, 4) array_like
+        Homogeneous matrix ``T_dst_src``, translation in mm.
+    dst, src : str
+        Frame names, destination first.
+
+    Raises
+    ------
+    FrameError
+        The matrix is not a rotation (det +1) and a translation.
+
+    Examples
+    --------
+    >>> T = RigidTransform.from_parts(np.eye(3), [1, 2, 3], dst="tracker", src="cochlea")
+    >>> T.apply([[0, 0, 0]])
+    array([[1., 2., 3.]])
+    """
+
+    matrix: FloatArray
+    dst: str
+    src: str
+
+    def __post_init__(self) -> None:
+        matrix = np.array(self.matrix, dtype=np.float64)
+        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+            raise FrameError(f"a rigid transform must be a finite (4, 4) matrix, got shape {matrix.shape}")
+        rotation = matrix[:3, :3]
+        off = float(np.abs(rotation.T @ rotation - np.eye(3)).max())
+        if off > _ORTHONORMAL_TOLERANCE or not np.array_equal(matrix[3], [0, 0, 0, 1]):
+            raise FrameError(f"T_{self.dst}_{self.src} is not rigid (off by {off:.2g})")
+        if np.linalg.det(rotation) < 0:
+            raise FrameError(f"T_{self.dst}_{self.src} mirrors (det -1); use mirror_x for the other side")
+        matrix.setflags(write=False)
+        object.__setattr__(self, "matrix", matrix)
+
+    @classmethod
+    def from_parts(cls, rotation: ArrayLike, translation: ArrayLike, *, dst: str, src: str) -> RigidTransform:
+        """Make a transform of a (3, 3) rotation and a (3,) translation in mm."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = rotation
+        matrix[:3, 3] = translation
+        return cls(matrix, dst, src)
+
+    @classmethod
+    def identity(cls, *, dst: str, src: str) -> RigidTransform:
+        """Make the transform that leaves coordinates as they are."""
+        return cls(np.eye(4), dst, src)
+
+    @property
+    def rotation(self) -> FloatArray:
+        """(3, 3) rotation, det +1."""
+        return self.matrix[:3, :3]
+
+    @property
+    def translation(self) -> FloatArray:
+        """(3,) translation, mm: where the origin of `src` lies in `dst`."""
+        return self.matrix[:3, 3]
+
+    def apply(self, points: ArrayLike) -> FloatArray:
+        """Move (N, 3) points from `src` to `dst`; rows of NaN (missing) stay missing."""
+        return as_points(points, "points", missing_allowed=True) @ self.rotation.T + self.translation
+
+    def apply_vector(self, vectors: ArrayLike) -> FloatArray:
+        """Turn vectors (..., 3) from `src` to `dst`."""
+        turned: FloatArray = np.asarray(vectors, dtype=np.float64) @ self.rotation.T
+        return turned
+
+    def inverse(self) -> RigidTransform:
+        """Return ``T_src_dst``."""
+        turned_back = self.rotation.T
+        return RigidTransform.from_parts(
+            turned_back, -turned_back @ self.translation, dst=self.src, src=self.dst
+        )
+
+    def __matmul__(self, other: RigidTransform) -> RigidTransform:
+        """Compose ``T_a_b @ T_b_c``.
+
+        Raises
+        ------
+        FrameError
+            The inner frames differ.
+        """
+        if self.src != other.dst:
+            raise FrameError(
+                f"T_{self.dst}_{self.src} cannot follow T_{other.dst}_{other.src}: "
+                f"{self.src!r} and {other.dst!r} are different frames"
+            )
+        return RigidTransform(self.matrix @ other.matrix, self.dst, other.src)
+
+
+def mirror_x(points: ArrayLike) -> FloatArray:
+    """Mirror (N, 3) points in x: the explicit step between the right side and the stored left."""
+    return as_points(points, "points", missing_allowed=True) * np.array([-1.0, 1.0, 1.0])

@@ -1,0 +1,212 @@
+"""Labelled points: one side of one head (`LandmarkSet`), and one animal (`Specimen`)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.checks import FloatArray, as_points
+from gp_core.errors import FeatureError, FrameError, GpError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import CODES, Side, feature, index_of
+
+__all__ = ["LandmarkSet", "Specimen", "Status"]
+
+
+class Status(str, Enum):
+    """How far a landmark is; the values are the words 3D Slicer writes as ``positionStatus``."""
+
+    PLACED = "defined"
+    TO_DO = "undefined"
+    UNSEEN = "missing"
+
+
+def _nothing() -> Mapping[str, FloatArray]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class LandmarkSet:
+    """The landmarks of one side of one head; never changed in place.
+
+    Parameters
+    ----------
+    points : (20, 3) array_like
+        Positions in mm, rows in the feature table's order, NaN where there is none.
+    side : Side
+        Side of the head.
+    frame : str
+        The frame of the positions: ``scan``, ``tracker``, ``cochlea`` or ``atlas``.
+    unseen : frozenset of str
+        Features that were looked for and cannot be seen (Slicer's ``missing``).
+    extra : mapping of str to (3,) array
+        Named points beside the 20 features, such as the skull features of a physical test, mm.
+
+    Examples
+    --------
+    >>> touched = LandmarkSet.from_mapping({"RWA": [1, 2, 3]}, "L", frame="tracker")
+    >>> touched.placed
+    ('RWA',)
+    """
+
+    points: FloatArray
+    side: Side
+    frame: str = "scan"
+    unseen: frozenset[str] = frozenset()
+    extra: Mapping[str, FloatArray] = field(default_factory=_nothing)
+
+    def __post_init__(self) -> None:
+        points = as_points(self.points, "points", missing_allowed=True).copy()
+        if len(points) != len(CODES):
+            raise GpError(f"a landmark set has {len(CODES)} rows, got {len(points)}")
+        points[np.isnan(points).any(axis=1)] = np.nan
+        points.setflags(write=False)
+        object.__setattr__(self, "points", points)
+        object.__setattr__(self, "side", Side.parse(self.side))
+        object.__setattr__(self, "unseen", frozenset(feature(c).code for c in self.unseen) - set(self.placed))
+
+    @classmethod
+    def empty(cls, side: Side | str, *, frame: str = "scan") -> LandmarkSet:
+        """Make a set with nothing placed."""
+        return cls(np.full((len(CODES), 3), np.nan), Side.parse(side), frame)
+
+    @classmethod
+    def from_mapping(
+        cls, points: Mapping[str, ArrayLike], side: Side | str, *, frame: str = "scan"
+    ) -> LandmarkSet:
+        """Make a set of named points.
+
+        Raises
+        ------
+        FeatureError
+            A name is unknown.
+        GpError
+            A position is not three finite numbers.
+        """
+        rows = np.full((len(CODES), 3), np.nan)
+        for code, position in points.items():
+            rows[index_of(code)] = _position(position, code)
+        return cls(rows, Side.parse(side), frame)
+
+    def __getitem__(self, code: str) -> FloatArray:
+        """Return the (3,) position of a feature, NaN where it is not placed."""
+        return self.points[index_of(code)]
+
+    def __contains__(self, code: object) -> bool:
+        """Whether a feature has a position."""
+        return isinstance(code, str) and bool(np.isfinite(self[code]).all())
+
+    @property
+    def placed(self) -> tuple[str, ...]:
+        """Codes that have a position, in the table's order."""
+        has_position = np.isfinite(self.points).all(axis=1)
+        return tuple(code for code, has in zip(CODES, has_position, strict=True) if has)
+
+    def status(self, code: str) -> Status:
+        """Return how far a feature is."""
+        if code in self:
+            return Status.PLACED
+        return Status.UNSEEN if feature(code).code in self.unseen else Status.TO_DO
+
+    def as_mapping(self, codes: Iterable[str] | None = None) -> dict[str, FloatArray]:
+        """Return the placed positions by code; of `codes` only, where given."""
+        wanted = self.placed if codes is None else tuple(codes)
+        return {code: self[code] for code in wanted if code in self}
+
+    def array(self, codes: Iterable[str]) -> FloatArray:
+        """Return the positions of `codes` as an (n, 3) array, in the order asked.
+
+        Raises
+        ------
+        FeatureError
+            One of them is not placed.
+        """
+        rows = [index_of(code) for code in codes]
+        for row in rows:
+            if np.isnan(self.points[row]).any():
+                raise FeatureError(
+                    f"the {self.side.word} side has no {CODES[row]}",
+                    landmark=CODES[row],
+                    remedy="Label it, or leave it out of the feature subset.",
+                )
+        return self.points[rows]
+
+    def with_point(self, code: str, position: ArrayLike | None) -> LandmarkSet:
+        """Return a copy with one feature moved, or cleared where `position` is None."""
+        points = self.points.copy()
+        points[index_of(code)] = np.nan if position is None else _position(position, code)
+        return replace(self, points=points, unseen=self.unseen - {feature(code).code})
+
+    def with_unseen(self, code: str) -> LandmarkSet:
+        """Return a copy in which one feature is marked as one that cannot be seen."""
+        cleared = self.with_point(code, None)
+        return replace(cleared, unseen=cleared.unseen | {feature(code).code})
+
+    def moved(self, T_dst_src: RigidTransform) -> LandmarkSet:
+        """Return the set in another frame.
+
+        Raises
+        ------
+        FrameError
+            The transform does not start at this set's frame.
+        """
+        if T_dst_src.src != self.frame:
+            raise FrameError(f"T_{T_dst_src.dst}_{T_dst_src.src} cannot move points of frame {self.frame!r}")
+        extra = {name: T_dst_src.apply(point[None])[0] for name, point in self.extra.items()}
+        return replace(
+            self, points=T_dst_src.apply(self.points), frame=T_dst_src.dst, extra=MappingProxyType(extra)
+        )
+
+
+def _position(position: ArrayLike, code: str) -> FloatArray:
+    try:
+        xyz = np.asarray(position, dtype=np.float64)
+    except (TypeError, ValueError):
+        xyz = np.empty(0)
+    if xyz.shape != (3,) or not np.isfinite(xyz).all():
+        raise GpError(
+            f"position must be three finite numbers in mm, got {position!r}",
+            landmark=code,
+            remedy="Leave the feature out if it was not seen.",
+        )
+    return xyz
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """One animal with the landmarks of its labelled sides.
+
+    Parameters
+    ----------
+    name : str
+        Specimen identifier.
+    sides : mapping of Side to LandmarkSet
+        One or both sides.
+    """
+
+    name: str
+    sides: Mapping[Side, LandmarkSet]
+
+    def __post_init__(self) -> None:
+        for side, landmarks in self.sides.items():
+            if landmarks.side is not side:
+                raise GpError(f"the {side.word} side holds {landmarks.side.word} landmarks", specimen=self.name)
+        object.__setattr__(self, "sides", MappingProxyType(dict(self.sides)))
+
+    def side(self, side: Side | str) -> LandmarkSet:
+        """Return the landmarks of one side.
+
+        Raises
+        ------
+        FeatureError
+            That side is not labelled.
+        """
+        wanted = Side.parse(side)
+        if wanted not in self.sides:
+            raise FeatureError(f"the {wanted.word} side is not labelled", specimen=self.name)
+        return self.sides[wanted]
