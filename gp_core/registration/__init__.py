@@ -1,0 +1,1 @@
+"""Rigid registration: corresponding points (Procrustes), many sets at once (JRMPC), surfaces (ICP)."""

@@ -1,0 +1,189 @@
+"""The rigid motion between two lists of corresponding points (weighted Procrustes)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.checks import FloatArray, as_points
+from gp_core.errors import GeometryError, GpError
+from gp_core.frames import RigidTransform
+
+__all__ = ["RigidFit", "fit_rigid", "weighted_procrustes"]
+
+COLLINEAR = 1e-3
+"""Width over length below which points count as one line: 1 µm a mm, finer than any touch or voxel."""
+
+_AMBIGUOUS = 1e-9
+
+
+@dataclass(frozen=True)
+class RigidFit:
+    """A rigid motion fitted to corresponding points.
+
+    Parameters
+    ----------
+    transform : RigidTransform
+        ``T_dst_src``.
+    residuals : (N,) array
+        Distance between each moved source point and its target, mm.
+    rms : float
+        Fiducial registration error: root of the (weighted) mean squared residual, mm.
+    """
+
+    transform: RigidTransform
+    residuals: FloatArray
+    rms: float
+
+
+def fit_rigid(
+    source: ArrayLike,
+    target: ArrayLike,
+    *,
+    weights: ArrayLike | None = None,
+    dst: str,
+    src: str,
+    names: Sequence[str] | None = None,
+) -> RigidFit:
+    """Fit ``T_dst_src`` to corresponding points.
+
+    Parameters
+    ----------
+    source, target : (N, 3) array_like
+        Corresponding points in frame `src` and frame `dst`, mm.
+    weights : (N,) array_like, optional
+        Not negative; equal by default.
+    dst, src : str
+        Frame names, destination first.
+    names : sequence of str, optional
+        Names of the points, for messages.
+
+    Raises
+    ------
+    GeometryError
+        The points do not determine a rotation; see `weighted_procrustes`.
+    GpError
+        Shapes, values or weights are wrong.
+
+    Examples
+    --------
+    >>> corners = np.eye(3)
+    >>> fit_rigid(corners, corners + 1.0, dst="scan", src="tracker").transform.translation
+    array([1., 1., 1.])
+    """
+    rotation, translation = weighted_procrustes(source, target, weights, names=names)
+    transform = RigidTransform.from_parts(rotation, translation, dst=dst, src=src)
+    residuals = np.linalg.norm(transform.apply(source) - as_points(target, "target"), axis=1)
+    rms = float(np.sqrt(np.average(residuals**2, weights=_as_weights(weights, len(residuals)))))
+    return RigidFit(transform, residuals, rms)
+
+
+def weighted_procrustes(
+    source: ArrayLike,
+    target: ArrayLike,
+    weights: ArrayLike | None = None,
+    *,
+    names: Sequence[str] | None = None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rotation and translation with ``target ~ rotation @ source + translation``.
+
+    Parameters
+    ----------
+    source, target : (N, 3) array_like
+        Corresponding points, mm.
+    weights : (N,) array_like, optional
+        Not negative; equal by default. Points of weight zero do not count.
+    names : sequence of str, optional
+        Names of the points, for messages.
+
+    Returns
+    -------
+    rotation : (3, 3) array
+        Proper rotation, det +1 always.
+    translation : (3,) array
+        Translation, mm.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than three points count, they lie on one line (`COLLINEAR`), or every rotation about
+        some axis fits equally well (the target is the source's mirror image).
+    GpError
+        Shapes, values or weights are wrong.
+
+    References
+    ----------
+    Umeyama, "Least-squares estimation of transformation parameters between two point patterns",
+    IEEE TPAMI 13(4), 1991. https://doi.org/10.1109/34.88573
+    """
+    points, aims = as_points(source, "source"), as_points(target, "target")
+    if points.shape != aims.shape:
+        raise GpError(f"source and target must hold as many points, got {len(points)} and {len(aims)}")
+    shares = _as_weights(weights, len(points))
+    _check_rank(points, aims, shares, _as_names(names, len(points)))
+    shares = shares / shares.sum()
+    point_centre, aim_centre = shares @ points, shares @ aims
+    covariance = (aims - aim_centre).T @ (shares[:, None] * (points - point_centre))
+    rotation = _nearest_rotation(covariance)
+    return rotation, aim_centre - rotation @ point_centre
+
+
+def _nearest_rotation(covariance: FloatArray) -> FloatArray:
+    left, spread, right = np.linalg.svd(covariance)
+    sign = 1.0 if np.linalg.det(left @ right) > 0 else -1.0
+    if spread[1] + sign * spread[2] <= _AMBIGUOUS * spread[0]:
+        raise GeometryError(
+            "source and target do not determine a rotation: many fit equally well",
+            remedy="Check that the points correspond and that neither list is a mirror image of the other.",
+        )
+    rotation: FloatArray = left @ np.diag([1.0, 1.0, sign]) @ right
+    return rotation
+
+
+def _check_rank(points: FloatArray, aims: FloatArray, weights: FloatArray, names: tuple[str, ...]) -> None:
+    counts = np.flatnonzero(weights > 0)
+    which = ", ".join(names[i] for i in counts[:12]) + (", ..." if len(counts) > 12 else "")
+    if len(counts) < 3:
+        raise GeometryError(
+            f"a rigid fit needs at least three points, got {len(counts)}" + (f": {which}" if which else ""),
+            remedy="Add points that do not lie on one line.",
+        )
+    for label, cloud in (("source", points), ("target", aims)):
+        if _is_line(cloud[counts], weights[counts]):
+            raise GeometryError(
+                f"the {label} points lie on one line and leave the turn about it open: {which}",
+                remedy="Add a point away from that line.",
+            )
+
+
+def _is_line(points: FloatArray, weights: FloatArray) -> bool:
+    centred = points - np.average(points, axis=0, weights=weights)
+    length, width = np.linalg.svd(np.sqrt(weights)[:, None] * centred, compute_uv=False)[:2]
+    # Coincident points leave rounding only, as wide as long: hold them against the coordinates too.
+    rounding = 1e-13 * float(np.sqrt(weights.sum())) * float(np.abs(points).max())
+    return bool(width <= max(COLLINEAR * length, rounding))
+
+
+def _as_weights(weights: ArrayLike | None, n: int) -> FloatArray:
+    if weights is None:
+        return np.ones(n)
+    try:
+        values = np.asarray(weights, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise GpError("weights must be numbers") from None
+    if values.shape != (n,):
+        raise GpError(f"weights must have the shape ({n},), got {values.shape}")
+    if not np.isfinite(values).all() or (values < 0).any():
+        raise GpError("weights must be finite and not negative")
+    return values
+
+
+def _as_names(names: Sequence[str] | None, n: int) -> tuple[str, ...]:
+    if names is None:
+        return tuple(f"row {i}" for i in range(n))
+    if len(names) != n:
+        raise GpError(f"names must hold {n} names, got {len(names)}")
+    return tuple(names)
