@@ -1,0 +1,42 @@
+"""Landmark files: Slicer's ``.mrk.json`` and ``.fcsv``, tables, the probe's ``.dat``, the authors' ``.mat``."""
+
+from gp_core.landmarks.files.dat import skull_feature_names
+from gp_core.landmarks.files.fcsv import write_fcsv
+from gp_core.landmarks.files.header import FileHeader
+from gp_core.landmarks.files.markups import write_markups
+from gp_core.landmarks.files.mat import import_mat, read_authors_mat
+from gp_core.landmarks.files.naming import landmark_file_name, natural_key
+from gp_core.landmarks.files.points import LabelledPoint, PointList
+from gp_core.landmarks.files.reading import (
+    landmarks_of,
+    read_landmarks,
+    read_points,
+    read_touches,
+    specimen_of,
+)
+from gp_core.landmarks.files.scale import check_plausible_size
+from gp_core.landmarks.files.specimens import load_specimens
+from gp_core.landmarks.files.table import write_csv
+from gp_core.landmarks.files.text import write_text
+
+__all__ = [
+    "FileHeader",
+    "LabelledPoint",
+    "PointList",
+    "check_plausible_size",
+    "import_mat",
+    "landmark_file_name",
+    "landmarks_of",
+    "load_specimens",
+    "natural_key",
+    "read_authors_mat",
+    "read_landmarks",
+    "read_points",
+    "read_touches",
+    "skull_feature_names",
+    "specimen_of",
+    "write_csv",
+    "write_fcsv",
+    "write_markups",
+    "write_text",
+]

@@ -1,0 +1,105 @@
+"""3D Slicer's old point lists, ``.fcsv``, in their three layouts."""
+
+from __future__ import annotations
+
+import csv
+import io
+import logging
+import re
+from os import PathLike
+from pathlib import Path
+
+from gp_core.errors import FileFormatError
+from gp_core.landmarks.features import FEATURES
+from gp_core.landmarks.files.points import STATUS_WORDS, LabelledPoint, PointList, labelled_point, points_of
+from gp_core.landmarks.files.text import flips_xy, read_text, shown, split_fields, split_lines, write_text
+from gp_core.landmarks.sets import LandmarkSet, Status
+
+__all__ = ["read_fcsv", "write_fcsv"]
+
+_log = logging.getLogger(__name__)
+
+_HEADER = """\
+# Markups fiducial file version = 4.11
+# CoordinateSystem = LPS
+# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID
+"""
+_SETTING = re.compile(r"#\s*(Markups fiducial file version|CoordinateSystem)\s*=\s*(.*)", re.IGNORECASE)
+_STATUSES = tuple(STATUS_WORDS.values())  # in the order of Slicer's numbers
+
+
+def read_fcsv(path: str | PathLike[str]) -> PointList:
+    """Read a point list of Slicer 3 (``label,x,y,z,sel,vis``), 4 (14 columns) or 5 (two more, unnamed).
+
+    Returns
+    -------
+    PointList
+        Positions in mm, LPS. A file that does not name its system is LPS, but RAS in the layout of
+        Slicer 3, as Slicer has it.
+
+    Raises
+    ------
+    FileFormatError
+        Wrong number of columns, an unknown status or system, or a position that is not three finite numbers.
+    """
+    lines = split_lines(read_text(path))
+    settings = {m[1].lower(): m[2] for _, line in lines if (m := _SETTING.match(line))}
+    rows = [
+        (number, split_fields(line, ",", number, path)) for number, line in lines if not line.startswith("#")
+    ]
+    old = bool(rows) and all(4 <= len(fields) <= 7 for _, fields in rows)
+    system = settings.get("coordinatesystem")
+    if system is None and not old:
+        _log.warning("%s: no coordinate system is named; taken as LPS", path)
+    flip_xy = flips_xy("RAS" if system is None and old else system, path)
+    read_row = _slicer3_row if old else _markups_row
+    return PointList(tuple(read_row(fields, number, flip_xy, path) for number, fields in rows), Path(path))
+
+
+def _slicer3_row(fields: list[str], number: int, flip_xy: bool, file: str | PathLike[str]) -> LabelledPoint:
+    return labelled_point(fields[0], fields[1:4], file=file, flip_xy=flip_xy)
+
+
+def _markups_row(fields: list[str], number: int, flip_xy: bool, file: str | PathLike[str]) -> LabelledPoint:
+    if not 12 <= len(fields) <= 16:
+        raise FileFormatError(
+            f"line {number} has {len(fields)} columns; a point has 14 or 16 (or 6 in Slicer 3)",
+            file=file,
+            remedy="Export the landmarks again.",
+        )
+    code = fields[14].strip() if len(fields) > 14 else ""
+    if code not in ("", "0", "1", "2", "3"):
+        raise FileFormatError(
+            f"position status (column 15) must be 0 to 3, got {shown(code)} in line {number}",
+            file=file,
+            landmark=fields[11],
+        )
+    status = _STATUSES[int(code)] if code else Status.PLACED
+    description = fields[12] if len(fields) > 12 else ""
+    return labelled_point(
+        fields[11], fields[1:4], status, file=file, description=description, flip_xy=flip_xy
+    )
+
+
+def write_fcsv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
+    """Write a landmark set as Slicer 5 does: 16 columns, LPS, mm, to the last bit of every coordinate.
+
+    The format has no place for specimen, side and frame; name the file ``<specimen>_L`` or ``_R``.
+    Points that are not placed stand at the origin with a status that says so, as Slicer has it; programs
+    that do not know the 15th column take them as placed, so prefer `write_markups`.
+
+    Raises
+    ------
+    GpError
+        The file cannot be written.
+    """
+    computed = {feature.code for feature in FEATURES if feature.computed}
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    for i, point in enumerate(points_of(landmarks), start=1):
+        xyz = [0.0, 0.0, 0.0] if point.position is None else point.position.tolist()
+        shown_selected_locked = [1, 1, int(point.label in computed)]
+        status = list(STATUS_WORDS).index(point.status.value)
+        texts = [point.label, point.description, ""]
+        writer.writerow([i, *xyz, 0, 0, 0, 1, *shown_selected_locked, *texts, status, 0])
+    write_text(path, _HEADER + stream.getvalue())

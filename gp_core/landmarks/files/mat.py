@@ -1,0 +1,125 @@
+"""The authors' labelled animals, two ``.mat`` files, and their import as landmark JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_core.errors import FileFormatError, GpError
+from gp_core.landmarks.features import CODES, Side, named_set
+from gp_core.landmarks.files.markups import write_markups
+from gp_core.landmarks.files.naming import landmark_file_name
+from gp_core.landmarks.files.text import check_file, shown
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+
+__all__ = ["import_mat", "read_authors_mat"]
+
+
+def read_authors_mat(path_left: str | PathLike[str], path_right: str | PathLike[str]) -> list[Specimen]:
+    """Read the labelled sets of Usevitch et al. 2021.
+
+    Parameters
+    ----------
+    path_left, path_right : path
+        Files with the variables ``cc_L`` and ``cc_R``: (20 features, 3, animals) in mm, each set in its
+        own cochlea frame, rows as the feature table's ``authors_mat`` names them.
+
+    Returns
+    -------
+    list of Specimen
+        ``GP01``, ``GP02``, ...; both sides, cochlea frame.
+
+    Raises
+    ------
+    FileFormatError
+        Not such files.
+    """
+    left = _read_sets(path_left, Side.LEFT)
+    right = _read_sets(path_right, Side.RIGHT)
+    if len(left) != len(right):
+        raise FileFormatError(
+            f"holds {len(right)} animals, the left side's file {len(left)}",
+            file=path_right,
+            remedy="Give the two files of one study.",
+        )
+    pairs = enumerate(zip(left, right, strict=True), start=1)
+    return [Specimen(f"GP{i:02d}", {Side.LEFT: a, Side.RIGHT: b}) for i, (a, b) in pairs]
+
+
+def import_mat(
+    path_left: str | PathLike[str], path_right: str | PathLike[str], directory: str | PathLike[str]
+) -> list[Path]:
+    """Write the authors' sets as landmark JSON, a file a side, and return the files.
+
+    Raises
+    ------
+    FileFormatError
+        See `read_authors_mat`.
+    GpError
+        The folder cannot be made or written.
+    """
+    specimens = read_authors_mat(path_left, path_right)
+    folder = Path(directory)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise GpError(f"cannot be made a folder ({error})", file=folder, remedy="Name another.") from None
+    written = []
+    for specimen in specimens:
+        for side, landmarks in specimen.sides.items():
+            file = folder / landmark_file_name(specimen.name, side)
+            source = Path(path_left if side is Side.LEFT else path_right).name
+            write_markups(
+                file,
+                landmarks,
+                specimen=specimen.name,
+                provenance={code: {"method": "imported", "source": source} for code in landmarks.placed},
+            )
+            written.append(file)
+    return written
+
+
+def _read_sets(path: str | PathLike[str], side: Side) -> list[LandmarkSet]:
+    rows = [named_set("authors_mat").index(code) for code in CODES]
+    values = _values(_load(path), f"cc_{side.value}", path)
+    return [LandmarkSet(values[rows, :, i], side, "cochlea") for i in range(values.shape[2])]
+
+
+def _load(path: str | PathLike[str]) -> Mapping[str, Any]:
+    from scipy.io import loadmat  # here, not above: it doubles the time of a start
+
+    check_file(path)
+    try:
+        content: Mapping[str, Any] = loadmat(path)
+    except Exception as error:  # its reader raises whatever the bytes lead it to
+        raise FileFormatError(
+            f"is not a MATLAB file up to version 7 ({type(error).__name__})",
+            file=path,
+            remedy="Save it in MATLAB with -v7.",
+        ) from None
+    return content
+
+
+def _values(content: Mapping[str, Any], variable: str, file: str | PathLike[str]) -> FloatArray:
+    n_rows = len(named_set("authors_mat"))
+    if variable not in content:
+        found = ", ".join(name for name in content if not name.startswith("__"))
+        raise FileFormatError(
+            f"has no variable {variable}; it holds {shown(found)}",
+            file=file,
+            remedy="Give the left side's file first, then the right side's.",
+        )
+    values = content[variable]
+    is_numeric = isinstance(values, np.ndarray) and values.dtype.kind in "fiu"
+    if not is_numeric or values.ndim != 3 or values.shape[:2] != (n_rows, 3):
+        got = getattr(values, "shape", type(values).__name__)
+        raise FileFormatError(f"{variable} must be numbers in ({n_rows}, 3, animals), got {got}", file=file)
+    values = values.astype(np.float64)
+    if np.isinf(values).any():
+        raise FileFormatError(f"{variable} holds infinite values", file=file, remedy="Correct them.")
+    return values

@@ -1,0 +1,45 @@
+"""What a landmark file's name says: its kind, the specimen and the side."""
+
+from __future__ import annotations
+
+import re
+from os import PathLike
+from pathlib import Path
+
+from gp_core.landmarks.features import Side
+
+__all__ = ["landmark_file_name", "name_parts", "natural_key"]
+
+# GP01_L, GP01-left, "GP01 right", GP01.R
+_SIDE_ENDING = re.compile(
+    r"(?P<specimen>.*[^ _.\-])[ _.\-]+(?P<side>l|r|left|right)", re.IGNORECASE | re.DOTALL
+)
+
+
+def landmark_file_name(specimen: str, side: Side) -> str:
+    """Return the name of the file that holds one side of a specimen."""
+    return f"{specimen}_{side.value}.mrk.json"
+
+
+def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None]:
+    """Return the specimen and the side that a file is named for; no side where the name ends otherwise.
+
+    Examples
+    --------
+    >>> name_parts("scans/LG.J_7-left.mrk.json", ".mrk.json")
+    ('LG.J_7', <Side.LEFT: 'L'>)
+    """
+    name = Path(path).name
+    stem = name[: len(name) - len(suffix)]
+    match = _SIDE_ENDING.fullmatch(stem)
+    if match is None:
+        return stem, None
+    return match["specimen"], Side.parse(match["side"])
+
+
+def natural_key(name: str) -> tuple[tuple[int, str], ...]:
+    """Return a sorting key by which GP2 comes before GP10, in any case of letters."""
+    parts = re.split(r"([0-9]+)", name.casefold())
+    # Odd parts are digits: without leading zeros, the longer one is the larger number.
+    tidy = [part.lstrip("0") if i % 2 else part for i, part in enumerate(parts)]
+    return tuple((len(part) if i % 2 else 0, part) for i, part in enumerate(tidy))

@@ -1,0 +1,156 @@
+"""Labelled points as a file holds them, before the feature table is asked."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_core.errors import FileFormatError
+from gp_core.landmarks.features import FEATURES, Feature
+from gp_core.landmarks.files.header import FileHeader
+from gp_core.landmarks.files.text import parse_position
+from gp_core.landmarks.sets import LandmarkSet, Status
+
+__all__ = ["STATUS_WORDS", "LabelledPoint", "PointList", "is_computed", "labelled_point", "points_of"]
+
+_log = logging.getLogger(__name__)
+
+# Slicer's words in the order of its numbers; a previewed point follows the mouse and is not placed.
+STATUS_WORDS: Mapping[str, Status] = {
+    "undefined": Status.TO_DO,
+    "preview": Status.TO_DO,
+    "defined": Status.PLACED,
+    "missing": Status.UNSEEN,
+}
+
+
+class LabelledPoint(NamedTuple):
+    """One point of a file: label, (3,) position in mm or None, how far it is, free text."""
+
+    label: str
+    position: FloatArray | None
+    status: Status
+    description: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class PointList:
+    """The labelled points of one file, in the file's order; labels may be anything, and doubled.
+
+    Parameters
+    ----------
+    points : tuple of LabelledPoint
+        The N points; positions in mm, LPS where the file has a coordinate system.
+    source : Path
+        The file.
+    frame : str
+        Frame of the positions.
+    header : FileHeader, optional
+        What this program wrote into the file, if it did.
+
+    Raises
+    ------
+    FileFormatError
+        There are no points.
+    """
+
+    points: tuple[LabelledPoint, ...]
+    source: Path
+    frame: str = "scan"
+    header: FileHeader | None = None
+
+    def __post_init__(self) -> None:
+        if not self.points:
+            raise FileFormatError("holds no points", file=self.source, remedy="Export the landmarks again.")
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels, in the file's order."""
+        return tuple(point.label for point in self.points)
+
+    @property
+    def positions(self) -> FloatArray:
+        """(N, 3) positions in mm, rows of NaN where there is none."""
+        return np.array([np.full(3, np.nan) if p.position is None else p.position for p in self.points])
+
+    @property
+    def statuses(self) -> tuple[Status, ...]:
+        """How far each point is."""
+        return tuple(point.status for point in self.points)
+
+    @property
+    def descriptions(self) -> tuple[str, ...]:
+        """Free text of each point."""
+        return tuple(point.description for point in self.points)
+
+
+def labelled_point(
+    label: str,
+    coordinates: Sequence[object],
+    status: Status = Status.PLACED,
+    *,
+    file: str | PathLike[str],
+    description: str = "",
+    flip_xy: bool = False,
+) -> LabelledPoint:
+    """Make a point of what a file says.
+
+    Parameters
+    ----------
+    label, description : str
+        As read; stray blanks and carriage returns are tidied away.
+    coordinates : sequence
+        Three numbers or texts. Not looked at unless `status` says that the point is placed:
+        Slicer leaves the last position, or the origin, at points that are not.
+    status : Status
+        How far the point is; a placed one without a position is one to do, as Slicer has it.
+    file : path
+        For messages.
+    flip_xy : bool
+        Whether the coordinates are RAS.
+
+    Raises
+    ------
+    FileFormatError
+        The coordinates are not three finite numbers, nor all missing.
+    """
+    label, description = " ".join(label.split()), description.strip()
+    if status is not Status.PLACED:
+        return LabelledPoint(label, None, status, description)
+    position = parse_position(coordinates, file=file, landmark=label)
+    if position is None:
+        _log.warning("%s: landmark %s is said to be placed but has no position", file, label)
+        return LabelledPoint(label, None, Status.TO_DO, description)
+    if flip_xy:
+        position[:2] *= -1.0
+    return LabelledPoint(label, position, status, description)
+
+
+def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
+    """Return a set as a file is to hold it: every feature, in the table's order, then the extra points."""
+    positions = landmarks.as_mapping()
+    features = [
+        LabelledPoint(f.code, positions.get(f.code), landmarks.status(f.code), _description(f))
+        for f in FEATURES
+    ]
+    extra = [LabelledPoint(name, position, Status.PLACED) for name, position in landmarks.extra.items()]
+    return (*features, *extra)
+
+
+def _description(feature: Feature) -> str:
+    return f"{feature.name}. {feature.where}" if feature.computed else feature.name
+
+
+def is_computed(label: str) -> bool:
+    """Return whether a label is a feature that follows from others, not to be dragged about in Slicer."""
+    return any(feature.code == label and feature.computed for feature in FEATURES)

@@ -1,0 +1,227 @@
+"""Landmarks from any file: by its kind to points, by their labels to features."""
+
+from __future__ import annotations
+
+import re
+from os import PathLike, fspath
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from gp_core.checks import check_option, near_matches
+from gp_core.errors import FeatureError, FileFormatError, GeometryError
+from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.files.dat import is_sentinel, read_dat
+from gp_core.landmarks.files.fcsv import read_fcsv
+from gp_core.landmarks.files.markups import read_markups
+from gp_core.landmarks.files.naming import name_parts
+from gp_core.landmarks.files.points import LabelledPoint, PointList
+from gp_core.landmarks.files.scale import check_plausible_size
+from gp_core.landmarks.files.table import read_table
+from gp_core.landmarks.files.text import check_file, shown
+from gp_core.landmarks.sets import LandmarkSet, Status
+
+__all__ = ["landmarks_of", "read_landmarks", "read_points", "read_touches", "specimen_of"]
+
+Unknown = Literal["error", "extra"]
+
+_READERS = {
+    ".mrk.json": read_markups,
+    ".json": read_markups,
+    ".fcsv": read_fcsv,
+    ".csv": read_table,
+    ".tsv": read_table,
+    ".dat": read_dat,
+}
+_SKULL_FEATURE = re.compile(r"S[0-9]{1,2}", re.IGNORECASE)
+_MIN_TO_TELL_A_POINT_FROM_A_SHAPE = 3
+
+
+def _suffix(path: str | PathLike[str]) -> str:
+    name = fspath(path).lower()
+    found = next((suffix for suffix in _READERS if name.endswith(suffix)), None)
+    if found is None:
+        check_file(path)
+        raise FileFormatError(
+            "is no kind of landmark file that is known", file=path, remedy=f"Give {', '.join(_READERS)}."
+        )
+    return found
+
+
+def read_points(path: str | PathLike[str]) -> PointList:
+    """Read the labelled points of a landmark file, whatever their labels are.
+
+    Parameters
+    ----------
+    path : path
+        ``.mrk.json``, ``.json``, ``.fcsv``, ``.csv``, ``.tsv`` or ``.dat``.
+
+    Returns
+    -------
+    PointList
+        Positions in mm; LPS, but of a ``.dat`` in the tracker frame.
+
+    Raises
+    ------
+    FileFormatError
+        Another kind of file, or one that cannot be read.
+    """
+    return _READERS[_suffix(path)](path)
+
+
+def read_landmarks(
+    path: str | PathLike[str], *, side: Side | str | None = None, unknown: Unknown = "error"
+) -> LandmarkSet:
+    """Read the landmarks of one side of a head.
+
+    Parameters
+    ----------
+    path : path
+        See `read_points`.
+    side : Side or str, optional
+        Needed only where neither the file's ``gpLabeler`` object nor the ending of its name
+        (``_L``, ``-left``, ...) says it.
+    unknown : {"error", "extra"}
+        What to do with labels outside the feature table: refuse, or keep in `LandmarkSet.extra`.
+        Skull features ``S1``, ``S2``, ... and what this program wrote as extra are always kept.
+
+    Returns
+    -------
+    LandmarkSet
+        In the frame that the file names, else ``scan`` (``.dat``: ``tracker``).
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read.
+    FeatureError
+        A label is unknown (near matches are named) or doubled, or the side is not known or contradicted.
+    GeometryError
+        All points are at one place.
+
+    Examples
+    --------
+    >>> read_landmarks("GP01_L.mrk.json").side  # doctest: +SKIP
+    <Side.LEFT: 'L'>
+    """
+    return landmarks_of(read_points(path), side=side, unknown=unknown)
+
+
+def landmarks_of(
+    points: PointList, *, side: Side | str | None = None, unknown: Unknown = "error"
+) -> LandmarkSet:
+    """Make landmarks of the points of a file; see `read_landmarks`."""
+    return _landmark_set(points, _side_of(points, side), points.frame, unknown)
+
+
+def read_touches(path: str | PathLike[str], side: Side | str, *, unknown: Unknown = "error") -> LandmarkSet:
+    """Read what was touched with the probe on one side of a head.
+
+    Parameters
+    ----------
+    path : path
+        See `read_points`. In a file of any kind, -1000 -1000 -1000 and 0 0 0 stand for *not seen*.
+    side : Side or str
+        Side of the head.
+    unknown : {"error", "extra"}
+        See `read_landmarks`.
+
+    Returns
+    -------
+    LandmarkSet
+        Positions in mm, tracker frame; the eight skull features in `extra`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read.
+    FeatureError
+        A label is unknown or doubled, or the file says that it is the other side.
+    GeometryError
+        All points are at one place, or are not in millimetres.
+    """
+    points = read_points(path)
+    wanted = Side.parse(side)
+    _check_side(wanted, points.header.side if points.header else None, points)
+    seen = PointList(tuple(_without_sentinel(point) for point in points.points), points.source)
+    touches = _landmark_set(seen, wanted, "tracker", unknown)
+    check_plausible_size(touches, path)
+    return touches
+
+
+def specimen_of(points: PointList) -> str:
+    """Return the specimen that a file names, in its ``gpLabeler`` object or by its name."""
+    name = points.header.specimen if points.header else None
+    return name or name_parts(points.source, _suffix(points.source))[0]
+
+
+def _without_sentinel(point: LabelledPoint) -> LabelledPoint:
+    if point.position is None or not is_sentinel(point.position):
+        return point
+    return point._replace(position=None, status=Status.UNSEEN)
+
+
+def _side_of(points: PointList, side: Side | str | None) -> Side:
+    said = points.header.side if points.header else None
+    said = said or name_parts(points.source, _suffix(points.source))[1]
+    given = None if side is None else Side.parse(side)
+    if given is not None:
+        _check_side(given, said, points)
+    if (found := said or given) is None:
+        raise FeatureError(
+            "does not say which side of the head it is",
+            file=points.source,
+            remedy="Give the side (L or R), or let the file's name end in _L or _R.",
+        )
+    return found
+
+
+def _check_side(wanted: Side, said: Side | None, points: PointList) -> None:
+    if said not in (None, wanted):
+        raise FeatureError(
+            f"is the {wanted.other.word} side, but was asked for as the {wanted.word} side",
+            file=points.source,
+            remedy=f"Give the side {wanted.other.value}, or correct the file.",
+        )
+
+
+def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -> LandmarkSet:
+    check_option(unknown, "unknown", ("error", "extra"))
+    names = _names(points, unknown)
+    positions = dict(zip(names, points.positions, strict=True))
+    placed = np.array([p.position for p in points.points if p.position is not None])
+    if len(placed) >= _MIN_TO_TELL_A_POINT_FROM_A_SHAPE and (placed == placed[0]).all():
+        raise GeometryError(
+            f"all {len(placed)} points are at the same place",
+            file=points.source,
+            remedy="Export the landmarks again.",
+        )
+    rows = np.array([positions.get(code, np.full(3, np.nan)) for code in CODES])
+    unseen = {name for name, status in zip(names, points.statuses, strict=True) if status is Status.UNSEEN}
+    extra = {name: p for name, p in positions.items() if name not in CODES and np.isfinite(p).all()}
+    return LandmarkSet(rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra))
+
+
+def _names(points: PointList, unknown: Unknown) -> list[str]:
+    known = set(points.header.extra) if points.header else set()
+    names: dict[str, None] = {}
+    for label in points.labels:
+        name = label.upper() if label.upper() in CODES or _SKULL_FEATURE.fullmatch(label) else label
+        if not (name in CODES or name in known or _SKULL_FEATURE.fullmatch(name) or unknown == "extra"):
+            raise _unknown(label, points)
+        if name in names:
+            raise FeatureError(
+                "is in the file twice", file=points.source, landmark=name[:40], remedy="Remove one of them."
+            )
+        names[name] = None
+    return list(names)
+
+
+def _unknown(label: str, points: PointList) -> FeatureError:
+    return FeatureError(
+        f"unknown feature {shown(label)}{near_matches(label[:40], CODES)}",
+        file=points.source,
+        landmark=label[:40],
+        remedy=f"The features are {' '.join(CODES)}.",
+    )

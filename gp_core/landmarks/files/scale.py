@@ -1,0 +1,80 @@
+"""Whether landmarks are in millimetres: told from the published distances between features."""
+
+from __future__ import annotations
+
+import csv
+import math
+from functools import cache
+from os import PathLike
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GeometryError
+from gp_core.landmarks.features import CODES, index_of
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.resources import resource_path
+
+__all__ = ["check_plausible_size"]
+
+_MIN_PAIRS = 3
+_TOLERANCE = 0.2  # of the decimal logarithm: animals differ by a tenth, mistaken units by ten times
+_UNITS = {-6: "kilometres", -3: "metres", -1: "centimetres", 3: "micrometres", 6: "nanometres"}
+
+
+@cache
+def _published_mm() -> FloatArray:
+    """Return the (20, 20) mean distances of the published table in mm, NaN on the diagonal."""
+    expected = np.full((len(CODES), len(CODES)), np.nan)
+    with resource_path("published_distances.csv").open(encoding="utf-8", newline="") as stream:
+        for row in csv.DictReader(stream):
+            a, b = index_of(row["feature_a"]), index_of(row["feature_b"])
+            expected[a, b] = expected[b, a] = float(row["mean_mm"])
+    expected.setflags(write=False)
+    return expected
+
+
+def check_plausible_size(landmarks: LandmarkSet, file: str | PathLike[str] | None = None) -> None:
+    """Refuse landmarks that are a power of ten too small or too large for a guinea pig.
+
+    The size is the median, over all pairs of placed features, of their distance by the published mean
+    distance (Usevitch et al. 2021, Figure 2). Other sizes, and fewer than three pairs, pass.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        Landmarks of one side, in any frame.
+    file : path, optional
+        Where they come from, for the message.
+
+    Raises
+    ------
+    GeometryError
+        The coordinates look like metres, micrometres or the like; the remedy names the factor.
+    """
+    rows = [index_of(code) for code in landmarks.placed]
+    pairs = np.triu_indices(len(rows), k=1)
+    points = landmarks.points[rows]
+    with np.errstate(over="ignore", invalid="ignore"):
+        measured = np.linalg.norm(points[pairs[0]] - points[pairs[1]], axis=1)
+    ratios = measured / _published_mm()[np.ix_(rows, rows)][pairs]
+    ratio = float(np.median(ratios)) if len(ratios) >= _MIN_PAIRS else 1.0
+    if not (math.isfinite(ratio) and ratio > 0):
+        return
+    power = round(math.log10(ratio))
+    if power == 0 or abs(math.log10(ratio) - power) > _TOLERANCE:
+        return
+    raise GeometryError(_problem(power), file=file, remedy=_remedy(power))
+
+
+def _problem(power: int) -> str:
+    much = f"10^{abs(power)}" if abs(power) > 6 else f"{10 ** abs(power)}"
+    size = "smaller" if power < 0 else "larger"
+    unit = f"; coordinates look like {_UNITS[power]}" if power in _UNITS else ""
+    return f"the distances between its landmarks are {much} times {size} than in a guinea pig{unit}"
+
+
+def _remedy(power: int) -> str:
+    verb = "multiply" if power < 0 else "divide"
+    much = f"10^{abs(power)}" if abs(power) > 6 else f"{10 ** abs(power)}"
+    return f"Coordinates must be in mm: {verb} them by {much}."

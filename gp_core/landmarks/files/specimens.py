@@ -1,0 +1,89 @@
+"""Animals from many landmark files, a side each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from os import PathLike, fspath
+from pathlib import Path
+
+from gp_core.errors import FeatureError, FileFormatError
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.files.naming import natural_key
+from gp_core.landmarks.files.reading import landmarks_of, read_points, specimen_of
+from gp_core.landmarks.files.scale import check_plausible_size
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+
+__all__ = ["load_specimens"]
+
+_IN_FOLDERS = (".mrk.json", ".fcsv")
+
+
+def load_specimens(
+    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
+) -> list[Specimen]:
+    """Read landmark files, or folders of them, and put the sides of each animal together.
+
+    Parameters
+    ----------
+    paths : path or iterable of path
+        Landmark files of any kind, and folders; these are searched, not deeper, for ``.mrk.json`` and
+        ``.fcsv``.
+
+    Returns
+    -------
+    list of Specimen
+        By name, GP2 before GP10. Files belong together by the specimen in their ``gpLabeler`` object,
+        else by their name without ``_L`` or ``_R``.
+
+    Raises
+    ------
+    FileFormatError
+        A file cannot be read, or a folder holds none.
+    FeatureError
+        Two files hold the same side of a specimen, a side is not known, or a label is unknown or doubled.
+    GeometryError
+        All points of a file are at one place, or not in millimetres.
+    """
+    files = _files([paths] if isinstance(paths, (str, PathLike)) else list(paths))
+    sides: dict[str, dict[Side, LandmarkSet]] = {}
+    sources: dict[tuple[str, Side], Path] = {}
+    for file in files:
+        points = read_points(file)
+        name, landmarks = specimen_of(points), landmarks_of(points)
+        check_plausible_size(landmarks, file)
+        earlier = sources.setdefault((name, landmarks.side), file)
+        if earlier is not file:
+            raise FeatureError(
+                f"the {landmarks.side.word} side is in {fspath(earlier)} too",
+                file=file,
+                specimen=name,
+                remedy="Give one file a side, or name the specimens apart.",
+            )
+        sides.setdefault(name, {})[landmarks.side] = landmarks
+    return [Specimen(name, sides[name]) for name in sorted(sides, key=natural_key)]
+
+
+def _files(paths: list[str | PathLike[str]]) -> list[Path]:
+    if not paths:
+        raise FileFormatError("no landmark files were given", remedy="Name files, or folders of them.")
+    found = [file for path in paths for file in _files_at(Path(path))]
+    return list(
+        {file.absolute(): file for file in found}.values()
+    )  # a file may be named along with its folder
+
+
+def _files_at(path: Path) -> list[Path]:
+    try:
+        if not path.is_dir():
+            return [path]
+        found = sorted(file for file in path.iterdir() if file.name.lower().endswith(_IN_FOLDERS))
+    except (OSError, ValueError) as error:
+        raise FileFormatError(f"cannot be searched ({error})", file=path, remedy="Check the name.") from None
+    found = [file for file in found if not file.name.startswith(".")]  # drafts, and what macOS leaves
+    if not found:
+        raise FileFormatError(
+            f"holds no landmark files ({', '.join('*' + suffix for suffix in _IN_FOLDERS)})",
+            file=path,
+            remedy="Name another folder, or the files themselves.",
+        )
+    return found

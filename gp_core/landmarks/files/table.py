@@ -1,0 +1,137 @@
+"""Tables of named points, ``.csv`` and ``.tsv``: Slicer's own, or simply ``name,x,y,z``."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+from gp_core.errors import FileFormatError
+from gp_core.landmarks.features import feature
+from gp_core.landmarks.files.points import STATUS_WORDS, LabelledPoint, PointList, labelled_point, points_of
+from gp_core.landmarks.files.text import read_text, shown, split_fields, split_lines, write_text
+from gp_core.landmarks.sets import LandmarkSet, Status
+
+__all__ = ["read_table", "write_csv"]
+
+_NAME_COLUMNS = ("label", "name", "landmark", "feature", "code", "point")
+_AXES = {"lps": False, "ras": True, "xyz": False}  # whether x and y change sign on the way to LPS
+_UNIT_MM = re.compile(r"\s*[\[(_ ]\s*mm\s*[\])]?$")  # x_mm, "x (mm)", "x [mm]"
+_HEADER = ("label", "l", "p", "s", "defined", "selected", "visible", "locked", "description", "status")
+_NO = ("0", "false", "no")
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """Where the values stand in a row."""
+
+    label: int
+    axes: tuple[int, ...]
+    width: int
+    flip_xy: bool
+    others: Mapping[str, int]
+
+
+def read_table(path: str | PathLike[str]) -> PointList:
+    """Read a table of named points.
+
+    With a header, columns are found by name: ``label`` (or ``name``, ``landmark``, ...); ``l,p,s``,
+    ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``defined``, ``status`` and
+    ``description``. Without one, the columns are name, x, y, z.
+
+    Returns
+    -------
+    PointList
+        Positions in mm, LPS.
+
+    Raises
+    ------
+    FileFormatError
+        Columns are missing, a row has the wrong number of them, or a position is not three finite numbers.
+    """
+    lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
+    delimiter = _delimiter(lines[0][1]) if lines else ","
+    rows = [(number, split_fields(line, delimiter, number, path)) for number, line in lines]
+    names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]] if rows else []
+    has_header = any(name in _NAME_COLUMNS for name in names)
+    columns = _columns(names, path) if has_header else _Columns(0, (1, 2, 3), 4, False, {})
+    points = tuple(_point(fields, columns, number, path) for number, fields in rows[has_header:])
+    return PointList(points, Path(path))
+
+
+def _delimiter(line: str) -> str:
+    return next((mark for mark in "\t;," if mark in line), " ")
+
+
+def _columns(names: list[str], file: str | PathLike[str]) -> _Columns:
+    label = next(names.index(name) for name in _NAME_COLUMNS if name in names)
+    for axes, flip_xy in _AXES.items():
+        if all(axis in names for axis in axes):
+            others = {name: i for i, name in enumerate(names)}
+            return _Columns(label, tuple(names.index(axis) for axis in axes), len(names), flip_xy, others)
+    raise FileFormatError(
+        f"its header must name the columns l,p,s or r,a,s or x,y,z (mm), got {shown(','.join(names))}",
+        file=file,
+        remedy="Rename them.",
+    )
+
+
+def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLike[str]) -> LabelledPoint:
+    needed = max(columns.label, *columns.axes) + 1
+    if len(fields) < needed or any(fields[columns.width :]):
+        raise FileFormatError(
+            f"line {number} has {len(fields)} columns, must have {columns.width}",
+            file=file,
+            remedy="Write name, x, y, z in every row, with decimal points.",
+        )
+
+    def other(name: str) -> str:
+        i = columns.others.get(name, len(fields))
+        return fields[i] if i < len(fields) else ""
+
+    label = fields[columns.label]
+    return labelled_point(
+        label,
+        [fields[i] for i in columns.axes],
+        _status(other("status"), other("defined"), label, file),
+        file=file,
+        description=other("description"),
+        flip_xy=columns.flip_xy,
+    )
+
+
+def _status(word: str, defined: str, label: str, file: str | PathLike[str]) -> Status:
+    if word and word not in STATUS_WORDS:
+        raise FileFormatError(
+            f"status must be one of {', '.join(STATUS_WORDS)}, got {shown(word)}",
+            file=file,
+            landmark=label[:40],
+            remedy="Correct it.",
+        )
+    return STATUS_WORDS[word] if word else Status.TO_DO if defined.lower() in _NO else Status.PLACED
+
+
+def write_csv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
+    """Write a landmark set as Slicer's table, to the last bit of every coordinate.
+
+    One column is added, ``status``, since Slicer's ``defined`` does not tell *to do* from *cannot be seen*.
+    The format has no place for specimen, side and frame; name the file ``<specimen>_L`` or ``_R``.
+
+    Raises
+    ------
+    GpError
+        The file cannot be written.
+    """
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(_HEADER)
+    for point in points_of(landmarks):
+        lps = ["", "", ""] if point.position is None else point.position.tolist()
+        defined = int(point.position is not None)
+        locked = int(point.label not in landmarks.extra and feature(point.label).computed)
+        writer.writerow([point.label, *lps, defined, 1, 1, locked, point.description, point.status.value])
+    write_text(path, stream.getvalue())
