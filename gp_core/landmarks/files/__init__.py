@@ -1,6 +1,7 @@
-"""Landmark files: Slicer's ``.mrk.json`` and ``.fcsv``, tables, the probe's ``.dat``, the authors' ``.mat``."""
+"""Landmark files: Slicer's ``.mrk.json`` and ``.fcsv``, tables, the probe's ``.dat``, the authors' sets."""
 
 from gp_core.landmarks.files.dat import skull_feature_names
+from gp_core.landmarks.files.disk import write_text
 from gp_core.landmarks.files.fcsv import write_fcsv
 from gp_core.landmarks.files.header import FileHeader
 from gp_core.landmarks.files.markups import write_markups
@@ -17,7 +18,6 @@ from gp_core.landmarks.files.reading import (
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.files.specimens import load_specimens
 from gp_core.landmarks.files.table import write_csv
-from gp_core.landmarks.files.text import write_text
 
 __all__ = [
     "FileHeader",

@@ -12,8 +12,9 @@ import numpy as np
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError
 from gp_core.landmarks.features import named_set
+from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.points import LabelledPoint, PointList, labelled_point
-from gp_core.landmarks.files.text import read_text, split_lines
+from gp_core.landmarks.files.text import split_lines
 from gp_core.landmarks.sets import Status
 
 __all__ = ["is_sentinel", "read_dat", "skull_feature_names"]

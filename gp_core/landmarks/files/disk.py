@@ -87,5 +87,5 @@ def write_text(path: str | PathLike[str], text: str) -> None:
         raise GpError(
             f"cannot be written ({reason})",
             file=path,
-            remedy="Check the folder, its permissions and the disk.",
+            remedy="Check the folder and its permissions.",
         ) from None

@@ -10,9 +10,16 @@ from os import PathLike
 from pathlib import Path
 
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.features import FEATURES
-from gp_core.landmarks.files.points import STATUS_WORDS, LabelledPoint, PointList, labelled_point, points_of
-from gp_core.landmarks.files.text import flips_xy, read_text, shown, split_fields, split_lines, write_text
+from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.points import (
+    STATUS_WORDS,
+    LabelledPoint,
+    PointList,
+    is_computed,
+    labelled_point,
+    points_of,
+)
+from gp_core.landmarks.files.text import flips_xy, shown, split_fields, split_lines
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["read_fcsv", "write_fcsv"]
@@ -24,7 +31,7 @@ _HEADER = """\
 # CoordinateSystem = LPS
 # columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID
 """
-_SETTING = re.compile(r"#\s*(Markups fiducial file version|CoordinateSystem)\s*=\s*(.*)", re.IGNORECASE)
+_SYSTEM = re.compile(r"#\s*CoordinateSystem\s*=(.*)", re.IGNORECASE)
 _STATUSES = tuple(STATUS_WORDS.values())  # in the order of Slicer's numbers
 
 
@@ -43,24 +50,24 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
         Wrong number of columns, an unknown status or system, or a position that is not three finite numbers.
     """
     lines = split_lines(read_text(path))
-    settings = {m[1].lower(): m[2] for _, line in lines if (m := _SETTING.match(line))}
+    system = next((m[1] for _, line in lines if (m := _SYSTEM.match(line))), None)
     rows = [
         (number, split_fields(line, ",", number, path)) for number, line in lines if not line.startswith("#")
     ]
     old = bool(rows) and all(4 <= len(fields) <= 7 for _, fields in rows)
-    system = settings.get("coordinatesystem")
     if system is None and not old:
         _log.warning("%s: no coordinate system is named; taken as LPS", path)
     flip_xy = flips_xy("RAS" if system is None and old else system, path)
-    read_row = _slicer3_row if old else _markups_row
-    return PointList(tuple(read_row(fields, number, flip_xy, path) for number, fields in rows), Path(path))
+    points = [
+        labelled_point(fields[0], fields[1:4], file=path, flip_xy=flip_xy)
+        if old
+        else _markups_point(fields, number, flip_xy, path)
+        for number, fields in rows
+    ]
+    return PointList(tuple(points), Path(path))
 
 
-def _slicer3_row(fields: list[str], number: int, flip_xy: bool, file: str | PathLike[str]) -> LabelledPoint:
-    return labelled_point(fields[0], fields[1:4], file=file, flip_xy=flip_xy)
-
-
-def _markups_row(fields: list[str], number: int, flip_xy: bool, file: str | PathLike[str]) -> LabelledPoint:
+def _markups_point(fields: list[str], number: int, flip_xy: bool, file: str | PathLike[str]) -> LabelledPoint:
     if not 12 <= len(fields) <= 16:
         raise FileFormatError(
             f"line {number} has {len(fields)} columns; a point has 14 or 16 (or 6 in Slicer 3)",
@@ -93,12 +100,11 @@ def write_fcsv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
     GpError
         The file cannot be written.
     """
-    computed = {feature.code for feature in FEATURES if feature.computed}
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     for i, point in enumerate(points_of(landmarks), start=1):
         xyz = [0.0, 0.0, 0.0] if point.position is None else point.position.tolist()
-        shown_selected_locked = [1, 1, int(point.label in computed)]
+        shown_selected_locked = [1, 1, int(is_computed(point.label))]
         status = list(STATUS_WORDS).index(point.status.value)
         texts = [point.label, point.description, ""]
         writer.writerow([i, *xyz, 0, 0, 0, 1, *shown_selected_locked, *texts, status, 0])

@@ -12,9 +12,10 @@ import numpy as np
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, Side, named_set
+from gp_core.landmarks.files.disk import check_file
 from gp_core.landmarks.files.markups import write_markups
 from gp_core.landmarks.files.naming import landmark_file_name
-from gp_core.landmarks.files.text import check_file, shown
+from gp_core.landmarks.files.text import shown
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["import_mat", "read_authors_mat"]
@@ -119,7 +120,7 @@ def _values(content: Mapping[str, Any], variable: str, file: str | PathLike[str]
     if not is_numeric or values.ndim != 3 or values.shape[:2] != (n_rows, 3):
         got = getattr(values, "shape", type(values).__name__)
         raise FileFormatError(f"{variable} must be numbers in ({n_rows}, 3, animals), got {got}", file=file)
-    values = values.astype(np.float64)
-    if np.isinf(values).any():
+    points: FloatArray = values.astype(np.float64)
+    if np.isinf(points).any():
         raise FileFormatError(f"{variable} holds infinite values", file=file, remedy="Correct them.")
-    return values
+    return points

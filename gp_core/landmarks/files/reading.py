@@ -13,13 +13,14 @@ from gp_core.checks import check_option, near_matches
 from gp_core.errors import FeatureError, FileFormatError, GeometryError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.files.dat import is_sentinel, read_dat
+from gp_core.landmarks.files.disk import check_file
 from gp_core.landmarks.files.fcsv import read_fcsv
 from gp_core.landmarks.files.markups import read_markups
 from gp_core.landmarks.files.naming import name_parts
 from gp_core.landmarks.files.points import LabelledPoint, PointList
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.files.table import read_table
-from gp_core.landmarks.files.text import check_file, shown
+from gp_core.landmarks.files.text import shown
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["landmarks_of", "read_landmarks", "read_points", "read_touches", "specimen_of"]

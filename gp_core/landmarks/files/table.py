@@ -11,9 +11,16 @@ from os import PathLike
 from pathlib import Path
 
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.features import feature
-from gp_core.landmarks.files.points import STATUS_WORDS, LabelledPoint, PointList, labelled_point, points_of
-from gp_core.landmarks.files.text import read_text, shown, split_fields, split_lines, write_text
+from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.points import (
+    STATUS_WORDS,
+    LabelledPoint,
+    PointList,
+    is_computed,
+    labelled_point,
+    points_of,
+)
+from gp_core.landmarks.files.text import shown, split_fields, split_lines
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["read_table", "write_csv"]
@@ -132,6 +139,6 @@ def write_csv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
     for point in points_of(landmarks):
         lps = ["", "", ""] if point.position is None else point.position.tolist()
         defined = int(point.position is not None)
-        locked = int(point.label not in landmarks.extra and feature(point.label).computed)
+        locked = int(is_computed(point.label))
         writer.writerow([point.label, *lps, defined, 1, 1, locked, point.description, point.status.value])
     write_text(path, stream.getvalue())
