@@ -50,7 +50,7 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
         Wrong number of columns, an unknown status or system, or a position that is not three finite numbers.
     """
     lines = split_lines(read_text(path))
-    system = next((m[1] for _, line in lines if (m := _SYSTEM.match(line))), None)
+    system = next((m[1].strip() for _, line in lines if (m := _SYSTEM.match(line))), None)
     rows = [
         (number, split_fields(line, ",", number, path)) for number, line in lines if not line.startswith("#")
     ]
@@ -79,7 +79,7 @@ def _markups_point(fields: list[str], number: int, flip_xy: bool, file: str | Pa
         raise FileFormatError(
             f"position status (column 15) must be 0 to 3, got {shown(code)} in line {number}",
             file=file,
-            landmark=fields[11],
+            landmark=fields[11][:40],
         )
     status = _STATUSES[int(code)] if code else Status.PLACED
     description = fields[12] if len(fields) > 12 else ""

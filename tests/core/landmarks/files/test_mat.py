@@ -1,0 +1,105 @@
+"""The authors' sets, real and made up."""
+
+import numpy as np
+import pytest
+from landmark_makers import SHARED, needs_shared_data, same_landmarks
+
+from gp_core.errors import FileFormatError, GpError
+from gp_core.landmarks.features import CODES, named_set
+from gp_core.landmarks.files import import_mat, load_specimens, read_authors_mat
+
+LEFT, RIGHT = (
+    SHARED / "usevitch2021" / f"combined_coords_method2_morepts_final_co_correct_{s}_CO.mat" for s in "LR"
+)
+
+
+def save(path, **variables):
+    from scipy.io import savemat
+
+    savemat(path, variables)
+    return path
+
+
+@pytest.fixture
+def made_up(tmp_path):
+    rng = np.random.default_rng(3)
+    left, right = rng.normal(size=(2, 20, 3, 2))
+    return save(tmp_path / "l.mat", cc_L=left), save(tmp_path / "r.mat", cc_R=right), left, right
+
+
+def test_rows_go_by_the_authors_order(made_up):
+    left_file, right_file, left, right = made_up
+    specimens = read_authors_mat(left_file, right_file)
+    assert [s.name for s in specimens] == ["GP01", "GP02"]
+    for row, code in enumerate(named_set("authors_mat")):
+        assert specimens[1].side("L")[code].tolist() == left[row, :, 1].tolist()
+        assert specimens[0].side("R")[code].tolist() == right[row, :, 0].tolist()
+
+
+@needs_shared_data
+def test_the_real_sets_in_their_cochlea_frames():
+    specimens = read_authors_mat(LEFT, RIGHT)
+    assert [s.name for s in specimens] == [f"GP{i:02d}" for i in range(1, 12)]
+    for specimen in specimens:
+        for side, sign in (("L", 1), ("R", -1)):
+            landmarks = specimen.side(side)
+            assert landmarks.placed == CODES
+            assert landmarks.frame == "cochlea"
+            assert np.abs(landmarks["CO"]).max() < 1e-12
+            assert sign * landmarks["CA"][0] > 3
+            assert landmarks["DTL"][2] > 0
+
+
+@needs_shared_data
+def test_import_writes_files_that_read_back_bit_for_bit(tmp_path):
+    written = import_mat(LEFT, RIGHT, tmp_path / "new" / "sets")
+    assert [file.name for file in written[:3]] == ["GP01_L.mrk.json", "GP01_R.mrk.json", "GP02_L.mrk.json"]
+    back = load_specimens(tmp_path / "new" / "sets")
+    for specimen, original in zip(back, read_authors_mat(LEFT, RIGHT), strict=True):
+        assert specimen.name == original.name
+        assert all(same_landmarks(specimen.side(side), original.side(side)) for side in "LR")
+
+
+def test_files_in_the_wrong_order_are_named(made_up):
+    left_file, right_file, *_ = made_up
+    with pytest.raises(FileFormatError, match=r"r\.mat: has no variable cc_L.*cc_R.*left side's file first"):
+        read_authors_mat(right_file, left_file)
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (np.zeros((19, 3, 2)), r"numbers in \(20, 3, animals\), got \(19, 3, 2\)"),
+        (np.zeros((20, 3)), r"got \(20, 3\)"),
+        (np.full((20, 3, 2), np.inf), "infinite"),
+        (np.zeros((20, 3, 2), dtype=complex), "must be numbers"),
+        ("text", "must be numbers"),
+        (np.zeros((20, 3, 5)), "holds 5 animals, the left side's file 2"),
+    ],
+)
+def test_wrong_variables_are_named(made_up, tmp_path, value, message):
+    with pytest.raises(FileFormatError, match=message):
+        read_authors_mat(made_up[0], save(tmp_path / "wrong.mat", cc_R=value))
+
+
+def test_a_missing_position_stays_missing(tmp_path):
+    values = np.ones((20, 3, 1))
+    values[0, :, 0] = np.nan
+    file = save(tmp_path / "x.mat", cc_L=values, cc_R=values)
+    (specimen,) = read_authors_mat(file, file)
+    assert specimen.side("L").status(named_set("authors_mat")[0]).value == "undefined"
+
+
+@pytest.mark.parametrize("content", [b"", b"no mat file at all", bytes(range(256)) * 4])
+def test_what_is_no_mat_file_is_named(tmp_path, content):
+    (tmp_path / "x.mat").write_bytes(content)
+    with pytest.raises(FileFormatError, match=r"x\.mat: is not a MATLAB file"):
+        read_authors_mat(tmp_path / "x.mat", tmp_path / "x.mat")
+    with pytest.raises(FileFormatError, match="does not exist"):
+        read_authors_mat(tmp_path / "none.mat", tmp_path / "x.mat")
+
+
+def test_a_folder_that_cannot_be_made_is_named(made_up, tmp_path):
+    (tmp_path / "taken").write_text("a file")
+    with pytest.raises(GpError, match="cannot be made a folder"):
+        import_mat(made_up[0], made_up[1], tmp_path / "taken")
