@@ -1,0 +1,178 @@
+"""The atlas: mean positions of the features of a left side, and how they vary together."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from functools import cache, cached_property
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_core.errors import FeatureError, FileFormatError, GpError
+from gp_core.landmarks.anatomy import cochlea_origin
+from gp_core.landmarks.features import CODES, check_codes
+
+__all__ = ["DEFINING", "SCHEMA_VERSION", "Atlas"]
+
+DEFINING = ("CA", "CB", "RWA", "RWP")
+"""The features that define the cochlea's pose; every atlas holds them."""
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class Atlas:
+    """A Gaussian shape of the placed features of a left side, in the CO frame of its mean.
+
+    CO is not among them: it is computed from the others. A right side is handled as the mirror image in x.
+
+    Parameters
+    ----------
+    name : str
+        What it was made from.
+    codes : tuple of str
+        Features, in the table's order.
+    mean : (n, 3) array, mm, atlas frame
+    covariance : (3 n, 3 n) array, mm^2, atlas frame
+        Of the deviations of all coordinates, feature by feature.
+    n_samples : int
+        Number of labelled sides behind it.
+    specimens : tuple of str
+        Their names, empty where they are not known.
+
+    Raises
+    ------
+    GpError
+        Shapes do not fit together, values are not finite, or CA, CB, RWA or RWP is missing.
+    """
+
+    name: str
+    codes: tuple[str, ...]
+    mean: FloatArray
+    covariance: FloatArray
+    n_samples: int
+    specimens: tuple[str, ...] = field(default=())
+
+    def __post_init__(self) -> None:
+        codes = check_codes(self.codes, "the atlas")
+        missing = [code for code in DEFINING if code not in codes]
+        if missing:
+            raise FeatureError(f"the atlas {self.name!r} lacks {' '.join(missing)}, which define the cochlea")
+        mean = np.array(self.mean, dtype=np.float64)
+        covariance = np.array(self.covariance, dtype=np.float64)
+        n = len(codes)
+        if mean.shape != (n, 3) or covariance.shape != (3 * n, 3 * n):
+            raise GpError(f"{n} features need a mean of ({n}, 3), got {mean.shape} and {covariance.shape}")
+        if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
+            raise GpError(f"the atlas {self.name!r} holds values that are not finite")
+        mean.setflags(write=False)
+        covariance.setflags(write=False)
+        object.__setattr__(self, "codes", codes)
+        object.__setattr__(self, "mean", mean)
+        object.__setattr__(self, "covariance", covariance)
+
+    @staticmethod
+    def published() -> Atlas:
+        """Return the atlas rebuilt from the published distance table (Figure 2 of the paper)."""
+        return _published()
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Atlas:
+        """Read an atlas file.
+
+        Raises
+        ------
+        FileFormatError
+            It cannot be read as an atlas of this schema version.
+        """
+        remedy = "Make it with: gp-core fit SPECIMENS... -o ATLAS"
+        try:
+            content = json.loads(Path(path).read_text(encoding="utf-8"))
+        except OSError as error:
+            raise FileFormatError(f"cannot be read ({error.strerror})", file=path) from None
+        except ValueError:
+            raise FileFormatError("is not an atlas: not valid JSON", file=path, remedy=remedy) from None
+        return cls._from_content(content, path, remedy)
+
+    @classmethod
+    def _from_content(cls, content: Any, path: str | PathLike[str], remedy: str) -> Atlas:
+        version = content.get("gpAtlas") if isinstance(content, dict) else None
+        if version != SCHEMA_VERSION:
+            problem = (
+                "is not an atlas"
+                if version is None
+                else f"has atlas version {version!r}, not {SCHEMA_VERSION}"
+            )
+            raise FileFormatError(problem, file=path, remedy=remedy)
+        try:
+            return cls(
+                name=str(content["name"]),
+                codes=tuple(content["features"]),
+                mean=content["mean_mm"],
+                covariance=content["covariance_mm2"],
+                n_samples=int(content["n_samples"]),
+                specimens=tuple(str(name) for name in content["specimens"]),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError, GpError) as error:
+            raise FileFormatError(f"is a damaged atlas ({error})", file=path, remedy=remedy) from None
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the atlas as JSON; numbers keep every bit."""
+        content = {
+            "gpAtlas": SCHEMA_VERSION,
+            "name": self.name,
+            "frame": "atlas",
+            "side": "L",
+            "units": "mm",
+            "n_samples": self.n_samples,
+            "specimens": list(self.specimens),
+            "features": list(self.codes),
+            "mean_mm": self.mean.tolist(),
+            "covariance_mm2": self.covariance.tolist(),
+        }
+        Path(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+
+    def __getitem__(self, code: str) -> FloatArray:
+        """Return the mean position (3,) of a feature, of CO too, in mm."""
+        if code == "CO":
+            return self.cochlea_origin
+        return self.mean[self._row(code)]
+
+    @cached_property
+    def cochlea_origin(self) -> FloatArray:
+        """(3,) mean position of CO, mm: the origin of the atlas frame, up to rounding."""
+        return cochlea_origin(*(self.mean[self._row(code)] for code in DEFINING))
+
+    def rows(self, codes: Iterable[str]) -> FloatArray:
+        """Return the mean positions (n, 3) of features, mm."""
+        return self.mean[[self._row(code) for code in codes]]
+
+    def cross_covariance(self, codes: Iterable[str], others: Iterable[str]) -> FloatArray:
+        """Return the covariance (3 n, 3 m) between the coordinates of two lists of features, mm^2."""
+        return self.covariance[np.ix_(self._coordinates(codes), self._coordinates(others))]
+
+    def _coordinates(self, codes: Iterable[str]) -> list[int]:
+        return [3 * self._row(code) + c for code in codes for c in range(3)]
+
+    def _row(self, code: str) -> int:
+        try:
+            return self._index[code]
+        except KeyError:
+            known = f"it holds {' '.join(self.codes)}" if code in CODES else "no such feature"
+            raise FeatureError(f"the atlas {self.name!r} lacks {code}; {known}", landmark=code) from None
+
+    @cached_property
+    def _index(self) -> dict[str, int]:
+        return {code: row for row, code in enumerate(self.codes)}
+
+
+@cache
+def _published() -> Atlas:
+    from gp_core.atlas.published import build_published_atlas  # it builds on this module
+
+    return build_published_atlas()

@@ -1,0 +1,196 @@
+"""The pose of a cochlea, estimated: the result, and the one function that makes it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.uncertainty import cone_95, radius_95
+from gp_core.checks import FloatArray, check_option
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+
+__all__ = ["METHODS", "CochleaPose", "estimate_pose"]
+
+METHODS = ("robust", "jrmpc")
+
+
+@dataclass(frozen=True)
+class CochleaPose:
+    """Where a cochlea is and how it is turned, in the frame of the touches.
+
+    Attributes
+    ----------
+    side : Side
+    method : str
+        ``robust`` or ``jrmpc``.
+    atlas : str
+        Name of the atlas, or of the specimens, behind it.
+    transform_to_touches : RigidTransform
+        ``T_tracker_cochlea`` (or scan): origin CO, x the modiolar axis CB->CA on both sides, y towards the
+        middle of the round window, z = x × y.
+    covariance : (6, 6) array
+        Of the origin (mm) and of a small rotation vector about it (rad), both in the frame of the touches.
+    residuals : dict of str to float
+        Distance of each touched point from the registered mean, mm.
+    suspects : tuple of str
+        Touched points that do not fit the others.
+    warnings : tuple of str
+        What the user should know before trusting the pose.
+    probe_noise : float or None
+        Scale of the touch errors that was found or given, mm a coordinate.
+    T_touches_atlas : RigidTransform or None
+        The registered atlas, for a left side; for a right side, from the atlas mirrored in x.
+    """
+
+    side: Side
+    method: str
+    atlas: str
+    transform_to_touches: RigidTransform
+    covariance: FloatArray
+    residuals: dict[str, float]
+    suspects: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    probe_noise: float | None = None
+    T_touches_atlas: RigidTransform | None = field(default=None, repr=False)
+
+    @property
+    def origin(self) -> FloatArray:
+        """(3,) cochlea origin CO, mm."""
+        return self.transform_to_touches.translation
+
+    @property
+    def axis(self) -> FloatArray:
+        """(3,) unit modiolar axis, from the base CB to the apex CA."""
+        return self.transform_to_touches.rotation[:, 0]
+
+    @property
+    def transform(self) -> FloatArray:
+        """(4, 4) homogeneous matrix ``T_tracker_cochlea``, mm."""
+        return self.transform_to_touches.matrix
+
+    @property
+    def radius_95(self) -> float:
+        """Radius of the ball about the origin that holds the true CO with 95 %, mm."""
+        return radius_95(self.covariance)
+
+    @property
+    def cone_95(self) -> float:
+        """Half-angle of the cone about the axis that holds the true axis with 95 %, rad."""
+        return cone_95(self.covariance, self.axis)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the pose as the JSON file holds it; lengths in mm, angles in degrees."""
+        return {
+            "gpPose": 1,
+            "method": self.method,
+            "side": self.side.value,
+            "atlas": self.atlas,
+            "frame": self.transform_to_touches.dst,
+            "cochlea_origin_mm": self.origin.tolist(),
+            "modiolar_axis": self.axis.tolist(),
+            "transform": self.transform.tolist(),
+            "covariance": self.covariance.tolist(),
+            "radius_95_mm": self.radius_95,
+            "cone_95_deg": float(np.degrees(self.cone_95)),
+            "residuals_mm": self.residuals,
+            "probe_noise_mm": self.probe_noise,
+            "suspect": list(self.suspects),
+            "warnings": list(self.warnings),
+        }
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the pose as JSON."""
+        Path(path).write_text(json.dumps(self.as_dict(), indent=1) + "\n", encoding="utf-8")
+
+    def save_tfm(self, path: str | PathLike[str]) -> None:
+        """Write ``T_tracker_cochlea`` as an ITK transform file, which 3D Slicer reads too.
+
+        ITK stores the mapping from the output to the input space, so loading it in Slicer and applying it to
+        a model drawn in cochlea coordinates needs the inverse that Slicer takes itself on reading.
+        """
+        back = self.transform_to_touches.inverse()
+        numbers = [*back.rotation.ravel(), *back.translation]
+        text = (
+            "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
+            f"Parameters: {' '.join(repr(float(n)) for n in numbers)}\nFixedParameters: 0 0 0\n"
+        )
+        Path(path).write_text(text, encoding="ascii")
+
+
+def estimate_pose(
+    touches: Mapping[str, ArrayLike] | LandmarkSet,
+    side: Side | str,
+    atlas: Atlas | None = None,
+    *,
+    method: str = "robust",
+    specimens: Sequence[Specimen] | None = None,
+    probe_noise: float | None = None,
+) -> CochleaPose:
+    """Estimate the pose of a cochlea from a few touched features, with no CT.
+
+    Parameters
+    ----------
+    touches : mapping of str to (3,) array_like, or LandmarkSet
+        Position of each touched feature in the tracker's frame, mm; three or more, not on one line.
+    side : {"L", "R"}
+        Side of the head.
+    atlas : Atlas, optional
+        By default the one fitted to `specimens`, or the published one. Not used by ``jrmpc``.
+    method : {"robust", "jrmpc"}
+        ``robust`` uses the names of the points; ``jrmpc`` is the paper's method and needs `specimens`.
+    specimens : sequence of Specimen, optional
+        Labelled animals.
+    probe_noise : float, optional
+        Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+
+    Returns
+    -------
+    CochleaPose
+
+    Raises
+    ------
+    GpError
+        Touches that no pose can be made of, or a method without what it needs.
+
+    Examples
+    --------
+    >>> atlas = Atlas.published()
+    >>> touched = {code: atlas[code] for code in ("CL", "LLI", "MN", "OS", "RWA", "RWP")}
+    >>> pose = estimate_pose(touched, "L")
+    >>> bool(np.linalg.norm(pose.origin) < 1e-6)
+    True
+    """
+    check_option(method, "method", METHODS)
+    landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
+    if landmarks.side is not Side.parse(side):
+        raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
+    if method == "jrmpc":
+        from gp_core.atlas.jrmpc_pose import estimate_jrmpc  # it makes the result that is defined here
+
+        return estimate_jrmpc(landmarks, specimens)
+    from gp_core.atlas.robust_pose import estimate_robust
+
+    if atlas is None:
+        atlas = _default_atlas(specimens)
+    return estimate_robust(landmarks, atlas, probe_noise=probe_noise)
+
+
+def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:
+    return LandmarkSet.from_mapping(touches, side, frame="tracker")
+
+
+def _default_atlas(specimens: Sequence[Specimen] | None) -> Atlas:
+    from gp_core.atlas.fitting import fit_atlas
+
+    return fit_atlas(specimens) if specimens else Atlas.published()

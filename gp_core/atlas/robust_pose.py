@@ -1,0 +1,186 @@
+"""The project's own estimator: named points, pose and shape together, robust to a mistouch."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.named_fit import (
+    NamedFit,
+    TouchModel,
+    fit_named_points,
+    motion_jacobian,
+    quick_misfit,
+)
+from gp_core.atlas.pose import CochleaPose
+from gp_core.atlas.uncertainty import cochlea_jacobian
+from gp_core.checks import FloatArray
+from gp_core.errors import FeatureError, GpError
+from gp_core.frames import RigidTransform, mirror_x
+from gp_core.landmarks.anatomy import cochlea_frame
+from gp_core.landmarks.features import EXTERNAL, Side
+from gp_core.landmarks.sets import LandmarkSet
+
+__all__ = ["estimate_robust"]
+
+_SUSPECT_WEIGHT = 0.35
+_CLEAR_MISFIT = 12.0
+"""How much worse (in -2 log likelihood) another reading must fit before it is out of the question."""
+
+_MIRROR = np.diag([-1.0, 1.0, 1.0])
+_MIRROR_POSE = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the other sign
+
+
+def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = None) -> CochleaPose:
+    """Estimate the pose of a cochlea from named touches; see `gp_core.atlas.pose.estimate_pose`.
+
+    Parameters
+    ----------
+    touches : LandmarkSet
+        At least three external features, in any frame, mm.
+    atlas : Atlas
+    probe_noise : float, optional
+        Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+
+    Raises
+    ------
+    FeatureError
+        Too few features, or one that no probe can touch.
+    GeometryError
+        The touches lie on one line.
+    """
+    model = touch_model(touches, atlas, probe_noise)
+    points = _leftwards(touches.array(model.codes), touches.side)
+    fit = fit_named_points(model, points)
+    defining = _defining_points(atlas, model, fit)
+    frame = _cochlea_in_touches(defining, fit, touches)
+    suspects = _suspects(model, fit)
+    return CochleaPose(
+        side=touches.side,
+        method="robust",
+        atlas=atlas.name,
+        transform_to_touches=frame,
+        covariance=_pose_covariance(atlas, model, fit, defining, touches.side),
+        residuals=_residuals(model, fit),
+        suspects=suspects,
+        warnings=tuple(_warnings(model, points, fit, touches.side, suspects)),
+        probe_noise=fit.noise,
+        T_touches_atlas=_atlas_in_touches(fit, touches),
+    )
+
+
+def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -> TouchModel:
+    """Return what the atlas says of the touched features, after checking that they can be used."""
+    if probe_noise is not None and not (np.isfinite(probe_noise) and probe_noise > 0):
+        raise GpError(f"probe noise must be a positive number of mm, got {probe_noise!r}")
+    codes = touches.placed
+    for code in codes:
+        if code not in EXTERNAL:
+            raise FeatureError(
+                f"{code} is inside the bone and cannot be touched",
+                landmark=code,
+                remedy=f"Touch any of {' '.join(EXTERNAL)}.",
+            )
+    usable = tuple(code for code in codes if code in atlas.codes)
+    if len(usable) < 3:
+        raise FeatureError(
+            f"a pose needs at least three touched features that the atlas holds, got {len(usable)}"
+            f"{': ' + ' '.join(usable) if usable else ''}",
+            remedy="Touch more of them.",
+        )
+    return TouchModel(usable, atlas.rows(usable), atlas.cross_covariance(usable, usable), probe_noise)
+
+
+def _leftwards(points: FloatArray, side: Side) -> FloatArray:
+    return points if side is Side.LEFT else mirror_x(points)
+
+
+def _defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArray:
+    """Return CA, CB, RWA, RWP (4, 3) of this animal in the atlas frame: the mean of its shape given the touches."""
+    cross = atlas.cross_covariance(DEFINING, model.codes)
+    return atlas.rows(DEFINING) + (cross @ (fit.precision @ fit.residual)).reshape(-1, 3)
+
+
+def _cochlea_in_touches(defining: FloatArray, fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
+    """Return ``T_touches_cochlea`` with x along the modiolar axis on both sides."""
+    placed = _leftwards(defining @ fit.rotation.T + fit.translation, touches.side)
+    points = LandmarkSet.from_mapping(
+        dict(zip(DEFINING, placed, strict=True)), Side.LEFT, frame=touches.frame
+    )
+    return cochlea_frame(points)
+
+
+def _atlas_in_touches(fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
+    rotation, translation = fit.rotation, fit.translation
+    if touches.side is Side.RIGHT:
+        rotation, translation = _MIRROR @ rotation @ _MIRROR, _MIRROR @ translation
+    return RigidTransform.from_parts(rotation, translation, dst=touches.frame, src="atlas")
+
+
+def _pose_covariance(
+    atlas: Atlas, model: TouchModel, fit: NamedFit, defining: FloatArray, side: Side
+) -> FloatArray:
+    """Return the (6, 6) covariance of the cochlea frame: what shape and pose leave open, given the touches."""
+    cross = atlas.cross_covariance(DEFINING, model.codes)
+    pull = cross @ fit.precision
+    shape = atlas.cross_covariance(DEFINING, DEFINING) - pull @ cross.T
+    motion = motion_jacobian(defining) - pull @ fit.jacobian
+    pose = np.linalg.inv(fit.jacobian.T @ fit.precision @ fit.jacobian)
+    to_frame = cochlea_jacobian(*defining)
+    covariance = to_frame @ (shape + motion @ pose @ motion.T) @ to_frame.T
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = fit.rotation
+    if side is Side.RIGHT:
+        turn = _MIRROR_POSE @ turn
+    in_touches: FloatArray = turn @ covariance @ turn.T
+    return (in_touches + in_touches.T) / 2
+
+
+def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
+    lengths = np.linalg.norm(fit.residual.reshape(-1, 3), axis=1)
+    return dict(zip(model.codes, lengths.tolist(), strict=True))
+
+
+def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
+    return tuple(
+        code for code, w in zip(model.codes, fit.weights.tolist(), strict=True) if w < _SUSPECT_WEIGHT
+    )
+
+
+def _warnings(
+    model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, suspects: tuple[str, ...]
+) -> Iterator[str]:
+    own = quick_misfit(model, points)
+    other = quick_misfit(model, mirror_x(points))
+    if other < own - _CLEAR_MISFIT:
+        yield f"the {side.other.word} side fits these points better than the {side.word}: check the side"
+    elif other < own + _CLEAR_MISFIT:
+        yield (
+            f"these points fit the {side.other.word} side about as well, so a wrong side would not be noticed: "
+            "touch one more feature away from their plane"
+        )
+    if suspects:
+        names = " and ".join(suspects)
+        yield f"{names} does not fit the other points: touch it again, or leave it out"
+        yield from _swaps(model, points, own)
+    if len(model.codes) < 5 and not suspects:
+        yield f"only {len(model.codes)} points: a mistouch cannot be told from an unusual animal"
+    if not fit.converged:
+        yield "the fit did not settle; check the touches"
+
+
+def _swaps(model: TouchModel, points: FloatArray, own: float) -> Iterator[str]:
+    """Name the two features which, exchanged, would explain the touches."""
+    best, pair = own - _CLEAR_MISFIT, None
+    for i, j in combinations(range(len(points)), 2):
+        exchanged = points.copy()
+        exchanged[[i, j]] = points[[j, i]]
+        misfit = quick_misfit(model, exchanged)
+        if misfit < best:
+            best, pair = misfit, (model.codes[i], model.codes[j])
+    acceptable = _CLEAR_MISFIT + 3 * len(points)
+    if pair is not None and best < acceptable:
+        yield f"{pair[0]} and {pair[1]} look swapped"

@@ -1,0 +1,170 @@
+"""What is computed from landmarks: the cochlea origin and the two frames built on features.
+
+The formulas follow Usevitch et al. 2021; where its words and its authors' numbers differ (the round-window
+frame), the numbers decide, see ``docs/method.md``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GeometryError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet
+
+__all__ = [
+    "axis_frame",
+    "cochlea_frame",
+    "cochlea_origin",
+    "modiolar_axis",
+    "round_window_frame",
+    "with_cochlea_origin",
+]
+
+_DEFINING = ("CA", "CB", "RWA", "RWP")
+_SMALLEST_MM = 1e-6
+
+
+def cochlea_origin(ca: ArrayLike, cb: ArrayLike, rwa: ArrayLike, rwp: ArrayLike) -> FloatArray:
+    """Compute the cochlea origin CO.
+
+    Parameters
+    ----------
+    ca, cb, rwa, rwp : (..., 3) array_like, mm
+        Cochlea apex and base, anterior and posterior edge of the round window, in any one frame.
+
+    Returns
+    -------
+    (..., 3) float array, mm
+        The point of the line CB-CA whose connection to the middle of RWA and RWP is perpendicular to it.
+
+    Raises
+    ------
+    GeometryError
+        CA and CB coincide.
+    """
+    base = np.asarray(cb, dtype=np.float64)
+    middle = (np.asarray(rwa, dtype=np.float64) + np.asarray(rwp, dtype=np.float64)) / 2
+    axis = modiolar_axis(ca, base)
+    along = np.sum((middle - base) * axis, axis=-1, keepdims=True)
+    origin: FloatArray = base + along * axis
+    return origin
+
+
+def modiolar_axis(ca: ArrayLike, cb: ArrayLike) -> FloatArray:
+    """Return the unit vector (..., 3) from the cochlea base to its apex.
+
+    Raises
+    ------
+    GeometryError
+        The two coincide.
+    """
+    axis = np.asarray(ca, dtype=np.float64) - np.asarray(cb, dtype=np.float64)
+    length = np.linalg.norm(axis, axis=-1, keepdims=True)
+    if (length < _SMALLEST_MM).any():
+        raise GeometryError("CA and CB are at the same place, so they give no axis", landmark="CA")
+    unit: FloatArray = axis / length
+    return unit
+
+
+def with_cochlea_origin(landmarks: LandmarkSet) -> LandmarkSet:
+    """Return the set with CO computed where CA, CB, RWA and RWP are placed, and without CO elsewhere."""
+    if not all(code in landmarks for code in _DEFINING):
+        return landmarks.with_point("CO", None)
+    return landmarks.with_point("CO", cochlea_origin(*(landmarks[code] for code in _DEFINING)))
+
+
+def cochlea_frame(landmarks: LandmarkSet) -> RigidTransform:
+    """Build the CO frame of the paper from CA, CB, RWA and RWP.
+
+    Origin CO; x towards CA on the left and away from it on the right; y from CO to the middle of the round
+    window; z = x × y. So the two sides are mirror images of each other in x.
+
+    Returns
+    -------
+    RigidTransform
+        ``T_<frame>_cochlea``: from the CO frame into the frame of the landmarks.
+
+    Raises
+    ------
+    FeatureError
+        One of the four features is not placed.
+    GeometryError
+        The round window lies on the axis.
+    """
+    ca, cb, rwa, rwp = landmarks.array(_DEFINING)
+    origin = cochlea_origin(ca, cb, rwa, rwp)
+    x = _sign(landmarks.side) * modiolar_axis(ca, cb)
+    return axis_frame(origin, x, (rwa + rwp) / 2 - origin, dst=landmarks.frame, src="cochlea")
+
+
+def round_window_frame(landmarks: LandmarkSet) -> RigidTransform:
+    """Build the RW frame, which brings touched points near the CO frame.
+
+    With p the foot of LLI on the line RWA-RWP: x = unit(RWA - RWP) on the left and its negative on the right,
+    y = unit(LLI - p), z = x × y, origin p - (LLI - p). The paper's words turn x and move the origin the other
+    way; this is what gives its authors' answers.
+
+    Returns
+    -------
+    RigidTransform
+        ``T_<frame>_window``.
+
+    Raises
+    ------
+    FeatureError
+        RWA, RWP or LLI is not there.
+    GeometryError
+        The three lie on one line.
+    """
+    rwa, rwp, lli = landmarks.array(("RWA", "RWP", "LLI"))
+    across = rwa - rwp
+    if np.linalg.norm(across) < _SMALLEST_MM:
+        raise GeometryError("RWA and RWP are at the same place", landmark="RWA", remedy="Touch them again.")
+    across = across / np.linalg.norm(across)
+    foot = rwp + np.dot(lli - rwp, across) * across
+    x = _sign(landmarks.side) * across
+    return axis_frame(2 * foot - lli, x, lli - foot, dst=landmarks.frame, src="window")
+
+
+def _sign(side: Side) -> float:
+    return 1.0 if side is Side.LEFT else -1.0
+
+
+def axis_frame(
+    origin: FloatArray, axis: FloatArray, towards_y: FloatArray, *, dst: str, src: str
+) -> RigidTransform:
+    """Build a right-handed frame on a point and an axis.
+
+    Parameters
+    ----------
+    origin : (3,) array, mm
+    axis : (3,) array
+        Direction of x.
+    towards_y : (3,) array
+        Direction of y, once made orthogonal to x.
+    dst, src : str
+        Frame of the coordinates given, and name of the frame built.
+
+    Returns
+    -------
+    RigidTransform
+        ``T_dst_src``.
+
+    Raises
+    ------
+    GeometryError
+        `towards_y` lies along the axis, or `axis` is zero.
+    """
+    x = axis / max(float(np.linalg.norm(axis)), _SMALLEST_MM)
+    across = towards_y - (towards_y @ x) * x
+    length = np.linalg.norm(across)
+    if length < _SMALLEST_MM or not np.isclose(x @ x, 1.0):
+        raise GeometryError(
+            f"the points that define the {src} frame lie on one line", remedy="Check their names."
+        )
+    y = across / length
+    return RigidTransform.from_parts(np.column_stack([x, y, np.cross(x, y)]), origin, dst=dst, src=src)
