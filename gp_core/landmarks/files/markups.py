@@ -85,7 +85,7 @@ def _point_lists(content: dict[str, Any], file: str | PathLike[str]) -> list[dic
     for markup in content["markups"]:
         kind = markup.get("type") if isinstance(markup, dict) else markup
         kinds.append(shown(kind))
-        if kind == "Fiducial":
+        if isinstance(markup, dict) and kind == "Fiducial":
             found.append(markup)
         else:
             _log.warning("%s: passed over a markup of type %s", file, shown(kind))

@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, Side, named_set
-from gp_core.landmarks.files.disk import check_file
 from gp_core.landmarks.files.markups import write_markups
+from gp_core.landmarks.files.mat5 import read_mat5
 from gp_core.landmarks.files.naming import landmark_file_name
 from gp_core.landmarks.files.text import shown
 from gp_core.landmarks.sets import LandmarkSet, Specimen
@@ -87,40 +86,22 @@ def import_mat(
 
 def _read_sets(path: str | PathLike[str], side: Side) -> list[LandmarkSet]:
     rows = [named_set("authors_mat").index(code) for code in CODES]
-    values = _values(_load(path), f"cc_{side.value}", path)
+    values = _values(read_mat5(path), f"cc_{side.value}", path)
     return [LandmarkSet(values[rows, :, i], side, "cochlea") for i in range(values.shape[2])]
 
 
-def _load(path: str | PathLike[str]) -> Mapping[str, Any]:
-    from scipy.io import loadmat  # here, not above: it doubles the time of a start
-
-    check_file(path)
-    try:
-        content: Mapping[str, Any] = loadmat(path)
-    except Exception as error:  # its reader raises whatever the bytes lead it to
-        raise FileFormatError(
-            f"is not a MATLAB file up to version 7 ({type(error).__name__})",
-            file=path,
-            remedy="Save it in MATLAB with -v7.",
-        ) from None
-    return content
-
-
-def _values(content: Mapping[str, Any], variable: str, file: str | PathLike[str]) -> FloatArray:
+def _values(content: Mapping[str, FloatArray | None], variable: str, file: str | PathLike[str]) -> FloatArray:
     n_rows = len(named_set("authors_mat"))
     if variable not in content:
-        found = ", ".join(name for name in content if not name.startswith("__"))
         raise FileFormatError(
-            f"has no variable {variable}; it holds {shown(found)}",
+            f"has no variable {variable}; it holds {shown(', '.join(content))}",
             file=file,
             remedy="Give the left side's file first, then the right side's.",
         )
     values = content[variable]
-    is_numeric = isinstance(values, np.ndarray) and values.dtype.kind in "fiu"
-    if not is_numeric or values.ndim != 3 or values.shape[:2] != (n_rows, 3):
-        got = getattr(values, "shape", type(values).__name__)
+    if values is None or values.ndim != 3 or values.shape[:2] != (n_rows, 3):
+        got = "none" if values is None else values.shape
         raise FileFormatError(f"{variable} must be numbers in ({n_rows}, 3, animals), got {got}", file=file)
-    points: FloatArray = values.astype(np.float64)
-    if np.isinf(points).any():
+    if np.isinf(values).any():
         raise FileFormatError(f"{variable} holds infinite values", file=file, remedy="Correct them.")
-    return points
+    return values

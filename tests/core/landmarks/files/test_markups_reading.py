@@ -134,6 +134,7 @@ def test_a_slicermorphr_file(file):
         ([{"type": "ClosedCurve"}], "no point list .*'ClosedCurve'"),
         ([], "no point list .*none"),
         ([7, None], "no point list .*7, None"),
+        (["Fiducial"], "no point list .*'Fiducial'"),
         ([markup()], "no points"),
         ([markup(*[7])], "list of objects"),
         ([{"type": "Fiducial", "controlPoints": {}}], "list of objects"),

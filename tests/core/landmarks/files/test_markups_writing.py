@@ -140,6 +140,21 @@ def test_a_failing_disk_leaves_the_old_file_and_no_draft(file, monkeypatch):
     assert list(file.parent.iterdir()) == [file]
 
 
+def test_the_old_file_is_whole_until_the_new_one_is(file, monkeypatch):
+    write_markups(file, some_landmarks(), specimen="GP01")
+    before, drafts = file.read_bytes(), []
+
+    def interrupted(draft, target):
+        drafts.append(draft.read_bytes())
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(type(file), "replace", interrupted)
+    with pytest.raises(GpError, match="Input/output error"):
+        write_markups(file, some_landmarks(seed=1), specimen="GP01")
+    assert file.read_bytes() == before
+    assert json.loads(drafts[0])["gpLabeler"]["specimen"] == "GP01"
+
+
 def test_a_missing_folder_is_named(tmp_path):
     with pytest.raises(GpError, match=r"cannot be written .*Check the folder"):
         write_markups(tmp_path / "none" / "GP01_L.mrk.json", some_landmarks(), specimen="GP01")

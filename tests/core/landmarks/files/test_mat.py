@@ -1,5 +1,7 @@
 """The authors' sets, real and made up."""
 
+import struct
+
 import numpy as np
 import pytest
 from landmark_makers import SHARED, needs_shared_data, same_landmarks
@@ -7,6 +9,7 @@ from landmark_makers import SHARED, needs_shared_data, same_landmarks
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, named_set
 from gp_core.landmarks.files import import_mat, load_specimens, read_authors_mat
+from gp_core.landmarks.files.mat5 import read_mat5
 
 LEFT, RIGHT = (
     SHARED / "usevitch2021" / f"combined_coords_method2_morepts_final_co_correct_{s}_CO.mat" for s in "LR"
@@ -88,6 +91,38 @@ def test_a_missing_position_stays_missing(tmp_path):
     file = save(tmp_path / "x.mat", cc_L=values, cc_R=values)
     (specimen,) = read_authors_mat(file, file)
     assert specimen.side("L").status(named_set("authors_mat")[0]).value == "undefined"
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("kind", ["f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", ">f8"])
+def test_arrays_are_what_scipy_reads(tmp_path, kind, compressed):
+    from scipy.io import loadmat, savemat
+
+    values = (np.random.default_rng(1).normal(size=(4, 3, 5)) * 50).clip(0, 100).astype(kind)
+    others = {"a": np.arange(3.0), "text": "abc", "cell": np.array([1, "x"], dtype=object), "z": 1 + 2j}
+    savemat(tmp_path / "x.mat", {"cc": values, **others}, do_compression=compressed)
+    ours, theirs = read_mat5(tmp_path / "x.mat"), loadmat(tmp_path / "x.mat")
+    assert np.array_equal(ours["cc"], theirs["cc"])
+    assert ours["a"].tolist() == [[0, 1, 2]]
+    assert [name for name, value in ours.items() if value is None] == ["text", "cell", "z"]
+
+
+@needs_shared_data
+def test_the_real_arrays_are_what_scipy_reads():
+    from scipy.io import loadmat
+
+    for file, name in ((LEFT, "cc_L"), (RIGHT, "cc_R")):
+        assert read_mat5(file)[name].tobytes() == loadmat(file)[name].tobytes()
+
+
+def test_big_endian_numbers(tmp_path):
+    def element(kind, data):
+        return struct.pack(">II", kind, len(data)) + data + b"\0" * (-len(data) % 8)
+
+    body = element(6, struct.pack(">II", 6, 0)) + element(5, struct.pack(">ii", 1, 2)) + element(1, b"cc")
+    body += element(9, struct.pack(">dd", 1.5, -2.5))
+    (tmp_path / "x.mat").write_bytes(b" " * 124 + b"\1\0MI" + element(14, body))
+    assert read_mat5(tmp_path / "x.mat")["cc"].tolist() == [[1.5, -2.5]]
 
 
 @pytest.mark.parametrize("content", [b"", b"no mat file at all", bytes(range(256)) * 4])
