@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from os import PathLike, fspath
 from types import MappingProxyType
 from typing import Literal
@@ -145,7 +146,7 @@ def read_touches(path: str | PathLike[str], side: Side | str, *, unknown: Unknow
     points = read_points(path)
     wanted = Side.parse(side)
     _check_side(wanted, points.header.side if points.header else None, points)
-    seen = PointList(tuple(_without_sentinel(point) for point in points.points), points.source)
+    seen = replace(points, points=tuple(_without_sentinel(point) for point in points.points))
     touches = _landmark_set(seen, wanted, "tracker", unknown)
     check_plausible_size(touches, path)
     return touches

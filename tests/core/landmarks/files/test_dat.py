@@ -118,3 +118,9 @@ def test_an_unknown_side_is_refused(file):
 
 def test_touches_read_as_landmarks_are_in_the_tracker_frame(file):
     assert read_landmarks(write(file, ROWS[:6]), side="L").frame == "tracker"
+
+
+def test_touches_keep_the_extra_points_that_the_file_declares(tmp_path):
+    points = markup(control_point("RWA"), control_point("tip", (4.0, 5.0, 6.0)))
+    file = write_json(tmp_path / "t.mrk.json", points, gpLabeler={"extra": ["tip"]})
+    assert read_touches(file, "L").extra["tip"].tolist() == [4, 5, 6]
