@@ -1,0 +1,1 @@
+"""Volumes, surfaces and phantoms: SimpleITK, VTK filters and file formats; knows no Qt."""

@@ -1,0 +1,181 @@
+"""Read a micro-CT scan, whatever it is kept in: look first, then load.
+
+`inspect_volume` reads headers and names only, and says what it found: size, voxel size, what stands against
+loading it and what can be chosen. `read_volume` loads what was looked into, or refuses with the same words.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gp_core.errors import GpError
+from gp_labeler.imaging.progress import Progress, Report
+from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
+from gp_labeler.imaging.readers.options import ImportOptions
+from gp_labeler.imaging.readers.plan import Choice, ImportPlan
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error
+from gp_labeler.imaging.readers.source import assemble
+from gp_labeler.imaging.volume import GreyArray, Volume
+
+__all__ = [
+    "READABLE",
+    "Choice",
+    "ImportOptions",
+    "ImportPlan",
+    "Problem",
+    "VolumeError",
+    "inspect_volume",
+    "is_readable_name",
+    "read_preview",
+    "read_volume",
+]
+
+PathOrPlan = str | PathLike[str] | ImportPlan
+
+
+def inspect_volume(
+    path: PathOrPlan,
+    *,
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
+    **options: Any,
+) -> ImportPlan:
+    """Look into a file or folder without loading it.
+
+    Parameters
+    ----------
+    path : path or ImportPlan
+        File or folder; a slice of a stack or series means the whole of it. Of a plan, the same path is looked
+        into again, under its options changed by those given.
+    progress, cancel : callable, optional
+        Told the fraction done; asked whether to stop.
+    **options
+        Fields of `ImportOptions`.
+
+    Returns
+    -------
+    ImportPlan
+        Whose `errors` must be empty before it can be loaded.
+
+    Raises
+    ------
+    VolumeError
+        It is no scan, or too damaged to say anything about it.
+    Cancelled
+        `cancel` said so.
+
+    Examples
+    --------
+    >>> plan = inspect_volume("scans/head_tif")  # doctest: +SKIP
+    >>> [problem.code for problem in plan.errors]  # doctest: +SKIP
+    ['spacing-missing']
+    """
+    before = path.options.as_json() if isinstance(path, ImportPlan) else {}
+    where = path.path if isinstance(path, ImportPlan) else path
+    return _inspect(where, ImportOptions.make(**before | options), Report(progress, cancel))
+
+
+def read_volume(
+    path: PathOrPlan,
+    *,
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
+    **options: Any,
+) -> Volume:
+    """Load a scan as one grey volume in LPS mm.
+
+    Parameters
+    ----------
+    path : path or ImportPlan
+        File or folder, or what `inspect_volume` returned.
+    progress, cancel : callable, optional
+        Told the fraction done; asked whether to stop.
+    **options
+        Fields of `ImportOptions`: `spacing`, `series`, `channel`, `accept`, `reverse`, `stride`, `region`.
+        They come with the volume as `choices`, and read the same again.
+
+    Raises
+    ------
+    VolumeError
+        Something must be decided first (before anything big is loaded), or the data are damaged.
+    Cancelled
+        `cancel` said so.
+
+    Examples
+    --------
+    >>> volume = read_volume("scans/head_tif", spacing=0.035)  # doctest: +SKIP
+    """
+    plan = _planned(path, options, Report(None, cancel))
+    if plan.errors:
+        raise VolumeError.of(plan.errors, plan.path)
+    return _load(plan, Report(progress, cancel))
+
+
+def read_preview(
+    plan: ImportPlan, *, cancel: Callable[[], bool] | None = None, reverse: bool | None = None
+) -> Volume:
+    """Load a coarse picture of a plan, whatever stands against it; a missing voxel size counts as 1 mm."""
+    stride = plan.preview_stride
+    options = replace(
+        plan.options, stride=stride, reverse=plan.options.reverse if reverse is None else reverse
+    )
+    return _load(plan.with_options(options), Report(None, cancel))
+
+
+def _planned(path: PathOrPlan, options: dict[str, Any], report: Report) -> ImportPlan:
+    """Return a plan under the options; it is looked into again only where they change what is read."""
+    if not isinstance(path, ImportPlan):
+        return _inspect(path, ImportOptions.make(**options), report)
+    wanted = ImportOptions.make(**path.options.as_json() | options)
+    if (wanted.series, wanted.channel) == (path.options.series, path.options.channel):
+        return path.with_options(wanted)
+    return _inspect(path.path, wanted, report)
+
+
+def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) -> ImportPlan:
+    # Here, not above: SimpleITK, pydicom and tifffile take half a second to load, and a window opens without.
+    from gp_labeler.imaging.readers.probe import inspect_path
+
+    return inspect_path(path, options, report)
+
+
+def _load(plan: ImportPlan, report: Report) -> Volume:
+    with failing_as_volume_error(plan.path):
+        try:
+            array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
+        except GpError as problem:
+            raise problem if problem.file else VolumeError(problem.problem, file=plan.path) from None
+    array, filled = _finite(array)
+    volume = Volume(
+        array,
+        plan.T_scan_voxel(),
+        name=plan.name,
+        path=Path(plan.path).resolve(),
+        notes=(*plan.all_notes(), *filled),
+        choices=plan.options.as_json(),
+    )
+    volume.checksum  # noqa: B018 - computed here, off the UI thread
+    return volume
+
+
+def _finite(array: GreyArray) -> tuple[GreyArray, tuple[str, ...]]:
+    """Put the lowest value where a float volume has none: surfaces cannot be made through NaN."""
+    if array.dtype.kind != "f":
+        return array, ()
+    bad = [~np.isfinite(plane) for plane in array]
+    n_bad = sum(int(plane.sum()) for plane in bad)
+    if n_bad == 0:
+        return array, ()
+    lowest = min(
+        (float(plane[~hole].min()) for plane, hole in zip(array, bad, strict=True) if not hole.all()),
+        default=0,
+    )
+    for plane, hole in zip(array, bad, strict=True):
+        plane[hole] = lowest
+    return array, (f"{n_bad} voxels without a finite value were set to {lowest:g}",)

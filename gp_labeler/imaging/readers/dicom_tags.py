@@ -1,0 +1,205 @@
+"""The tags of DICOM files that say what a slice is and where it lies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pydicom
+from pydicom.errors import InvalidDicomError
+
+from gp_core.checks import FloatArray
+from gp_labeler.imaging.progress import Report
+
+__all__ = ["Frame", "is_dicom", "scan_dicom"]
+
+_TAGS = [
+    "SOPClassUID", "ImageType", "SeriesInstanceUID", "SeriesNumber", "SeriesDescription", "InstanceNumber",
+    "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness",
+    "SpacingBetweenSlices", "Rows", "Columns", "NumberOfFrames", "SamplesPerPixel", "BitsAllocated",
+    "BitsStored", "PixelRepresentation", "RescaleSlope", "RescaleIntercept",
+    "SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """One slice, or one file of many frames.
+
+    Parameters
+    ----------
+    path : Path
+        File.
+    series, description : str
+        Series UID, and what people call it.
+    number : int
+        Instance number.
+    shape : (2,) int
+        Rows and columns.
+    n_frames : int
+        Frames in the file.
+    positions : (n, 3) array, mm
+        Centre of the first pixel of each frame; empty where the file does not say.
+    axes : (3, 3) array, optional
+        Columns: where x, y of the image and its normal point in LPS; None where the file does not say.
+    pixel : (2,) float, mm, optional
+        Pixel size along x, y.
+    thickness : float, mm, optional
+        Distance of slices if given, else their thickness.
+    value_range : (2,) float
+        Lowest and highest value that a pixel can have.
+    integral : bool
+        Whether all values are integers.
+    channels : int
+        Samples of a pixel.
+    localizer : bool
+        Whether it calls itself a scout image.
+    """
+
+    path: Path
+    series: str
+    description: str
+    number: int
+    shape: tuple[int, int]
+    n_frames: int
+    positions: FloatArray
+    axes: FloatArray | None
+    pixel: tuple[float, float] | None
+    thickness: float | None
+    value_range: tuple[float, float]
+    integral: bool
+    channels: int
+    localizer: bool
+
+
+def is_dicom(path: Path) -> bool:
+    """Return whether a file begins as DICOM files do."""
+    with path.open("rb") as file:
+        return file.read(132)[128:] == b"DICM"
+
+
+def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[Frame], list[Path]]:
+    """Read the tags of all files that are DICOM images; the rest comes back as junk."""
+    every = list(files)
+    frames, junk = [], []
+    for n, file in enumerate(every):
+        report(n / max(len(every), 1))
+        frame = _read(file) if is_dicom(file) else None
+        if frame is not None:
+            frames.append(frame)
+        elif file.name.upper() != "DICOMDIR":
+            junk.append(file)
+    return frames, junk
+
+
+def _read(path: Path) -> Frame | None:
+    try:
+        tags = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_TAGS)
+    except (InvalidDicomError, EOFError, OSError, ValueError, KeyError):
+        return None
+    rows, columns = _whole(tags, "Rows"), _whole(tags, "Columns")
+    if not rows or not columns:  # a report, a directory: no image
+        return None
+    shared = _first(tags.get("SharedFunctionalGroupsSequence"))
+    each = list(tags.get("PerFrameFunctionalGroupsSequence") or [])
+    measures = _group("PixelMeasuresSequence", shared, each, tags)
+    pixel = _numbers(measures, "PixelSpacing", 2)
+    distance = _numbers(measures, "SpacingBetweenSlices", 1) or _numbers(measures, "SliceThickness", 1)
+    orientation = _numbers(
+        _group("PlaneOrientationSequence", shared, each, tags), "ImageOrientationPatient", 6
+    )
+    rescale = _group("PixelValueTransformationSequence", shared, each, tags)
+    values, integral = _values(tags, rescale)
+    return Frame(
+        path=path,
+        series=str(tags.get("SeriesInstanceUID", "")),
+        description=_description(tags),
+        number=_whole(tags, "InstanceNumber"),
+        shape=(rows, columns),
+        n_frames=max(1, _whole(tags, "NumberOfFrames")),
+        positions=_positions(tags, each),
+        axes=None if orientation is None else _axes(orientation),
+        pixel=None
+        if pixel is None or min(pixel) <= 0
+        else (float(pixel[1]), float(pixel[0])),  # rows come first
+        thickness=None if distance is None or distance[0] <= 0 else float(distance[0]),
+        value_range=values,
+        integral=integral,
+        channels=max(1, _whole(tags, "SamplesPerPixel")),
+        localizer="LOCALIZER" in [str(word).upper() for word in _listed(tags.get("ImageType"))],
+    )
+
+
+def _first(sequence: Any) -> Any:
+    return sequence[0] if sequence else None
+
+
+def _group(name: str, shared: Any, each: list[Any], tags: Any) -> Any:
+    """Return the functional group that holds for all frames, or the plain tags of a single-frame file."""
+    for holder in (shared, _first(each)):
+        group = _first(holder.get(name)) if holder is not None else None
+        if group is not None:
+            return group
+    return tags
+
+
+def _positions(tags: Any, each: list[Any]) -> FloatArray:
+    if not each:
+        position = _numbers(tags, "ImagePositionPatient", 3)
+        return np.empty((0, 3)) if position is None else np.array([position])
+    found = [_first(frame.get("PlanePositionSequence")) for frame in each]
+    positions = [None if plane is None else _numbers(plane, "ImagePositionPatient", 3) for plane in found]
+    known = [position for position in positions if position is not None]
+    return np.array(known) if known and len(known) == len(each) else np.empty((0, 3))
+
+
+def _axes(orientation: tuple[float, ...]) -> FloatArray | None:
+    x, y = np.array(orientation[:3]), np.array(orientation[3:])
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.5 or abs(x @ y) > 1e-3:
+        return None
+    x = x / np.linalg.norm(x)
+    y = y - (y @ x) * x
+    y = y / np.linalg.norm(y)
+    return np.column_stack([x, y, np.cross(x, y)])
+
+
+def _values(tags: Any, rescale: Any) -> tuple[tuple[float, float], bool]:
+    bits = _whole(tags, "BitsStored") or _whole(tags, "BitsAllocated") or 16
+    signed = _whole(tags, "PixelRepresentation") == 1
+    low, high = (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) if signed else (0.0, 2.0**bits - 1)
+    slope = (_numbers(rescale, "RescaleSlope", 1) or (1.0,))[0] or 1.0
+    shift = (_numbers(rescale, "RescaleIntercept", 1) or (0.0,))[0]
+    ends = sorted((low * slope + shift, high * slope + shift))
+    return (ends[0], ends[1]), float(slope).is_integer() and float(shift).is_integer()
+
+
+def _description(tags: Any) -> str:
+    number, text = tags.get("SeriesNumber"), str(tags.get("SeriesDescription", "") or "").strip()
+    return (
+        " ".join(part for part in (f"series {number}" if number is not None else "", text) if part)
+        or "series"
+    )
+
+
+def _whole(tags: Any, name: str) -> int:
+    numbers = _numbers(tags, name, 1)
+    return 0 if numbers is None else int(numbers[0])
+
+
+def _numbers(tags: Any, name: str, n: int) -> tuple[float, ...] | None:
+    """Return `n` finite numbers of a tag, or None where it is absent, empty or broken."""
+    try:
+        value = tags.get(name)
+        numbers = tuple(float(part) for part in _listed(value))
+    except (TypeError, ValueError, AttributeError):
+        return None
+    return numbers if len(numbers) == n and np.isfinite(numbers).all() else None
+
+
+def _listed(value: Any) -> list[Any]:
+    if value is None or value == "":
+        return []
+    return list(value) if hasattr(value, "__iter__") and not isinstance(value, str) else [value]

@@ -1,0 +1,152 @@
+"""Look at a path: which reader it is for, and what that reader finds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
+
+from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.dicom import inspect_dicom
+from gp_labeler.imaging.readers.dicom_tags import is_dicom
+from gp_labeler.imaging.readers.formats import (
+    DICOM_SUFFIXES,
+    READABLE,
+    SCANCO_SUFFIXES,
+    SLICE_SUFFIXES,
+    TIFF_SUFFIXES,
+    is_readable_name,
+    scanco_suffix,
+    volume_kind,
+)
+from gp_labeler.imaging.readers.itk_image import inspect_itk_image
+from gp_labeler.imaging.readers.options import ImportOptions
+from gp_labeler.imaging.readers.plan import ImportPlan
+from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error, names
+from gp_labeler.imaging.readers.scanco import inspect_scanco
+from gp_labeler.imaging.readers.stack import inspect_stack
+from gp_labeler.imaging.readers.tiff import inspect_tiff, is_multi_page
+
+__all__ = ["inspect_path"]
+
+_HINTS = {
+    ".raw": "A raw file needs its header: give the MHD or NHDR file that belongs to it.",
+    ".vol": "Save it as TIFF stack, DICOM or MHD in the scanner's software.",
+    ".vff": "Save it as NRRD in 3D Slicer (extension SlicerRT) first.",
+    ".mnc": "Save it as NIfTI or NRRD first.",
+    ".stl": "This is a mesh; give the scan it was made from.",
+    ".ply": "This is a mesh; give the scan it was made from.",
+}
+
+
+def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Report) -> ImportPlan:
+    """Look into a file or folder under given options; see `inspect_volume`."""
+    where = Path(path)
+    if not where.exists():
+        raise VolumeError("there is no such file or folder", file=where, remedy="Check the path.")
+    with failing_as_volume_error(where):
+        if where.is_dir():
+            return _inspect_folder(where, options, report)
+        if where.stat().st_size == 0:
+            raise VolumeError("it is empty", file=where, remedy="Copy it again.")
+        return _inspect_file(where, options, report)
+
+
+def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    kind, suffix = volume_kind(path) or _kind_by_content(path), path.suffix.lower()
+    if kind is not None:
+        return inspect_itk_image(path, options, kind)
+    if is_dicom(path) or suffix in DICOM_SUFFIXES:
+        return inspect_dicom(path.parent, _siblings(path), options, report, chosen=path)
+    if suffix in TIFF_SUFFIXES and is_multi_page(path):
+        return inspect_tiff(path, options)
+    if suffix in SLICE_SUFFIXES:
+        return inspect_stack(path.parent, _images(_siblings(path)), options, report, chosen=path)
+    if suffix == ".log" and (images := _images(_siblings(path))):
+        return inspect_stack(path.parent, images, options, report)
+    if scanco_suffix(path) in SCANCO_SUFFIXES or _begins(path, b"CTDATA-HEADER_V1"):
+        return inspect_scanco(path, options)
+    raise VolumeError(
+        "its format is not known", file=path, remedy=_HINTS.get(suffix, f"Readable are {READABLE}.")
+    )
+
+
+def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    files = _files(folder)
+    images = _images(files)
+    dicom = [file for file in files if file not in set(images) and is_dicom(file)]
+    volumes = [file for file in files if _is_volume(file)]
+    if dicom and len(dicom) >= len(images):
+        return inspect_dicom(folder, [file for file in files if file not in set(images)], options, report)
+    if len(images) > 1 and not volumes:
+        return inspect_stack(folder, images, options, report)
+    if len(volumes) == 1 and len(images) <= 1 + (volumes[0] in images):
+        return _inspect_file(volumes[0], options, report)
+    if len(volumes) > 1 and len(images) <= len(volumes):
+        raise VolumeError(
+            f"it holds several volumes: {names(volumes, 12)}", file=folder, remedy="Give one of them."
+        )
+    if images:
+        return inspect_stack(folder, images, options, report)
+    return _inspect_below(folder, files, options, report)
+
+
+def _inspect_below(folder: Path, files: Sequence[Path], options: ImportOptions, report: Report) -> ImportPlan:
+    """Go into the only subfolder that holds anything, as DICOM exports nest them."""
+    below = [
+        sub
+        for sub in _subfolders(folder)
+        if any(is_readable_name(file) or is_dicom(file) for file in _files(sub))
+    ]
+    if len(below) == 1:
+        return _inspect_folder(below[0], options, report)
+    if below:
+        text = f"the scans are in its folders {names(below, 12)}"
+        raise VolumeError(text, file=folder, remedy="Give one of these folders.")
+    holds = f"only {names(files)}" if files else "nothing"
+    raise VolumeError(f"it holds no scan, {holds}", file=folder, remedy=f"Readable are {READABLE}.")
+
+
+def _is_volume(path: Path) -> bool:
+    """Return whether a file of a folder is a whole volume by itself."""
+    if path.suffix.lower() in TIFF_SUFFIXES:
+        try:
+            return path.stat().st_size > 0 and is_multi_page(path)
+        except Exception:  # a broken slice: the stack reader names it
+            return False
+    known = volume_kind(path) is not None and path.suffix.lower() not in (".img",)
+    return known or scanco_suffix(path) in SCANCO_SUFFIXES
+
+
+def _kind_by_content(path: Path) -> str | None:
+    """Recognise what goes under another name, or none."""
+    if path.suffix.lower() in (*SLICE_SUFFIXES, *TIFF_SUFFIXES, *DICOM_SUFFIXES):
+        return None
+    with path.open("rb") as file:
+        head = file.read(352)
+    if head.startswith(b"NRRD000"):
+        return "NRRD"
+    if head[344:348] == b"n+1\0":
+        return "NIfTI"
+    return "MetaImage" if head.startswith((b"ObjectType", b"NDims")) else None
+
+
+def _begins(path: Path, magic: bytes) -> bool:
+    with path.open("rb") as file:
+        return file.read(len(magic)) == magic
+
+
+def _siblings(path: Path) -> list[Path]:
+    return _files(path.parent)
+
+
+def _files(folder: Path) -> list[Path]:
+    return sorted(file for file in folder.iterdir() if file.is_file() and not file.name.startswith("."))
+
+
+def _subfolders(folder: Path) -> list[Path]:
+    return sorted(sub for sub in folder.rglob("*") if sub.is_dir() and not sub.name.startswith("."))
+
+
+def _images(files: Sequence[Path]) -> list[Path]:
+    return [file for file in files if file.suffix.lower() in SLICE_SUFFIXES]

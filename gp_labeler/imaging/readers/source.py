@@ -1,0 +1,249 @@
+"""Where voxels come from: plane after plane, so that loading can tell how far it is, stop, and skip."""
+
+from __future__ import annotations
+
+import bz2
+import gzip
+import io
+import zlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from gp_core.errors import GpError
+from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.grey import to_grey
+from gp_labeler.imaging.readers.options import ImportOptions, Region
+from gp_labeler.imaging.readers.problems import VolumeError
+
+__all__ = ["Compression", "FileSource", "RawSource", "SliceSource", "assemble", "open_stream", "window"]
+
+Plane = NDArray[Any]
+Compression = Literal["none", "gzip", "zlib", "bzip2"]
+
+
+class SliceSource(Protocol):
+    """Something that yields grey planes."""
+
+    def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
+        """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
+        ...
+
+
+@dataclass(frozen=True)
+class RawSource:
+    """Voxels that lie in one file as they are, or compressed as one stream.
+
+    Parameters
+    ----------
+    path : Path
+        File that holds them.
+    offset : int
+        Bytes of the file before the voxels, or before their compressed stream.
+    dtype : dtype
+        Of one stored value, with its byte order.
+    plane_shape : tuple
+        (y, x), or (y, x, channels).
+    n_planes : int
+        How many there are.
+    compression : str
+        How the stream is packed.
+    plane_step : int, optional
+        Bytes from one plane to the next where they do not touch.
+    finish : callable, optional
+        Applied to each plane: scaling, inversion, choice of a channel.
+    skip : int
+        Bytes of the unpacked stream before the first voxel.
+    """
+
+    path: Path
+    offset: int
+    dtype: np.dtype[Any]
+    plane_shape: tuple[int, ...]
+    n_planes: int
+    compression: Compression = "none"
+    plane_step: int | None = None
+    finish: Callable[[Plane], Plane] = to_grey
+    skip: int = 0
+
+    @property
+    def plane_bytes(self) -> int:
+        """Bytes of one stored plane."""
+        return int(np.prod(self.plane_shape)) * self.dtype.itemsize
+
+    @property
+    def bytes_needed(self) -> int:
+        """Bytes up to the end of the last plane, unpacked."""
+        return (
+            self.offset
+            + self.skip
+            + (self.plane_step or self.plane_bytes) * (self.n_planes - 1)
+            + self.plane_bytes
+        )
+
+    def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
+        """Yield the (y, x) grey planes with the numbers `wanted`, which rise; each is good until the next."""
+        buffer = bytearray(self.plane_bytes)
+        stored: Plane = np.frombuffer(buffer, self.dtype).reshape(self.plane_shape)
+        step = self.plane_step or self.plane_bytes
+        position = 0
+        with open_stream(self.path, self.compression, self.offset) as stream:
+            for number in wanted:
+                start = self.skip + step * number
+                if start != position:
+                    _advance(stream, position, start, self.offset if self.compression == "none" else None)
+                if _fill(stream, buffer) < len(buffer):
+                    raise VolumeError(
+                        f"it ends within slice {number + 1} of {self.n_planes}",
+                        file=self.path,
+                        remedy="The file is incomplete: copy it again.",
+                    )
+                position = start + len(buffer)
+                yield self.finish(stored)
+
+
+@dataclass(frozen=True)
+class FileSource:
+    """One plane a file; a missing one is stood in for by its nearest neighbour.
+
+    Parameters
+    ----------
+    files : tuple of Path or None
+        In slice order.
+    decode : callable
+        Reads the grey plane of one file.
+    """
+
+    files: tuple[Path | None, ...]
+    decode: Callable[[Path], Plane]
+
+    def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
+        """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
+        there = np.array([n for n, file in enumerate(self.files) if file is not None])
+        shape: tuple[int, ...] | None = None
+        for number in wanted:
+            file = self.files[there[np.abs(there - number).argmin()]]
+            assert file is not None
+            plane = self.decode(file)
+            shape = shape or plane.shape
+            if plane.shape != shape:
+                raise VolumeError(f"it is {_times(plane.shape)}, the other slices {_times(shape)}", file=file)
+            yield plane
+
+
+def assemble(
+    source: SliceSource, size: tuple[int, int, int], dtype: DTypeLike, options: ImportOptions, report: Report
+) -> Plane:
+    """Read the wanted part of a volume of `size` (x, y, z) into one (z, y, x) array of `dtype`."""
+    i, j, k = window(size, options)
+    nz = size[2]
+    wanted = [nz - 1 - n for n in reversed(k)] if options.reverse else list(k)
+    volume = np.empty((len(k), len(j), len(i)), dtype)
+    ys, xs = slice(j.start, j.stop, j.step), slice(i.start, i.stop, i.step)
+    for n, plane in enumerate(source.planes(wanted)):
+        report(n / len(wanted))
+        if plane.shape != (size[1], size[0]):
+            raise VolumeError(
+                f"slice {wanted[n] + 1} is {_times(plane.shape)}, not {size[0]} x {size[1]} pixels"
+            )
+        volume[len(k) - 1 - n if options.reverse else n] = plane[ys, xs]
+    report(1.0)
+    return volume
+
+
+def window(size: tuple[int, int, int], options: ImportOptions) -> tuple[range, range, range]:
+    """Return the voxels to keep along i, j, k, counted in the whole (reversed, if asked) volume.
+
+    Raises
+    ------
+    GpError
+        The region reaches beyond the volume.
+    """
+    region: Region = options.region or ((0, size[0]), (0, size[1]), (0, size[2]))
+    for (low, high), n, axis in zip(region, size, "ijk", strict=True):
+        if high > n:
+            raise GpError(f"the region must lie within the volume: {axis} is 0 to {n}, got {low} to {high}")
+    i, j, k = (range(low, high, options.stride) for low, high in region)
+    return i, j, k
+
+
+def open_stream(path: Path, compression: Compression, offset: int = 0) -> IO[bytes] | io.RawIOBase:
+    """Open the bytes of a file from `offset` on, unpacked."""
+    file = path.open("rb", buffering=0)
+    file.seek(offset)
+    if compression == "none":
+        return file
+    if compression == "gzip":
+        return _Closing(gzip.GzipFile(fileobj=file), file)
+    if compression == "bzip2":
+        return _Closing(bz2.BZ2File(file), file)
+    return _Closing(_Inflated(file), file)
+
+
+class _Closing(io.RawIOBase):
+    """An unpacking stream that closes the file below it, too."""
+
+    def __init__(self, stream: Any, file: io.RawIOBase) -> None:
+        self._stream, self._file = stream, file
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        return int(self._stream.readinto(buffer) or 0)
+
+    def close(self) -> None:
+        if not self.closed:
+            self._stream.close()
+            self._file.close()
+        super().close()
+
+
+class _Inflated(io.RawIOBase):
+    """A zlib stream, unpacked while it is read."""
+
+    def __init__(self, file: io.RawIOBase) -> None:
+        self._file = file
+        self._unpack = zlib.decompressobj()
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        while not self._unpack.eof:
+            packed = self._unpack.unconsumed_tail or self._file.read(1 << 18) or b""
+            data = self._unpack.decompress(packed, len(buffer))
+            if data or not packed:
+                buffer[: len(data)] = data
+                return len(data)
+        return 0
+
+
+def _fill(stream: IO[bytes] | io.RawIOBase, buffer: bytearray) -> int:
+    view, filled = memoryview(buffer), 0
+    while filled < len(buffer):
+        got = stream.readinto(view[filled:])  # type: ignore[union-attr]
+        if not got:
+            break
+        filled += got
+    return filled
+
+
+def _advance(stream: IO[bytes] | io.RawIOBase, position: int, to: int, seek_base: int | None) -> None:
+    """Go to byte `to` of the unpacked stream: by seeking where it is not packed, else by reading on."""
+    if seek_base is not None:
+        stream.seek(seek_base + to)
+        return
+    while position < to:
+        got = _fill(stream, bytearray(min(to - position, 1 << 20)))
+        if not got:
+            return  # the next plane will be short, and say so
+        position += got
+
+
+def _times(shape: Sequence[int]) -> str:
+    return " x ".join(str(n) for n in reversed(shape)) + " pixels"

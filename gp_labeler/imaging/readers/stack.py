@@ -1,0 +1,346 @@
+"""Stacks: a folder with one image file for each slice."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import tifffile
+from PIL import Image
+
+from gp_core.errors import GpError
+from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.formats import TIFF_SUFFIXES
+from gp_labeler.imaging.readers.grey import palette_as_grey, to_grey
+from gp_labeler.imaging.readers.naming import Numbering, SliceGroup, group_slices, number_slices
+from gp_labeler.imaging.readers.options import ImportOptions
+from gp_labeler.imaging.readers.pixel_size import (
+    UNKNOWN,
+    PixelSize,
+    dots_per_inch,
+    stack_geometry,
+    tiff_pixel_size,
+)
+from gp_labeler.imaging.readers.plan import Choice, Geometry, ImportPlan
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
+from gp_labeler.imaging.readers.skyscan import SkyScanLog, find_log
+from gp_labeler.imaging.readers.source import FileSource, Plane
+from gp_labeler.imaging.readers.spacing import shown
+from gp_labeler.imaging.readers.tiff import finishing, page_array
+
+__all__ = ["inspect_stack"]
+
+_PALETTE = 3
+_FEW = 0.1  # a group with less than this part of the largest one's files is not another scan
+
+
+@dataclass(frozen=True)
+class _Slice:
+    """What the header of one image says."""
+
+    shape: tuple[int, int]
+    dtype: np.dtype[np.generic]
+    channels: int
+    palette: bool
+    pixel_size: PixelSize
+
+
+def inspect_stack(
+    folder: Path, files: Sequence[Path], options: ImportOptions, report: Report, chosen: Path | None = None
+) -> ImportPlan:
+    """Look into the image files of a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where they are.
+    files : sequence of Path
+        Those with an image suffix.
+    options : ImportOptions
+        `series` chooses where there are several stacks.
+    report : Report
+        Told how far it is.
+    chosen : Path, optional
+        A slice that was picked: its stack is meant.
+
+    Raises
+    ------
+    VolumeError
+        There is no stack.
+    """
+    slices = [file for file in files if not file.stem.lower().endswith("_spr")]
+    groups = group_slices(slices)
+    candidates = [group for group in groups if len(group.files) >= max(2, _FEW * len(groups[0].files))]
+    if not candidates:
+        raise VolumeError(
+            f"it holds no stack of slices, but {names(files)}",
+            file=folder,
+            remedy="A stack needs one image file for each slice, with names that differ in a number.",
+        )
+    group, found = _choose(candidates, options, chosen, folder)
+    found += _left_out(files, slices, groups, candidates)
+    headers = _read_headers(group.files, report)
+    return _plan(folder, group, headers, found, [_choice(one) for one in candidates], options)
+
+
+def _choice(group: SliceGroup) -> Choice:
+    return Choice(group.pattern, f"{group.pattern}: {len(group.files)} slices")
+
+
+def _choose(
+    candidates: Sequence[SliceGroup], options: ImportOptions, chosen: Path | None, folder: Path
+) -> tuple[SliceGroup, list[Problem]]:
+    if options.series is not None:
+        wanted = options.series.lower()
+        exact = [group for group in candidates if group.pattern.lower() == wanted]
+        fitting = exact or [group for group in candidates if wanted in group.pattern.lower()]
+        if len(fitting) == 1:
+            return fitting[0], []
+        raise VolumeError(
+            f"series {options.series!r} fits {len(fitting)} of its stacks",
+            file=folder,
+            remedy=f"Give one of: {names([group.pattern for group in candidates], 12)}.",
+        )
+    for group in candidates:
+        if chosen is not None and chosen in group.files:
+            return group, []
+    if len(candidates) == 1:
+        return candidates[0], []
+    listed = names([f"{group.pattern} ({len(group.files)})" for group in candidates], 12)
+    problem = Problem(
+        "several-series",
+        f"it holds {len(candidates)} stacks: {listed}",
+        remedy="Choose one (--series, with a part of its name).",
+        resolved_by=("series",),
+    )
+    return candidates[0], [problem]
+
+
+def _left_out(
+    files: Sequence[Path],
+    slices: Sequence[Path],
+    groups: Sequence[SliceGroup],
+    candidates: Sequence[SliceGroup],
+) -> list[Problem]:
+    found = []
+    scouts = [file for file in files if file not in set(slices)]
+    if scouts:
+        found.append(warning("scout", f"scout images are left out: {names(scouts)}"))
+    stray = [file for group in groups if group not in candidates for file in group.files]
+    if stray:
+        found.append(warning("stray", f"images that are no part of a stack are left out: {names(stray)}"))
+    return found
+
+
+def _read_headers(files: Sequence[Path], report: Report) -> dict[Path, _Slice]:
+    headers = {}
+    for n, file in enumerate(files):
+        report(n / len(files))
+        if file.stat().st_size == 0:
+            raise VolumeError("it is empty", file=file, remedy="Copy it again, or remove it from the stack.")
+        try:
+            headers[file] = _tiff_slice(file) if file.suffix.lower() in TIFF_SUFFIXES else _image_slice(file)
+        except (OSError, ValueError, SyntaxError, tifffile.TiffFileError) as problem:
+            raise VolumeError(
+                f"it is no image: {problem}", file=file, remedy="Copy it again, or remove it from the stack."
+            ) from None
+    return headers
+
+
+def _tiff_slice(path: Path) -> _Slice:
+    with tifffile.TiffFile(path) as tif:
+        page = tif.pages.first
+        assert isinstance(page, tifffile.TiffPage)
+        shape = (page.imagelength, page.imagewidth)
+        palette = page.photometric == _PALETTE
+        return _Slice(shape, np.dtype(page.dtype), page.samplesperpixel, palette, tiff_pixel_size(tif))
+
+
+def _image_slice(path: Path) -> _Slice:
+    with Image.open(path) as image:
+        dpi = image.info.get("dpi")
+        size = dots_per_inch(float(dpi[0]), float(dpi[1])) if dpi else UNKNOWN
+        dtype = np.dtype(
+            {"I": "int32", "F": "float32"}.get(image.mode, "uint16" if ";16" in image.mode else "uint8")
+        )
+        return _Slice(
+            (image.height, image.width), dtype, len(image.getbands()), image.mode in ("P", "PA"), size
+        )
+
+
+def _plan(
+    folder: Path,
+    group: SliceGroup,
+    headers: dict[Path, _Slice],
+    found: list[Problem],
+    choices: list[Choice],
+    options: ImportOptions,
+) -> ImportPlan:
+    shape = Counter(header.shape for header in headers.values()).most_common(1)[0][0]
+    group, strays = _trimmed(group, headers, shape)
+    numbering = number_slices(group)
+    odd = [file for file in numbering.files if file is not None and headers[file].shape != shape]
+    files = tuple(None if file in odd else file for file in numbering.files)
+    usable = {file: headers[file] for file in files if file is not None}
+    log = find_log(folder, group.pattern)
+    kind = (
+        "SkyScan" if log else group.files[0].suffix[1:].upper().replace("TIFF", "TIF").replace("TIF", "TIFF")
+    )
+    found += _numbering_problems(group, numbering)
+    found += _odd_sizes(strays, odd, headers, shape)
+    found += _mixtures(usable, options)
+    first = next(iter(usable.values()))
+    geometry, log_problems = _geometry(first.pixel_size, numbering, log, shape, group)
+    dtypes = [np.dtype(np.uint8) if header.palette else header.dtype for header in usable.values()]
+    return ImportPlan(
+        path=folder,
+        format=f"{kind} stack",
+        files=tuple(usable),
+        size=(shape[1], shape[0], len(files)),
+        stored_dtype=np.result_type(*set(dtypes)),
+        source=FileSource(files, _decoder(options.channel)),
+        geometry=geometry,
+        found=(*found, *log_problems),
+        choices=tuple(choices),
+        choice=group.pattern,
+        options=options,
+        name=log.prefix.rstrip("_") if log and log.prefix else folder.name,
+    )
+
+
+def _numbering_problems(group: SliceGroup, numbering: Numbering) -> list[Problem]:
+    found = []
+    if numbering.missing:
+        gap = names([str(number) for number in numbering.missing], 6)
+        where = f"{group.files[0].name} to {group.files[-1].name}"
+        found.append(
+            Problem(
+                "gap",
+                f"between {where} the numbers {gap} are missing ({len(numbering.missing)} slices)",
+                remedy="Put the files back, or accept copies of the neighbouring slices (--accept gap).",
+                resolved_by=("accept",),
+            )
+        )
+    if numbering.doubled:
+        text = f"slice numbers are there twice: {names(numbering.doubled)}"
+        remedy = "Remove one of each, or accept the first (--accept doubled)."
+        found.append(Problem("doubled", text, remedy=remedy, resolved_by=("accept",)))
+    if numbering.step > 1:
+        text = f"the numbers of the slices run in steps of {numbering.step}"
+        found.append(warning("step", f"{text}: the distance of slices is taken to be as many times larger"))
+    return found
+
+
+def _trimmed(
+    group: SliceGroup, headers: dict[Path, _Slice], shape: tuple[int, int]
+) -> tuple[SliceGroup, tuple[Path, ...]]:
+    """Drop images of another size before the first and behind the last slice: they are no slices."""
+    fitting = [n for n, file in enumerate(group.files) if headers[file].shape == shape]
+    first, last = fitting[0], fitting[-1] + 1
+    strays = (*group.files[:first], *group.files[last:])
+    return SliceGroup(group.pattern, group.files[first:last], group.numbers[first:last]), strays
+
+
+def _odd_sizes(
+    strays: Sequence[Path], odd: Sequence[Path], headers: dict[Path, _Slice], shape: tuple[int, int]
+) -> list[Problem]:
+    def listed(files: Sequence[Path]) -> str:
+        return names([f"{file.name} ({_times(headers[file].shape)})" for file in files])
+
+    found = []
+    if strays:
+        text = (
+            f"images of another size than the slices' {_times(shape)} pixels are left out: {listed(strays)}"
+        )
+        found.append(warning("stray", text))
+    if odd:
+        text = f"slices differ in size from the others' {_times(shape)} pixels: {listed(odd)}"
+        remedy = (
+            "Remove them, or accept copies of the neighbouring slices in their place (--accept slice-size)."
+        )
+        found.append(Problem("slice-size", text, remedy=remedy, resolved_by=("accept",)))
+    return found
+
+
+def _mixtures(headers: dict[Path, _Slice], options: ImportOptions) -> list[Problem]:
+    """Say where slices differ in number type or colour; values of another type rarely mean the same."""
+    found = []
+    kinds = {file: "palette" if h.palette else str(h.dtype) for file, h in headers.items()}
+    usual = Counter(kinds.values()).most_common(1)[0][0]
+    rare = [f"{file.name} ({kind})" for file, kind in kinds.items() if kind != usual]
+    if rare:
+        text = f"slices differ in bit depth from the others' {usual}: {names(rare)}"
+        remedy = "Export the stack again with one bit depth, or accept the values (--accept mixed-depth)."
+        found.append(Problem("mixed-depth", text, remedy=remedy, resolved_by=("accept",)))
+    coloured = [file for file, h in headers.items() if h.channels > 2]
+    if coloured and len(coloured) < len(headers):
+        few = (
+            coloured
+            if 2 * len(coloured) <= len(headers)
+            else [file for file in headers if file not in set(coloured)]
+        )
+        text = f"some slices are in colour and some are grey; the exceptions are {names(few)}"
+        remedy = "Export the stack again in grey, or accept luminance (--accept mixed-colour)."
+        found.append(Problem("mixed-colour", text, remedy=remedy, resolved_by=("accept",)))
+    elif coloured:
+        taken = "luminance" if options.channel is None else f"channel {options.channel}"
+        found.append(warning("colour", f"the slices are in colour; {taken} is taken"))
+        _check_channel(options.channel, min(h.channels for h in headers.values()))
+    if usual == "palette":
+        found.append(warning("palette", "the slices have a palette; its colours become grey"))
+    return found
+
+
+def _check_channel(channel: int | None, channels: int) -> None:
+    if channel is not None and not 0 <= channel < channels:
+        raise GpError(f"channel must be 0 to {channels - 1}, got {channel}")
+
+
+def _geometry(
+    size: PixelSize, numbering: Numbering, log: SkyScanLog | None, shape: tuple[int, int], group: SliceGroup
+) -> tuple[Geometry, list[Problem]]:
+    if log is None or log.pixel_mm is None:
+        return stack_geometry(size, numbering.step), []
+    mm, found = log.pixel_mm, []
+    if log.prefix and not group.pattern.lower().startswith(log.prefix.lower()):
+        text = f"{log.path.name} speaks of slices {log.prefix}..., these are {group.pattern}; it is believed"
+        found.append(warning("log-prefix", text))
+    ends = (min(group.numbers), max(group.numbers))
+    if log.first is not None and log.last is not None and ends != (log.first, log.last):
+        text = f"{log.path.name} speaks of slices {log.first} to {log.last}, there are {ends[0]} to {ends[1]}"
+        found.append(warning("log-sections", text))
+    if log.width and log.height and (log.height, log.width) != shape:
+        reason = (
+            f"{log.path.name} speaks of {log.width} x {log.height} pixels, the slices have {_times(shape)}: "
+            f"if they were made smaller, its voxel size of {shown((mm,))} is wrong for them"
+        )
+        return Geometry(sides_known=False, suggested=(mm, mm, mm * numbering.step), reason=reason), found
+    return Geometry((mm, mm, mm * numbering.step), sides_known=False), found
+
+
+def _decoder(channel: int | None) -> Callable[[Path], Plane]:
+    return partial(_decode, channel=channel)
+
+
+def _decode(path: Path, channel: int | None) -> Plane:
+    if path.suffix.lower() in TIFF_SUFFIXES:
+        with tifffile.TiffFile(path) as tif:
+            page = tif.pages.first
+            assert isinstance(page, tifffile.TiffPage)
+            plane = page_array(page, path, 0)
+            return finishing(page, channel if page.samplesperpixel > 1 else None)(plane)
+    with Image.open(path) as image:
+        if image.mode in ("P", "PA"):
+            colours = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
+            indices = np.asarray(image)
+            return palette_as_grey(indices if indices.ndim == 2 else indices[..., 0], colours, channel)
+        usual = image.convert("RGB") if image.mode in ("CMYK", "YCbCr", "LAB", "HSV") else image
+        return to_grey(np.asarray(usual), channel)
+
+
+def _times(shape: tuple[int, int]) -> str:
+    return f"{shape[1]} x {shape[0]}"

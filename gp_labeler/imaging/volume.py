@@ -1,0 +1,216 @@
+"""A scan in memory: grey voxels and where they lie."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gp_core.checks import FloatArray, as_points
+from gp_core.errors import GeometryError
+
+__all__ = ["GreyArray", "Volume"]
+
+GreyArray = NDArray[Any]
+
+_PERCENTILES = (0.1, 99.9)
+_SAMPLES = 1_000_000
+_BLOCK = 8192  # words of 8 bytes: one sum stands for 64 KiB of voxels
+
+
+@dataclass(frozen=True, eq=False)
+class Volume:
+    """One grey channel on a regular grid, in the scan frame.
+
+    Voxel indices are (i, j, k) = (x, y, z) in all methods, while `array` is indexed ``[k, j, i]``. An index
+    names the *centre* of its voxel.
+
+    Parameters
+    ----------
+    array : (z, y, x) array
+        Grey values; made C-contiguous, of native byte order and read-only.
+    T_scan_voxel : (4, 4) array_like
+        Affine from voxel index to LPS mm: direction (possibly mirrored) times spacing, and origin.
+    name : str
+        What to call it.
+    path : Path, optional
+        File or folder it came from.
+    notes : tuple of str
+        What the import decided, for the record: channel chosen, type narrowed, order of slices, ...
+    choices : mapping
+        The import options that were used, as JSON values; `read_volume(path, **choices)` reads the same.
+
+    Raises
+    ------
+    GeometryError
+        Not three-dimensional, or the affine is singular, sheared or not finite.
+
+    Examples
+    --------
+    >>> volume = Volume(np.zeros((4, 5, 6), np.uint8), np.diag([0.1, 0.1, 0.2, 1.0]))
+    >>> volume.size, volume.spacing
+    ((6, 5, 4), (0.1, 0.1, 0.2))
+    """
+
+    array: GreyArray
+    T_scan_voxel: FloatArray
+    name: str = "volume"
+    path: Path | None = None
+    notes: tuple[str, ...] = ()
+    choices: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        array = np.asarray(self.array)
+        if array.ndim != 3 or 0 in array.shape:
+            raise GeometryError(f"a volume must be (z, y, x), got shape {array.shape}")
+        array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("=")).view()
+        array.setflags(write=False)
+        object.__setattr__(self, "array", array)
+        object.__setattr__(self, "T_scan_voxel", _checked_affine(self.T_scan_voxel))
+
+    @classmethod
+    def from_parts(
+        cls,
+        array: GreyArray,
+        spacing: ArrayLike,
+        origin: ArrayLike = (0.0, 0.0, 0.0),
+        direction: ArrayLike | None = None,
+        **rest: Any,
+    ) -> Volume:
+        """Make a volume of a (z, y, x) array, (3,) spacing and origin (LPS), mm, and (3, 3) direction."""
+        affine = np.eye(4)
+        axes = np.eye(3) if direction is None else np.asarray(direction, dtype=np.float64)
+        affine[:3, :3] = axes * np.asarray(spacing, dtype=np.float64)
+        affine[:3, 3] = origin
+        return cls(array, affine, **rest)
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Voxels along i, j, k."""
+        nz, ny, nx = self.array.shape
+        return nx, ny, nz
+
+    @property
+    def spacing(self) -> tuple[float, float, float]:
+        """Voxel size along i, j, k, mm."""
+        x, y, z = (float(length) for length in np.linalg.norm(self.T_scan_voxel[:3, :3], axis=0))
+        return x, y, z
+
+    @property
+    def origin(self) -> FloatArray:
+        """(3,) LPS mm: the centre of voxel (0, 0, 0)."""
+        return self.T_scan_voxel[:3, 3]
+
+    @property
+    def direction(self) -> FloatArray:
+        """(3, 3) unit columns: where i, j, k point in LPS; determinant -1 if the grid is left-handed."""
+        axes: FloatArray = self.T_scan_voxel[:3, :3] / np.asarray(self.spacing)
+        return axes
+
+    @property
+    def is_mirrored(self) -> bool:
+        """Whether i, j, k are left-handed, so that surfaces made in voxels must be turned inside out."""
+        return float(np.linalg.det(self.T_scan_voxel[:3, :3])) < 0
+
+    @cached_property
+    def T_voxel_scan(self) -> FloatArray:  # noqa: N802 - a transform keeps its name
+        """(4, 4) affine from LPS mm to voxel index."""
+        inverse: FloatArray = np.linalg.inv(self.T_scan_voxel).astype(np.float64)
+        inverse.setflags(write=False)
+        return inverse
+
+    @property
+    def extent(self) -> FloatArray:
+        """(2, 3) LPS mm: lowest and highest corner of the box around all voxels, half widths included."""
+        nx, ny, nz = self.size
+        corners = np.array([(i, j, k) for i in (0, nx) for j in (0, ny) for k in (0, nz)]) - 0.5
+        points = self.voxel_to_scan(corners)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
+
+    def voxel_to_scan(self, indices: ArrayLike) -> FloatArray:
+        """Return the LPS mm positions of (N, 3) voxel indices (i, j, k), which may be fractions."""
+        affine = self.T_scan_voxel
+        moved: FloatArray = (
+            as_points(indices, "indices", missing_allowed=True) @ affine[:3, :3].T + affine[:3, 3]
+        )
+        return moved
+
+    def scan_to_voxel(self, points: ArrayLike) -> FloatArray:
+        """Return the voxel indices (i, j, k), fractions, of (N, 3) LPS mm points; missing stays NaN."""
+        affine = self.T_voxel_scan
+        moved: FloatArray = (
+            as_points(points, "points", missing_allowed=True) @ affine[:3, :3].T + affine[:3, 3]
+        )
+        return moved
+
+    def contains(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Return for (N, 3) LPS mm points whether each lies in a voxel; missing points do not."""
+        index = self.scan_to_voxel(points)
+        inside: NDArray[np.bool_] = np.all((index >= -0.5) & (index < np.array(self.size) - 0.5), axis=1)
+        return inside
+
+    def values_at(self, points: ArrayLike) -> FloatArray:
+        """Return the values of the voxels that hold (N, 3) LPS mm points, NaN outside."""
+        inside = self.contains(points)
+        values = np.full(len(inside), np.nan)
+        i, j, k = np.floor(self.scan_to_voxel(points)[inside] + 0.5).astype(np.intp).T
+        values[inside] = self.array[k, j, i]
+        return values
+
+    def value_at(self, point: ArrayLike) -> float | None:
+        """Return the value of the voxel that holds the (3,) LPS mm point, or None outside."""
+        value = float(self.values_at(np.reshape(point, (1, 3)))[0])
+        return None if np.isnan(value) else value
+
+    @cached_property
+    def intensity_range(self) -> tuple[float, float]:
+        """The 0.1 and 99.9 percentiles of a regular subsample: where a window may start."""
+        flat = self.array.reshape(-1)
+        step = max(1, flat.size // _SAMPLES)
+        while math.gcd(step, self.array.shape[2]) > 1:  # else the samples would walk down columns
+            step += 1
+        sample = flat[::step]
+        low, high = np.percentile(sample[np.isfinite(sample)], _PERCENTILES)
+        return float(low), float(high)
+
+    @cached_property
+    def checksum(self) -> str:
+        """32 hex digits of the voxels and where they lie; the same for the same scan in another file format.
+
+        Every voxel counts, through one wrapping 64-bit sum for each 64 KiB, and every 64th block of them is
+        hashed as it is; so a change of any one voxel shows, and 1 GB takes well under a second. Positions
+        count to 0.0001 mm.
+        """
+        digest = hashlib.blake2b(digest_size=16)
+        digest.update(f"{self.array.shape}{self.array.dtype.str[1:]}".encode())
+        digest.update((np.round(self.T_scan_voxel, 4) + 0.0).astype("<f8").tobytes())  # + 0.0: no minus zero
+        raw = self.array.reshape(-1).view(np.uint8)
+        whole = raw.size - raw.size % (8 * _BLOCK)
+        blocks = raw[:whole].view("<u8").reshape(-1, _BLOCK)
+        digest.update(blocks.sum(axis=1, dtype=np.uint64).astype("<u8").tobytes())
+        digest.update(np.ascontiguousarray(blocks[::64]).tobytes())
+        digest.update(raw[whole:].tobytes())
+        return digest.hexdigest()
+
+
+def _checked_affine(affine: ArrayLike) -> FloatArray:
+    matrix = np.array(affine, dtype=np.float64)
+    if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        raise GeometryError(f"T_scan_voxel must be a finite (4, 4) matrix, got shape {matrix.shape}")
+    lengths = np.linalg.norm(matrix[:3, :3], axis=0)
+    if not np.array_equal(matrix[3], [0, 0, 0, 1]) or lengths.min() <= 0:
+        raise GeometryError(
+            f"T_scan_voxel must have three voxel axes and the last row 0 0 0 1, got {matrix.tolist()}"
+        )
+    axes = matrix[:3, :3] / lengths
+    if np.abs(axes.T @ axes - np.eye(3)).max() > 1e-4:
+        raise GeometryError("the voxel axes of T_scan_voxel must be orthogonal; resample the volume first")
+    matrix.setflags(write=False)
+    return matrix
