@@ -1,1 +1,1 @@
-"""Rigid registration: corresponding points (Procrustes), many sets at once (JRMPC), surfaces (ICP)."""
+"""Registration of point sets: Procrustes, JRMPC, ICP."""

@@ -12,7 +12,7 @@ from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 
-__all__ = ["RigidFit", "fit_rigid", "weighted_procrustes"]
+__all__ = ["RigidFit", "align", "fit_rigid", "weighted_procrustes"]
 
 COLLINEAR = 1e-3
 """Width over length below which points count as one line: 1 µm a mm, finer than any touch or voxel."""
@@ -124,7 +124,12 @@ def weighted_procrustes(
         raise GpError(f"source and target must hold as many points, got {len(points)} and {len(aims)}")
     shares = _as_weights(weights, len(points))
     _check_rank(points, aims, shares, _as_names(names, len(points)))
-    shares = shares / shares.sum()
+    return align(points, aims, shares)
+
+
+def align(points: FloatArray, aims: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Do what `weighted_procrustes` does, for points already known to be sound and not on one line."""
+    shares = weights / weights.sum()
     point_centre, aim_centre = shares @ points, shares @ aims
     covariance = (aims - aim_centre).T @ (shares[:, None] * (points - point_centre))
     rotation = _nearest_rotation(covariance)
@@ -139,7 +144,8 @@ def _nearest_rotation(covariance: FloatArray) -> FloatArray:
             "source and target do not determine a rotation: many fit equally well",
             remedy="Check that the points correspond and that neither list is a mirror image of the other.",
         )
-    rotation: FloatArray = left @ np.diag([1.0, 1.0, sign]) @ right
+    left[:, 2] *= sign
+    rotation: FloatArray = left @ right
     return rotation
 
 
@@ -160,7 +166,7 @@ def _check_rank(points: FloatArray, aims: FloatArray, weights: FloatArray, names
 
 
 def _is_line(points: FloatArray, weights: FloatArray) -> bool:
-    centred = points - np.average(points, axis=0, weights=weights)
+    centred = points - weights @ points / weights.sum()
     length, width = np.linalg.svd(np.sqrt(weights)[:, None] * centred, compute_uv=False)[:2]
     # Coincident points leave rounding only, as wide as long: hold them against the coordinates too.
     rounding = 1e-13 * float(np.sqrt(weights.sum())) * float(np.abs(points).max())
