@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FrameError
 
-__all__ = ["FRAMES", "RigidTransform", "mirror_x"]
+__all__ = ["FRAMES", "RigidTransform", "cross_matrix", "mirror_x"]
 
 FRAMES = ("scan", "tracker", "cochlea", "window", "atlas")
 
@@ -85,7 +85,10 @@ class RigidTransform:
 
     def apply(self, points: ArrayLike) -> FloatArray:
         """Move (N, 3) points from `src` to `dst`; rows of NaN (missing) stay missing."""
-        return as_points(points, "points", missing_allowed=True) @ self.rotation.T + self.translation
+        moved: FloatArray = (
+            as_points(points, "points", missing_allowed=True) @ self.rotation.T + self.translation
+        )
+        return moved
 
     def apply_vector(self, vectors: ArrayLike) -> FloatArray:
         """Turn vectors (..., 3) from `src` to `dst`."""
@@ -118,3 +121,9 @@ class RigidTransform:
 def mirror_x(points: ArrayLike) -> FloatArray:
     """Mirror (N, 3) points in x: the explicit step between the right side and the stored left."""
     return as_points(points, "points", missing_allowed=True) * np.array([-1.0, 1.0, 1.0])
+
+
+def cross_matrix(vector: FloatArray) -> FloatArray:
+    """Return the (3, 3) matrix that maps v to ``vector × v``."""
+    x, y, z = vector.tolist()
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

@@ -1,0 +1,1 @@
+"""The atlas, and the poses estimated with it."""

@@ -11,11 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.landmarks.anatomy import cochlea_origin
 from gp_core.landmarks.features import CODES, check_codes
+from gp_core.landmarks.files import write_text
 
 __all__ = ["DEFINING", "SCHEMA_VERSION", "Atlas"]
 
@@ -39,7 +41,9 @@ class Atlas:
         Features, in the table's order.
     mean : (n, 3) array, mm, atlas frame
     covariance : (3 n, 3 n) array, mm^2, atlas frame
-        Of the deviations of all coordinates, feature by feature.
+        Of the deviations of all coordinates, feature by feature; of full rank, fit for weights.
+    scatter : (3 n, 3 n) array, mm^2
+        The sample covariance as it was measured: unbiased, so fit for error bars, but hardly of full rank.
     n_samples : int
         Number of labelled sides behind it.
     specimens : tuple of str
@@ -55,6 +59,7 @@ class Atlas:
     codes: tuple[str, ...]
     mean: FloatArray
     covariance: FloatArray
+    scatter: FloatArray
     n_samples: int
     specimens: tuple[str, ...] = field(default=())
 
@@ -63,18 +68,18 @@ class Atlas:
         missing = [code for code in DEFINING if code not in codes]
         if missing:
             raise FeatureError(f"the atlas {self.name!r} lacks {' '.join(missing)}, which define the cochlea")
-        mean = np.array(self.mean, dtype=np.float64)
-        covariance = np.array(self.covariance, dtype=np.float64)
-        n = len(codes)
-        if mean.shape != (n, 3) or covariance.shape != (3 * n, 3 * n):
-            raise GpError(f"{n} features need a mean of ({n}, 3), got {mean.shape} and {covariance.shape}")
-        if not (np.isfinite(mean).all() and np.isfinite(covariance).all()):
-            raise GpError(f"the atlas {self.name!r} holds values that are not finite")
-        mean.setflags(write=False)
-        covariance.setflags(write=False)
         object.__setattr__(self, "codes", codes)
-        object.__setattr__(self, "mean", mean)
-        object.__setattr__(self, "covariance", covariance)
+        n = len(codes)
+        self._freeze("mean", self.mean, (n, 3))
+        self._freeze("covariance", self.covariance, (3 * n, 3 * n))
+        self._freeze("scatter", self.scatter, (3 * n, 3 * n))
+
+    def _freeze(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
+        array = np.array(value, dtype=np.float64)
+        if array.shape != shape or not np.isfinite(array).all():
+            raise GpError(f"the {name} of atlas {self.name!r} must be finite and {shape}, got {array.shape}")
+        array.setflags(write=False)
+        object.__setattr__(self, name, array)
 
     @staticmethod
     def published() -> Atlas:
@@ -115,6 +120,7 @@ class Atlas:
                 codes=tuple(content["features"]),
                 mean=content["mean_mm"],
                 covariance=content["covariance_mm2"],
+                scatter=content["scatter_mm2"],
                 n_samples=int(content["n_samples"]),
                 specimens=tuple(str(name) for name in content["specimens"]),
             )
@@ -134,14 +140,16 @@ class Atlas:
             "features": list(self.codes),
             "mean_mm": self.mean.tolist(),
             "covariance_mm2": self.covariance.tolist(),
+            "scatter_mm2": self.scatter.tolist(),
         }
-        Path(path).write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+        write_text(path, json.dumps(content, indent=1) + "\n")
 
     def __getitem__(self, code: str) -> FloatArray:
         """Return the mean position (3,) of a feature, of CO too, in mm."""
         if code == "CO":
             return self.cochlea_origin
-        return self.mean[self._row(code)]
+        position: FloatArray = self.mean[self._row(code)]
+        return position
 
     @cached_property
     def cochlea_origin(self) -> FloatArray:
@@ -152,11 +160,18 @@ class Atlas:
         """Return the mean positions (n, 3) of features, mm."""
         return self.mean[[self._row(code) for code in codes]]
 
+    def variances(self, codes: Iterable[str]) -> FloatArray:
+        """Return the variance (n,) of features between animals, mean of the three coordinates, mm^2."""
+        diagonal = self.covariance.diagonal()[self.coordinates(codes)]
+        mean: FloatArray = diagonal.reshape(-1, 3).mean(axis=1)
+        return mean
+
     def cross_covariance(self, codes: Iterable[str], others: Iterable[str]) -> FloatArray:
         """Return the covariance (3 n, 3 m) between the coordinates of two lists of features, mm^2."""
-        return self.covariance[np.ix_(self._coordinates(codes), self._coordinates(others))]
+        return self.covariance[np.ix_(self.coordinates(codes), self.coordinates(others))]
 
-    def _coordinates(self, codes: Iterable[str]) -> list[int]:
+    def coordinates(self, codes: Iterable[str]) -> list[int]:
+        """Return the rows of `covariance` that belong to features, three each."""
         return [3 * self._row(code) + c for code in codes for c in range(3)]
 
     def _row(self, code: str) -> int:

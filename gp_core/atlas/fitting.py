@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import DEFINING, Atlas
 from gp_core.checks import FloatArray
@@ -61,11 +62,14 @@ def fit_atlas(
     codes = _choose(shapes, features)
     rows = [CODES.index(code) for code in codes]
     mean, aligned = _generalised_procrustes(shapes[:, rows], codes, owners)
+    animals = [i for i, specimen in enumerate(specimens) for _ in specimen.sides]
+    scatter, covariance = _covariances(aligned - mean, animals)
     return Atlas(
         name=name or f"{len(specimens)} specimens",
         codes=codes,
         mean=mean,
-        covariance=_shrunk_covariance(aligned - mean),
+        covariance=covariance,
+        scatter=scatter,
         n_samples=len(shapes),
         specimens=tuple(specimen.name for specimen in specimens),
     )
@@ -115,7 +119,7 @@ def _generalised_procrustes(
     shapes: FloatArray, codes: tuple[str, ...], owners: list[str]
 ) -> tuple[FloatArray, FloatArray]:
     """Align the shapes (S, n, 3) to their mean; return it (n, 3) in its own CO frame, and them."""
-    placed = np.isfinite(shapes).all(axis=2)
+    placed = ~np.isnan(shapes[:, :, 0])
     mean = shapes[int(np.argmax(placed.sum(axis=1)))]
     mean = _complete_start(mean, shapes, placed)
     weights = np.ones(len(codes))
@@ -137,7 +141,7 @@ def _generalised_procrustes(
     return T_cochlea_mean.apply(mean), np.array(turned)
 
 
-def _complete_start(mean: FloatArray, shapes: FloatArray, placed: FloatArray) -> FloatArray:
+def _complete_start(mean: FloatArray, shapes: FloatArray, placed: NDArray[np.bool_]) -> FloatArray:
     """Fill features that the first shape lacks from the shapes that have them, aligned to it."""
     start = mean.copy()
     for row in np.flatnonzero(np.isnan(mean).any(axis=1)):
@@ -150,7 +154,7 @@ def _complete_start(mean: FloatArray, shapes: FloatArray, placed: FloatArray) ->
 
 def _align(
     shape: FloatArray,
-    placed: FloatArray,
+    placed: NDArray[np.bool_],
     mean: FloatArray,
     weights: FloatArray,
     owner: str,
@@ -168,27 +172,36 @@ def _as_landmarks(points: FloatArray, codes: tuple[str, ...]) -> LandmarkSet:
     return LandmarkSet.from_mapping(dict(zip(codes, points, strict=True)), Side.LEFT, frame="mean")
 
 
-def _shrunk_covariance(deviations: FloatArray) -> FloatArray:
-    """Return the shrunk covariance (3 n, 3 n) of deviations (S, n, 3) with NaN for missing features."""
+def _covariances(deviations: FloatArray, animals: Sequence[int]) -> tuple[FloatArray, FloatArray]:
+    """Return the sample covariance (3 n, 3 n) of deviations (S, n, 3), and the same shrunk.
+
+    NaN marks missing features; `animals` (S,) says whose sides they are: the two sides of an animal are
+    alike, so animals, not sides, are what the shrinkage counts as independent.
+    """
     flat = deviations.reshape(len(deviations), -1)
     known = np.isfinite(flat).astype(np.float64)
     filled = np.nan_to_num(flat)
-    pairs = known.T @ known
-    raw = filled.T @ filled / np.maximum(pairs - 1, 1)
-    target = per_feature_covariance(raw) + _LABELLING_SD_MM**2 / 10 * np.eye(len(raw))
-    intensity = _shrinkage(filled, raw, target, pairs)
-    return _positive((1 - intensity) * raw + intensity * target)
+    scatter = filled.T @ filled / np.maximum(known.T @ known - 1, 1)
+    floor = _LABELLING_SD_MM**2 / 10 * np.eye(len(scatter))
+    target = per_feature_covariance(scatter) + floor
+    intensity = _shrinkage(filled / np.sqrt(target.diagonal()), np.asarray(animals))
+    return _positive(scatter), _positive((1 - intensity) * scatter + intensity * target)
 
 
-def _shrinkage(filled: FloatArray, raw: FloatArray, target: FloatArray, pairs: FloatArray) -> float:
-    """Return the share of the target that minimises the expected squared error of the correlations."""
-    scale = np.sqrt(np.maximum(target.diagonal(), 1e-12))
-    unit = filled / scale
-    correlation = raw / np.outer(scale, scale)
-    count = np.maximum(pairs - 1, 1)
-    spread = (unit**2).T @ (unit**2) / count**2 - correlation**2 / count
-    off = correlation - target / np.outer(scale, scale)
-    return float(np.clip(spread.sum() / (off**2).sum(), 0.05, 1.0))
+def _shrinkage(unit: FloatArray, animals: NDArray[np.intp]) -> float:
+    """Return the share of the target that minimises the expected squared error of the correlations.
+
+    `unit` (S, 3 n): deviations in units of each feature's own SD.
+    """
+    products = np.array(
+        [unit[animals == animal].T @ unit[animals == animal] for animal in np.unique(animals)]
+    )
+    n, sides = len(products), len(unit)
+    mean = products.mean(axis=0)
+    variance = ((products - mean) ** 2).sum(axis=0) * n / (n - 1) / max(sides - 1, 1) ** 2
+    correlation = products.sum(axis=0) / max(sides - 1, 1)
+    off = ~np.eye(len(mean), dtype=bool)
+    return float(np.clip(variance[off].sum() / (correlation[off] ** 2).sum(), 0.0, 1.0))
 
 
 def _positive(covariance: FloatArray) -> FloatArray:

@@ -66,7 +66,7 @@ def register_with_training(
     features: Iterable[str] = TRAINING,
     settings: JrmpcSettings = ESTIMATION,
 ) -> JrmpcResult:
-    """Register touched points (n, 3), given in the RW frame, with the training sides; the probe is the last set."""
+    """Register points touched (n, 3), in the RW frame, with the training sides; the probe is the last set."""
     codes = tuple(features)
     sets = [side.landmarks.array(codes) for side in training]
     return jrmpc(

@@ -2,12 +2,16 @@
 
 Model, in the atlas frame (left side). The point touched at feature j is
 
-    y_j = R (mu_j + s_j + e_j) + t,    s ~ N(0, Sigma),    e_j ~ Student-t(nu, sigma),
+    y_j = R (mu_j + s_j + e_j) + t,    s_j ~ N(0, v_j I),    e_j ~ Student-t(nu, sigma),
 
-where the shape deviation s runs through all features by the atlas covariance Sigma, and the error e_j is each
-touch's own. A Student-t is a Gaussian of variance sigma^2 / w_j whose weight w_j is itself unknown, so a
-mistouch talks itself out of the fit. Expectation conditional maximisation: the weights and sigma from the
-expected squared errors, the pose by a Gauss-Newton step on the likelihood in which the shape is integrated out.
+where s_j is how this animal's feature differs from the mean, with the variance v_j the atlas gives it, and
+e_j is the error of the touch. A Student-t is a Gaussian of variance sigma^2 / w_j whose weight w_j is itself
+unknown, so a mistouch talks itself out of the fit. Expectation conditional maximisation: the weights and
+sigma from the expected squared errors, the pose by a Gauss-Newton step on the likelihood with the shape
+integrated out.
+
+Correlations between features are left out of the weights on purpose: learned from some twenty sides, they
+made the estimates of held-out animals worse (docs/method.md). They do enter the error bars, `robust_pose`.
 
 References
 ----------
@@ -25,7 +29,8 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
-from gp_core.registration.procrustes import weighted_procrustes
+from gp_core.frames import cross_matrix
+from gp_core.registration.procrustes import align, weighted_procrustes
 
 __all__ = [
     "TYPICAL_NOISE_MM",
@@ -36,10 +41,10 @@ __all__ = [
     "quick_misfit",
 ]
 
-TYPICAL_NOISE_MM = 0.1
+TYPICAL_NOISE_MM = 0.05
 """Scale of a careful touch, mm a coordinate, to which the estimate of sigma is drawn."""
 
-_PRIOR_WEIGHT = 4.0
+_PRIOR_WEIGHT = 2.0
 _NU = 4.0
 _MAX_ITERATIONS = 100
 _WEIGHT_TOLERANCE = 3e-3
@@ -57,20 +62,16 @@ class TouchModel:
     codes : tuple of str
         Their features.
     mean : (n, 3) array, mm, atlas frame
-    covariance : (3 n, 3 n) array, mm^2, atlas frame
+    variances : (n,) array, mm^2
+        Between animals, a coordinate.
     noise : float or None
         Scale of the touch errors, mm a coordinate; None: estimated with the pose.
     """
 
     codes: tuple[str, ...]
     mean: FloatArray
-    covariance: FloatArray
+    variances: FloatArray
     noise: float | None = None
-
-    @property
-    def variances(self) -> FloatArray:
-        """(n,) variance of each feature, mean over the coordinates, mm^2."""
-        return self.covariance.diagonal().reshape(-1, 3).sum(axis=1) / 3
 
 
 @dataclass(frozen=True)
@@ -87,8 +88,8 @@ class NamedFit:
         About 1 for an ordinary touch, towards 0 for one that does not fit.
     noise : float
         Scale sigma of the touch errors, mm.
-    precision : (3 n, 3 n) array
-        Inverse of the covariance of `residual` with these weights.
+    precision : (3 n,) array
+        Inverse variance of `residual` with these weights.
     jacobian : (3 n, 6) array
         `motion_jacobian` of the touches.
     misfit : float
@@ -106,6 +107,11 @@ class NamedFit:
     jacobian: FloatArray
     misfit: float
     converged: bool
+
+    @property
+    def touch_variances(self) -> FloatArray:
+        """(3 n,) variance of each touched coordinate, mm^2: a Student-t varies more than its scale says."""
+        return np.repeat(_NU / (_NU - 2) * self.noise**2 / self.weights, 3)
 
 
 def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
@@ -125,8 +131,8 @@ def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     GeometryError
         Fewer than three touches, or touches on one line.
     """
-    everything = np.ones(len(touches))
-    fit = _fit_from(model, touches, everything)
+    weighted_procrustes(model.mean, touches, names=model.codes)  # for its guards; below, none are needed
+    fit = _fit_from(model, touches, np.ones(len(touches)))
     if fit.weights.min() > _DOUBTFUL_WEIGHT or len(touches) == 3:
         return fit
     others = [_fit_from(model, touches, start) for start in _one_left_out(model, touches)]
@@ -140,15 +146,9 @@ def quick_misfit(model: TouchModel, touches: FloatArray) -> float:
     chi-square with 3 n - 6 degrees of freedom where the reading is right.
     """
     noise = (TYPICAL_NOISE_MM if model.noise is None else model.noise) ** 2
-    rotation, translation = weighted_procrustes(model.mean, touches, 1 / (model.variances + noise))
-    local = (touches - translation) @ rotation
-    residual = (local - model.mean).ravel()
-    pulled = _inverse_sum(model.covariance, np.full(len(residual), noise)) @ np.column_stack(
-        [residual, motion_jacobian(local)]
-    )
-    gradient = pulled[:, 1:].T @ residual
-    information = pulled[:, 1:].T @ motion_jacobian(local)
-    return float(residual @ pulled[:, 0] - gradient @ np.linalg.solve(information, gradient))
+    rotation, translation = align(model.mean, touches, 1 / (model.variances + noise))
+    residual = ((touches - translation) @ rotation - model.mean).ravel()
+    return float(residual @ (np.repeat(1 / (model.variances + noise), 3) * residual))
 
 
 def _one_left_out(model: TouchModel, touches: FloatArray) -> Iterator[FloatArray]:
@@ -164,19 +164,20 @@ def _one_left_out(model: TouchModel, touches: FloatArray) -> Iterator[FloatArray
 
 def _fit_from(model: TouchModel, touches: FloatArray, weights: FloatArray) -> NamedFit:
     sigma2 = (TYPICAL_NOISE_MM if model.noise is None else model.noise) ** 2
-    rotation, translation = weighted_procrustes(
-        model.mean, touches, 1 / (model.variances + sigma2 / weights), names=model.codes
-    )
+    rotation, translation = align(model.mean, touches, 1 / (model.variances + sigma2 / weights))
     for iteration in range(_MAX_ITERATIONS + 1):
         local = (touches - translation) @ rotation
         residual = (local - model.mean).ravel()
-        noise = np.repeat(sigma2 / weights, 3)
-        precision = _inverse_sum(model.covariance, noise)
+        noise = sigma2 / weights
+        precision = np.repeat(1 / (model.variances + noise), 3)
         jacobian = motion_jacobian(local)
-        pull = precision @ jacobian
+        pull = precision[:, None] * jacobian
         pose_covariance = np.linalg.inv(jacobian.T @ pull)
         step = pose_covariance @ (residual @ pull)
-        error, spread = _touch_errors(noise, precision, pull, pose_covariance, residual, step)
+        pulled = precision * residual - pull @ step
+        leverage = ((pull @ pose_covariance) * pull).sum(axis=1)
+        error = noise**2 * _over_coordinates(pulled * pulled)
+        spread = 3 * noise - noise**2 * _over_coordinates(precision - leverage)
         updated = (_NU + 3) / (_NU + (error + spread) / sigma2)
         converged = bool(np.abs(updated - weights).max() < _WEIGHT_TOLERANCE)
         if converged or iteration == _MAX_ITERATIONS:
@@ -186,7 +187,7 @@ def _fit_from(model: TouchModel, touches: FloatArray, weights: FloatArray) -> Na
             sigma2 *= (_noise_variance(weights, error + spread) / sigma2) ** _OVER_RELAXATION
         translation = translation + rotation @ step[:3]
         rotation = rotation @ _rotation_from_vector(step[3:])
-    misfit = _misfit(model, precision @ residual, error, sigma2)
+    misfit = _misfit(model, _over_coordinates(pulled * pulled), error, sigma2)
     return NamedFit(
         rotation, translation, residual, weights, sigma2**0.5, precision, jacobian, misfit, converged
     )
@@ -213,25 +214,9 @@ def motion_jacobian(points: FloatArray) -> FloatArray:
     return jacobian.reshape(-1, 6)
 
 
-def _inverse_sum(covariance: FloatArray, noise: FloatArray) -> FloatArray:
-    total = covariance.copy()
-    total.ravel()[:: len(total) + 1] += noise
-    return np.linalg.inv(total)
-
-
-def _touch_errors(
-    noise: FloatArray,
-    precision: FloatArray,
-    pull: FloatArray,
-    pose_covariance: FloatArray,
-    residual: FloatArray,
-    step: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    """Return |E e_j|^2 and the variance of e_j given the touches, (n,) each, mm^2."""
-    expected = noise * (precision @ residual - pull @ step)
-    leverage = ((pull @ pose_covariance) * pull).sum(axis=1)
-    variance = noise - noise * noise * (precision.diagonal() - leverage)
-    return (expected * expected).reshape(-1, 3).sum(axis=1), variance.reshape(-1, 3).sum(axis=1)
+def _over_coordinates(values: FloatArray) -> FloatArray:
+    total: FloatArray = values.reshape(-1, 3).sum(axis=1)
+    return total
 
 
 def _noise_variance(weights: FloatArray, squared_errors: FloatArray) -> float:
@@ -240,7 +225,8 @@ def _noise_variance(weights: FloatArray, squared_errors: FloatArray) -> float:
 
 
 def _misfit(model: TouchModel, pulled: FloatArray, error: FloatArray, sigma2: float) -> float:
-    shape = float(pulled @ model.covariance @ pulled) / 2
+    """Shape and touch errors, each by its own law; `pulled` is |s_j|^2 / v_j^2."""
+    shape = float(model.variances @ pulled) / 2
     touches = (_NU + 3) / 2 * sum(log1p(e / (_NU * sigma2)) for e in error.tolist())
     prior = 0.0
     if model.noise is None:
@@ -251,10 +237,8 @@ def _misfit(model: TouchModel, pulled: FloatArray, error: FloatArray, sigma2: fl
 
 def _rotation_from_vector(vector: FloatArray) -> FloatArray:
     """Rodrigues' formula; also for the tiny turns near convergence."""
-    x, y, z = vector.tolist()
-    square = x * x + y * y + z * z
-    angle = square**0.5
-    across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    first, second = (sin(angle) / angle, (1 - cos(angle)) / square) if angle > 1e-8 else (1.0, 0.5)
+    angle = float(vector @ vector) ** 0.5
+    across = cross_matrix(vector)
+    first, second = (sin(angle) / angle, (1 - cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
     turn: FloatArray = np.eye(3) + first * across + second * (across @ across)
     return turn

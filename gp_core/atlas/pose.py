@@ -6,7 +6,6 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,7 @@ from gp_core.checks import FloatArray, check_option
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.files import check_plausible_size, write_text
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["METHODS", "CochleaPose", "estimate_pose"]
@@ -111,21 +111,23 @@ class CochleaPose:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the pose as JSON."""
-        Path(path).write_text(json.dumps(self.as_dict(), indent=1) + "\n", encoding="utf-8")
+        write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
 
     def save_tfm(self, path: str | PathLike[str]) -> None:
-        """Write ``T_tracker_cochlea`` as an ITK transform file, which 3D Slicer reads too.
+        """Write the pose as an ITK transform file that 3D Slicer shows as cochlea to tracker.
 
-        ITK stores the mapping from the output to the input space, so loading it in Slicer and applying it to
-        a model drawn in cochlea coordinates needs the inverse that Slicer takes itself on reading.
+        By ITK's convention, which Slicer undoes on reading, the file holds the way back: it maps points of
+        the touches' frame into the cochlea frame.
         """
         back = self.transform_to_touches.inverse()
-        numbers = [*back.rotation.ravel(), *back.translation]
+        numbers = " ".join(repr(float(n)) for n in (*back.rotation.ravel(), *back.translation))
         text = (
-            "#Insight Transform File V1.0\n#Transform 0\nTransform: AffineTransform_double_3_3\n"
-            f"Parameters: {' '.join(repr(float(n)) for n in numbers)}\nFixedParameters: 0 0 0\n"
+            "#Insight Transform File V1.0\n"
+            f"# maps {back.src} points to {back.dst} points (mm); Slicer shows the way back\n"
+            "#Transform 0\nTransform: AffineTransform_double_3_3\n"
+            f"Parameters: {numbers}\nFixedParameters: 0 0 0\n"
         )
-        Path(path).write_text(text, encoding="ascii")
+        write_text(path, text)
 
 
 def estimate_pose(
@@ -175,6 +177,7 @@ def estimate_pose(
     landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
+    check_plausible_size(landmarks)
     if method == "jrmpc":
         from gp_core.atlas.jrmpc_pose import estimate_jrmpc  # it makes the result that is defined here
 

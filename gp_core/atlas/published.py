@@ -50,11 +50,13 @@ def build_published_atlas() -> Atlas:
     positions = _refine(_classical_scaling(mean), mean, sd, variances)
     positions = _left_cochlea_frame(positions)
     placed = [i for i, code in enumerate(CODES) if code != "CO"]
+    independent = np.diag(np.repeat(variances[placed], 3))
     return Atlas(
         name="published",
         codes=tuple(CODES[i] for i in placed),
         mean=positions[placed],
-        covariance=np.diag(np.repeat(variances[placed], 3)),
+        covariance=independent,
+        scatter=independent,
         n_samples=_N_SIDES,
     )
 

@@ -20,13 +20,13 @@ from gp_core.atlas.uncertainty import cochlea_jacobian
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GpError
 from gp_core.frames import RigidTransform, mirror_x
-from gp_core.landmarks.anatomy import cochlea_frame
+from gp_core.landmarks.anatomy import axis_frame, cochlea_origin
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["estimate_robust"]
 
-_SUSPECT_WEIGHT = 0.35
+_SUSPECT_WEIGHT = 0.2
 _CLEAR_MISFIT = 12.0
 """How much worse (in -2 log likelihood) another reading must fit before it is out of the question."""
 
@@ -91,7 +91,7 @@ def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -
             f"{': ' + ' '.join(usable) if usable else ''}",
             remedy="Touch more of them.",
         )
-    return TouchModel(usable, atlas.rows(usable), atlas.cross_covariance(usable, usable), probe_noise)
+    return TouchModel(usable, atlas.rows(usable), atlas.variances(usable), probe_noise)
 
 
 def _leftwards(points: FloatArray, side: Side) -> FloatArray:
@@ -99,18 +99,27 @@ def _leftwards(points: FloatArray, side: Side) -> FloatArray:
 
 
 def _defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArray:
-    """Return CA, CB, RWA, RWP (4, 3) of this animal in the atlas frame: the mean of its shape given the touches."""
-    cross = atlas.cross_covariance(DEFINING, model.codes)
-    return atlas.rows(DEFINING) + (cross @ (fit.precision @ fit.residual)).reshape(-1, 3)
+    """Return the expected CA, CB, RWA, RWP (4, 3) of this animal, in the atlas frame."""
+    shape = _shape_of_residual(model, fit) @ fit.residual
+    return atlas.rows(DEFINING) + shape.reshape(-1, 3)
+
+
+def _shape_of_residual(model: TouchModel, fit: NamedFit) -> FloatArray:
+    """Return (12, 3 n): the part of each residual taken as the animal's own shape, at the defining points."""
+    gain = np.zeros((len(DEFINING), 3, len(model.codes), 3))
+    share = model.variances * fit.precision[::3]
+    for row, code in enumerate(DEFINING):
+        if code in model.codes:
+            column = model.codes.index(code)
+            gain[row, :, column] = share[column] * np.eye(3)
+    return gain.reshape(3 * len(DEFINING), -1)
 
 
 def _cochlea_in_touches(defining: FloatArray, fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
     """Return ``T_touches_cochlea`` with x along the modiolar axis on both sides."""
-    placed = _leftwards(defining @ fit.rotation.T + fit.translation, touches.side)
-    points = LandmarkSet.from_mapping(
-        dict(zip(DEFINING, placed, strict=True)), Side.LEFT, frame=touches.frame
-    )
-    return cochlea_frame(points)
+    ca, cb, rwa, rwp = _leftwards(defining @ fit.rotation.T + fit.translation, touches.side)
+    origin = cochlea_origin(ca, cb, rwa, rwp)
+    return axis_frame(origin, ca - cb, (rwa + rwp) / 2 - origin, dst=touches.frame, src="cochlea")
 
 
 def _atlas_in_touches(fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
@@ -123,20 +132,33 @@ def _atlas_in_touches(fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
 def _pose_covariance(
     atlas: Atlas, model: TouchModel, fit: NamedFit, defining: FloatArray, side: Side
 ) -> FloatArray:
-    """Return the (6, 6) covariance of the cochlea frame: what shape and pose leave open, given the touches."""
-    cross = atlas.cross_covariance(DEFINING, model.codes)
-    pull = cross @ fit.precision
-    shape = atlas.cross_covariance(DEFINING, DEFINING) - pull @ cross.T
-    motion = motion_jacobian(defining) - pull @ fit.jacobian
-    pose = np.linalg.inv(fit.jacobian.T @ fit.precision @ fit.jacobian)
+    """Return the (6, 6) covariance of the cochlea frame.
+
+    Near the solution the estimate is linear in the residuals, so its error is a linear map of the animal's
+    shape and of the touch errors. The shape enters with all its correlations as measured: features taken one
+    by one, which is what gives the estimate its weights, would promise too much.
+    """
+    pull = fit.precision[:, None] * fit.jacobian
+    pose_of_residual = np.linalg.solve(fit.jacobian.T @ pull, pull.T)
+    shape_of_residual = _shape_of_residual(model, fit)
+    points_of_residual = (
+        shape_of_residual + (motion_jacobian(defining) - shape_of_residual @ fit.jacobian) @ pose_of_residual
+    )
     to_frame = cochlea_jacobian(*defining)
-    covariance = to_frame @ (shape + motion @ pose @ motion.T) @ to_frame.T
-    turn = np.zeros((6, 6))
-    turn[:3, :3] = turn[3:, 3:] = fit.rotation
-    if side is Side.RIGHT:
-        turn = _MIRROR_POSE @ turn
+    of_touches = to_frame @ points_of_residual
+    of_shape = np.zeros((6, len(atlas.covariance)))
+    of_shape[:, atlas.coordinates(DEFINING)] = to_frame
+    of_shape[:, atlas.coordinates(model.codes)] -= of_touches
+    covariance = of_shape @ atlas.scatter @ of_shape.T + (of_touches * fit.touch_variances) @ of_touches.T
+    turn = _pose_rotation(fit, side)
     in_touches: FloatArray = turn @ covariance @ turn.T
     return (in_touches + in_touches.T) / 2
+
+
+def _pose_rotation(fit: NamedFit, side: Side) -> FloatArray:
+    turn = np.zeros((6, 6))
+    turn[:3, :3] = turn[3:, 3:] = fit.rotation
+    return turn if side is Side.LEFT else _MIRROR_POSE @ turn
 
 
 def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
@@ -159,7 +181,7 @@ def _warnings(
         yield f"the {side.other.word} side fits these points better than the {side.word}: check the side"
     elif other < own + _CLEAR_MISFIT:
         yield (
-            f"these points fit the {side.other.word} side about as well, so a wrong side would not be noticed: "
+            f"these points fit the {side.other.word} side about as well, so a wrong side would pass: "
             "touch one more feature away from their plane"
         )
     if suspects:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gp_core.checks import FloatArray
+from gp_core.frames import cross_matrix
 
 __all__ = ["cochlea_jacobian", "cone_95", "radius_95"]
 
@@ -69,7 +70,7 @@ def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: Float
     along = float((middle - cb) @ x)
     to_window = middle - cb - along * x
     distance = float(np.linalg.norm(to_window))
-    z = np.cross(x, to_window / distance)
+    z = cross_matrix(x) @ to_window / distance
     axis_of_ca = (eye - np.outer(x, x)) / length
     origin_of_ca = (np.outer(x, to_window) + along * eye) @ axis_of_ca
     origin_of_window = np.outer(x, x) / 2
@@ -79,5 +80,5 @@ def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: Float
     nothing = np.zeros((3, 3))
     axis = np.hstack([axis_of_ca, -axis_of_ca, nothing, nothing])
     window = np.hstack([nothing, nothing, eye / 2, eye / 2]) - origin
-    turn = np.cross(x, axis, axisb=0, axisc=0) + np.outer(x, z / distance) @ window
+    turn = cross_matrix(x) @ axis + np.outer(x, z) @ window / distance
     return np.vstack([origin, turn])

@@ -159,12 +159,17 @@ def axis_frame(
     GeometryError
         `towards_y` lies along the axis, or `axis` is zero.
     """
-    x = axis / max(float(np.linalg.norm(axis)), _SMALLEST_MM)
+    x = axis / (_length(axis) or 1.0)
     across = towards_y - (towards_y @ x) * x
-    length = np.linalg.norm(across)
-    if length < _SMALLEST_MM or not np.isclose(x @ x, 1.0):
+    length = _length(across)
+    if length < _SMALLEST_MM or not x.any():
         raise GeometryError(
             f"the points that define the {src} frame lie on one line", remedy="Check their names."
         )
     y = across / length
-    return RigidTransform.from_parts(np.column_stack([x, y, np.cross(x, y)]), origin, dst=dst, src=src)
+    z = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
+    return RigidTransform.from_parts(np.array([x, y, z]).T, origin, dst=dst, src=src)
+
+
+def _length(vector: FloatArray) -> float:
+    return float(np.sqrt(vector @ vector))

@@ -151,7 +151,11 @@ def check_codes(
         if found.count(code) > 1:
             raise FeatureError(f"{name} names {code} twice", landmark=code)
         if code not in permitted:
-            raise FeatureError(f"{name} may not hold {code}; allowed are {' '.join(permitted)}", landmark=code)
+            raise FeatureError(
+                f"{name} may not hold {code}; allowed are {' '.join(permitted)}", landmark=code
+            )
     if len(found) < at_least:
-        raise FeatureError(f"{name} must hold at least {at_least} features, got {len(found)}: {' '.join(found)}")
+        raise FeatureError(
+            f"{name} must hold at least {at_least} features, got {len(found)}: {' '.join(found)}"
+        )
     return found

@@ -95,7 +95,8 @@ class LandmarkSet:
 
     def __getitem__(self, code: str) -> FloatArray:
         """Return the (3,) position of a feature, NaN where it is not placed."""
-        return self.points[index_of(code)]
+        point: FloatArray = self.points[index_of(code)]
+        return point
 
     def __contains__(self, code: object) -> bool:
         """Whether a feature has a position."""
@@ -104,8 +105,8 @@ class LandmarkSet:
     @property
     def placed(self) -> tuple[str, ...]:
         """Codes that have a position, in the table's order."""
-        has_position = np.isfinite(self.points).all(axis=1)
-        return tuple(code for code, has in zip(CODES, has_position, strict=True) if has)
+        missing = np.isnan(self.points[:, 0]).tolist()
+        return tuple(code for code, absent in zip(CODES, missing, strict=True) if not absent)
 
     def status(self, code: str) -> Status:
         """Return how far a feature is."""
@@ -195,7 +196,9 @@ class Specimen:
     def __post_init__(self) -> None:
         for side, landmarks in self.sides.items():
             if landmarks.side is not side:
-                raise GpError(f"the {side.word} side holds {landmarks.side.word} landmarks", specimen=self.name)
+                raise GpError(
+                    f"the {side.word} side holds {landmarks.side.word} landmarks", specimen=self.name
+                )
         object.__setattr__(self, "sides", MappingProxyType(dict(self.sides)))
 
     def side(self, side: Side | str) -> LandmarkSet:

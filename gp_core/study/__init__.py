@@ -1,0 +1,1 @@
+"""The study: leave-one-out, subset search, simulation, physical test, figures."""

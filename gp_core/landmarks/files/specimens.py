@@ -7,6 +7,7 @@ from os import PathLike, fspath
 from pathlib import Path
 
 from gp_core.errors import FeatureError, FileFormatError
+from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.naming import natural_key
 from gp_core.landmarks.files.reading import landmarks_of, read_points, specimen_of
@@ -33,7 +34,7 @@ def load_specimens(
     -------
     list of Specimen
         By name, GP2 before GP10. Files belong together by the specimen in their ``gpLabeler`` object,
-        else by their name without ``_L`` or ``_R``.
+        else by their name without ``_L`` or ``_R``. CO is computed, whatever the file says.
 
     Raises
     ------
@@ -59,7 +60,7 @@ def load_specimens(
                 specimen=name,
                 remedy="Give one file a side, or name the specimens apart.",
             )
-        sides.setdefault(name, {})[landmarks.side] = landmarks
+        sides.setdefault(name, {})[landmarks.side] = with_cochlea_origin(landmarks)
     return [Specimen(name, sides[name]) for name in sorted(sides, key=natural_key)]
 
 

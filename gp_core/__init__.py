@@ -1,0 +1,63 @@
+"""The atlas core of gp-labeler: landmarks of guinea-pig heads, and the pose of a cochlea from a few touches.
+
+Lengths are mm, angles radians, points (N, 3) rows; ``T_dst_src`` maps frame `src` to frame `dst`.
+
+Examples
+--------
+>>> import gp_core
+>>> atlas = gp_core.Atlas.published()
+>>> touched = {code: atlas[code] for code in ("CL", "LLI", "MN", "OS", "RWA", "RWP")}
+>>> gp_core.estimate_pose(touched, "L", atlas).suspects
+()
+"""
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.pose import CochleaPose, estimate_pose
+from gp_core.atlas.quality import Finding, check_specimen
+from gp_core.atlas.shape import predict
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import CODES, EXTERNAL, FEATURES, PROBE, TRAINING, Feature, Side
+from gp_core.landmarks.files import (
+    import_mat,
+    load_specimens,
+    read_landmarks,
+    read_touches,
+    write_markups,
+)
+from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
+from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "CODES",
+    "EXTERNAL",
+    "FEATURES",
+    "PROBE",
+    "TRAINING",
+    "Atlas",
+    "CochleaPose",
+    "Feature",
+    "Finding",
+    "GpError",
+    "JrmpcResult",
+    "JrmpcSettings",
+    "LandmarkSet",
+    "RigidTransform",
+    "Side",
+    "Specimen",
+    "Status",
+    "__version__",
+    "check_specimen",
+    "estimate_pose",
+    "fit_atlas",
+    "import_mat",
+    "jrmpc",
+    "load_specimens",
+    "predict",
+    "read_landmarks",
+    "read_touches",
+    "write_markups",
+]

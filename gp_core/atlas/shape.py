@@ -1,0 +1,149 @@
+"""What an atlas says of a labelled side: where features should be, and which labels look wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.named_fit import NamedFit, TouchModel, fit_named_points, motion_jacobian
+from gp_core.checks import FloatArray
+from gp_core.errors import FeatureError
+from gp_core.frames import mirror_x
+from gp_core.landmarks.anatomy import cochlea_origin
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet
+
+__all__ = ["Departure", "departures", "predict"]
+
+LABELLING_NOISE_MM = 0.1
+"""Scale of a placed label's error: about a voxel, mm a coordinate."""
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How far a labelled point is from where the atlas expects it, given the other points.
+
+    Attributes
+    ----------
+    distance : float
+        mm.
+    mahalanobis : float
+        The same in standard deviations; 4 is about one in 10 000 for a point labelled well.
+    """
+
+    distance: float
+    mahalanobis: float
+
+
+def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Predict every feature that is not placed from those that are.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    landmarks : LandmarkSet
+        At least three placed features that the atlas holds, not on one line, in any frame, mm.
+
+    Returns
+    -------
+    dict of str to (mean (3,), covariance (3, 3))
+        In the frame of the landmarks, mm and mm^2; CO among them where it is not placed.
+
+    Raises
+    ------
+    FeatureError
+        Fewer than three usable features.
+    GeometryError
+        They lie on one line.
+    """
+    known = _known(atlas, landmarks)
+    fit = _fit(atlas, landmarks, known)
+    wanted = tuple(code for code in atlas.codes if code not in known)
+    mean, covariance = _given(atlas, known, fit, wanted)
+    mean, covariance = _to_frame(mean, covariance, fit, landmarks.side)
+    found = {
+        code: (mean[i], covariance[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]) for i, code in enumerate(wanted)
+    }
+    if "CO" not in landmarks:
+        found["CO"] = _predict_origin(landmarks, found)
+    return found
+
+
+def departures(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, Departure]:
+    """Hold every placed feature against where the other ones put it.
+
+    Raises
+    ------
+    FeatureError
+        Fewer than four usable features.
+    """
+    known = _known(atlas, landmarks)
+    if len(known) < 4:
+        raise FeatureError(
+            f"at least four placed features are needed to check one against the rest, got {len(known)}"
+        )
+    return {code: _departure(atlas, landmarks, known, code) for code in known}
+
+
+def _departure(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...], code: str) -> Departure:
+    others = tuple(other for other in known if other != code)
+    fit = _fit(atlas, landmarks, others)
+    mean, covariance = _to_frame(*_given(atlas, others, fit, (code,)), fit, landmarks.side)
+    away = landmarks[code] - mean[0]
+    spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
+    return Departure(float(np.linalg.norm(away)), float(np.sqrt(away @ np.linalg.solve(spread, away))))
+
+
+def _known(atlas: Atlas, landmarks: LandmarkSet) -> tuple[str, ...]:
+    known = tuple(code for code in landmarks.placed if code in atlas.codes)
+    if len(known) < 3:
+        raise FeatureError(
+            f"at least three placed features are needed, got {len(known)}", remedy="Place more of them."
+        )
+    return known
+
+
+def _fit(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...]) -> NamedFit:
+    points = landmarks.array(known)
+    model = TouchModel(known, atlas.rows(known), atlas.variances(known), LABELLING_NOISE_MM)
+    return fit_named_points(model, points if landmarks.side is Side.LEFT else mirror_x(points))
+
+
+def _given(
+    atlas: Atlas, known: tuple[str, ...], fit: NamedFit, wanted: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean (m, 3) and covariance (3 m, 3 m) of other features, given the fitted ones; atlas frame."""
+    noise = np.repeat(fit.noise**2 / fit.weights, 3)
+    precision = np.linalg.inv(atlas.cross_covariance(known, known) + np.diag(noise))
+    jacobian = fit.jacobian
+    information = jacobian.T @ precision @ jacobian
+    shift = np.linalg.solve(information, jacobian.T @ precision @ fit.residual)
+    cross = atlas.cross_covariance(wanted, known) @ precision
+    prior = atlas.rows(wanted)
+    motion = motion_jacobian(prior)
+    mean = prior + (cross @ (fit.residual - jacobian @ shift) + motion @ shift).reshape(-1, 3)
+    lever = motion - cross @ jacobian
+    covariance = atlas.cross_covariance(wanted, wanted) - cross @ atlas.cross_covariance(known, wanted)
+    return mean, covariance + lever @ np.linalg.solve(information, lever.T)
+
+
+def _to_frame(
+    mean: FloatArray, covariance: FloatArray, fit: NamedFit, side: Side
+) -> tuple[FloatArray, FloatArray]:
+    points = mean @ fit.rotation.T + fit.translation
+    turn = np.kron(np.eye(len(mean)), fit.rotation)
+    if side is Side.RIGHT:
+        points = mirror_x(points)
+        turn = np.kron(np.eye(len(mean)), np.diag([-1.0, 1.0, 1.0])) @ turn
+    return points, turn @ covariance @ turn.T
+
+
+def _predict_origin(
+    landmarks: LandmarkSet, found: dict[str, tuple[FloatArray, FloatArray]]
+) -> tuple[FloatArray, FloatArray]:
+    """Return CO of the placed or predicted points that define it, and the spread of the least certain one."""
+    points = [landmarks[code] if code in landmarks else found[code][0] for code in DEFINING]
+    spreads = [found[code][1] for code in DEFINING if code in found] or [np.zeros((3, 3))]
+    return cochlea_origin(*points), max(spreads, key=np.trace)

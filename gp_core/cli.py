@@ -1,0 +1,57 @@
+"""The command line ``gp-core``: thin over the functions at the top of `gp_core`."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+
+from gp_core import __version__
+from gp_core.commands import estimate, labels
+from gp_core.errors import GpError
+
+__all__ = ["main", "make_parser"]
+
+_COMMANDS = (estimate, labels)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser with all commands."""
+    parser = argparse.ArgumentParser(
+        prog="gp-core",
+        description="Atlas of guinea-pig ear landmarks, and cochlea poses from touched points.",
+    )
+    parser.add_argument("--version", action="version", version=f"gp-core {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for module in _COMMANDS:
+        module.add(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Returns
+    -------
+    int
+        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line.
+    """
+    logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
+    args = make_parser().parse_args(arguments)
+    try:
+        status: int = args.run(args)
+    except GpError as error:
+        sys.stderr.write(f"gp-core: {error}\n")
+        return 2
+    except OSError as error:
+        sys.stderr.write(f"gp-core: {error.filename or 'file'}: {error.strerror or error}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("gp-core: stopped\n")
+        return 130
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

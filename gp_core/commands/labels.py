@@ -1,0 +1,116 @@
+"""Commands on labelled animals: ``fit``, ``import-mat`` and ``check``."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.quality import Finding, check_specimen
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_specimens,
+    read_atlas,
+    save_json,
+    say,
+)
+from gp_core.landmarks.files import import_mat, load_specimens
+from gp_core.landmarks.sets import Specimen
+
+__all__ = ["add"]
+
+_HARMLESS = ("missing", "unseen")
+
+
+def add(commands: Subparsers) -> None:
+    """Add the commands."""
+    fit = add_command(
+        commands,
+        "fit",
+        run_fit,
+        summary="fit an atlas to labelled animals",
+        example="gp-core fit labelled/ -o atlas.json",
+    )
+    add_specimens(fit)
+    fit.add_argument("-o", "--output", required=True, metavar="ATLAS", help="atlas file to write (.json)")
+    fit.add_argument("--name", help="name of the atlas, by default the number of animals")
+    mat = add_command(
+        commands,
+        "import-mat",
+        run_import_mat,
+        summary="turn the authors' labelled sets into landmark files",
+        example="gp-core import-mat sets_L.mat sets_R.mat -o labelled/",
+    )
+    mat.add_argument("left", metavar="CC_L.mat", help="sets of the left side, variable cc_L")
+    mat.add_argument("right", metavar="CC_R.mat", help="sets of the right side, variable cc_R")
+    mat.add_argument("-o", "--output", required=True, metavar="DIR", help="folder to write to")
+    check = add_command(
+        commands,
+        "check",
+        run_check,
+        summary="report labels that are missing, doubtful or exchanged",
+        example="gp-core check labelled/GP01_L.mrk.json labelled/GP01_R.mrk.json",
+    )
+    add_specimens(check)
+    check.add_argument("--atlas", nargs="+", default=["published"], metavar="ATLAS", help="as for estimate")
+    add_json(check)
+
+
+def run_fit(args: argparse.Namespace) -> int:
+    """Fit, write, and say what the atlas holds."""
+    specimens = load_specimens(args.specimens)
+    atlas = fit_atlas(specimens, name=args.name)
+    atlas.save(args.output)
+    spread = np.sqrt(atlas.variances(atlas.codes))
+    say(f"Atlas of {len(specimens)} animals, {atlas.n_samples} sides: {args.output}")
+    say("  feature   SD between animals, mm a coordinate")
+    for code, sd in zip(atlas.codes, spread, strict=True):
+        say(f"  {code:<9} {sd:5.2f}")
+    return 0
+
+
+def run_import_mat(args: argparse.Namespace) -> int:
+    """Convert and say what was written."""
+    written = import_mat(args.left, args.right, args.output)
+    say(f"{len(written)} landmark files in {args.output}")
+    return 0
+
+
+def run_check(args: argparse.Namespace) -> int:
+    """Print what there is to look at; status 1 where a label is doubtful."""
+    specimens = load_specimens(args.specimens)
+    atlas, others = read_atlas(args.atlas)
+    report = {s.name: check_specimen(s, _atlas_for(s, atlas, others)) for s in specimens}
+    save_json(args.json, {name: [_as_dict(f) for f in findings] for name, findings in report.items()})
+    for name, findings in report.items():
+        say(f"{name}: {_verdict(findings)}")
+        for finding in findings:
+            mark = " " if finding.kind in _HARMLESS else "!"
+            codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
+            say(f"  {mark} {finding.side.word:<5} {codes:<8} {finding.text}")
+    return int(any(f.kind not in _HARMLESS for findings in report.values() for f in findings))
+
+
+def _atlas_for(specimen: Specimen, atlas: Atlas | None, others: list[Specimen] | None) -> Atlas:
+    """Return the atlas, fitted without the animal that is held against it."""
+    return atlas or fit_atlas([other for other in others or [] if other.name != specimen.name])
+
+
+def _verdict(findings: list[Finding]) -> str:
+    doubtful = sum(f.kind not in _HARMLESS for f in findings)
+    absent = len(findings) - doubtful
+    if not findings:
+        return "all labels placed, none doubtful"
+    return f"{doubtful} to look at, {absent} not placed"
+
+
+def _as_dict(finding: Finding) -> dict[str, Any]:
+    content = asdict(finding)
+    content["side"] = finding.side.value
+    return content

@@ -1,0 +1,96 @@
+"""Options that several commands share, and how commands speak."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.errors import GpError
+from gp_core.landmarks.files import load_specimens, write_text
+from gp_core.landmarks.sets import Specimen
+
+__all__ = [
+    "AtlasSource",
+    "Subparsers",
+    "add_command",
+    "add_json",
+    "add_specimens",
+    "read_atlas",
+    "save_json",
+    "say",
+]
+
+Subparsers = Any
+"""What `argparse.ArgumentParser.add_subparsers` returns; its class is private."""
+
+AtlasSource = tuple[Atlas | None, list[Specimen] | None]
+
+
+def add_command(
+    commands: Subparsers, name: str, run: Callable[[argparse.Namespace], int], *, summary: str, example: str
+) -> argparse.ArgumentParser:
+    """Add a command with its one-line summary and an example to the help."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=summary,
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_specimens(parser: argparse.ArgumentParser) -> None:
+    """Add the labelled animals, one or more paths."""
+    parser.add_argument(
+        "specimens",
+        nargs="+",
+        metavar="SPECIMENS",
+        help="landmark files of labelled animals, or folders of them",
+    )
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json FILE``."""
+    parser.add_argument("--json", metavar="FILE", help="write the full result here")
+
+
+def read_atlas(words: list[str]) -> AtlasSource:
+    """Return the atlas that ``--atlas`` names, or the specimens it is to be fitted to.
+
+    Raises
+    ------
+    GpError
+        A file cannot be read as either.
+    """
+    if words == ["published"]:
+        return Atlas.published(), None
+    if len(words) == 1 and _is_atlas_file(words[0]):
+        return Atlas.load(words[0]), None
+    return None, load_specimens(words)
+
+
+def _is_atlas_file(word: str) -> bool:
+    name = word.lower()
+    return not Path(word).is_dir() and name.endswith(".json") and not name.endswith(".mrk.json")
+
+
+def save_json(path: str | None, content: Any) -> None:
+    """Write a result where ``--json`` was given."""
+    if path is None:
+        return
+    try:
+        write_text(path, json.dumps(content, indent=1) + "\n")
+    except OSError as error:
+        raise GpError(f"cannot be written ({error.strerror})", file=path) from None
+
+
+def say(text: str = "") -> None:
+    """Write a line to the terminal."""
+    sys.stdout.write(text + "\n")
