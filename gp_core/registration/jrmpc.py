@@ -25,6 +25,7 @@ __all__ = ["DEFAULTS", "ESTIMATION", "JrmpcBatch", "JrmpcResult", "JrmpcSettings
 
 _FEWEST_POINTS = 3
 _SIZES = (1e-30, 1e30)
+_LEAST_GAMMA = 1e-12
 _AT_REST = 1e-13
 """Largest relative change of an iteration after which the rest would move nothing beyond 1e-9."""
 _CONVERGED = 1e-6
@@ -67,8 +68,8 @@ class JrmpcSettings:
         count = self.max_iterations
         if not isinstance(count, int | np.integer) or isinstance(count, bool) or count < 1:
             raise GpError(f"max_iterations must be a whole number from 1, got {count!r}")
-        if self.gamma is not None and not _is_number(self.gamma, lambda g: g > 0):
-            raise GpError(f"gamma must be a number above 0, got {self.gamma!r}")
+        if self.gamma is not None and not _is_number(self.gamma, lambda g: g >= _LEAST_GAMMA):
+            raise GpError(f"gamma must be a number from {_LEAST_GAMMA:g}, got {self.gamma!r}")
         if not _is_number(self.epsilon, lambda e: e >= 0):
             raise GpError(f"epsilon must be a number from 0, got {self.epsilon!r}")
 
@@ -256,7 +257,8 @@ def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettin
 class _Problem:
     """B problems as the kernels want them: coordinates in rows, each set about its own centroid.
 
-    `poses` (B, M, 7) and `centres` (B, 5, K) change as the kernels run.
+    `poses` (B, M, 7) and `centres` (B, 5, K) change as the kernels run. All arrays are C-contiguous: any
+    other layout would make numba compile the kernels once more.
     """
 
     points: FloatArray
@@ -297,7 +299,7 @@ class _Problem:
             shift=shift,
             size=size,
             poses=poses,
-            centres=np.concatenate([x, precision, prior * precision**1.5], axis=1),
+            centres=np.ascontiguousarray(np.concatenate([x, precision, prior * precision**1.5], axis=1)),
             beta=gamma / (2.0 * size**2 * (gamma + 1.0)),
             prior=prior,
         )

@@ -9,6 +9,7 @@ keep these loops scalar. Shapes: P points, M sets, K centres. A *piece* is a run
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,9 @@ from gp_core.registration.turns import best_turn, product, write_rotation
 __all__ = ["expect", "maximise", "move", "run_batch"]
 
 IndexArray = NDArray[np.uint64]
+
+# Other threads may run meanwhile; a division by zero gives inf, as in NumPy, and so costs no branch.
+_compiled = partial(njit, nogil=True, error_model="numpy")
 
 # Sums may be reordered in the kernels below; the exponential relies on the order of its additions.
 _SUMS = {"contract", "reassoc", "nsz"}
@@ -56,7 +60,7 @@ _as_bits: Any = intrinsic(_to_bits)
 _from_bits: Any = intrinsic(_to_float)
 
 
-@njit(fastmath=_EXACT, nogil=True)
+@_compiled(fastmath=_EXACT, cache=True)
 def exp_negative(u: float) -> float:
     """Compute exp(u) for u <= 0 to one unit in the last place, without branches; 0 below -708.
 
@@ -82,7 +86,7 @@ def exp_negative(u: float) -> float:
     return value if u >= _LOWEST else 0.0
 
 
-@njit(nogil=True, cache=True)
+@_compiled(cache=True)
 def expect(
     moved: FloatArray,
     pieces: IndexArray,
@@ -122,7 +126,7 @@ def expect(
             _moments(moved, start, pieces[s], pieces[s + np.uint64(1)], centres, table, inverse, moments[s])
 
 
-@njit(fastmath=_EXACT, nogil=True)
+@_compiled(fastmath=_EXACT)
 def _responsibilities(
     moved: FloatArray,
     start: int,
@@ -146,7 +150,7 @@ def _responsibilities(
         inverse[i] = 1.0 / inverse[i]
 
 
-@njit(fastmath=_SUMS, nogil=True)
+@_compiled(fastmath=_SUMS)
 def _moments(
     moved: FloatArray,
     origin: int,
@@ -171,7 +175,7 @@ def _moments(
         out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = s0, s1, s2, s3, s4
 
 
-@njit(nogil=True, cache=True)
+@_compiled(cache=True)
 def maximise(
     moments: FloatArray,
     piece_sets: IndexArray,
@@ -215,7 +219,7 @@ def maximise(
     return max(change, _centre_step(sums, centres, prior, epsilon, size))
 
 
-@njit(nogil=True)
+@_compiled()
 def _gather(moments: FloatArray, piece_sets: IndexArray) -> None:
     """Add the pieces of each set up, in order, into the row of the set."""
     for s in range(1, piece_sets.size):
@@ -226,7 +230,7 @@ def _gather(moments: FloatArray, piece_sets: IndexArray) -> None:
                 moments[j, c, k] = kept * moments[j, c, k] + moments[s, c, k]
 
 
-@njit(nogil=True)
+@_compiled()
 def _pose_step(
     moments: FloatArray,
     j: int,
@@ -260,7 +264,7 @@ def _pose_step(
     return max(angle, math.sqrt(dx * dx + dy * dy + dz * dz) / size)
 
 
-@njit(fastmath=_SUMS, nogil=True)
+@_compiled(fastmath=_SUMS)
 def _weighted_means(
     moments: FloatArray, j: int, centres: FloatArray
 ) -> tuple[float, float, float, float, float, float]:
@@ -281,7 +285,7 @@ def _weighted_means(
     return x / w, y / w, z / w, dx / w, dy / w, dz / w
 
 
-@njit(fastmath=_SUMS, nogil=True)
+@_compiled(fastmath=_SUMS)
 def _covariance(
     moments: FloatArray, j: int, centres: FloatArray, x: float, y: float, z: float, h: FloatArray
 ) -> None:
@@ -310,7 +314,7 @@ def _covariance(
     h[2, 0], h[2, 1], h[2, 2] = zx, zy, zz
 
 
-@njit(fastmath=_SUMS, nogil=True)
+@_compiled(fastmath=_SUMS)
 def _add_set(moments: FloatArray, j: int, motion: FloatArray, centres: FloatArray, sums: FloatArray) -> None:
     """Add what one set gives to each centre: weight, displacement from the old centre (three), its square.
 
@@ -338,7 +342,7 @@ def _add_set(moments: FloatArray, j: int, motion: FloatArray, centres: FloatArra
         )
 
 
-@njit(nogil=True)
+@_compiled()
 def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: float, size: float) -> float:
     """Move each centre to the mean of its moved points, then set its variance about that mean."""
     floor = (_LEAST_SPREAD * size) ** 2
@@ -359,7 +363,7 @@ def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: f
     return change
 
 
-@njit(fastmath=_EXACT, nogil=True, cache=True)
+@_compiled(fastmath=_EXACT, cache=True)
 def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: FloatArray) -> None:
     """Write the points (3, P) of all sets under their poses (M, 7); set j starts at ``starts[j]``."""
     rotation = np.empty((3, 3))
@@ -371,7 +375,7 @@ def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: Float
                 moved[a, i] = rx * points[0, i] + ry * points[1, i] + rz * points[2, i] + t
 
 
-@njit(nogil=True, cache=True)
+@_compiled(cache=True)
 def run_batch(
     points: FloatArray,
     starts: IndexArray,

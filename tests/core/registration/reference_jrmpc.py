@@ -1,4 +1,4 @@
-"""JRMPC in plain NumPy, written the obvious way: what the compiled version must agree with, and is timed against.
+"""JRMPC in plain NumPy, written the obvious way: the compiled version must agree, and is timed against it.
 
 Follows Evangelidis and Horaud (IEEE TPAMI 2018, https://doi.org/10.1109/TPAMI.2017.2717829), one line of
 algebra per line of code, and holds every (points × centres) table in memory.
@@ -33,7 +33,11 @@ def reference_jrmpc(
 ) -> ReferenceResult:
     """Run every iteration; the arguments are those of `gp_core.registration.jrmpc.jrmpc`."""
     sets = [np.asarray(points, dtype=float) for points in point_sets]
-    x = np.array([points.mean(axis=0) for points in sets]) if centres is None else np.array(centres, dtype=float)
+    x = (
+        np.array([points.mean(axis=0) for points in sets])
+        if centres is None
+        else np.array(centres, dtype=float)
+    )
     n_centres = len(x)
     gamma = 1.0 / n_centres if gamma is None else gamma
     rotations = [np.eye(3) for _ in sets]
@@ -69,7 +73,7 @@ def reference_jrmpc(
 
 
 def _pose(sums: FloatArray, lam: FloatArray, x: FloatArray, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Take the means ``sums / lam`` to `x` with weights ``lam * q``; a centre that nothing reaches has none."""
+    """Take the means ``sums / lam`` to `x` with weights ``lam * q``."""
     means = sums / np.where(lam > 0, lam, 1.0)[:, None]
     weights = lam * q / np.sum(lam * q)
     from_, to = weights @ means, weights @ x
