@@ -1,0 +1,195 @@
+"""Bone as a triangle mesh: the isosurface of a scan, of all of it coarsely or of a box finely.
+
+Long steps let other threads run: VTK's filters release the interpreter while they update, and so do the
+compiled loops.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from threading import Event, Thread
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkCommonCore import vtkSMPTools
+from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
+from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
+
+from gp_core.checks import FloatArray, as_points
+from gp_core.errors import GpError
+from gp_labeler.imaging.islands import kept_triangles
+from gp_labeler.imaging.mesh import Surface, SurfaceHit
+from gp_labeler.imaging.progress import Cancelled, Progress, Report
+from gp_labeler.imaging.threshold import surface_level
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.imaging.vtk_arrays import to_vtk, triangles_of, triple
+
+__all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
+
+OVERVIEW_VOXELS = 256**3
+SMALLEST_PART_MM = 1.0
+"""Ossicles are larger than this across; specks of noise are smaller."""
+
+_CANCEL_POLL_S = 0.02
+
+
+def overview_stride(volume: Volume, n_voxels: int = OVERVIEW_VOXELS) -> int:
+    """Return the stride at which a first look of a volume takes at most about `n_voxels` voxels."""
+    return max(1, int(np.ceil((volume.array.size / n_voxels) ** (1 / 3) - 1e-9)))
+
+
+def box_around(centre: ArrayLike, half_mm: float) -> FloatArray:
+    """Return the (2, 3) corners of a cube around a scan position, mm."""
+    corners: FloatArray = np.asarray(centre, dtype=np.float64) + half_mm * np.array([[-1.0], [1.0]])
+    return corners
+
+
+def extract_isosurface(
+    volume: Volume,
+    threshold: float,
+    *,
+    box: ArrayLike | None = None,
+    stride: int = 1,
+    smallest_mm: float = SMALLEST_PART_MM,
+    largest: int | None = None,
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> Surface:
+    """Mesh the surface where the grey value crosses a threshold.
+
+    Parameters
+    ----------
+    volume : Volume
+        The scan.
+    threshold : float
+        Voxels of this value and above are bone (see `surface_level`).
+    box : (2, 3) array_like, mm, scan frame, optional
+        Opposite corners; only the voxels around this box are meshed.
+    stride : int
+        Take every so many voxels along each axis.
+    smallest_mm : float
+        Drop parts smaller than this across; 0 keeps all.
+    largest : int, optional
+        Keep only so many parts, those of the most triangles.
+    progress : callable, optional
+        Called with the fraction done.
+    cancel : callable, optional
+        Asked now and then, also while VTK works; True stops.
+
+    Returns
+    -------
+    Surface
+        Ready for picking.
+
+    Raises
+    ------
+    GpError
+        No surface at this threshold, or the box lies outside the volume.
+    Cancelled
+        `cancel` said so.
+
+    References
+    ----------
+    Schroeder, Maynard and Geveci 2015, Flying edges, doi:10.1109/LDAV.2015.7348069.
+    """
+    report = Report(progress, cancel)
+    report(0.0)
+    region = _region(volume, box)
+    level = surface_level(threshold, volume.array)
+    mesh = _contour(_image(volume, region, stride), level, report)
+    if volume.is_mirrored:
+        _turn_over(mesh)
+    surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
+    report(0.6)
+    if surface.n_triangles and (smallest_mm > 0 or largest is not None):
+        points, triangles = surface.points, surface.triangles
+        surface = surface.only(kept_triangles(points, triangles, smallest_mm=smallest_mm, largest=largest))
+    if not surface.n_triangles:
+        raise _no_surface(volume, threshold, box)
+    report(0.8)
+    surface.prepare()
+    report(1.0)
+    return surface
+
+
+def _no_surface(volume: Volume, threshold: float, box: ArrayLike | None) -> GpError:
+    low, high = volume.array.min(), volume.array.max()
+    where = "in the volume" if box is None else "in the box"
+    return GpError(
+        f"no surface {where} at threshold {threshold:g}; the volume's values are {low:g} to {high:g}",
+        remedy="Choose another threshold or a larger box.",
+    )
+
+
+def _region(volume: Volume, box: ArrayLike | None) -> FloatArray:
+    """Return the first and last voxel index around a box, within the volume."""
+    last = np.array(volume.size, dtype=np.float64) - 1
+    if box is None:
+        return np.stack([np.zeros(3), last])
+    low, high = as_points(box, "box")
+    corners = np.array([[low, high][c[a]][a] for c in np.ndindex(2, 2, 2) for a in range(3)]).reshape(8, 3)
+    index = volume.scan_to_voxel(corners)
+    region = np.stack([np.floor(index.min(axis=0)).clip(0), np.minimum(np.ceil(index.max(axis=0)), last)])
+    if (region[0] >= region[1]).any():
+        raise GpError(
+            f"the box {np.round(np.asarray(box), 2).tolist()} mm lies outside the volume",
+            remedy="Draw it over the head.",
+        )
+    return region
+
+
+def _image(volume: Volume, region: FloatArray, stride: int) -> vtkImageData:
+    """Wrap (a part of) the voxels as VTK sees them; whole volumes are not copied."""
+    (i0, j0, k0), (i1, j1, k1) = region.astype(int)
+    part = volume.array[k0 : k1 + 1 : stride, j0 : j1 + 1 : stride, i0 : i1 + 1 : stride]
+    image = vtkImageData()
+    image.SetDimensions(part.shape[::-1])
+    image.SetOrigin(triple(volume.voxel_to_scan(region[:1])[0]))
+    image.SetSpacing(triple(np.array(volume.spacing) * stride))
+    image.SetDirectionMatrix(volume.direction.ravel().tolist())
+    image.GetPointData().SetScalars(to_vtk(_vtk_ready(part).ravel(), share=True))
+    return image
+
+
+def _vtk_ready(array: NDArray[Any]) -> NDArray[Any]:
+    """Return the voxels contiguous and of a type that VTK has."""
+    if array.dtype == bool:
+        array = array.astype(np.uint8)
+    elif array.dtype == np.float16:
+        array = array.astype(np.float32)
+    return np.ascontiguousarray(array)
+
+
+def _contour(image: vtkImageData, level: float, report: Report) -> vtkPolyData:
+    """Run flying edges on all cores; another thread watches for the wish to stop."""
+    vtkSMPTools.SetBackend("STDThread")  # the wheel's default is one thread
+    edges = vtkFlyingEdges3D()
+    edges.SetInputData(image)
+    edges.SetValue(0, level)
+    edges.ComputeScalarsOff()
+    done = Event()
+    watch = Thread(target=_stop_when, args=(report.cancel, edges, done), daemon=True)
+    if report.cancel is not None:
+        watch.start()
+    edges.Update()
+    done.set()
+    if report.cancel is not None:
+        watch.join()
+    if edges.GetAbortOutput():
+        raise Cancelled
+    mesh: vtkPolyData = edges.GetOutput()
+    return mesh
+
+
+def _stop_when(cancel: Callable[[], bool], edges: vtkFlyingEdges3D, done: Event) -> None:
+    while not done.wait(_CANCEL_POLL_S):
+        if cancel():
+            edges.SetAbortExecuteAndUpdateTime()
+            return
+
+
+def _turn_over(mesh: vtkPolyData) -> None:
+    """Turn every triangle round: an image whose axes mirror gives them clockwise."""
+    corners = triangles_of(mesh)
+    corners[:, [1, 2]] = corners[:, [2, 1]]

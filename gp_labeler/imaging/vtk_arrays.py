@@ -1,0 +1,71 @@
+"""Between numpy and VTK, with types."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
+from vtkmodules.vtkCommonCore import vtkPoints
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
+from vtkmodules.vtkCommonMath import vtkMatrix4x4
+
+__all__ = ["cells_of", "matrix_of", "points_of", "to_numpy", "to_vtk", "triangles_of", "triple"]
+
+
+def to_numpy(array: Any) -> NDArray[Any]:
+    """Return a view of a VTK data array."""
+    view: NDArray[Any] = vtk_to_numpy(array)  # type: ignore[no-untyped-call]
+    return view
+
+
+def to_vtk(array: NDArray[Any], name: str = "", *, share: bool = False) -> Any:
+    """Return a VTK data array of the values of (N,) or (N, components).
+
+    Parameters
+    ----------
+    array : array
+        Values.
+    name : str
+        Name in VTK.
+    share : bool
+        Use the same memory, which VTK then keeps alive, where the array is contiguous.
+    """
+    made = numpy_to_vtk(np.ascontiguousarray(array), deep=not share)  # type: ignore[no-untyped-call]
+    if name:
+        made.SetName(name)
+    return made
+
+
+def points_of(positions: NDArray[Any]) -> vtkPoints:
+    """Return (N, 3) positions as VTK points."""
+    points = vtkPoints()
+    points.SetData(to_vtk(positions))
+    return points
+
+
+def cells_of(corners: NDArray[Any]) -> vtkCellArray:
+    """Return (M, n) point numbers as cells of n corners."""
+    cells = vtkCellArray()
+    cells.SetData(corners.shape[1], to_vtk(np.asarray(corners, dtype=np.int64).ravel()))
+    return cells
+
+
+def triangles_of(mesh: vtkPolyData) -> NDArray[np.int64]:
+    """Return the (T, 3) point numbers of a mesh of triangles, a view."""
+    corners = to_numpy(mesh.GetPolys().GetConnectivityArray())
+    return corners.reshape(-1, 3)
+
+
+def matrix_of(values: ArrayLike) -> vtkMatrix4x4:
+    """Return a (4, 4) matrix as VTK has them."""
+    matrix = vtkMatrix4x4()
+    matrix.DeepCopy(np.asarray(values, dtype=np.float64).ravel().tolist())
+    return matrix
+
+
+def triple(values: ArrayLike) -> tuple[float, float, float]:
+    """Return three numbers as VTK takes them."""
+    x, y, z = np.asarray(values, dtype=np.float64).tolist()
+    return x, y, z

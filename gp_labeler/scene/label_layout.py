@@ -1,0 +1,88 @@
+"""Where labels go so that they hide neither each other nor the marks."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gp_core.checks import FloatArray
+
+__all__ = ["place_labels"]
+
+_SIDES = np.array([[1, -0.6], [-1, -0.6], [1, 0.6], [-1, 0.6], [0, -1], [0, 1], [1, 0], [-1, 0]])
+"""Directions from a mark in which its label may lie, the preferred first."""
+
+_RINGS = (1.0, 2.6)
+_RELUCTANCE = 0.02
+_MARK_WEIGHT = 0.5
+"""Covering a mark a little is better than covering a word."""
+
+_HIDDEN_ABOVE = 0.35
+"""A label covered more than this is left out rather than drawn into a heap."""
+
+
+def place_labels(
+    anchors: ArrayLike, sizes: ArrayLike, view: tuple[int, int], *, gaps: ArrayLike, ranks: ArrayLike
+) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Place labels beside their marks, one after the other, each where it covers least.
+
+    Parameters
+    ----------
+    anchors : (N, 2) array_like
+        Pixels of the marks.
+    sizes : (N, 2) array_like
+        Width and height of the labels, pixels.
+    view : (2,) tuple of int
+        Width and height of the view.
+    gaps : (N,) array_like
+        Distance between each mark and its label, pixels.
+    ranks : (N,) array_like
+        Labels of a higher rank are placed earlier; one of a positive rank is never left out.
+
+    Returns
+    -------
+    corners : (N, 2) float array
+        Top left corners.
+    shown : (N,) bool array
+        Which labels have room.
+    """
+    marks, size = (np.asarray(a, dtype=np.float64).reshape(-1, 2) for a in (anchors, sizes))
+    gap, rank = np.asarray(gaps, dtype=np.float64), np.asarray(ranks, dtype=np.float64)
+    inside: NDArray[np.bool_] = np.all((marks > 0) & (marks < np.array(view)), axis=1)
+    corners, shown = np.zeros((len(marks), 2)), np.zeros(len(marks), dtype=bool)
+    half = gap[inside, None] / 2
+    taken = np.concatenate([marks[inside] - half, marks[inside] + half], axis=1)
+    weights = np.full(len(taken), _MARK_WEIGHT)
+    for n in np.lexsort((np.arange(len(marks)), -rank)):
+        if not inside[n]:
+            continue
+        boxes = _candidates(marks[n], size[n], gap[n])
+        bad = (_covered(boxes, taken) @ weights + _outside(boxes, view)) / size[n].prod()
+        best = int((bad + _RELUCTANCE * np.arange(len(boxes))).argmin())
+        if bad[best] <= _HIDDEN_ABOVE or rank[n] > 0:
+            corners[n], shown[n] = boxes[best, :2], True
+            taken, weights = np.vstack([taken, boxes[best]]), np.append(weights, 1.0)
+    return corners, shown
+
+
+def _candidates(mark: FloatArray, size: FloatArray, gap: float) -> FloatArray:
+    """Boxes (left, top, right, bottom) around a mark: each side of it, near and then farther off."""
+    sides = np.concatenate([_SIDES] * len(_RINGS))
+    rings = np.repeat(_RINGS, len(_SIDES))[:, None]
+    corner = mark + sides * rings * gap + (np.sign(sides) - 1) / 2 * size
+    return np.concatenate([corner, corner + size], axis=1)
+
+
+def _covered(boxes: FloatArray, taken: FloatArray) -> FloatArray:
+    """(C, T) areas that C boxes share with T others."""
+    low = np.maximum(boxes[:, None, :2], taken[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], taken[None, :, 2:])
+    areas: FloatArray = np.clip(high - low, 0, None).prod(axis=2)
+    return areas
+
+
+def _outside(boxes: FloatArray, view: tuple[int, int]) -> FloatArray:
+    """(C,) areas that lie outside the view."""
+    whole = np.array([[0.0, 0.0, *view]])
+    areas: FloatArray = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1) - _covered(boxes, whole)[:, 0]
+    return areas

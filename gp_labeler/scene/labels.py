@@ -1,0 +1,85 @@
+"""The labels of everything in the 3D view, placed together so that none lies on another."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.camera import Viewpoint
+from gp_labeler.scene.label_layout import place_labels
+from gp_labeler.scene.sprites import SpriteSheet, Text
+from gp_labeler.scene.stage import Stage
+
+__all__ = ["LABEL_PIXELS", "Label", "LabelActor"]
+
+LABEL_PIXELS = 13.0
+"""Font size, logical pixels."""
+
+
+@dataclass(frozen=True, eq=False)
+class Label:
+    """A text beside a point on the screen.
+
+    Parameters
+    ----------
+    text : Text
+        What it says.
+    anchor : (2,) float array
+        The pixel it belongs to.
+    gap : float
+        How far from there it begins, pixels.
+    rank : float
+        Labels of a higher rank are placed earlier; a positive one is never left out.
+    faint : bool
+        Whether what it names is hidden.
+    """
+
+    text: Text
+    anchor: FloatArray
+    gap: float
+    rank: float = 0.0
+    faint: bool = False
+
+
+class LabelActor:
+    """Draws labels.
+
+    Parameters
+    ----------
+    stage : Stage
+        Where to draw.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self._sheet = SpriteSheet(stage.overlay)
+        self._written: tuple[object, ...] = ()
+        self.visible = True
+
+    def refresh(self, view: Viewpoint, labels: Sequence[Label]) -> None:
+        """Draw these labels in place of those before."""
+        shown_labels = list(labels) if self.visible else []
+        self._write(tuple(label.text for label in shown_labels))
+        anchors = np.array([label.anchor for label in shown_labels]).reshape(-1, 2)
+        corners, shown = place_labels(
+            anchors,
+            self._sheet.sizes,
+            view.size,
+            gaps=[label.gap for label in shown_labels],
+            ranks=[label.rank for label in shown_labels],
+        )
+        faint = np.array([label.faint for label in shown_labels], dtype=bool)
+        self._sheet.draw(np.flatnonzero(shown), corners[shown], faint[shown])
+
+    def close(self) -> None:
+        """Let go of the texts."""
+        self._sheet.close()
+
+    def _write(self, texts: tuple[Text, ...]) -> None:
+        wanted = (texts, self._stage.scale, self._stage.colours.halo)
+        if wanted != self._written:
+            self._sheet.write(texts, LABEL_PIXELS * self._stage.scale, self._stage.colours.halo)
+            self._written = wanted

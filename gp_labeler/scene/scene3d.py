@@ -1,0 +1,238 @@
+"""The 3D view: bone, landmarks, ghosts, crosshair, slices, and what lies under a pixel.
+
+Adapters only draw what they are shown; who shows what when is for the view that owns the scene.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
+
+from gp_core.checks import FloatArray
+from gp_labeler.imaging.surface import SurfaceHit
+from gp_labeler.scene.bone import BoneActor
+from gp_labeler.scene.camera import SceneCamera
+from gp_labeler.scene.colours import SceneColours, rgb
+from gp_labeler.scene.furniture import OrientationCube, ScaleBar
+from gp_labeler.scene.gestures import CameraControl
+from gp_labeler.scene.ghosts import GhostActor
+from gp_labeler.scene.labels import LabelActor
+from gp_labeler.scene.marks import MarkActor
+from gp_labeler.scene.segments import CrosshairActor, SegmentActor
+from gp_labeler.scene.slice_planes import SlicePlaneActor
+from gp_labeler.scene.stage import Stage
+from gp_labeler.scene.target import RenderTarget
+
+__all__ = ["Scene3D"]
+
+_EMPTY_BOUNDS = np.array([[-10.0, -10.0, -10.0], [10.0, 10.0, 10.0]])
+_LIGHTS = (((0.35, 0.75, 1.0), 0.84), ((-0.9, 0.1, 0.6), 0.24), ((0.3, -0.9, 0.4), 0.14))
+"""Directions in camera coordinates (right, up, towards the eye) and strengths: from above, with two fills."""
+
+_HIDDEN_SLACK_VOXELS = 2.0
+_FIT_SAMPLES = 20_000
+
+
+class Scene3D:
+    """A 3D scene in a render target.
+
+    Parameters
+    ----------
+    target : RenderTarget
+        Where it is drawn; closed with the scene.
+
+    Attributes
+    ----------
+    bone, marks, ghosts, lines, crosshair, slices : adapters
+        What is drawn; each has ``show(...)``.
+    camera : SceneCamera
+        Where it is seen from.
+    control : CameraControl
+        Takes mouse gestures.
+    """
+
+    def __init__(self, target: RenderTarget) -> None:
+        self.target = target
+        base, overlay = vtkRenderer(), vtkRenderer()
+        self._stage = Stage(base, overlay)
+        overlay.SetLayer(1)
+        overlay.SetActiveCamera(base.GetActiveCamera())
+        overlay.InteractiveOff()
+        target.add(base)
+        target.add(overlay)
+        _light(base)
+        _light(overlay)
+        base.UseFXAAOn()
+        self.camera = SceneCamera(base.GetActiveCamera(), lambda: target.size)
+        self.control = CameraControl(self.camera)
+        self.bone = BoneActor(self._stage)
+        self.slices = SlicePlaneActor(self._stage)
+        self.lines = SegmentActor(self._stage)
+        self.crosshair = CrosshairActor(self._stage)
+        self.ghosts = GhostActor(self._stage)
+        self.marks = MarkActor(self._stage)
+        self.labels = LabelActor(self._stage)
+        self.scale_bar = ScaleBar(self._stage)
+        self.cube = OrientationCube(self._stage)
+        target.add(self.cube.renderer)
+        self.set_colours(self._stage.colours)
+        self.camera.view_from("A")
+        self.camera.fit(_EMPTY_BOUNDS)
+
+    @property
+    def scale(self) -> float:
+        """Device pixels per logical pixel."""
+        return self._stage.scale
+
+    @scale.setter
+    def scale(self, value: float) -> None:
+        self._stage.scale = float(value)
+
+    def set_colours(self, colours: SceneColours) -> None:
+        """Take a theme; lines and ghosts take it when they are shown next."""
+        self._stage.colours = colours
+        base = self._stage.base
+        base.GradientBackgroundOn()
+        base.SetBackground(rgb(colours.bottom))
+        base.SetBackground2(rgb(colours.top))
+        self.bone.recolour()
+        self.cube.recolour()
+
+    def set_ambient_occlusion(self, on: bool) -> None:
+        """Darken hollows, which shows depth; without a graphics card a frame then takes twice as long."""
+        base, bounds = self._stage.base, self.bounds
+        base.SetUseSSAO(bool(on))
+        size = float(np.linalg.norm(bounds[1] - bounds[0]))
+        base.SetSSAORadius(0.06 * size)
+        base.SetSSAOBias(0.002 * size)
+        base.SetSSAOKernelSize(48)
+        base.SSAOBlurOn()
+
+    @property
+    def bounds(self) -> FloatArray:
+        """(2, 3) lowest and highest coordinates of the bone and the marks, mm."""
+        boxes = [] if self.bone.bounds is None else [self.bone.bounds]
+        if len(self.marks.positions):
+            boxes.append(np.stack([self.marks.positions.min(axis=0), self.marks.positions.max(axis=0)]))
+        if not boxes:
+            return _EMPTY_BOUNDS
+        return np.stack([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+
+    def fit(self) -> None:
+        """Show everything from where the eye looks now."""
+        shown = [
+            surface.points[:: max(1, len(surface.points) // _FIT_SAMPLES)] for surface in self.bone.surfaces
+        ]
+        points = np.concatenate([*shown, self.marks.positions]) if shown else self.marks.positions
+        self.camera.fit(points if len(points) > 1 else _EMPTY_BOUNDS)
+
+    def render(self, *, quick: bool = False) -> None:
+        """Draw one frame.
+
+        Parameters
+        ----------
+        quick : bool
+            The camera is being dragged: draw the coarser stand-in of the bone, where there is one.
+        """
+        self.bone.hurry(quick)
+        self._set_clipping()
+        view = self.camera.viewpoint()
+        labels = self.marks.refresh(view, self.hidden(self.marks.positions))
+        self.labels.refresh(view, labels + self.ghosts.refresh(view))
+        self.scale_bar.refresh(view, self.camera)
+        self.cube.refresh(view, self.camera)
+        self.target.render()
+
+    def image(self, width: int | None = None, height: int | None = None) -> NDArray[np.uint8]:
+        """Draw a frame, of another size where given, and return it, (h, w, 3)."""
+        before = self.target.size
+        self.target.resize(width or before[0], height or before[1])
+        self.render()
+        pixels = self.target.pixels()
+        self.target.resize(*before)
+        return pixels
+
+    def pick(self, x: float, y: float) -> SurfaceHit | None:
+        """Return the point of the bone seen at a pixel, or None where there is none."""
+        self._set_clipping()
+        return self.bone.pick(*self._viewpoint_ray(x, y))
+
+    def display_of(self, points: ArrayLike) -> FloatArray:
+        """Return the (N, 2) pixels of (N, 3) scan positions, seen or not; `pick` there finds them again."""
+        return self.camera.viewpoint().display(points)[:, :2]
+
+    def hidden(self, points: ArrayLike) -> NDArray[np.bool_]:
+        """Return which of (N, 3) scan positions lie behind bone; those on its near surface do not."""
+        scan = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+        slack = _HIDDEN_SLACK_VOXELS * max((s.voxel_mm for s in self.bone.surfaces), default=0.0)
+        if not slack or not len(scan):
+            return np.zeros(len(scan), dtype=bool)
+        view = self.camera.viewpoint()
+        display = view.display(scan)
+        near = view.scan(np.column_stack([display[:, :2], np.full(len(scan), -1.0)]))
+        towards = near - scan
+        distance = np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
+        ends = scan + towards / distance * np.minimum(slack, distance)
+        return np.array([self.bone.blocks(eye, end) for eye, end in zip(near, ends, strict=True)], dtype=bool)
+
+    def mark_at(self, x: float, y: float, within: float = 10.0) -> str | None:
+        """Return the key of the mark nearest to a pixel, seen before hidden, within logical pixels."""
+        marks = self.marks.marks
+        if not marks:
+            return None
+        away = np.linalg.norm(self.display_of(self.marks.positions) - [x, y], axis=1)
+        near = away <= within * self.scale
+        if not near.any():
+            return None
+        rank = away + np.where(self.hidden(self.marks.positions), within * self.scale, 0.0)
+        return marks[int(np.where(near, rank, np.inf).argmin())].key
+
+    def close(self) -> None:
+        """Let go of everything drawn, and of the target."""
+        for adapter in (
+            self.cube,
+            self.scale_bar,
+            self.labels,
+            self.marks,
+            self.ghosts,
+            self.crosshair,
+            self.lines,
+            self.slices,
+            self.bone,
+        ):
+            adapter.close()
+        for renderer in (self._stage.overlay, self._stage.base):
+            renderer.RemoveAllLights()
+            renderer.RemoveAllViewProps()
+        self.target.close()
+
+    def _viewpoint_ray(self, x: float, y: float) -> tuple[FloatArray, FloatArray]:
+        return self.camera.viewpoint().ray(x, y)
+
+    def _set_clipping(self) -> None:
+        """Keep everything between the near and the far plane; both layers share them."""
+        low, high = self._drawn_bounds()
+        margin = 0.05 * float(np.linalg.norm(high - low)) + 1.0
+        box = np.stack([low - margin, high + margin]).T.ravel().tolist()
+        self._stage.base.ResetCameraClippingRange(box)
+
+    def _drawn_bounds(self) -> FloatArray:
+        boxes = [self.bounds, np.stack([self.camera.focus - 5.0, self.camera.focus + 5.0])]
+        for renderer in (self._stage.base, self._stage.overlay):
+            drawn = np.array(renderer.ComputeVisiblePropBounds()).reshape(3, 2).T
+            if (drawn[0] <= drawn[1]).all():
+                boxes.append(drawn)
+        return np.stack([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+
+
+def _light(renderer: vtkRenderer) -> None:
+    """Light from above and beside the eye, moving with it, so that form shows from everywhere."""
+    renderer.AutomaticLightCreationOff()
+    for direction, strength in _LIGHTS:
+        light = vtkLight()
+        light.SetLightTypeToCameraLight()
+        light.SetPosition(direction)
+        light.SetFocalPoint(0, 0, 0)
+        light.SetIntensity(strength)
+        renderer.AddLight(light)
