@@ -1,7 +1,7 @@
 """Time JRMPC against plain NumPy in the same run, and check that both give the same answer.
 
 Run from the top of a checkout: ``python benchmarks/jrmpc.py``. The problems are made here, as large as those
-of the study (11 sets, 10 of 16 points and one of 6) and of four scans of one surface (1200 points, 580 centres).
+of the study (10 sets of 16 points and one of 6) and as four scans of one surface (1200 points, 580 centres).
 """
 
 from __future__ import annotations
