@@ -1,0 +1,205 @@
+"""The cochlea of a phantom: bony capsule, coiled duct, modiolus, and its two windows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_labeler.imaging.phantom import grey
+from gp_labeler.imaging.phantom.canvas import Canvas
+from gp_labeler.imaging.phantom.layout import Ear, unit
+from gp_labeler.imaging.phantom.rim import Rim
+from gp_labeler.imaging.phantom.solids import Grid, Solid, Values, cone, ellipsoid, implicit, sheet, tube, union
+
+__all__ = ["Cochlea"]
+
+_CAP = 0.4
+_WALL = 0.34
+_LIP = 0.2
+_TURNS = (0.0, 1.0, 2.0, 3.0, 3.6)
+_RISE = (0.13, 0.41, 0.64, 0.83, 0.915)
+"""Height of the middle of the duct after so many turns, as a share of CB-CA."""
+
+_DUCT = (0.5, 0.44, 0.37, 0.31, 0.26)
+_DENT_MM = 0.5
+
+
+@dataclass(frozen=True)
+class Cochlea:
+    """The cochlea of one ear, built on CA, CB, CC, CL and the rims of both windows."""
+
+    ear: Ear
+
+    @cached_property
+    def axis(self) -> FloatArray:
+        """(3,) unit vector from CB to CA."""
+        return unit(self.ear["CA"] - self.ear["CB"])
+
+    @cached_property
+    def length(self) -> float:
+        """CB to CA, mm."""
+        return float(np.linalg.norm(self.ear["CA"] - self.ear["CB"]))
+
+    @cached_property
+    def across(self) -> FloatArray:
+        """(2, 3) unit vectors perpendicular to the axis: to the round window, and on along the basal turn."""
+        window = (self.ear["RWA"] + self.ear["RWP"]) / 2 - self.ear["CO"]
+        first = unit(window - (window @ self.axis) * self.axis)
+        return np.stack([first, -self.ear.sign * np.cross(self.axis, first)])
+
+    def _polar(self, code: str) -> tuple[float, float, FloatArray]:
+        """Return height above CB, distance from the axis (mm) and the direction outward (3,) of a landmark."""
+        offset = self.ear[code] - self.ear["CB"]
+        height = float(offset @ self.axis)
+        radial = offset - height * self.axis
+        return height, float(np.linalg.norm(radial)), unit(radial)
+
+    @cached_property
+    def round_window(self) -> Rim:
+        """The rim of the round window, through RWA, RWM, RWP and RWL."""
+        points = [self.ear[code] for code in ("RWA", "RWM", "RWP", "RWL")]
+        along = points[0] - points[2]
+        outward = np.cross(along, points[3] - points[1])
+        outward *= np.sign(outward @ self.across[0])
+        return Rim.through(points, along=along, outward=outward)
+
+    @cached_property
+    def oval_window(self) -> Rim:
+        """The rim of the oval window, through FPA and FPP; its narrow side is towards the round window."""
+        front, back = self.ear["FPA"], self.ear["FPP"]
+        middle, along = (front + back) / 2, unit(front - back)
+        outward = self.ear["LLI"] - middle
+        outward = unit(outward - (outward @ along) * along)
+        away = np.cross(outward, along)
+        away *= np.sign(away @ (middle - self.round_window.centre))
+        points = [front, middle + 0.42 * away, back, middle - 0.2 * away]
+        return Rim.through(points, along=along, outward=outward)
+
+    def radius(self, heights: FloatArray) -> FloatArray:
+        """Return the outer radius of the capsule at heights (n,) above CB, mm, before it is fitted to CC."""
+        from scipy.interpolate import PchipInterpolator
+
+        cc_height, cc_radius, _ = self._polar("CC")
+        cl_height, cl_radius, _ = self._polar("CL")
+        h = self.length
+        knots = [
+            (-1.4, 1.2),
+            (0.1 * h, 2.15),
+            (np.clip(cl_height, 0.25 * h, 0.4 * h), min(2.05, cl_radius - 0.22)),
+            (np.clip(cc_height, 0.5 * h, 0.72 * h), np.clip(cc_radius, 1.2, 1.5)),
+            (0.94 * h, 0.88),
+            (h + _CAP, 0.0),
+        ]
+        s, r = np.array(knots).T
+        squared = PchipInterpolator(s, r**2)(np.clip(heights, s[0], s[-1]))
+        beyond = np.maximum(heights - s[-1], 0) + np.maximum(s[0] - heights, 0)
+        return np.asarray(np.sqrt(np.maximum(squared, 0)) - beyond)
+
+    def capsule(self) -> Solid:
+        """Return the body of bone around the duct; its surface passes through CC."""
+        height, radius, _ = self._polar("CC")
+        steps = np.linspace(-2.5, self.length + 2.0, 2048)
+        table = self.radius(steps)
+        table = (np.sign(table) * table**2).astype(np.float32)
+        misfit = float(np.interp(height, steps, table)) - radius**2
+        base, cc, axis = self.ear["CB"], self.ear["CC"], self.axis
+
+        def value(grid: Grid) -> Values:
+            x, y, z = (a - np.float32(c) for a, c in zip(grid, base, strict=True))
+            s = np.float32(axis[0]) * x + np.float32(axis[1]) * y + np.float32(axis[2]) * z
+            to_cc = sum((a - np.float32(c)) ** 2 for a, c in zip(grid, cc, strict=True))
+            fit = np.float32(misfit) * np.exp(to_cc / np.float32(-2 * _DENT_MM**2))
+            return x * x + y * y + z * z - s * s - np.interp(s, steps, table).astype(np.float32) + fit
+
+        ends = np.stack([base - 1.5 * axis, self.ear["CA"] + _CAP * axis])
+        return implicit(value, ends.min(axis=0) - 2.4, ends.max(axis=0) + 2.4)
+
+    def duct_line(self, per_turn: int = 32) -> tuple[FloatArray, FloatArray]:
+        """Return the middle (n, 3) of the coiled duct from base to apex, and its radius (n,)."""
+        turns = np.arange(0.08, _TURNS[-1], 1 / per_turn)
+        height = np.interp(turns, _TURNS, _RISE) * self.length
+        thick = np.interp(turns, _TURNS, _DUCT)
+        rho = np.maximum(self.radius(height) - _WALL - thick, 0.1)
+        angle = 2 * np.pi * turns[:, None]
+        line = (
+            self.ear["CB"]
+            + height[:, None] * self.axis
+            + rho[:, None] * (np.cos(angle) * self.across[0] + np.sin(angle) * self.across[1])
+        )
+        start = self.round_window.centre - 0.6 * self.round_window.normal
+        top = self.ear["CA"] - thick[-1] * self.axis  # its round end touches the bony cap at CA
+        return np.concatenate([start[None], line, top[None]]), np.concatenate([[0.5], thick, thick[-1:]])
+
+    def paint_bone(self, canvas: Canvas) -> None:
+        """Paint the capsule with the lips of its windows, the corner CL and the root at CC."""
+        round_window, oval = self.round_window, self.oval_window
+        parts = [
+            self.capsule(),
+            round_window.plug(-1.0, 0.05, grow=2 * _LIP),
+            round_window.ring(_LIP),
+            oval.plug(-1.0, 0.05, grow=2 * _LIP),
+            oval.ring(_LIP),
+            self._corner(),
+        ]
+        canvas.paint(union(parts), grey.BONE)
+
+    def _corner(self) -> Solid:
+        """Return the corner of the basal turn that ends in CL, with the ridge from it to the bulla wall."""
+        cl = self.ear["CL"]
+        _, _, out = self._polar("CL")
+        out = unit(out + 0.35 * self.ear.towards(1, 0, 0))
+        tip = cl - 0.24 * out
+        behind = cl - 0.6 * out
+        wall = self.ear.at((2.8, -0.6, -3.6), (2.8, 1.6, -3.4))
+        ridge = sheet([behind - 0.6 * self.axis, behind + 0.4 * self.axis], wall, 0.22)
+        return union([cone(cl - 1.3 * out, tip, 0.75, 0.24), ridge])
+
+    def paint_inside(self, canvas: Canvas) -> None:
+        """Paint duct, vestibule, nerve canal, modiolus and the open windows."""
+        line, thick = self.duct_line()
+        oval, axis, base = self.oval_window, self.axis, self.ear["CB"]
+        vestibule = oval.centre - 0.85 * oval.normal
+        canvas.paint(union([tube(line, thick), cone(vestibule, line[0], 0.62, 0.4)]), grey.FLUID)
+        self._paint_lamina(canvas, line[1:-1], thick[1:-1])
+        canvas.paint(cone(base + 0.5 * axis, base + 0.7 * self.length * axis, 0.4, 0.2), grey.CANCELLOUS)
+        nerve = np.stack([base - 0.45 * axis, base - 1.2 * axis, self.ear.at((1.6, -2.6, 2.6))])
+        canvas.paint(tube(nerve, (0.45, 0.5, 0.7)), grey.SOFT)
+        canvas.paint(cone(*self._patch(), 0.3), grey.BONE)
+        self.round_window_open(canvas)
+        canvas.paint(oval.plug(-0.9, 0.0), grey.FLUID)
+        canvas.paint(oval.plug(0.0, 0.9, flare=0.3), grey.AIR)
+
+    def _patch(self) -> tuple[FloatArray, FloatArray]:
+        """Return the ends of a rod under CC that keeps the bone there whole."""
+        _, _, out = self._polar("CC")
+        inner = self.ear["CC"] - 0.32 * out
+        return inner - 0.3 * self.axis, inner
+
+    def round_window_open(self, canvas: Canvas) -> None:
+        """Open the round window: fluid within, its thin membrane, air without."""
+        rim = self.round_window
+        canvas.paint(rim.plug(-0.9, 0.0), grey.FLUID)
+        canvas.paint(rim.plug(0.0, 1.2, flare=0.4), grey.AIR)
+
+    def _paint_lamina(self, canvas: Canvas, line: FloatArray, thick: FloatArray) -> None:
+        """Paint the spiral lamina and basilar membrane: a shelf across the duct, thinner than a voxel."""
+        inward = -(line - self.ear["CB"])
+        inward = inward - (inward @ self.axis)[:, None] * self.axis
+        inward /= np.linalg.norm(inward, axis=1, keepdims=True)
+        shelf = sheet(line + 1.1 * thick[:, None] * inward, line, 0.05)
+        canvas.paint(shelf, grey.CANCELLOUS)
+
+    def paint_stapes(self, canvas: Canvas) -> None:
+        """Paint the stapes: its footplate free in the oval window, two limbs and the head."""
+        oval = self.oval_window
+        gap = 0.22
+        canvas.paint(oval.plug(-0.28, -0.02, grow=-gap), grey.BONE)
+        reach = oval.radii[np.argmin(np.abs(oval.angles))] - gap - 0.12
+        head = oval.centre + 0.85 * oval.normal
+        feet = [oval.centre + side * reach * oval.axes[0] - 0.1 * oval.normal for side in (-1, 1)]
+        limbs = [tube([foot, (foot + head) / 2 + 0.35 * (foot - oval.centre), head], 0.12) for foot in feet]
+        canvas.paint(union(limbs), grey.BONE)
+        canvas.paint(ellipsoid(head, 0.17 * np.eye(3)), grey.BONE)

@@ -1,0 +1,149 @@
+"""A synthetic scan of a guinea-pig head with known landmarks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.draw import draw_animal
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.files.markups import write_markups
+from gp_core.landmarks.sets import Specimen
+from gp_labeler.imaging.phantom import grey
+from gp_labeler.imaging.phantom.canvas import Canvas
+from gp_labeler.imaging.phantom.ear import paint_ear
+from gp_labeler.imaging.phantom.jaw import paint_jaw
+from gp_labeler.imaging.phantom.layout import HeadLayout
+from gp_labeler.imaging.phantom.skull import (
+    head_box,
+    paint_arches,
+    paint_skin,
+    paint_skull,
+    paint_upper_teeth,
+)
+from gp_labeler.imaging.volume import Volume
+
+__all__ = ["Phantom", "make_phantom", "write_phantom"]
+
+_SPACINGS_MM = (0.08, 0.5)
+_TILT_DEG = 2.0
+_BLUR_MM = 0.1
+_NOISE = 900.0
+
+
+@dataclass(frozen=True)
+class Phantom:
+    """A synthetic scan and the truth about it.
+
+    Parameters
+    ----------
+    volume : Volume
+        Grey values as of a micro-CT, 16 bit.
+    specimen : Specimen
+        True positions of all 20 features on both sides, frame ``scan``.
+    """
+
+    volume: Volume
+    specimen: Specimen
+
+
+def make_phantom(
+    seed: int = 0,
+    *,
+    spacing: float = 0.2,
+    box: FloatArray | None = None,
+    specimen: Specimen | None = None,
+) -> Phantom:
+    """Make the synthetic scan of a guinea pig drawn from the published atlas.
+
+    Parameters
+    ----------
+    seed : int
+        The animal and the noise; the same seed gives the same voxels.
+    spacing : float
+        Voxel size, mm.
+    box : (2, 3) array, mm, scan frame, optional
+        Make this part only; by default the whole head.
+    specimen : Specimen, optional
+        Make this animal instead of a drawn one: all 20 features on both sides.
+
+    Returns
+    -------
+    Phantom
+
+    Raises
+    ------
+    GpError
+        `spacing` is not between 0.08 and 0.5 mm.
+    FeatureError
+        `specimen` lacks a feature.
+    """
+    if not _SPACINGS_MM[0] <= spacing <= _SPACINGS_MM[1]:
+        raise GpError(f"spacing must be {_SPACINGS_MM[0]} to {_SPACINGS_MM[1]} mm, got {spacing!r}")
+    rng = np.random.default_rng(seed)
+    atlas = Atlas.published()
+    name = f"phantom-{seed}"
+    animal = specimen or draw_animal(atlas, rng=rng, tilt_deg=_TILT_DEG, name=name)
+    head = HeadLayout(animal, atlas)
+    low, high = head_box(head) if box is None else box
+    canvas = Canvas(low, high, spacing, grey.AIR)
+    _paint(canvas, head)
+    voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=_NOISE)
+    notes = (f"synthetic head, seed {seed}: no animal was scanned",)
+    volume = Volume.from_parts(voxels, [spacing] * 3, canvas.origin, name=name, notes=notes)
+    return Phantom(volume, animal)
+
+
+def _paint(canvas: Canvas, head: HeadLayout) -> None:
+    paint_skin(canvas, head)
+    paint_skull(canvas, head)
+    paint_arches(canvas, head)
+    paint_upper_teeth(canvas, head)
+    for ear in head.ears:
+        paint_ear(canvas, ear)
+    paint_jaw(canvas, head)
+
+
+def write_phantom(phantom: Phantom, directory: str | PathLike[str]) -> tuple[Path, Path, Path]:
+    """Write a phantom's volume as NRRD and its true landmarks as landmark JSON, one file a side.
+
+    Returns
+    -------
+    volume, left, right : Path
+        ``<name>.nrrd``, ``<name>_L.mrk.json``, ``<name>_R.mrk.json``.
+
+    Raises
+    ------
+    GpError
+        The folder cannot be written to.
+    """
+    import SimpleITK as sitk
+
+    folder = Path(directory)
+    name = phantom.specimen.name
+    path = folder / f"{name}.nrrd"
+    image = sitk.GetImageFromArray(phantom.volume.array)
+    image.SetSpacing(phantom.volume.spacing)
+    image.SetOrigin(phantom.volume.origin.tolist())
+    image.SetDirection(phantom.volume.direction.ravel().tolist())
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        sitk.WriteImage(image, str(path), useCompression=True)
+    except (OSError, RuntimeError) as error:
+        raise GpError(f"the phantom cannot be written ({error})", file=path) from None
+    about = {
+        "name": path.name,
+        "size": list(phantom.volume.size),
+        "spacing": list(phantom.volume.spacing),
+        "checksum": phantom.volume.checksum,
+    }
+    files = []
+    for side, landmarks in phantom.specimen.sides.items():
+        files.append(folder / f"{name}_{side.value}.mrk.json")
+        write_markups(files[-1], landmarks, specimen=name, volume=about)
+    return path, files[0], files[1]
