@@ -85,9 +85,8 @@ class RigidTransform:
 
     def apply(self, points: ArrayLike) -> FloatArray:
         """Move (N, 3) points from `src` to `dst`; rows of NaN (missing) stay missing."""
-        moved: FloatArray = (
-            as_points(points, "points", missing_allowed=True) @ self.rotation.T + self.translation
-        )
+        moved: FloatArray = as_points(points, "points", missing_allowed=True) @ self.rotation.T
+        moved += self.translation
         return moved
 
     def apply_vector(self, vectors: ArrayLike) -> FloatArray:
@@ -120,7 +119,8 @@ class RigidTransform:
 
 def mirror_x(points: ArrayLike) -> FloatArray:
     """Mirror (N, 3) points in x: the explicit step between the right side and the stored left."""
-    return as_points(points, "points", missing_allowed=True) * np.array([-1.0, 1.0, 1.0])
+    mirrored: FloatArray = as_points(points, "points", missing_allowed=True) * np.array([-1.0, 1.0, 1.0])
+    return mirrored
 
 
 def cross_matrix(vector: FloatArray) -> FloatArray:

@@ -153,9 +153,9 @@ def _touched(touches: LandmarkSet) -> tuple[str, ...]:
 
 
 def _pose_frame(points: FloatArray, frame: str) -> RigidTransform:
-    """Return ``T_touches_cochlea`` of points (20, 3), x from CO to CA on both sides."""
-    origin, apex, *window = (points[index_of(code)] for code in ("CO", "CA", "RWA", "RWP"))
-    return axis_frame(origin, apex - origin, np.mean(window, axis=0) - origin, dst=frame, src="cochlea")
+    """Return ``T_touches_cochlea`` of points (20, 3), x from CB to CA on both sides."""
+    origin, apex, base, *window = (points[index_of(code)] for code in ("CO", "CA", "CB", "RWA", "RWP"))
+    return axis_frame(origin, apex - base, np.mean(window, axis=0) - origin, dst=frame, src="cochlea")
 
 
 def _scatter(frames: Sequence[RigidTransform], mean: RigidTransform) -> FloatArray:

@@ -88,6 +88,8 @@ class NamedFit:
         About 1 for an ordinary touch, towards 0 for one that does not fit.
     noise : float
         Scale sigma of the touch errors, mm.
+    noise_estimated : bool
+        Whether it was found from the touches.
     precision : (3 n,) array
         Inverse variance of `residual` with these weights.
     jacobian : (3 n, 6) array
@@ -103,6 +105,7 @@ class NamedFit:
     residual: FloatArray
     weights: FloatArray
     noise: float
+    noise_estimated: bool
     precision: FloatArray
     jacobian: FloatArray
     misfit: float
@@ -110,8 +113,13 @@ class NamedFit:
 
     @property
     def touch_variances(self) -> FloatArray:
-        """(3 n,) variance of each touched coordinate, mm^2: a Student-t varies more than its scale says."""
-        return np.repeat(_NU / (_NU - 2) * self.noise**2 / self.weights, 3)
+        """(3 n,) variance of each touched coordinate, mm^2.
+
+        A Student-t varies more than its scale says, and a scale found from few touches is itself unsure.
+        """
+        freedom = 3 * len(self.weights) - 6 + _PRIOR_WEIGHT
+        unsure = freedom / (freedom - 2) if self.noise_estimated else 1.0
+        return np.repeat(unsure * _NU / (_NU - 2) * self.noise**2 / self.weights, 3)
 
 
 def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
@@ -189,7 +197,16 @@ def _fit_from(model: TouchModel, touches: FloatArray, weights: FloatArray) -> Na
         rotation = rotation @ _rotation_from_vector(step[3:])
     misfit = _misfit(model, _over_coordinates(pulled * pulled), error, sigma2)
     return NamedFit(
-        rotation, translation, residual, weights, sigma2**0.5, precision, jacobian, misfit, converged
+        rotation=rotation,
+        translation=translation,
+        residual=residual,
+        weights=weights,
+        noise=sigma2**0.5,
+        noise_estimated=model.noise is None,
+        precision=precision,
+        jacobian=jacobian,
+        misfit=misfit,
+        converged=converged,
     )
 
 

@@ -27,6 +27,9 @@ from gp_core.landmarks.sets import LandmarkSet
 __all__ = ["estimate_robust"]
 
 _SUSPECT_WEIGHT = 0.2
+_SUSPECT_SQUARED = 20.0
+"""Squared deviation over its variance; three coordinates exceed it once in 6000 ordinary touches."""
+
 _CLEAR_MISFIT = 12.0
 """How much worse (in -2 log likelihood) another reading must fit before it is out of the question."""
 
@@ -167,42 +170,60 @@ def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
 
 
 def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
-    return tuple(
-        code for code, w in zip(model.codes, fit.weights.tolist(), strict=True) if w < _SUSPECT_WEIGHT
-    )
+    """Name touches that the fit set aside, or that only a most unusual animal would explain."""
+    spread = model.variances + fit.noise**2
+    squared = (fit.residual**2).reshape(-1, 3).sum(axis=1) / spread
+    doubtful = (fit.weights < _SUSPECT_WEIGHT) | (squared > _SUSPECT_SQUARED)
+    return tuple(code for code, is_suspect in zip(model.codes, doubtful, strict=True) if is_suspect)
 
 
 def _warnings(
     model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, suspects: tuple[str, ...]
 ) -> Iterator[str]:
-    own = quick_misfit(model, points)
-    other = quick_misfit(model, mirror_x(points))
-    if other < own - _CLEAR_MISFIT:
-        yield f"the {side.other.word} side fits these points better than the {side.word}: check the side"
-    elif other < own + _CLEAR_MISFIT:
-        yield (
-            f"these points fit the {side.other.word} side about as well, so a wrong side would pass: "
-            "touch one more feature away from their plane"
-        )
+    careful = quick_misfit(model, points)
+    swap = () if careful < _acceptable(model) else tuple(_swaps(model, points))
+    yield from swap or _side_warning(model, points, fit, side, careful)
     if suspects:
         names = " and ".join(suspects)
-        yield f"{names} does not fit the other points: touch it again, or leave it out"
-        yield from _swaps(model, points, own)
+        verb, it = ("does", "it") if len(suspects) == 1 else ("do", "them")
+        yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
     if len(model.codes) < 5 and not suspects:
         yield f"only {len(model.codes)} points: a mistouch cannot be told from an unusual animal"
     if not fit.converged:
         yield "the fit did not settle; check the touches"
 
 
-def _swaps(model: TouchModel, points: FloatArray, own: float) -> Iterator[str]:
+def _side_warning(
+    model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, careful: float
+) -> Iterator[str]:
+    """Say so where the other side would fit as well or better."""
+    mirrored = mirror_x(points)
+    if careful < _acceptable(model):
+        worse = quick_misfit(model, mirrored) - careful
+    else:  # rough touches: only fits that allow for them compare
+        worse = 2 * (fit_named_points(model, mirrored).misfit - fit.misfit)
+    if worse < -_CLEAR_MISFIT:
+        yield f"the {side.other.word} side fits these points better than the {side.word}: check the side"
+    elif worse < _CLEAR_MISFIT:
+        yield (
+            f"these points fit the {side.other.word} side about as well, so a wrong side would pass: "
+            "touch one more feature away from their plane"
+        )
+
+
+def _acceptable(model: TouchModel) -> float:
+    """Return the misfit up to which careful touches of an ordinary animal go."""
+    return _CLEAR_MISFIT + 3 * len(model.codes)
+
+
+def _swaps(model: TouchModel, points: FloatArray) -> Iterator[str]:
     """Name the two features which, exchanged, would explain the touches."""
-    best, pair = own - _CLEAR_MISFIT, None
+    best, pair = _acceptable(model), None
     for i, j in combinations(range(len(points)), 2):
         exchanged = points.copy()
         exchanged[[i, j]] = points[[j, i]]
         misfit = quick_misfit(model, exchanged)
         if misfit < best:
             best, pair = misfit, (model.codes[i], model.codes[j])
-    acceptable = _CLEAR_MISFIT + 3 * len(points)
-    if pair is not None and best < acceptable:
+    if pair is not None:
         yield f"{pair[0]} and {pair[1]} look swapped"
