@@ -28,6 +28,8 @@ from gp_core.landmarks.files import (
 )
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
+from gp_core.study.distances import DistanceTable, distances
+from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
 
 __version__ = "0.1.0"
 
@@ -39,22 +41,26 @@ __all__ = [
     "TRAINING",
     "Atlas",
     "CochleaPose",
+    "DistanceTable",
     "Feature",
     "Finding",
     "GpError",
     "JrmpcResult",
     "JrmpcSettings",
     "LandmarkSet",
+    "LeaveOneOutReport",
     "RigidTransform",
     "Side",
     "Specimen",
     "Status",
     "__version__",
     "check_specimen",
+    "distances",
     "estimate_pose",
     "fit_atlas",
     "import_mat",
     "jrmpc",
+    "leave_one_out",
     "load_specimens",
     "predict",
     "read_landmarks",

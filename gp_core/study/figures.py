@@ -1,0 +1,127 @@
+"""Figures of the study, as matplotlib figures that belong to the caller; nothing global is touched."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import CODES
+from gp_core.study.distances import DistanceTable
+from gp_core.study.leave_one_out import LeaveOneOutReport
+
+__all__ = ["distance_matrix", "error_histograms", "save_figure"]
+
+LEFT, RIGHT = "#2f6f9f", "#e0a458"
+"""Colours of the two sides; told apart in grey print and by colour-blind readers."""
+
+AXIS_ERROR, ORIGIN_ERROR = "Modiolar-axis error (degrees)", "Cochlea-origin error (mm)"
+
+_INK, _FAINT = "#222222", "#d9d9d9"
+_SUFFIXES = (".png", ".pdf", ".svg")
+_DPI = 200
+
+
+def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
+    """Write a figure as PNG, PDF or SVG, by the name's ending.
+
+    Raises
+    ------
+    GpError
+        Another ending, or the file cannot be written.
+    """
+    name = str(path)
+    if not name.lower().endswith(_SUFFIXES):
+        raise GpError("is no kind of figure that can be written", file=path, remedy="Use .png, .pdf or .svg.")
+    try:
+        figure.savefig(name, dpi=_DPI)
+    except OSError as error:
+        raise GpError(f"cannot be written ({error.strerror})", file=path) from None
+
+
+def new_figure(n_rows: int, n_columns: int, size_in: tuple[float, float]) -> tuple[Figure, list[Axes]]:
+    """Return a figure of this size (inches) with a grid of plain axes, row by row."""
+    figure = Figure(figsize=size_in, layout="constrained")
+    axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
+    for ax in axes:
+        ax.spines[["top", "right"]].set_visible(False)
+        ax.spines[["left", "bottom"]].set(color=_INK, linewidth=0.8)
+        ax.tick_params(labelsize=8, color=_INK, labelcolor=_INK, width=0.8, length=3)
+    return figure, axes
+
+
+def label(ax: Axes, letter: str, x: str, y: str) -> None:
+    """Name the axes, and the panel by a bold letter at its upper left."""
+    ax.set_xlabel(x, fontsize=9, color=_INK)
+    ax.set_ylabel(y, fontsize=9, color=_INK)
+    ax.set_title(letter, loc="left", fontsize=10, fontweight="bold", color=_INK)
+
+
+def distance_matrix(table: DistanceTable) -> Figure:
+    """Draw mean and SD of the distances of all pairs as a triangle of cells (Figure 2)."""
+    figure, (ax,) = new_figure(1, 1, (9.2, 8.2))
+    shown = np.tril(np.ones_like(table.mean, dtype=bool), -1)
+    shade = np.where(shown & (table.sd > 0), table.sd, np.nan)
+    norm = LogNorm(0.05, 5.0)
+    image = ax.imshow(shade, cmap="YlGnBu", norm=norm, aspect="equal")
+    for i, j in zip(*np.nonzero(shown & (table.counts > 0)), strict=True):
+        spread = table.sd[i, j]
+        dark = np.isfinite(spread) and norm(spread) > 0.62
+        colour = "white" if dark else _INK
+        ax.text(j, i - 0.17, f"{table.mean[i, j]:.1f}", ha="center", va="center", fontsize=6.5, color=colour)
+        small = f"({spread:.2f})" if spread < 1 else f"({spread:.1f})"
+        if np.isfinite(spread):
+            ax.text(j, i + 0.2, small, ha="center", va="center", fontsize=5.2, color=colour)
+    for row, code in enumerate(CODES):
+        ax.text(row, row, code, ha="center", va="center", fontsize=7.5, fontweight="bold", color=_INK)
+    ax.set_axis_off()
+    bar = figure.colorbar(image, ax=ax, shrink=0.55, pad=0.01, aspect=28)
+    bar.set_label("Standard deviation (mm)", fontsize=9, color=_INK)
+    bar.ax.tick_params(labelsize=8)
+    bar.ax.set_yticks([0.05, 0.1, 0.2, 0.5, 1, 2, 5], ["0.05", "0.1", "0.2", "0.5", "1", "2", "5"])
+    bar.ax.minorticks_off()
+    ax.text(
+        0.98,
+        0.96,
+        f"Distance between features: mean (SD), mm, {table.n_sides} sides",
+        transform=ax.transAxes,
+        ha="right",
+        fontsize=10,
+        color=_INK,
+    )
+    return figure
+
+
+def error_histograms(report: LeaveOneOutReport) -> Figure:
+    """Draw histograms of both errors over the held-out sides (Figure 6 A and B)."""
+    figure, (first, second) = new_figure(1, 2, (7.0, 2.9))
+    sides = np.array([row.side for row in report.rows])
+    _histogram(first, report.errors.e_ma_deg, sides, 1.0)
+    _histogram(second, report.errors.e_co_mm, sides, 0.05)
+    label(first, "A", AXIS_ERROR, "Held-out sides")
+    label(second, "B", ORIGIN_ERROR, "Held-out sides")
+    first.legend(fontsize=8, frameon=False)
+    second.legend(handles=second.lines, fontsize=8, frameon=False)
+    second.set_title(f"method {report.method}, {len(sides)} sides", loc="right", fontsize=8, color=_INK)
+    return figure
+
+
+def _histogram(ax: Axes, values: FloatArray, sides: Any, width: float) -> None:
+    edges: list[float] = (width * np.arange(np.ceil(values.max() / width + 1e-9) + 1)).tolist()
+    parts: Sequence[FloatArray] = [values[sides == "L"], values[sides == "R"]]
+    ax.hist(
+        parts, edges, stacked=True, color=[LEFT, RIGHT], label=["left", "right"], edgecolor="white", lw=0.8
+    )
+    mean, median = float(values.mean()), float(np.median(values))
+    ax.axvline(mean, color=_INK, lw=1.0, label=f"mean {mean:.2g}")
+    ax.axvline(median, color=_INK, lw=1.0, ls="--", label=f"median {median:.2g}")
+    ax.set_xlim(0, edges[-1])
+    ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))

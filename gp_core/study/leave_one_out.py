@@ -1,0 +1,189 @@
+"""Leave-one-out: every labelled side is estimated from the other animals (Figure 6 A and B)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.jrmpc_pose import training_sides
+from gp_core.atlas.pose import METHODS
+from gp_core.checks import FloatArray, check_option
+from gp_core.landmarks.anatomy import round_window_frame, with_cochlea_origin
+from gp_core.landmarks.features import PROBE, TRAINING
+from gp_core.landmarks.sets import Specimen
+from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
+from gp_core.study.scoring import PoseErrors, jrmpc_errors, robust_errors, touched
+from gp_core.study.subsets import check_labels, check_subsets, sides_of
+
+__all__ = ["Folds", "LeaveOneOutReport", "Row", "folds_of", "leave_one_out", "summarise"]
+
+
+@dataclass(frozen=True)
+class Row:
+    """Errors of one held-out side."""
+
+    specimen: str
+    side: str
+    e_co_mm: float
+    e_ma_deg: float
+
+
+@dataclass(frozen=True)
+class LeaveOneOutReport:
+    """Errors of every side, each estimated without its animal.
+
+    Attributes
+    ----------
+    method : str
+        ``jrmpc`` or ``robust``.
+    training, probe : tuple of str
+        The features of the training animals, and those that were touched.
+    settings : JrmpcSettings or None
+        Of ``jrmpc``.
+    rows : tuple of Row
+        Left sides, then right sides.
+    """
+
+    method: str
+    training: tuple[str, ...]
+    probe: tuple[str, ...]
+    settings: JrmpcSettings | None
+    rows: tuple[Row, ...]
+
+    @property
+    def errors(self) -> PoseErrors:
+        """The errors of all rows."""
+        return PoseErrors(
+            np.array([row.e_co_mm for row in self.rows]), np.array([row.e_ma_deg for row in self.rows])
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report as the JSON file holds it."""
+        return {
+            "rows": [asdict(row) for row in self.rows],
+            "summary": summarise(self.errors),
+            "settings": describe(self.method, self.training, self.probe, self.settings),
+        }
+
+
+def describe(
+    method: str, training: Sequence[str], probe: Sequence[str], settings: JrmpcSettings | None
+) -> dict[str, Any]:
+    """Return what a study ran on, as its JSON file holds it."""
+    numbers = {} if settings is None else asdict(settings)
+    return {"method": method, "training": list(training), "probe": list(probe), **numbers}
+
+
+def summarise(errors: PoseErrors) -> dict[str, Any]:
+    """Return mean, median and maximum of both errors, and E_T."""
+    return {
+        **{name: _summary(getattr(errors, name)) for name in ("e_co_mm", "e_ma_deg")},
+        "e_t": errors.e_t,
+    }
+
+
+def _summary(values: FloatArray) -> dict[str, float]:
+    return {
+        "mean": float(values.mean()),
+        "median": float(np.median(values)),
+        "max": float(values.max()),
+    }
+
+
+def leave_one_out(
+    specimens: Sequence[Specimen],
+    *,
+    method: str = "robust",
+    training: Iterable[str] = TRAINING,
+    probe: Iterable[str] = PROBE,
+    settings: JrmpcSettings = ESTIMATION,
+) -> LeaveOneOutReport:
+    """Estimate the cochlea of every labelled side from the other animals, and measure the errors.
+
+    With ``jrmpc`` each side is registered with the same side of the other animals, as in the paper. With
+    ``robust`` the atlas is fitted anew without the animal, neither of its sides, and with both sides of all
+    others.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        At least three animals that have the features on every labelled side.
+    method : {"robust", "jrmpc"}
+    training : iterable of str
+        Features of the training animals, CO may be among them.
+    probe : iterable of str
+        Features touched on the held-out side: external ones among `training`.
+    settings : JrmpcSettings
+        Of ``jrmpc``; not used by ``robust``.
+
+    Raises
+    ------
+    GpError
+        Too few animals, or a feature is missing, not allowed or unknown.
+    """
+    check_option(method, "method", METHODS)
+    features, touches = check_subsets(training, probe)
+    check_labels(specimens, features)
+    groups = sides_of(specimens)
+    if method == "robust":
+        errors = _robust(specimens, features, touches)
+    else:
+        folds = folds_of(specimens)
+        errors = PoseErrors.joined([fold.errors(features, touches, settings) for fold in folds])
+    owners = [(specimens[i].name, side.value) for side, which in groups for i in which]
+    rows = [
+        Row(name, side, float(e_co), float(e_ma))
+        for (name, side), e_co, e_ma in zip(owners, errors.e_co_mm, errors.e_ma_deg, strict=True)
+    ]
+    return LeaveOneOutReport(method, features, touches, settings if method == "jrmpc" else None, tuple(rows))
+
+
+@dataclass(frozen=True)
+class Folds:
+    """The A leave-one-out problems of one side of the head, as JRMPC takes them.
+
+    Attributes
+    ----------
+    cochlea : (A, 20, 3) array, mm
+        Each animal in its own CO frame.
+    window : (A, 20, 3) array, mm
+        Each animal in its own RW frame.
+    """
+
+    cochlea: FloatArray
+    window: FloatArray
+
+    def errors(self, features: Sequence[str], probe: Sequence[str], settings: JrmpcSettings) -> PoseErrors:
+        """Register each animal with all others and return the errors; see `jrmpc_errors`."""
+        animals = np.arange(len(self.cochlea))
+        others = np.array([np.delete(animals, held_out) for held_out in animals])
+        return jrmpc_errors(self.cochlea[others], self.window, self.window, features, probe, settings)
+
+
+def folds_of(specimens: Sequence[Specimen]) -> list[Folds]:
+    """Return the leave-one-out problems of each labelled side."""
+    folds = []
+    for side, _ in sides_of(specimens):
+        labelled = [training.landmarks for training in training_sides(specimens, side)]
+        cochlea = np.array([landmarks.points for landmarks in labelled])
+        window = [round_window_frame(landmarks).inverse().apply(landmarks.points) for landmarks in labelled]
+        folds.append(Folds(cochlea, np.array(window)))
+    return folds
+
+
+def _robust(specimens: Sequence[Specimen], features: tuple[str, ...], probe: tuple[str, ...]) -> PoseErrors:
+    atlases = {
+        held_out.name: fit_atlas([s for s in specimens if s is not held_out], features=features)
+        for held_out in specimens
+    }
+    sides = [(specimens[i], side) for side, which in sides_of(specimens) for i in which]
+    truths = [with_cochlea_origin(specimen.side(side)) for specimen, side in sides]
+    return robust_errors(
+        [atlases[specimen.name] for specimen, _ in sides],
+        [touched(truth, probe) for truth in truths],
+        truths,
+    )

@@ -1,0 +1,128 @@
+"""How far an estimated cochlea is off: the errors of the paper, for both methods."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.robust_pose import estimate_robust
+from gp_core.checks import FloatArray
+from gp_core.landmarks.features import index_of
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.registration.jrmpc import JrmpcSettings, jrmpc_batch
+
+__all__ = ["AXIS_WEIGHT", "PoseErrors", "angle_between_deg", "jrmpc_errors", "robust_errors", "touched"]
+
+AXIS_WEIGHT = 0.2
+"""What a degree of axis error counts beside a millimetre of position error in E_T."""
+
+_CO, _CA = index_of("CO"), index_of("CA")
+
+
+@dataclass(frozen=True)
+class PoseErrors:
+    """Errors of B estimates.
+
+    Attributes
+    ----------
+    e_co_mm : (B,) array
+        Distance between the estimated and the true cochlea origin.
+    e_ma_deg : (B,) array
+        Angle between the estimated and the true modiolar axis.
+    """
+
+    e_co_mm: FloatArray
+    e_ma_deg: FloatArray
+
+    @property
+    def e_t(self) -> float:
+        """Total error E_T, the sum of 0.2 E_MA (degrees) + E_CO (mm)."""
+        return float(np.sum(AXIS_WEIGHT * self.e_ma_deg + self.e_co_mm))
+
+    @classmethod
+    def joined(cls, parts: Sequence[PoseErrors]) -> PoseErrors:
+        """Return the errors of several lists of estimates as one list."""
+        return cls(
+            np.concatenate([part.e_co_mm for part in parts]),
+            np.concatenate([part.e_ma_deg for part in parts]),
+        )
+
+
+def angle_between_deg(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the angles (...,) between vectors (..., 3), in degrees; exact for small angles too."""
+    sine = np.linalg.norm(np.cross(first, second), axis=-1)
+    cosine = np.sum(first * second, axis=-1)
+    angle: FloatArray = np.degrees(np.arctan2(sine, cosine))
+    return angle
+
+
+def jrmpc_errors(
+    training: FloatArray,
+    touches: FloatArray,
+    truth: FloatArray,
+    features: Sequence[str],
+    probe: Sequence[str],
+    settings: JrmpcSettings,
+) -> PoseErrors:
+    """Register touches with training sides by JRMPC and measure the errors in the joint frame.
+
+    The estimate is the mean CO of the training sides after registration, and the direction from it to their
+    mean CA.
+
+    Parameters
+    ----------
+    training : (B, M, 20, 3) array, mm
+        All points of the M training sides, each in its own CO frame, CO at the origin.
+    touches : (B, 20, 3) array, mm
+        What the probe reports, in the RW frame built on it.
+    truth : (B, 20, 3) array, mm
+        The points of the same sides as they are, in the same frame.
+    features, probe : sequence of str
+        Which of the training points and of the touches take part.
+    settings : JrmpcSettings
+        See there.
+    """
+    rows, touched_rows = ([index_of(code) for code in codes] for codes in (features, probe))
+    n_problems, n_sets = training.shape[:2]
+    known = training[:, :, rows].reshape(n_problems, -1, 3)
+    problems = np.concatenate([known, touches[:, touched_rows]], axis=1)
+    result = jrmpc_batch(problems, [len(rows)] * n_sets + [len(touched_rows)], settings)
+    ends = np.concatenate([training[:, :, [_CO, _CA]], truth[:, None, [_CO, _CA]]], axis=1)
+    moved = np.einsum("bmij,bmkj->bmki", result.rotations, ends) + result.translations[:, :, None]
+    origin, apex = moved[:, :-1].mean(axis=1).swapaxes(0, 1)
+    true_origin, true_apex = moved[:, -1].swapaxes(0, 1)
+    return PoseErrors(
+        np.linalg.norm(true_origin - origin, axis=1),
+        angle_between_deg(true_apex - true_origin, apex - origin),
+    )
+
+
+def robust_errors(
+    atlases: Sequence[Atlas], touches: Sequence[LandmarkSet], truths: Sequence[LandmarkSet]
+) -> PoseErrors:
+    """Estimate poses with the robust method, and hold them against the labelled cochleae.
+
+    Parameters
+    ----------
+    atlases : sequence of Atlas
+        Of each estimate; nothing of the animal in question may be in it.
+    touches : sequence of LandmarkSet
+        The touched features and no others; see `touched`.
+    truths : sequence of LandmarkSet
+        The same sides with CO and CA, in the same frame.
+    """
+    origins, axes = [], []
+    for atlas, touch, truth in zip(atlases, touches, truths, strict=True):
+        pose = estimate_robust(touch, atlas)
+        origins.append(pose.origin - truth["CO"])
+        axes.append((pose.axis, truth["CA"] - truth["CO"]))
+    estimated, true = np.array(axes).swapaxes(0, 1)
+    return PoseErrors(np.linalg.norm(origins, axis=1), angle_between_deg(estimated, true))
+
+
+def touched(landmarks: LandmarkSet, probe: Sequence[str]) -> LandmarkSet:
+    """Return a set that holds the probe features only."""
+    return LandmarkSet.from_mapping(landmarks.as_mapping(probe), landmarks.side, frame=landmarks.frame)

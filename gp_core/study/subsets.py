@@ -1,0 +1,76 @@
+"""Which features and which sides take part in a study, checked once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from gp_core.errors import FeatureError, GpError
+from gp_core.landmarks.features import EXTERNAL, Side, check_codes
+from gp_core.landmarks.sets import Specimen
+
+__all__ = ["WINDOW_FEATURES", "check_labels", "check_subsets", "sides_of"]
+
+WINDOW_FEATURES = ("RWA", "RWP", "LLI")
+"""The RW frame, in which touches enter JRMPC, is built on these, whether or not they are probe features."""
+
+_COCHLEA = ("CA", "CB", "RWA", "RWP")
+_FEWEST = 3
+_FEWEST_ANIMALS = 3
+
+
+def check_subsets(training: Iterable[str], probe: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return the training and the probe features as the table spells them.
+
+    Raises
+    ------
+    FeatureError
+        Unknown, doubled, fewer than three, or a probe feature that is internal or not a training feature.
+    """
+    features = check_codes(training, "the training features", at_least=_FEWEST)
+    external = [code for code in EXTERNAL if code in features]
+    return features, check_codes(probe, "the probe features", allowed=external, at_least=_FEWEST)
+
+
+def check_labels(specimens: Sequence[Specimen], codes: Iterable[str]) -> None:
+    """Raise unless there are three animals or more, and all their sides have these features and the cochlea.
+
+    Raises
+    ------
+    GpError
+        Too few animals, two of one name, or a feature is missing (says whose).
+    """
+    names = [specimen.name for specimen in specimens]
+    if len(names) < _FEWEST_ANIMALS:
+        raise GpError(f"a study needs at least {_FEWEST_ANIMALS} labelled animals, got {len(names)}")
+    for name in names:
+        if names.count(name) > 1:
+            raise GpError("two animals have this name", specimen=name, remedy="Name them apart.")
+    needed = dict.fromkeys([*_COCHLEA, *WINDOW_FEATURES, *codes])
+    for specimen in specimens:
+        for side, landmarks in specimen.sides.items():
+            for code in needed:
+                if code != "CO" and code not in landmarks:
+                    raise FeatureError(
+                        f"the {side.word} side has no {code}",
+                        specimen=specimen.name,
+                        landmark=code,
+                        remedy="Label it, or leave the feature or the animal out.",
+                    )
+
+
+def sides_of(specimens: Sequence[Specimen]) -> list[tuple[Side, list[int]]]:
+    """Return for each labelled side which specimens have it, left first.
+
+    Raises
+    ------
+    GpError
+        A side is labelled in fewer than three animals, but in some.
+    """
+    found = [(side, [i for i, s in enumerate(specimens) if side in s.sides]) for side in Side]
+    for side, which in found:
+        if 0 < len(which) < _FEWEST_ANIMALS:
+            raise GpError(
+                f"the {side.word} side is labelled in {len(which)} animals only; a study needs "
+                f"{_FEWEST_ANIMALS} or none"
+            )
+    return [(side, which) for side, which in found if which]

@@ -1,0 +1,77 @@
+"""The commands of the study: what they write, print and refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from study_cases import herd
+
+from gp_core.cli import main
+from gp_core.landmarks.files import landmark_file_name, write_markups
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """Landmark files of four drawn animals."""
+    where = tmp_path_factory.mktemp("herd")
+    for animal in herd(4):
+        for side, landmarks in animal.sides.items():
+            write_markups(where / landmark_file_name(animal.name, side), landmarks, specimen=animal.name)
+    return str(where)
+
+
+def test_distances(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [tmp_path / name for name in ("d.json", "d.csv", "d.png")]
+    options = ["--json", str(files[0]), "--csv", str(files[1]), "--figure", str(files[2])]
+    assert main(["distances", folder, *options]) == 0
+    assert "on 8 sides" in capsys.readouterr().out
+    assert len(json.loads(files[0].read_text())["pairs"]) == 190
+    assert files[1].read_text().startswith("feature_a,feature_b,mean_mm,sd_mm")
+    assert files[2].read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("method", ["jrmpc", "robust"])
+def test_leave_one_out(method: str, folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report, figure = tmp_path / "loo.json", tmp_path / "loo.svg"
+    options = ["--method", method, "--json", str(report), "--figure", str(figure)]
+    assert main(["leave-one-out", folder, *options]) == 0
+    content = json.loads(report.read_text())
+    assert len(content["rows"]) == 8
+    out = capsys.readouterr().out
+    assert f"{content['summary']['e_t']:.2f}" in out
+    assert "D04" in out
+    assert "<svg" in figure.read_text()
+
+
+def test_features_and_settings_reach_the_study(folder: str, tmp_path: Path) -> None:
+    report = tmp_path / "loo.json"
+    options = ["--training", "all", "--probe", "CL,MN", "OS", "--method", "jrmpc"]
+    numbers = ["--settings", "defaults", "--gamma", "0.2", "--max-iterations", "5"]
+    assert main(["leave-one-out", folder, *options, *numbers, "--json", str(report)]) == 0
+    settings = json.loads(report.read_text())["settings"]
+    assert len(settings["training"]) == 20
+    assert settings["probe"] == ["CL", "MN", "OS"]
+    assert settings["max_iterations"] == 5
+    assert settings["gamma"] == 0.2
+    assert settings["epsilon"] == 1e-6
+    assert main(["leave-one-out", folder, "--probe", "all", "--json", str(report)]) == 0
+    assert len(json.loads(report.read_text())["settings"]["probe"]) == 10
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--probe", "CL", "MN", "OX"], "unknown feature 'OX'"),
+        (["--gamma", "-1", "--method", "jrmpc"], "gamma must be a number"),
+        (["--figure", "loo.bmp"], "Use .png, .pdf or .svg"),
+    ],
+)
+def test_bad_options_are_one_line(
+    folder: str, options: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["leave-one-out", folder, *options]) == 2
+    captured = capsys.readouterr().err
+    assert message in captured
+    assert captured.count("\n") == 1
