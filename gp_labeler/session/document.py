@@ -1,0 +1,203 @@
+"""The state of a specimen as the JSON document that is saved and journalled, and back.
+
+What is unknown or still to do has no entry. Numbers keep every bit: Python writes the shortest text that
+reads back as the same float.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
+
+from gp_core.errors import FileFormatError, GpError
+from gp_core.landmarks.features import CODES, Side
+from gp_labeler.session.frozen_json import thaw
+from gp_labeler.session.state import (
+    How,
+    Landmark,
+    PointKey,
+    PoseCheck,
+    Position,
+    Provenance,
+    SpecimenState,
+    point_key,
+)
+from gp_labeler.session.volume_reference import VolumeReference
+
+__all__ = ["Document", "document_of", "provenance_document", "provenance_of", "state_of", "volume_document"]
+
+Document = dict[str, Any]
+T = TypeVar("T")
+
+BOTH = "both"
+_ORDER = {code: i for i, code in enumerate(CODES)}
+
+
+def document_of(state: SpecimenState) -> Document:
+    """Return the document of a state: dicts, lists, text and finite numbers only."""
+    document: Document = {
+        "specimen": state.specimen,
+        "landmarks": _landmarks_out(state.landmarks),
+        "notes": state.notes,
+        "import_choices": thaw(state.import_choices),
+        "pose_checks": [_pose_check_out(check) for check in state.pose_checks],
+    }
+    if state.volume is not None:
+        document["volume"] = volume_document(state.volume)
+    if state.threshold is not None:
+        document["threshold"] = state.threshold
+    return document
+
+
+def state_of(document: Mapping[str, Any]) -> SpecimenState:
+    """Return the state of a document; entries it does not know are left out.
+
+    Raises
+    ------
+    FileFormatError
+        An entry is not what it should be; the message names it.
+    """
+    volume = document.get("volume")
+    threshold = document.get("threshold")
+    checks = _typed(document.get("pose_checks", []), list, "pose_checks")
+    try:
+        return SpecimenState(
+            specimen=_typed(document.get("specimen", "unnamed"), str, "specimen"),
+            landmarks=_landmarks_in(_typed(document.get("landmarks", {}), dict, "landmarks")),
+            volume=None if volume is None else _volume_in(_typed(volume, dict, "volume")),
+            import_choices=_typed(document.get("import_choices", {}), dict, "import_choices"),
+            threshold=None if threshold is None else _number(threshold, "threshold"),
+            notes=_typed(document.get("notes", ""), str, "notes"),
+            pose_checks=tuple(_pose_check_in(c, f"pose_checks[{i}]") for i, c in enumerate(checks)),
+        )
+    except FileFormatError:
+        raise
+    except GpError as error:
+        raise FileFormatError(error.problem, landmark=error.landmark, remedy=error.remedy) from None
+
+
+def _landmarks_out(landmarks: Mapping[PointKey, Landmark]) -> Document:
+    out: Document = {}
+    for (side, code), landmark in sorted(landmarks.items(), key=lambda item: _ORDER[item[0][1]]):
+        out.setdefault(BOTH if side is None else side.value, {})[code] = _landmark_out(landmark)
+    return out
+
+
+def _landmark_out(landmark: Landmark) -> Document:
+    out: Document = {}
+    if landmark.position is not None:
+        out["position"] = list(landmark.position)
+    if landmark.provenance is not None:
+        out["provenance"] = provenance_document(landmark.provenance)
+    return out | {name: True for name in ("unseen", "locked", "checked") if getattr(landmark, name)}
+
+
+def provenance_document(provenance: Provenance) -> Document:
+    """Return a provenance as it is saved."""
+    out: Document = {"how": provenance.how.value}
+    if provenance.voxel_mm is not None:
+        out["voxel_mm"] = list(provenance.voxel_mm)
+    return out | {name: text for name in ("time", "by", "source") if (text := getattr(provenance, name))}
+
+
+def volume_document(volume: VolumeReference) -> Document:
+    """Return a reference to a scan as it is saved."""
+    out: Document = {"name": volume.name, "size": list(volume.size), "spacing": list(volume.spacing)}
+    return out | {name: text for name in ("checksum", "path") if (text := getattr(volume, name))}
+
+
+def _pose_check_out(check: PoseCheck) -> Document:
+    text = {name: getattr(check, name) for name in ("verdict", "by", "time", "note")}
+    return {"side": check.side.value, **text, "pose": thaw(check.pose)}
+
+
+def _landmarks_in(document: Mapping[str, Any]) -> dict[PointKey, Landmark]:
+    found: dict[PointKey, Landmark] = {}
+    for owner, marks in document.items():
+        side = None if owner == BOTH else Side.parse(owner)
+        for code, mark in _typed(marks, dict, f"landmarks.{owner}").items():
+            where = f"landmarks.{owner}.{code}"
+            key = point_key(side or Side.LEFT, code)
+            if (key[0] is None) != (side is None):
+                raise FileFormatError(
+                    f"{where} is not where it belongs: IN is under {BOTH!r}, all else under L or R"
+                )
+            found[key] = _landmark_in(_typed(mark, dict, where), where)
+    return found
+
+
+def _landmark_in(document: Mapping[str, Any], where: str) -> Landmark:
+    position, provenance = document.get("position"), document.get("provenance")
+    is_true = {
+        n: _typed(document.get(n, False), bool, f"{where}.{n}") for n in ("unseen", "locked", "checked")
+    }
+    return Landmark(
+        position=None if position is None else _triple(position, f"{where}.position"),
+        unseen=is_true["unseen"] and position is None,
+        locked=is_true["locked"],
+        checked=is_true["checked"] and position is not None,
+        provenance=None if provenance is None else provenance_of(provenance, f"{where}.provenance"),
+    )
+
+
+def provenance_of(document: Any, where: str) -> Provenance:
+    """Return a saved provenance; raises `FileFormatError`, which calls it `where`."""
+    content = _typed(document, dict, where)
+    voxel = content.get("voxel_mm")
+    return Provenance(
+        how=_parsed(How, content.get("how"), f"{where}.how"),
+        voxel_mm=None if voxel is None else _triple(voxel, f"{where}.voxel_mm"),
+        **{name: _typed(content.get(name, ""), str, f"{where}.{name}") for name in ("time", "by", "source")},
+    )
+
+
+def _volume_in(document: Mapping[str, Any]) -> VolumeReference:
+    path = document.get("path")
+    i, j, k = (int(n) for n in _triple(document.get("size"), "volume.size"))
+    return VolumeReference(
+        name=_typed(document.get("name", ""), str, "volume.name"),
+        size=(i, j, k),
+        spacing=_triple(document.get("spacing"), "volume.spacing"),
+        checksum=_typed(document.get("checksum", ""), str, "volume.checksum"),
+        path=None if path is None else _typed(path, str, "volume.path"),
+    )
+
+
+def _pose_check_in(document: Any, where: str) -> PoseCheck:
+    content = _typed(document, dict, where)
+    return PoseCheck(
+        side=_parsed(Side.parse, content.get("side"), f"{where}.side"),
+        pose=_typed(content.get("pose", {}), dict, f"{where}.pose"),
+        **{n: _typed(content.get(n, ""), str, f"{where}.{n}") for n in ("verdict", "by", "time", "note")},
+    )
+
+
+def _typed(value: Any, kind: type[T], where: str) -> T:
+    if not isinstance(value, kind):
+        words = {dict: "an object", list: "a list", str: "text", bool: "true or false"}
+        raise FileFormatError(f"{where} must be {words[kind]}, got {value!r:.60}")
+    return value
+
+
+def _parsed(parse: Callable[[Any], T], value: Any, where: str) -> T:
+    try:
+        return parse(value)
+    except (ValueError, GpError):
+        raise FileFormatError(f"{where} is unknown: {value!r:.60}") from None
+
+
+def _number(value: Any, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise FileFormatError(f"{where} must be a number, got {value!r:.60}")
+    if not abs(value) <= sys.float_info.max:  # so written, NaN is refused too
+        raise FileFormatError(f"{where} must be finite, got {value!r:.20}")
+    return float(value)
+
+
+def _triple(value: Any, where: str) -> Position:
+    numbers = _typed(value, list, where)
+    if len(numbers) != 3:
+        raise FileFormatError(f"{where} must be three numbers, got {value!r:.60}")
+    x, y, z = (_number(v, where) for v in numbers)
+    return x, y, z

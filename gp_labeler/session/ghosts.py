@@ -1,0 +1,216 @@
+"""Ghosts and doubts: where the atlas expects a point that is to do, or not where it was placed."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Any, TypeVar
+
+import numpy as np
+
+from gp_core.atlas.quality import DOUBTFUL_SD
+from gp_core.atlas.shape import LABELLING_NOISE_MM
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import FEATURES
+from gp_core.landmarks.sets import LandmarkSet, Status
+
+__all__ = ["Doubt", "Expectations", "Ghost", "Judging", "Predict", "mirror_ghosts"]
+
+Predict = Callable[[LandmarkSet], Mapping[str, tuple[FloatArray, FloatArray]]]
+"""Mean (3,) and covariance (3, 3) of every feature, given some: `gp_core.atlas.shape.predict`."""
+
+N_FOR_GHOSTS = 3
+N_FOR_DOUBTS = 5
+"""With fewer, a point that is off cannot be told from its neighbours."""
+
+CHI2_95 = 7.815
+"""95 % quantile of the squared distance of a point from its mean, in standard deviations, in space."""
+
+N_REMEMBERED = 16
+
+MIRROR_SD_MM = 0.5
+MIRROR_SD_PER_MM = 0.05
+"""Ears differ by about half a millimetre, and the plane between them is known to some 3 degrees."""
+
+
+@dataclass(frozen=True)
+class Ghost:
+    """Where a point is expected.
+
+    Parameters
+    ----------
+    code : str
+        Feature.
+    position : (3,) float array
+        Expected place, mm, scan frame.
+    covariance : (3, 3) float array
+        Its uncertainty, mm².
+    source : str
+        ``atlas``, or ``mirror`` for the other side's point mirrored.
+    """
+
+    code: str
+    position: FloatArray
+    covariance: FloatArray
+    source: str = "atlas"
+
+    @property
+    def radius_95(self) -> float:
+        """Radius that holds the point with 95 %, mm, along the least certain direction."""
+        return float(np.sqrt(CHI2_95 * max(np.linalg.eigvalsh(self.covariance)[-1], 0.0)))
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """A placed point far from where the others make the atlas expect it.
+
+    Parameters
+    ----------
+    code : str
+        Feature.
+    distance : float
+        From the expected place, mm.
+    expected : (3,) float array
+        That place, mm, scan frame.
+    n_sd : float
+        The same in standard deviations.
+    """
+
+    code: str
+    distance: float
+    expected: FloatArray
+    n_sd: float
+
+
+T = TypeVar("T")
+
+
+class Expectations:
+    """What the atlas expects, remembered for the sets it was asked about last; may be asked from any thread.
+
+    Parameters
+    ----------
+    predict : callable, optional
+        The atlas; None expects nothing.
+    """
+
+    def __init__(self, predict: Predict | None = None) -> None:
+        self._predict = predict
+        self._known: dict[tuple[object, ...], Mapping[str, Any]] = {}
+        self._lock = threading.Lock()
+
+    def ghosts(self, landmarks: LandmarkSet, other: LandmarkSet) -> Mapping[str, Ghost]:
+        """Return where the features that are to do are expected, by code.
+
+        From three placed features on it is the atlas that says so; before, the `other` side, mirrored.
+        """
+        key = ("ghosts", _fingerprint(landmarks), _fingerprint(other))
+        return self._remembered(key, lambda: self._ghosts(landmarks, other))
+
+    def doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt]:
+        """Return the placed features that are far from where the others make the atlas expect them, by code.
+
+        That takes a while: 20 ms for a good set, 150 ms where one point is off. The atlas must see to it that
+        one wrong point does not accuse its neighbours; `gp_core.atlas.shape` does.
+        """
+        return self._remembered(("doubts", _fingerprint(landmarks)), lambda: self._doubts(landmarks))
+
+    def known_doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt] | None:
+        """Return `doubts` where they were found before, else None; at once."""
+        return self._known.get(("doubts", _fingerprint(landmarks)))
+
+    def _remembered(self, key: tuple[object, ...], make: Callable[[], dict[str, T]]) -> Mapping[str, T]:
+        if key not in self._known:
+            made = MappingProxyType(make())
+            with self._lock:
+                self._known[key] = made
+                while len(self._known) > N_REMEMBERED:
+                    del self._known[next(iter(self._known))]
+            return made
+        found: Mapping[str, T] = self._known[key]
+        return found
+
+    def _ghosts(self, landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost]:
+        to_do = [f.code for f in FEATURES if not f.computed and landmarks.status(f.code) is Status.TO_DO]
+        if not to_do:
+            return {}
+        expected = self._expected(_without(landmarks, "CO"))
+        found = mirror_ghosts(landmarks, other) | {c: Ghost(c, *expected[c]) for c in expected}
+        return {code: found[code] for code in to_do if code in found}
+
+    def _expected(self, landmarks: LandmarkSet) -> Mapping[str, tuple[FloatArray, FloatArray]]:
+        if self._predict is None or len(landmarks.placed) < N_FOR_GHOSTS:
+            return {}
+        try:
+            return self._predict(landmarks)
+        except GpError:  # such as points on a line, which determine nothing
+            return {}
+
+    def _doubts(self, landmarks: LandmarkSet) -> dict[str, Doubt]:
+        placed = _without(landmarks, "CO")
+        if len(placed.placed) < N_FOR_DOUBTS:
+            return {}
+        return {code: doubt for code in placed.placed if (doubt := self._judged(placed, code))}
+
+    def _judged(self, landmarks: LandmarkSet, code: str) -> Doubt | None:
+        expected = self._expected(_without(landmarks, code))
+        if code not in expected:
+            return None
+        mean, covariance = expected[code]
+        off = landmarks[code] - mean
+        spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
+        n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
+        return Doubt(code, float(np.linalg.norm(off)), mean, n_sd) if n_sd > DOUBTFUL_SD else None
+
+
+@dataclass(frozen=True)
+class Judging:
+    """A job (see `jobs`) that finds the doubts of one side, so that they are known afterwards."""
+
+    expectations: Expectations
+    landmarks: LandmarkSet
+    title: str = "Checking labels"
+
+    def run(self, progress: Callable[[float], None]) -> Mapping[str, Doubt]:
+        """Return the doubts."""
+        progress(0.0)
+        return self.expectations.doubts(self.landmarks)
+
+
+def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost]:
+    """Expect the points of the other side, mirrored in the plane between the features placed on both.
+
+    Returns
+    -------
+    dict of str to Ghost
+        Every feature that the other side has; empty where no feature (but IN) is placed on both.
+    """
+    paired = [
+        f.code for f in FEATURES if not (f.shared or f.computed) and f.code in landmarks and f.code in other
+    ]
+    if not paired:
+        return {}
+    here, there = landmarks.array(paired), other.array(paired)
+    across = (here - there).mean(axis=0)
+    if np.linalg.norm(across) < 1.0:  # two ears are not within a millimetre
+        return {}
+    normal = across / np.linalg.norm(across)
+    middle = (here + there).mean(axis=0) / 2
+    found = {}
+    for code, point in other.as_mapping().items():
+        position = point - 2 * np.dot(point - middle, normal) * normal
+        reach = float(np.linalg.norm(position - here, axis=1).min())
+        variance = MIRROR_SD_MM**2 + (MIRROR_SD_PER_MM * reach) ** 2
+        found[code] = Ghost(code, position, variance * np.eye(3), "mirror")
+    return found
+
+
+def _without(landmarks: LandmarkSet, code: str) -> LandmarkSet:
+    return landmarks.with_point(code, None) if code in landmarks else replace(landmarks)
+
+
+def _fingerprint(landmarks: LandmarkSet) -> tuple[object, ...]:
+    return (landmarks.side, landmarks.points.tobytes(), landmarks.unseen)

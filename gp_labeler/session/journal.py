@@ -1,0 +1,265 @@
+"""The journal: what makes every confirmed edit outlive the program.
+
+A journal is a file of JSON lines, each ``{"record": ..., "crc32": ...}``. The first record holds the whole
+document as it was last saved; each further one what an edit changed in it (not the command: so replay depends
+on nothing but the format). A record is on the disk before the edit shows. Reading stops at the first line
+that is torn, out of sequence, or whose checksum is wrong; an edit whose line was not finished was never
+confirmed.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from gp_core.errors import FileFormatError, GpError
+from gp_labeler.session.changes import difference, dumped, patched
+from gp_labeler.session.document import Document
+from gp_labeler.session.specimen_file import application, write_durably
+
+__all__ = ["Entry", "Journal", "JournalContent", "read_journal"]
+
+VERSION = 1
+KINDS = ("edit", "merge", "undo", "redo", "change")
+"""``merge`` continues the edit before it; ``change`` cannot be undone (another volume)."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One confirmed edit: what kind, its text, when, and the document after it."""
+
+    kind: str
+    text: str
+    time: str
+    document: Document
+
+
+@dataclass(frozen=True)
+class JournalContent:
+    """What a journal says.
+
+    Parameters
+    ----------
+    base : Document
+        The document as last saved (or begun with).
+    entries : tuple of Entry
+        The edits since, oldest first.
+    specimen_file : Path, optional
+        The file the specimen is saved in; None where it never was.
+    saved : str, optional
+        Checksum of that file.
+    n_bytes : int
+        Length of the part that is whole.
+    """
+
+    base: Document
+    entries: tuple[Entry, ...]
+    specimen_file: Path | None
+    saved: str | None
+    n_bytes: int
+
+    @property
+    def document(self) -> Document:
+        """The document after the last confirmed edit."""
+        return self.entries[-1].document if self.entries else self.base
+
+
+class Journal:
+    """An open journal; see `Journal.create` and `Journal.resume`.
+
+    Parameters
+    ----------
+    path : Path
+        The file, whose first `n_bytes` are whole.
+    n_records : int
+        How many records these are.
+    document : Document
+        The document after them.
+    """
+
+    def __init__(self, path: Path, *, n_bytes: int, n_records: int, document: Document) -> None:
+        self.path = path
+        self._end = n_bytes
+        self._n_records = n_records
+        self._document = document
+        self._file: BinaryIO | None = _opened(path)
+
+    @classmethod
+    def create(
+        cls, path: Path, base: Document, *, specimen_file: Path | None, saved: str | None = None
+    ) -> Journal:
+        """Begin a journal at `base`, in place of what is at `path`.
+
+        Parameters
+        ----------
+        path : Path
+            Where; its folder is made if need be.
+        base : Document
+            What to begin with.
+        specimen_file : Path, optional
+            The file the specimen is saved in.
+        saved : str, optional
+            Checksum of that file.
+
+        Raises
+        ------
+        GpError
+            It cannot be written.
+        """
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise GpError(f"cannot be made: {error.strerror}", file=path.parent) from None
+        line = _base_line(base, specimen_file, saved)
+        write_durably(path, line.decode())
+        return cls(path, n_bytes=len(line), n_records=1, document=base)
+
+    @classmethod
+    def resume(cls, path: Path, content: JournalContent) -> Journal:
+        """Go on with a journal that was read, behind its last whole record."""
+        return cls(
+            path,
+            n_bytes=content.n_bytes,
+            n_records=1 + len(content.entries),
+            document=content.document,
+        )
+
+    def append(self, kind: str, text: str, document: Document, *, time: str = "") -> None:
+        """Write what leads from the last document to this one, and wait until the disk has it.
+
+        Raises
+        ------
+        GpError
+            The disk is full or gone; the journal is as it was.
+        """
+        changes = difference(self._document, document)
+        line = _line({"kind": kind, "n": self._n_records, "text": text, "time": time, "changes": changes})
+        try:
+            self._write(line)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                self._handle().truncate(self._end)
+            raise GpError(
+                f"the edit cannot be kept safe: {error.strerror}",
+                file=self.path,
+                remedy="It was not made. Free some disk space, then repeat it.",
+            ) from None
+        self._end += len(line)
+        self._n_records += 1
+        self._document = document
+
+    def _write(self, line: bytes) -> None:
+        file = self._handle()
+        file.seek(self._end)
+        if file.write(line) != len(line):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        file.truncate()  # what a torn line may have left behind
+        os.fsync(file.fileno())
+
+    def _handle(self) -> BinaryIO:
+        if self._file is None:
+            raise OSError(errno.EBADF, "the journal is closed")
+        return self._file
+
+    def restart(self, base: Document, *, specimen_file: Path | None, saved: str | None) -> None:
+        """Begin anew at `base`, which is saved; the arguments are those of `create`.
+
+        Raises
+        ------
+        GpError
+            It cannot be written; the journal goes on as it was.
+        """
+        line = _base_line(base, specimen_file, saved)
+        self.close()
+        try:
+            write_durably(self.path, line.decode())
+        finally:
+            self._file = _opened(self.path)
+        self._end, self._n_records, self._document = len(line), 1, base
+
+    def close(self) -> None:
+        """Close the file and leave it where it is."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def remove(self) -> None:
+        """Close and delete the file: all it holds is saved, or not wanted."""
+        self.close()
+        with contextlib.suppress(OSError):
+            self.path.unlink()
+
+
+def _base_line(base: Document, specimen_file: Path | None, saved: str | None) -> bytes:
+    header = {"kind": "base", "n": 0, "version": VERSION, "application": application(), "document": base}
+    return _line(header | {"specimen_file": specimen_file and str(specimen_file), "saved": saved})
+
+
+def _opened(path: Path) -> BinaryIO:
+    try:
+        return path.open("r+b", buffering=0)
+    except OSError as error:
+        raise GpError(f"cannot be opened: {error.strerror}", file=path) from None
+
+
+def read_journal(path: Path) -> JournalContent:
+    """Read what a journal confirms.
+
+    Raises
+    ------
+    GpError
+        It cannot be opened, its first record is damaged, or it is of a newer version.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise GpError(f"cannot be opened: {error.strerror}", file=path) from None
+    records = _whole_records(content)
+    header, end = next(records, ({}, 0))
+    if header.get("kind") != "base" or not isinstance(header.get("document"), dict):
+        raise FileFormatError("is not a journal, or its beginning is damaged", file=path)
+    if header.get("version") != VERSION:
+        raise FileFormatError(f"is a journal of version {header.get('version')}, not {VERSION}", file=path)
+    document, entries = header["document"], []
+    for record, n_bytes in records:
+        document = patched(document, record["changes"])
+        entries.append(Entry(record["kind"], record["text"], record["time"], document))
+        end = n_bytes
+    file = header.get("specimen_file")
+    return JournalContent(
+        header["document"], tuple(entries), Path(file) if file else None, header.get("saved"), end
+    )
+
+
+def _whole_records(content: bytes) -> Iterator[tuple[dict[str, Any], int]]:
+    """Yield each record with the offset behind it, up to the first line that is not whole."""
+    start = 0
+    for n in range(content.count(b"\n")):
+        end = content.index(b"\n", start) + 1
+        record = _record(content[start:end])
+        if record is None or record.get("n") != n:
+            return
+        yield record, end
+        start = end
+
+
+def _line(record: Mapping[str, Any]) -> bytes:
+    text = dumped(record)
+    return f'{{"record":{text},"crc32":{zlib.crc32(text.encode())}}}\n'.encode()
+
+
+def _record(line: bytes) -> dict[str, Any] | None:
+    try:
+        content = json.loads(line)
+        record = content["record"]
+        whole = zlib.crc32(dumped(record).encode()) == content["crc32"]
+    except (ValueError, TypeError, LookupError):
+        return None
+    return record if whole and isinstance(record, dict) else None

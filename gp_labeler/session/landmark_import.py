@@ -1,0 +1,216 @@
+"""Taking over the landmarks of files, with a look at whether they can belong to this scan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.files import PointList, landmarks_of, read_points
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.session.document import provenance_of
+from gp_labeler.session.edits import as_position, point_text, require_free
+from gp_labeler.session.labelling import provenance
+from gp_labeler.session.session import Session
+from gp_labeler.session.state import TO_DO, How, Landmark, PointKey, Provenance, SpecimenState, point_key
+
+__all__ = ["ImportLandmarks", "MisfitError", "Predicate", "import_landmarks"]
+
+Predicate = Callable[[FloatArray], NDArray[np.bool_]]
+"""Tells for (N, 3) points, mm, scan frame, whether each is inside, or near bone."""
+
+_TURN_RAS = np.array([-1.0, -1.0, 1.0])
+
+
+class MisfitError(GpError):
+    """Landmarks cannot belong to this scan: they lie outside it, or most lie off the bone."""
+
+
+def import_landmarks(
+    session: Session,
+    paths: Iterable[str | PathLike[str]],
+    *,
+    side: Side | str | None = None,
+    near_bone: Predicate | None = None,
+    accept_misfit: bool = False,
+    replace_placed: bool = True,
+) -> tuple[str, ...]:
+    """Take over the landmarks of one or more files; one edit, all or nothing.
+
+    A valid header proves nothing: real files exist whose points all lie outside their scan. So the loaded
+    volume is asked whether the points lie in it.
+
+    Parameters
+    ----------
+    session : Session
+        Where to.
+    paths : iterable of path
+        Any landmark file that `gp_core.landmarks.files` reads.
+    side : Side or str, optional
+        Where the files do not say it.
+    near_bone : callable, optional
+        Tells which points are near bone.
+    accept_misfit : bool
+        Import nevertheless.
+    replace_placed : bool
+        Whether placed points give way; otherwise only what is still to do is filled.
+
+    Returns
+    -------
+    tuple of str
+        What the user should know.
+
+    Raises
+    ------
+    MisfitError
+        Points lie outside the volume, or more than half are off the bone.
+    GpError
+        A file cannot be read, or a point that would change is locked.
+    """
+    lists = [read_points(path) for path in paths]
+    if not lists:
+        raise GpError("no landmark file was given")
+    sets = tuple(landmarks_of(points, side=side) for points in lists)
+    off_bone = _misfit(session, sets, near_bone, accept_misfit)
+    known = {key: found for p, s in zip(lists, sets, strict=True) for key, found in _known(p, s.side).items()}
+    source = ", ".join(points.source.name for points in lists)
+    session.do(
+        ImportLandmarks(
+            sets, provenance(session, How.IMPORTED, source=source), known, replace_placed=replace_placed
+        )
+    )
+    return (*_doubtful_origin(session, lists), *off_bone)
+
+
+def _misfit(
+    session: Session, sets: tuple[LandmarkSet, ...], near_bone: Predicate | None, accepted: bool
+) -> tuple[str, ...]:
+    names = [point_text(s.side, code) for s in sets for code in s.placed if not feature(code).computed]
+    placed = [s[code] for s in sets for code in s.placed if not feature(code).computed]
+    if not placed:
+        return ()
+    points = np.array(placed)
+    contains: Predicate | None = getattr(session.volume, "contains", None)
+    problem, remedy = "", ""
+    if contains is not None and not (inside := contains(points)).all():
+        problem = f"{_listed(names, ~inside)} lie outside the scan"
+        turned = bool(contains(points * _TURN_RAS).all())
+        remedy = "With x and y negated all lie inside: is the file RAS, called LPS?" if turned else ""
+    off = np.zeros(len(points), bool) if near_bone is None else ~near_bone(points)
+    if not problem and off.mean() > 0.5:
+        problem = f"{_listed(names, off)} lie off the bone"
+    if problem and not accepted:
+        remedy = remedy or "Are they of another scan? Import them nevertheless only if you know why."
+        raise MisfitError(problem, specimen=session.state.specimen, remedy=remedy)
+    warning = problem or (f"{_listed(names, off)} lie off the bone" if off.any() else "")
+    return (warning,) if warning else ()
+
+
+def _listed(names: list[str], chosen: NDArray[np.bool_]) -> str:
+    wanted = [name for name, is_chosen in zip(names, chosen, strict=True) if is_chosen]
+    shown = ", ".join(wanted[:6]) + (", ..." if len(wanted) > 6 else "")
+    return f"{len(wanted)} of {len(names)} points ({shown})"
+
+
+def _known(points: PointList, side: Side) -> dict[tuple[Side, str], Provenance]:
+    """Return the provenance that a file of this program carries; what cannot be read is passed over."""
+    found = {}
+    for label, content in (points.header.provenance if points.header else {}).items():
+        try:
+            found[side, feature(label).code] = provenance_of(content, label)
+        except GpError:
+            continue
+    return found
+
+
+def _doubtful_origin(session: Session, lists: list[PointList]) -> list[str]:
+    found = []
+    for points in lists:
+        header, reference = points.header, session.state.volume
+        if header is None:
+            continue
+        if header.specimen and header.specimen != session.state.specimen:
+            found.append(f"{points.source.name} is of specimen {header.specimen}")
+        theirs = (header.volume or {}).get("checksum")
+        if reference and reference.checksum and theirs and theirs != reference.checksum:
+            found.append(f"{points.source.name} was labelled on another scan")
+    return found
+
+
+@dataclass(frozen=True)
+class ImportLandmarks:
+    """Take over the landmarks of a file.
+
+    Parameters
+    ----------
+    landmarks : tuple of LandmarkSet
+        One or both sides, scan frame. A computed CO in them is not taken: it is computed anew.
+    provenance : Provenance
+        Of those points that bring none of their own.
+    known : mapping of (Side, str) to Provenance
+        Provenance that the file carries.
+    replace_placed : bool
+        Whether placed points give way; otherwise only what is still to do is filled.
+    """
+
+    landmarks: tuple[LandmarkSet, ...]
+    provenance: Provenance
+    known: Mapping[tuple[Side, str], Provenance] | None = None
+    replace_placed: bool = True
+
+    @property
+    def text(self) -> str:
+        """Such as ``import 38 points``."""
+        n = len({key for key, mark in self._marks().items() if mark.position is not None})
+        return f"import {n} point{'' if n == 1 else 's'}"
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the points taken over.
+
+        Raises
+        ------
+        GpError
+            They are not in the scan frame, the sides disagree on IN, or a locked point would change.
+        """
+        for landmarks in self.landmarks:
+            if landmarks.frame != "scan":
+                raise GpError(f"landmarks to import must be in the scan frame, got {landmarks.frame!r}")
+        changes = {
+            key: mark
+            for key, mark in self._marks().items()
+            if self.replace_placed or not state.landmarks.get(key, TO_DO).settled
+        }
+        moved = [key for key, mark in changes.items() if _moves(state.landmarks.get(key, TO_DO), mark)]
+        require_free(state, moved)
+        return state.with_landmarks({key: changes[key] for key in moved})
+
+    def _marks(self) -> dict[PointKey, Landmark]:
+        marks: dict[PointKey, Landmark] = {}
+        for landmarks in self.landmarks:
+            for code in (*landmarks.placed, *sorted(landmarks.unseen)):
+                if feature(code).computed:
+                    continue
+                key, mark = point_key(landmarks.side, code), self._mark(landmarks, code)
+                if _moves(marks.setdefault(key, mark), mark):
+                    raise GpError(
+                        f"the sides share {code}, but have it at {marks[key].position} and {mark.position}",
+                        landmark=code,
+                        remedy="Correct one of the files, or import one side.",
+                    )
+        return marks
+
+    def _mark(self, landmarks: LandmarkSet, code: str) -> Landmark:
+        provenance = (self.known or {}).get((landmarks.side, code), self.provenance)
+        if code in landmarks.unseen:
+            return Landmark(unseen=True, provenance=provenance)
+        return Landmark(as_position(landmarks[code], code), provenance=provenance)
+
+
+def _moves(old: Landmark, new: Landmark) -> bool:
+    return (old.position, old.unseen) != (new.position, new.unseen)

@@ -1,0 +1,64 @@
+"""The list of files opened last."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+
+from gp_core.errors import GpError
+from gp_labeler.session.specimen_file import write_durably
+
+__all__ = ["RecentFiles"]
+
+
+class RecentFiles:
+    """Files opened last, newest first, kept in a small file of the state directory.
+
+    A list that cannot be read counts as empty, and one that cannot be written is let be: nobody's work hangs
+    on it.
+
+    Parameters
+    ----------
+    directory : Path
+        The state directory.
+    limit : int
+        How many to remember.
+    """
+
+    def __init__(self, directory: Path, *, limit: int = 12) -> None:
+        self._path = directory / "recent.json"
+        self._limit = limit
+
+    def all(self) -> tuple[Path, ...]:
+        """Return the remembered files, also those that are gone now."""
+        try:
+            content = json.loads(self._path.read_bytes())
+        except (OSError, ValueError, RecursionError):
+            return ()
+        paths = content.get("files") if isinstance(content, dict) else None
+        if not isinstance(paths, list):
+            return ()
+        return tuple(Path(p) for p in paths if isinstance(p, str) and p)[: self._limit]
+
+    def add(self, path: str | PathLike[str]) -> None:
+        """Put a file at the top."""
+        newest = Path(path).resolve()
+        self._write([newest, *(p for p in self.all() if p != newest)])
+
+    def remove(self, path: str | PathLike[str]) -> None:
+        """Forget a file."""
+        gone = Path(path).resolve()
+        self._write([p for p in self.all() if p != gone])
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._write([])
+
+    def _write(self, paths: list[Path]) -> None:
+        content = {"files": [str(p) for p in paths[: self._limit]]}
+        try:
+            self._path.parent.mkdir(parents=True, exist_ok=True)
+            write_durably(self._path, json.dumps(content, indent=1))
+        except (OSError, GpError):
+            return

@@ -1,0 +1,252 @@
+"""Everything a specimen file holds, as one value that is never changed in place.
+
+Each point is kept once: what is shared by both sides (IN) has one record, under the key ``(None, "IN")``, so
+the two sides cannot contradict each other. CO has none: it is computed from CA, CB, RWA and RWP whenever they
+change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gp_core.checks import check_option
+from gp_core.errors import FeatureError, GpError
+from gp_core.landmarks.anatomy import with_cochlea_origin
+from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.session.frozen_json import freeze
+from gp_labeler.session.volume_reference import VolumeReference
+
+__all__ = [
+    "How",
+    "Landmark",
+    "PointKey",
+    "PoseCheck",
+    "Provenance",
+    "SpecimenState",
+    "changed_points",
+    "point_key",
+]
+
+LARGEST_MM = 1e4
+"""No scan is ten metres wide: a coordinate beyond this is a slip of units."""
+
+VERDICTS = ("accept", "reject")
+
+Position = tuple[float, float, float]
+PointKey = tuple["Side | None", str]
+"""Whose point, and which feature; no side for what both sides share."""
+
+
+class How(str, Enum):
+    """How a point came to be where it is."""
+
+    MESH = "mesh"
+    SLICE = "slice"
+    GHOST = "accepted ghost"
+    IMPORTED = "imported"
+    TYPED = "typed"
+    UNSEEN = "looked for"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a position comes from.
+
+    Parameters
+    ----------
+    how : How
+        On the mesh, on a slice, from the atlas, ...
+    time : str
+        When, ISO 8601 in UTC.
+    by : str
+        Who.
+    voxel_mm : (3,) tuple of float, optional
+        Voxel size of the scan it was placed on, mm.
+    source : str
+        The file it was imported from.
+    """
+
+    how: How
+    time: str = ""
+    by: str = ""
+    voxel_mm: Position | None = None
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """One point of one side (or shared by both): position in scan mm, and what is known about it."""
+
+    position: Position | None = None
+    unseen: bool = False
+    locked: bool = False
+    checked: bool = False
+    provenance: Provenance | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether it was placed, or looked for and not seen."""
+        return self.unseen or self.position is not None
+
+
+TO_DO = Landmark()
+
+
+@dataclass(frozen=True)
+class PoseCheck:
+    """A person's verdict on an estimated pose seen over the scan.
+
+    Parameters
+    ----------
+    side : Side
+        Side of the head.
+    verdict : str
+        ``accept`` or ``reject``.
+    by, time, note : str
+        Initials, when (ISO 8601, UTC), and why.
+    pose : mapping
+        The estimate that was judged, as its pose JSON has it.
+    """
+
+    side: Side
+    verdict: str
+    by: str
+    time: str
+    note: str = ""
+    pose: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_option(self.verdict, "verdict", VERDICTS)
+        object.__setattr__(self, "side", Side.parse(self.side))
+        object.__setattr__(self, "pose", freeze(self.pose, "pose"))
+
+
+def point_key(side: Side | str, code: str) -> PointKey:
+    """Return the key under which a state keeps a point.
+
+    Raises
+    ------
+    FeatureError
+        The feature is unknown, or computed (CO): that one is nobody's to place.
+    """
+    row = feature(code)
+    if row.computed:
+        raise FeatureError(
+            f"{row.code} is computed, not placed",
+            landmark=row.code,
+            remedy="It moves with CA, CB, RWA and RWP.",
+        )
+    return (None if row.shared else Side.parse(side), row.code)
+
+
+@dataclass(frozen=True)
+class SpecimenState:
+    """Everything that is saved of a specimen.
+
+    Parameters
+    ----------
+    specimen : str
+        Name of the specimen; exported files are called after it.
+    landmarks : mapping of PointKey to Landmark
+        What was placed, marked or locked; a point that is to do has no entry.
+    volume : VolumeReference, optional
+        The scan.
+    import_choices : mapping
+        What the user answered when the scan was read (spacing, reversed stack, ...).
+    threshold : float, optional
+        Bone threshold, in grey values of the scan.
+    notes : str
+        Free text.
+    pose_checks : tuple of PoseCheck
+        Verdicts, oldest first.
+
+    Raises
+    ------
+    GpError
+        The name cannot stand in a file name, the threshold is not finite, or CA and CB are at the same place.
+    """
+
+    specimen: str = "unnamed"
+    landmarks: Mapping[PointKey, Landmark] = field(default_factory=dict)
+    volume: VolumeReference | None = None
+    import_choices: Mapping[str, Any] = field(default_factory=dict)
+    threshold: float | None = None
+    notes: str = ""
+    pose_checks: tuple[PoseCheck, ...] = ()
+    sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        name = self.specimen.strip()
+        if not name or set(name) & set('/\\:*?"<>|\n\t') or name.startswith("."):
+            raise GpError(
+                f"a specimen's name must do as a file name, got {self.specimen!r}", remedy="Such as GP-014."
+            )
+        kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
+        sets = {side: _landmark_set(kept, side) for side in Side}
+        if self.threshold is not None:
+            object.__setattr__(self, "threshold", freeze(float(self.threshold), "threshold"))
+        object.__setattr__(self, "specimen", name)
+        object.__setattr__(self, "landmarks", MappingProxyType(kept))
+        object.__setattr__(self, "import_choices", freeze(self.import_choices, "import choices"))
+        object.__setattr__(self, "sets", MappingProxyType(sets))
+
+    def side(self, side: Side | str) -> LandmarkSet:
+        """Return the landmarks of one side in the scan frame, with IN and, once determined, CO."""
+        return self.sets[Side.parse(side)]
+
+    def landmark(self, side: Side | str, code: str) -> Landmark:
+        """Return what is known of one point; see `point_key` for what it raises."""
+        return self.landmarks.get(point_key(side, code), TO_DO)
+
+    def with_landmarks(self, changes: Mapping[PointKey, Landmark]) -> SpecimenState:
+        """Return a copy in which these points are replaced."""
+        return replace(self, landmarks={**self.landmarks, **changes})
+
+    def on_volume(self, volume: VolumeReference | None, import_choices: Mapping[str, Any]) -> SpecimenState:
+        """Return a copy that belongs to another volume, or to the same one elsewhere."""
+        return replace(self, volume=volume, import_choices=import_choices)
+
+
+def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Side, str]]:
+    """Return the points in which two states differ: IN on both sides, and CO where it was computed anew."""
+    changed = set()
+    for side, code in old.landmarks.keys() | new.landmarks.keys():
+        if old.landmarks.get((side, code)) != new.landmarks.get((side, code)):
+            changed |= {(each, code) for each in (Side if side is None else (side,))}
+    for side in Side:
+        computed = (f.code for f in FEATURES if f.computed)
+        changed |= {
+            (side, code)
+            for code in computed
+            if not np.array_equal(old.side(side)[code], new.side(side)[code], True)
+        }
+    return frozenset(changed)
+
+
+def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> LandmarkSet:
+    positions, unseen = {}, set()
+    for row in FEATURES:
+        mark = TO_DO if row.computed else landmarks.get(point_key(side, row.code), TO_DO)
+        if mark.position is not None:
+            positions[row.code] = _plausible(mark.position, row.code)
+        elif mark.unseen:
+            unseen.add(row.code)
+    placed = replace(LandmarkSet.from_mapping(positions, side), unseen=frozenset(unseen))
+    return with_cochlea_origin(placed)
+
+
+def _plausible(position: Position, code: str) -> Position:
+    if not all(abs(x) <= LARGEST_MM for x in position):
+        raise GpError(
+            f"a position must be three numbers within ±{LARGEST_MM:g} mm, got {position}",
+            landmark=code,
+            remedy="Are its units millimetres?",
+        )
+    return position

@@ -1,0 +1,293 @@
+"""What comes next, what is expected where, and what clicks mean."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+
+import numpy as np
+import pytest
+from session_cases import MARK, PLACEABLE, FakeVolume, predict, shape
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.quality import DOUBTFUL_SD
+from gp_core.atlas.shape import departures
+from gp_core.atlas.shape import predict as shape_predict
+from gp_core.errors import FeatureError, GeometryError, GpError
+from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import CheckPoint, PlacePoint
+from gp_labeler.session.ghosts import Expectations, mirror_ghosts
+from gp_labeler.session.landmark_import import ImportLandmarks
+from gp_labeler.session.session import Session
+from gp_labeler.session.state import How, SpecimenState
+from gp_labeler.session.view import View, ViewState
+from gp_labeler.session.workflow import Active, PointState, placing_order
+
+L, R = Side.LEFT, Side.RIGHT
+BOTH = ImportLandmarks((shape(L), shape(R)), MARK)
+
+
+def test_auto_advance_visits_everything_once():
+    for atlas in (None, predict):
+        session = Session(predict=atlas)
+        visited = []
+        while session.active.code is not None:
+            visited.append(session.active)
+            labelling.place(session, shape(session.active.side)[session.active.code])
+        assert len(visited) == len(set(visited)) == 37  # 19 and 18: IN is shared
+        assert {a.side for a in visited[:19]} == {L}
+        assert [session.progress(side).text for side in Side] == ["20 of 20", "20 of 20"]
+        assert session.click_text == "Everything is placed · choose a feature to move it"
+        with pytest.raises(GpError, match=r"no feature is chosen. Choose one in the table"):
+            labelling.place(session, (0, 0, 0))
+
+
+def test_what_is_skipped_comes_again_and_what_is_unseen_does_not():
+    session = Session()
+    seen = []
+    for _ in range(19):
+        seen.append(session.active)
+        labelling.skip(session)
+    assert session.active == seen[0]
+    assert len(set(seen)) == 19
+    labelling.mark_unseen(session)
+    assert session.active == seen[1]
+    assert session.state.landmark(L, "CA").provenance.how is How.UNSEEN
+    assert session.progress(L).text == "0 of 20, 1 not seen"
+    while session.active.side is L:
+        labelling.mark_unseen(session)
+    assert session.active == Active(R, "CA")
+
+
+def test_skipping_the_last_one_of_a_side_goes_to_the_other_and_comes_back():
+    session = Session(ImportLandmarks((shape(L).with_point("ZL", None),), MARK).apply(SpecimenState()))
+    assert session.active == Active(L, "ZL")
+    labelling.skip(session)
+    assert session.active == Active(R, "CA")
+    only = Session(ImportLandmarks((shape(L).with_point("ZL", None), shape(R)), MARK).apply(SpecimenState()))
+    labelling.skip(only)
+    assert only.active == Active(L, "ZL")
+
+
+def test_the_order_opens_with_three_and_then_follows_sure_ghosts():
+    assert placing_order({})[:4] == ("CA", "RWP", "OS", "CB")
+    session = Session(predict=predict)
+    for code in ("CA", "RWP", "OS"):
+        assert session.active.code == code
+        labelling.place(session, shape()[code])
+    ghosts = session.ghosts(L)
+    assert set(ghosts) == set(PLACEABLE) - {"CA", "RWP", "OS"}
+    unsure = {"CB", "IN"}
+    sure = {c: g for c, g in ghosts.items() if c not in unsure}
+    order = placing_order(sure)
+    assert order[: len(sure)] == tuple(c for c in PLACEABLE if c in sure)
+    assert sorted(order) == sorted(PLACEABLE)
+    assert session.active.code == "CB"
+    assert np.allclose(session.crosshair, ghosts["CB"].position)  # follows the ghost
+
+
+def test_moving_a_point_goes_nowhere():
+    session = Session()
+    labelling.go_to(session, "L", "zl")
+    labelling.place(session, (1, 2, 3))
+    assert session.active.code == "CA"
+    labelling.go_to(session, L, "ZL")
+    assert session.crosshair.tolist() == [1, 2, 3]
+    labelling.place(session, (4, 5, 6), How.SLICE)
+    assert (session.active.code, session.undo_text) == ("ZL", "move ZL left")
+    labelling.place(session, (4, 5, 6), side=R, code="MN")  # not the active one
+    assert session.active.code == "ZL"
+    labelling.clear(session)
+    assert (session.active.code, "ZL" in session.landmarks(L)) == ("ZL", False)
+    session.view.update(auto_advance=False)
+    labelling.place(session, (1, 1, 1))
+    assert session.active.code == "ZL"
+
+
+def test_points_know_where_they_come_from():
+    session = Session(author="AB", clock=lambda: "2026-01-02T03:04:05+00:00")
+    session.attach_volume(FakeVolume())
+    labelling.place(session, (1, 2, 3), How.SLICE)
+    found = session.state.landmark(L, "CA").provenance
+    assert (found.how, found.time, found.by, found.voxel_mm) == (
+        How.SLICE,
+        "2026-01-02T03:04:05+00:00",
+        "AB",
+        (0.1, 0.1, 0.2),
+    )
+
+
+def test_the_next_click_is_told():
+    session = Session()
+    assert session.click_text == "Click on bone or a slice to place CA left"
+    labelling.go_to(session, R, "IN")
+    assert session.click_text == "Click on bone or a slice to place IN, for both sides"
+    labelling.mark_unseen(session, side=R, code="IN")
+    labelling.go_to(session, L, "IN")
+    assert session.click_text == "Click on bone or a slice to place IN, for both sides after all"
+    session.do(PlacePoint(L, "ZL", (1, 2, 3), MARK))
+    labelling.go_to(session, L, "ZL")
+    assert session.click_text == "Click on bone or a slice to move ZL left"
+    labelling.lock(session)
+    assert session.click_text == "ZL left is locked"
+    with pytest.raises(GpError, match="ZL left is locked"):
+        labelling.place(session, (0, 0, 0))
+    session.set_active(Active(L))
+    assert session.click_text == "Choose a feature to place"
+    with pytest.raises(FeatureError, match="CO is computed"):
+        session.set_active(Active(L, "CO"))
+
+
+def test_locking_all_and_unlocking():
+    session = Session(BOTH.apply(SpecimenState()))
+    assert labelling.lock_all(session)
+    assert session.undo_text == "lock 37 points"
+    assert not labelling.lock_all(session)
+    assert labelling.lock_all(session, False)
+    assert not labelling.lock_all(Session())
+
+
+def test_states_of_points():
+    session = Session(predict=predict)
+    assert set(session.point_states(L).values()) == {PointState.TO_DO}
+    session.do(ImportLandmarks((shape(L),), MARK))
+    assert session.point_states(L)["CO"] is PointState.COMPUTED
+    assert list(session.point_states(L)) == list(CODES)
+    labelling.clear(session, side=L, code="ZL")
+    labelling.mark_unseen(session, side=L, code="MN")
+    off = shape()["FPP"] + [0, 3, 0]
+    labelling.place(session, off, side=L, code="FPP")
+    states = session.point_states(L)
+    assert states["ZL"] is PointState.GHOST
+    assert states["MN"] is PointState.UNSEEN
+    assert [c for c, s in states.items() if s is PointState.DOUBTFUL] == ["FPP"]
+    assert session.doubts(L)["FPP"].distance == pytest.approx(3, abs=0.5)
+    session.do(CheckPoint(L, "FPP"))
+    assert session.point_states(L)["FPP"] is PointState.CHECKED
+
+
+def test_ghosts_need_three_points_and_an_atlas():
+    session = Session()
+    heard = []
+    session.ghosts_changed.connect(lambda: heard.append(1))
+    session.set_predict(predict)
+    assert heard == [1]
+    for code in ("CA", "RWP"):
+        session.do(PlacePoint(L, code, shape()[code] + [1, 2, 3], MARK))
+        assert not session.ghosts(L)
+    with pytest.raises(GpError, match=r"nothing says yet where ZL left should be. Place three"):
+        labelling.accept_ghost(session, side=L, code="ZL")
+    session.do(PlacePoint(L, "OS", shape()["OS"] + [1, 2, 3], MARK))
+    ghost = session.ghosts(L)["ZL"]
+    assert np.allclose(ghost.position, shape()["ZL"] + [1, 2, 3])
+    assert ghost.radius_95 == pytest.approx(np.sqrt(7.815) * 0.2)
+    labelling.go_to(session, L, "ZL")
+    labelling.accept_ghost(session)
+    assert session.state.landmark(L, "ZL").provenance.how is How.GHOST
+    assert "ZL" not in session.ghosts(L)
+
+
+def test_an_atlas_that_cannot_say_expects_nothing():
+    def refuse(landmarks):
+        raise GeometryError("on a line")
+
+    expectations = Expectations(refuse)
+    assert not expectations.ghosts(shape(), LandmarkSet.empty(R))
+    assert not expectations.doubts(shape())
+
+
+def test_the_atlas_is_asked_once_for_the_same_points():
+    asked = []
+
+    def count(landmarks):
+        asked.append(landmarks)
+        return predict(landmarks)
+
+    session = Session(BOTH.apply(SpecimenState()), predict=count)
+    assert session.point_states(L, wait=False)["ZL"] is PointState.PLACED
+    assert asked == []
+    assert session.point_states(L) == session.point_states(L)
+    assert len(asked) == 19
+    session.do(PlacePoint(R, "ZL", (0, 0, 0), MARK))
+    session.doubts(L)
+    assert len(asked) == 19
+
+
+def test_doubts_can_be_found_by_a_job():
+    session = Session(BOTH.apply(SpecimenState()), predict=predict)
+    session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
+    assert session.point_states(L, wait=False)["FPP"] is PointState.PLACED
+    with ThreadPoolExecutor(1) as pool:
+        pool.submit(session.judging(L).run, lambda fraction: None).result()
+    assert session.point_states(L, wait=False)["FPP"] is PointState.DOUBTFUL
+
+
+def test_the_published_atlas_expects_as_its_own_checks_do():
+    atlas = Atlas.published()
+    rng = np.random.default_rng(3)
+    points = {code: atlas[code] + rng.normal(size=3) * 0.1 for code in atlas.codes}
+    points["MH"] = points["MH"] + [0, 2.5, 0]
+    session = Session(predict=partial(shape_predict, atlas))
+    session.do(ImportLandmarks((LandmarkSet.from_mapping(points, L),), MARK))
+    found = session.doubts(L)
+    far = {c: d for c, d in departures(atlas, session.landmarks(L)).items() if d.mahalanobis > DOUBTFUL_SD}
+    assert set(found) == set(far) == {"MH"}
+    assert found["MH"].distance == pytest.approx(far["MH"].distance)
+    assert found["MH"].n_sd == pytest.approx(far["MH"].mahalanobis)
+    labelling.clear(session, side=L, code="MH")
+    ghost = session.ghosts(L)["MH"]
+    assert np.linalg.norm(ghost.position - atlas["MH"]) < ghost.radius_95 < 1.0
+
+
+def test_one_pair_mirrors_the_other_side():
+    some = LandmarkSet.from_mapping({"CA": shape(R)["CA"]}, R)
+    assert not mirror_ghosts(LandmarkSet.empty(R), shape(L))
+    ghosts = mirror_ghosts(some, shape(L))
+    for code in PLACEABLE:
+        assert np.allclose(ghosts[code].position, _mirrored_in_bisector(code))
+    assert ghosts["CA"].radius_95 < ghosts["ZL"].radius_95
+    session = Session(ImportLandmarks((shape(L), some), MARK).apply(SpecimenState()))
+    assert session.ghosts(R)["ZL"].source == "mirror"
+    assert "IN" not in session.ghosts(R)
+
+
+def _mirrored_in_bisector(code):
+    a, b = shape(L)["CA"], shape(R)["CA"]
+    normal = (a - b) / np.linalg.norm(a - b)
+    point = shape(L)[code]
+    return point - 2 * np.dot(point - (a + b) / 2, normal) * normal
+
+
+def test_crosshair_and_active_tell_only_changes():
+    session = Session()
+    heard = []
+    session.crosshair_changed.connect(lambda p: heard.append(p.tolist()))
+    session.active_changed.connect(heard.append)
+    session.set_crosshair((1, 2, 3))
+    session.set_crosshair([1, 2, 3])
+    session.set_active(Active(L, "ZL"))
+    session.set_active(Active(L, "ZL"))
+    assert heard == [[1, 2, 3], Active(L, "ZL")]
+    with pytest.raises(ValueError, match="read-only"):
+        session.crosshair[0] = 5
+    with pytest.raises(GpError, match="crosshair: position must be three finite"):
+        session.set_crosshair((1, 2))
+
+
+def test_view():
+    view = View()
+    heard = []
+    view.changed.connect(heard.append)
+    view.update(layout="axial", mesh_opacity=1.0)
+    assert heard == [frozenset({"layout"})]
+    for changes, message in [
+        ({"layout": "five-up"}, "layout must be one of four-up"),
+        ({"mesh_opacity": 2}, "mesh_opacity must be from 0 to 1, got 2"),
+        ({"width": 0}, "width must be above 0"),
+        ({"zoom": 1}, "view field must be one of"),
+    ]:
+        with pytest.raises(GpError, match=message):
+            view.update(**changes)
+    assert view.state == ViewState(layout="axial")
