@@ -1,0 +1,51 @@
+"""The house: what may import what, how long things may be, what every public name explains."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+_ROOT = Path(__file__).resolve().parents[1]
+_SOURCES = sorted(p for package in ("gp_core", "gp_labeler") for p in (_ROOT / package).rglob("*.py"))
+_LONGEST_FILE = 500
+_LONGEST_FUNCTION = 60
+
+
+def _functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
+    for node in ast.walk(tree):
+        if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+            yield node
+
+
+def _body_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
+    body = function.body[1:] if ast.get_docstring(function) else function.body
+    return body[-1].end_lineno - body[0].lineno + 1 if body else 0  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("path", _SOURCES, ids=lambda p: str(p.relative_to(_ROOT)))
+def test_files_and_functions_keep_their_size(path: Path) -> None:
+    text = path.read_text(encoding="utf-8")
+    assert text.count("\n") <= _LONGEST_FILE
+    for function in _functions(ast.parse(text)):
+        assert _body_lines(function) <= _LONGEST_FUNCTION, f"{function.name}, line {function.lineno}"
+
+
+def test_the_core_brings_no_window_with_it() -> None:
+    heavy = ("PySide6", "PyQt6", "qtpy", "vtk", "vtkmodules", "pyvista", "SimpleITK", "skimage", "numba")
+    code = (
+        "import sys, gp_core, gp_core.cli;"
+        f"print([m for m in sys.modules if m.split('.')[0] in {(*heavy, 'matplotlib')}])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=_ROOT)
+    assert done.stdout.strip() == "[]"
+
+
+def test_no_real_data_is_shipped() -> None:
+    listed = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=False, cwd=_ROOT)
+    odd = [f for f in listed.stdout.split() if f.endswith((".mat", ".dat", ".nii", ".gz", ".nrrd", ".dcm"))]
+    assert odd == []
