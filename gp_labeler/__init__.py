@@ -1,0 +1,1 @@
+"""The application of gp-labeler: label guinea-pig head micro-CT, check estimated cochlea poses."""
