@@ -7,7 +7,6 @@ compiled loops.
 from __future__ import annotations
 
 from collections.abc import Callable
-from threading import Event, Thread
 from typing import Any
 
 import numpy as np
@@ -20,18 +19,16 @@ from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GpError
 from gp_labeler.imaging.islands import kept_triangles
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
-from gp_labeler.imaging.progress import Cancelled, Progress, Report
+from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.imaging.vtk_arrays import to_vtk, triangles_of, triple
+from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple
 
 __all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
 
 OVERVIEW_VOXELS = 256**3
 SMALLEST_PART_MM = 1.0
 """Ossicles are larger than this across; specks of noise are smaller."""
-
-_CANCEL_POLL_S = 0.02
 
 
 def overview_stride(volume: Volume, n_voxels: int = OVERVIEW_VOXELS) -> int:
@@ -75,7 +72,7 @@ def extract_isosurface(
     progress : callable, optional
         Called with the fraction done.
     cancel : callable, optional
-        Asked now and then, also while VTK works; True stops.
+        Asked between steps; True stops.
 
     Returns
     -------
@@ -97,7 +94,7 @@ def extract_isosurface(
     report(0.0)
     region = _region(volume, box)
     level = surface_level(threshold, volume.array)
-    mesh = _contour(_image(volume, region, stride), level, report)
+    mesh = _contour(_image(volume, region, stride), level)
     if volume.is_mirrored:
         _turn_over(mesh)
     surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
@@ -161,35 +158,24 @@ def _vtk_ready(array: NDArray[Any]) -> NDArray[Any]:
     return np.ascontiguousarray(array)
 
 
-def _contour(image: vtkImageData, level: float, report: Report) -> vtkPolyData:
-    """Run flying edges on all cores; another thread watches for the wish to stop."""
+def _contour(image: vtkImageData, level: float) -> vtkPolyData:
+    """Run flying edges on all cores.
+
+    It is not stopped in the middle: aborted, it goes on with counts that it has not made (VTK 9.7).
+    """
     vtkSMPTools.SetBackend("STDThread")  # the wheel's default is one thread
     edges = vtkFlyingEdges3D()
     edges.SetInputData(image)
     edges.SetValue(0, level)
     edges.ComputeScalarsOff()
-    done = Event()
-    watch = Thread(target=_stop_when, args=(report.cancel, edges, done), daemon=True)
-    if report.cancel is not None:
-        watch.start()
     edges.Update()
-    done.set()
-    if report.cancel is not None:
-        watch.join()
-    if edges.GetAbortOutput():
-        raise Cancelled
     mesh: vtkPolyData = edges.GetOutput()
     return mesh
 
 
-def _stop_when(cancel: Callable[[], bool], edges: vtkFlyingEdges3D, done: Event) -> None:
-    while not done.wait(_CANCEL_POLL_S):
-        if cancel():
-            edges.SetAbortExecuteAndUpdateTime()
-            return
-
-
 def _turn_over(mesh: vtkPolyData) -> None:
-    """Turn every triangle round: an image whose axes mirror gives them clockwise."""
+    """Turn triangles and normals outwards: from an image whose axes mirror both come inwards."""
     corners = triangles_of(mesh)
     corners[:, [1, 2]] = corners[:, [2, 1]]
+    normals = to_numpy(mesh.GetPointData().GetNormals())
+    np.negative(normals, out=normals)

@@ -75,7 +75,7 @@ class Viewpoint:
 
     def scan(self, display: ArrayLike) -> FloatArray:
         """Return the (N, 3) scan positions, mm, of (N, 3) pixels and depths."""
-        x, y, depth = np.asarray(display, dtype=np.float64).T
+        x, y, depth = np.asarray(display, dtype=np.float64).reshape(-1, 3).T
         width, height = self.size
         ndc = np.stack(
             [(x + 0.5) * 2 / width - 1, 1 - (y + 0.5) * 2 / height, depth, np.ones_like(depth)], axis=1
@@ -89,11 +89,11 @@ class Viewpoint:
         near, far = self.scan([[x, y, -1.0], [x, y, 1.0]])
         return near, (far - near) / np.linalg.norm(far - near)
 
-    def mm_per_pixel(self, point: ArrayLike) -> float:
-        """Return how large a pixel is at a (3,) scan position."""
-        x, y, depth = self.display(np.reshape(point, (1, 3)))[0]
-        across = self.scan([[x, y, depth], [x + 1, y, depth]])
-        return float(np.linalg.norm(across[1] - across[0]))
+    def pixel_sizes(self, points: ArrayLike) -> FloatArray:
+        """Return how large a pixel is, (N,) mm, at (N, 3) scan positions."""
+        beside = self.display(points) + np.array([1.0, 0.0, 0.0])
+        sizes: FloatArray = np.linalg.norm(self.scan(beside) - np.asarray(points), axis=1)
+        return sizes
 
 
 class SceneCamera:
@@ -195,7 +195,7 @@ class SceneCamera:
         """Turn in the plane of the screen as a drag round the middle does."""
         middle = (np.array(self._size()) - 1) / 2
         (x0, y0), (x1, y1) = start - middle, end - middle
-        self._camera.Roll(float(np.degrees(np.arctan2(y1, x1) - np.arctan2(y0, x0))))
+        self._camera.Roll(float(np.degrees(np.arctan2(y0, x0) - np.arctan2(y1, x1))))
         self._camera.OrthogonalizeViewUp()
 
     def pan(self, start: tuple[float, float], end: tuple[float, float]) -> None:

@@ -44,7 +44,7 @@ class ScaleBar:
             self._sheet.draw([], np.empty((0, 2)))
             return
         colours, scale = self._stage.colours, self._stage.scale
-        length, pixels = scale_bar_length(view.mm_per_pixel(camera.focus), _BAR_PIXELS * scale)
+        length, pixels = scale_bar_length(float(view.pixel_sizes(camera.focus[None])[0]), _BAR_PIXELS * scale)
         wanted = (length, scale, colours)
         if wanted != self._written:
             self._sheet.write([Text(f"{length:g} mm", colours.text, bold=False)], 13 * scale, colours.halo)

@@ -107,10 +107,9 @@ class MarkActor:
         if self.size.unit == "mm":
             sizes = np.full(len(self._marks), self.size.diameter)
         else:
-            pixels = self.size.diameter * self._stage.scale
-            sizes = pixels * np.array([view.mm_per_pixel(mark.position) for mark in self._marks])
-        grown = np.array([_ACTIVE_GROWS if mark.active else 1.0 for mark in self._marks])
-        return np.asarray(sizes * grown, dtype=np.float64)
+            sizes = self.size.diameter * self._stage.scale * view.pixel_sizes(self.positions)
+        grown: FloatArray = sizes * [_ACTIVE_GROWS if mark.active else 1.0 for mark in self._marks]
+        return grown
 
     def refresh(self, view: Viewpoint, hidden: NDArray[np.bool_]) -> list[Label]:
         """Bring sizes and faintness up to date with the camera, and return the labels to draw.
@@ -127,10 +126,10 @@ class MarkActor:
         shapes = np.array([_SHAPES.get(mark.state, 0) for mark in self._marks], dtype=int)
         self._solid.set(self.positions, sizes, colours, shapes)
         self._faint.set(self.positions[hidden], sizes[hidden], colours[hidden], shapes[hidden])
-        radii = [0.5 * d / view.mm_per_pixel(m.position) for d, m in zip(sizes, self._marks, strict=True)]
+        radii = 0.5 * sizes / view.pixel_sizes(self.positions)
         self._ring_active(pixels, radii)
         return [
-            self._label(mark, pixel, radius, bool(behind))
+            self._label(mark, pixel, float(radius), bool(behind))
             for mark, pixel, radius, behind in zip(self._marks, pixels, radii, hidden, strict=True)
             if mark.label
         ]
@@ -148,7 +147,7 @@ class MarkActor:
         rank = 2.0 if mark.active else -float(hidden)
         return Label(Text(mark.label, self._colour(mark)), pixel, gap, rank, hidden and not mark.active)
 
-    def _ring_active(self, pixels: FloatArray, radii: list[float]) -> None:
+    def _ring_active(self, pixels: FloatArray, radii: FloatArray) -> None:
         scale, turn = self._stage.scale, np.linspace(0, 2 * np.pi, 49)
         circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
         rings = [
@@ -203,13 +202,10 @@ class _GlyphLayer:
         if not len(points):
             return
         self._points.SetPoints(points_of(points))
-        arrays: dict[str, NDArray[Any]] = {
-            "size": sizes,
-            "shape": shapes,
-            "colour": (colours * 255).astype(np.uint8),
-        }
-        for name, values in arrays.items():
-            self._points.GetPointData().AddArray(to_vtk(values, name))
+        data = self._points.GetPointData()
+        data.AddArray(to_vtk(sizes, "size"))
+        data.AddArray(to_vtk(shapes, "shape"))
+        data.AddArray(to_vtk((colours * 255).astype(np.uint8), "colour"))
 
     def close(self) -> None:
         release(self._renderer, self._actor)

@@ -17,6 +17,7 @@ from gp_labeler.scene.colours import SceneColours, rgb
 from gp_labeler.scene.furniture import OrientationCube, ScaleBar
 from gp_labeler.scene.gestures import CameraControl
 from gp_labeler.scene.ghosts import GhostActor
+from gp_labeler.scene.hover import HoverActor
 from gp_labeler.scene.labels import LabelActor
 from gp_labeler.scene.marks import MarkActor
 from gp_labeler.scene.segments import CrosshairActor, SegmentActor
@@ -44,7 +45,7 @@ class Scene3D:
 
     Attributes
     ----------
-    bone, marks, ghosts, lines, crosshair, slices : adapters
+    bone, marks, ghosts, lines, crosshair, hover, slices : adapters
         What is drawn; each has ``show(...)``.
     camera : SceneCamera
         Where it is seen from.
@@ -72,6 +73,7 @@ class Scene3D:
         self.crosshair = CrosshairActor(self._stage)
         self.ghosts = GhostActor(self._stage)
         self.marks = MarkActor(self._stage)
+        self.hover = HoverActor(self._stage)
         self.labels = LabelActor(self._stage)
         self.scale_bar = ScaleBar(self._stage)
         self.cube = OrientationCube(self._stage)
@@ -140,6 +142,7 @@ class Scene3D:
         view = self.camera.viewpoint()
         labels = self.marks.refresh(view, self.hidden(self.marks.positions))
         self.labels.refresh(view, labels + self.ghosts.refresh(view))
+        self.hover.refresh(view)
         self.scale_bar.refresh(view, self.camera)
         self.cube.refresh(view, self.camera)
         self.target.render()
@@ -194,6 +197,7 @@ class Scene3D:
             self.cube,
             self.scale_bar,
             self.labels,
+            self.hover,
             self.marks,
             self.ghosts,
             self.crosshair,

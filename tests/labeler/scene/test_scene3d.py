@@ -1,0 +1,422 @@
+"""The 3D scene with no display: what is drawn where, what a pixel hits, and that closing lets all go."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scene_cases import DIRECTIONS, MIDDLE, scan_of
+
+from gp_labeler.imaging.readers import read_volume
+from gp_labeler.imaging.surface import Surface, extract_isosurface
+from gp_labeler.scene.camera import VIEWPOINTS
+from gp_labeler.scene.colours import DARK, LIGHT
+from gp_labeler.scene.ghosts import RADIUS_95, Ghost, ellipse
+from gp_labeler.scene.label_layout import place_labels
+from gp_labeler.scene.marks import GlyphSize, Mark
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.scene3d import Scene3D
+from gp_labeler.scene.segments import Segment
+from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.target import RenderTarget
+from gp_labeler.scene.window_level import WindowLevel
+
+BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
+
+
+@pytest.fixture
+def scene() -> Iterator[Scene3D]:
+    made = Scene3D(RenderTarget.offscreen(320, 240))
+    made.scale_bar.visible = made.cube.visible = False
+    yield made
+    made.close()
+
+
+@pytest.fixture(scope="module")
+def ball() -> Surface:
+    return extract_isosurface(scan_of([(BALL, RADIUS)], np.eye(3)), 100)
+
+
+def _unlike_background(pixels: np.ndarray) -> np.ndarray:
+    """Where something is drawn: the background is a gentle gradient of one hue from top to bottom."""
+    background = pixels[:, :1].astype(int)
+    return np.abs(pixels.astype(int) - background).max(axis=2) > 25
+
+
+def _coloured(pixels: np.ndarray, colour: str) -> np.ndarray:
+    """Where a hue prevails, however it is lit."""
+    wanted = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)], float)
+    shown = pixels.astype(float)
+    cosine = shown @ wanted / np.maximum(np.linalg.norm(shown, axis=2) * np.linalg.norm(wanted), 1)
+    return (cosine > 0.985) & (shown.max(axis=2) > 70)
+
+
+@pytest.mark.parametrize("letter", VIEWPOINTS)
+@pytest.mark.parametrize("name", ["straight", "mirrored", "oblique mirrored"])
+def test_a_bright_ball_is_drawn_where_it_is(scene: Scene3D, name: str, letter: str) -> None:
+    scene.bone.show([extract_isosurface(scan_of([(BALL, RADIUS)], DIRECTIONS[name]), 100)])
+    scene.camera.view_from(letter)
+    scene.camera.focus_on(MIDDLE, across_mm=16)
+    drawn = _unlike_background(scene.image())
+    assert drawn.shape == (240, 320)
+    rows, columns = np.nonzero(drawn)
+    assert np.array([columns.mean(), rows.mean()]) == pytest.approx(scene.display_of(BALL[None])[0], abs=0.6)
+    assert drawn.sum() == pytest.approx(np.pi * (RADIUS * 240 / 16) ** 2, rel=0.03)
+
+
+@pytest.mark.parametrize("parallel", [True, False])
+def test_a_click_on_the_projection_of_a_surface_point_gives_it_back(
+    scene: Scene3D, ball: Surface, parallel: bool
+) -> None:
+    scene.bone.show([ball])
+    scene.camera.parallel = parallel
+    rng = np.random.default_rng(8)
+    n_found = 0
+    for _ in range(12):
+        scene.camera.rotate(*rng.uniform(-200, 200, 2))
+        scene.camera.focus_on(BALL + rng.uniform(-1, 1, 3), across_mm=rng.uniform(4, 14))
+        points = ball.points[rng.integers(0, len(ball.points), 30)].astype(float)
+        points = points[~scene.hidden(points) & (np.abs((points - BALL) @ scene.camera.direction) > 1)]
+        for point, (x, y) in zip(points, scene.display_of(points), strict=True):
+            hit = scene.pick(x, y)
+            assert hit is not None
+            assert np.linalg.norm(hit.point - point) < 0.1 * 0.2
+            assert hit.normal @ scene.camera.direction < 0
+            n_found += 1
+    assert n_found > 60
+
+
+def test_what_is_drawn_is_what_is_hit(scene: Scene3D, ball: Surface) -> None:
+    """Every pixel, against the picture: they differ at most on the rim of the silhouette."""
+    scene.bone.show([ball])
+    scene.target.resize(80, 60)
+    scene.camera.focus_on(BALL + np.array([0.3, 0.2, 0.4]), across_mm=8)
+    scene.bone._fine[0].GetProperty().LightingOff()  # the side in the shade is dim against the background
+    drawn = _unlike_background(scene.image())
+    hit = np.array([[scene.pick(x, y) is not None for x in range(80)] for y in range(60)])
+    assert hit.sum() > 1000
+    assert (drawn != hit).sum() < 0.03 * hit.sum()
+    rows, columns = np.nonzero(hit)
+    drawn_rows, drawn_columns = np.nonzero(drawn)
+    assert columns.mean() == pytest.approx(drawn_columns.mean(), abs=0.05)
+    assert rows.mean() == pytest.approx(drawn_rows.mean(), abs=0.05)
+
+
+def test_a_click_that_misses_or_meets_what_is_not_seen_hits_nothing(scene: Scene3D, ball: Surface) -> None:
+    assert scene.pick(160, 120) is None
+    scene.bone.show([ball])
+    scene.fit()
+    assert scene.pick(160, 120) is not None
+    assert scene.pick(2, 2) is None
+    scene.bone.opacity = 0.02
+    assert scene.pick(160, 120) is None
+    scene.bone.opacity = 1
+    scene.bone.visible = False
+    assert scene.pick(160, 120) is None
+    assert not _unlike_background(scene.image()).any()
+
+
+def test_the_nearest_of_several_surfaces_is_hit(scene: Scene3D) -> None:
+    near, far = (
+        extract_isosurface(scan_of([(BALL + np.array([0, y, 0]), 1.5)], np.eye(3)), 100) for y in (-3.0, 3.0)
+    )
+    scene.bone.show([far, near])
+    scene.camera.view_from("A")
+    scene.camera.focus_on(BALL)
+    x, y = scene.display_of(BALL[None])[0]
+    hit = scene.pick(x, y)
+    assert hit is not None
+    assert hit.point[1] == pytest.approx(BALL[1] - 4.5, abs=0.05)
+    assert scene.bone.bounds == pytest.approx(np.stack([near.bounds[0], far.bounds[1]]))
+
+
+def test_marks_are_drawn_solid_in_front_and_faint_behind_bone(scene: Scene3D, ball: Surface) -> None:
+    front, behind = BALL + np.array([1, -RADIUS, 1]), BALL + np.array([-1, RADIUS, -1])
+    scene.bone.show([ball])
+    scene.marks.show([Mark("front", front), Mark("behind", behind)])
+    scene.camera.view_from("A")
+    scene.fit()
+    assert scene.hidden(scene.marks.positions).tolist() == [False, True]
+    pixels = scene.image()
+    orange = _coloured(pixels, DARK.states["placed"])
+    x, y = np.rint(scene.display_of(front[None])[0]).astype(int)
+    assert orange[y - 2 : y + 3, x - 2 : x + 3].mean() > 0.7
+    x, y = np.rint(scene.display_of(behind[None])[0]).astype(int)
+    scene.marks.show([])
+    bare = scene.image()
+    assert not _coloured(bare, DARK.states["placed"]).any()
+    change = np.abs(pixels[y, x].astype(int) - bare[y, x]).max()
+    assert 8 < change < 120
+    scene.camera.view_from("P")
+    scene.marks.show([Mark("front", front), Mark("behind", behind)])
+    assert scene.hidden(scene.marks.positions).tolist() == [True, False]
+
+
+def test_glyphs_are_as_large_as_asked_in_pixels_or_mm(scene: Scene3D) -> None:
+    scene.marks.show([Mark("a", MIDDLE)])
+    for across in (5.0, 40.0):
+        scene.camera.focus_on(MIDDLE, across_mm=across)
+        scene.marks.size = GlyphSize(20, "px")
+        assert np.ptp(np.nonzero(_unlike_background(scene.image()))[0]) + 1 == pytest.approx(20, abs=2)
+        scene.marks.size = GlyphSize(2.0, "mm")
+        expected = 2.0 * 240 / across
+        assert np.ptp(np.nonzero(_unlike_background(scene.image()))[0]) + 1 == pytest.approx(expected, abs=2)
+
+
+def test_the_mark_under_the_pointer_is_named(scene: Scene3D, ball: Surface) -> None:
+    front, behind = BALL + np.array([0, -RADIUS, 0]), BALL + np.array([0.2, RADIUS, 0])
+    scene.bone.show([ball])
+    scene.marks.show([Mark("L:MH", behind), Mark("L:OI", front), Mark("gone", np.full(3, np.nan))])
+    scene.camera.view_from("A")
+    scene.fit()
+    (x, y), (x2, y2) = scene.display_of([front, behind])
+    assert scene.mark_at(x, y) == "L:OI"
+    assert scene.mark_at(x2 - 0.4, y2) == "L:OI"  # the seen one first
+    assert scene.mark_at(x2 + 9, y2) == "L:MH"
+    assert scene.mark_at(x + 60, y) is None
+
+
+def test_labels_do_not_cover_each_other() -> None:
+    rng = np.random.default_rng(6)
+    anchors = rng.uniform(100, 300, (40, 2))
+    sizes = np.column_stack([rng.uniform(20, 40, 40), np.full(40, 16.0)])
+    ranks = np.zeros(40)
+    ranks[7] = 1.0
+    corners, shown = place_labels(anchors, sizes, (400, 400), gaps=np.full(40, 8.0), ranks=ranks)
+    boxes = np.column_stack([corners, corners + sizes])[shown]
+    assert shown[7]
+    assert shown.sum() > 20
+    low = np.maximum(boxes[:, None, :2], boxes[None, :, :2])
+    high = np.minimum(boxes[:, None, 2:], boxes[None, :, 2:])
+    shared = np.clip(high - low, 0, None).prod(axis=2) - np.diag(sizes[shown].prod(axis=1))
+    assert (shared / sizes[shown].prod(axis=1)).max() < 0.36
+    assert not place_labels([[500, 10]], [[20, 10]], (400, 400), gaps=[4], ranks=[1])[1].any()
+    assert place_labels([], [], (400, 400), gaps=[], ranks=[])[0].shape == (0, 2)
+
+
+def test_labels_are_drawn_beside_their_marks(scene: Scene3D) -> None:
+    scene.marks.show([Mark("a", MIDDLE, state="computed")])
+    scene.camera.focus_on(MIDDLE)
+    without = _coloured(scene.image(), DARK.states["computed"]).sum()
+    scene.marks.show([Mark("a", MIDDLE, "RWA", state="computed")])
+    drawn = _coloured(scene.image(), DARK.states["computed"])
+    assert drawn.sum() > without + 40
+    rows, columns = np.nonzero(drawn)
+    assert np.abs(columns - 160).max() < 50
+    assert np.abs(rows - 120).max() < 30
+    scene.labels.visible = False
+    assert _coloured(scene.image(), DARK.states["computed"]).sum() == without
+
+
+def test_a_ghost_is_outlined_by_its_95_percent_ellipse(scene: Scene3D) -> None:
+    covariance = np.diag([0.8, 0.3, 0.1])
+    scene.ghosts.show([Ghost("L:IN", MIDDLE, covariance, active=True)])
+    scene.camera.view_from("A")
+    scene.camera.focus_on(MIDDLE, across_mm=12)
+    rows, columns = np.nonzero(_coloured(scene.image(), DARK.states["ghost"]))
+    per_mm = 240 / 12
+    assert np.ptp(columns) / 2 == pytest.approx(RADIUS_95 * np.sqrt(0.8) * per_mm, abs=3)
+    assert np.ptp(rows) / 2 == pytest.approx(RADIUS_95 * np.sqrt(0.1) * per_mm, abs=3)
+    outline = ellipse([1, 2], [[4, 1], [1, 2]], 1.5) - [1, 2]
+    radius = np.sqrt(np.einsum("ij,jk,ik->i", outline, np.linalg.inv([[4, 1], [1, 2]]), outline))
+    assert radius == pytest.approx(1.5)
+
+
+def test_crosshair_lines_slices_and_hover_are_drawn_and_taken_away(scene: Scene3D) -> None:
+    volume = scan_of([(BALL, RADIUS)], np.eye(3))
+    source = SliceSource(volume)
+    scene.camera.view_from("A")
+    scene.camera.rotate(40, 30)
+    scene.camera.focus_on(MIDDLE, across_mm=14)
+    empty = scene.image()
+    shows = {
+        "crosshair": (lambda: scene.crosshair.show(MIDDLE), lambda: scene.crosshair.show(None)),
+        "line": (
+            lambda: scene.lines.show([Segment(MIDDLE - 3, MIDDLE + 3, "#FF00FF")]),
+            lambda: scene.lines.show([]),
+        ),
+        "hover": (lambda: scene.hover.show(MIDDLE), lambda: scene.hover.show(None)),
+        "slices": (
+            lambda: scene.slices.show(
+                [source.image(p, MIDDLE[p.axis]) for p in Plane], WindowLevel.of(volume)
+            ),
+            lambda: scene.slices.show([], WindowLevel(0, 1)),
+        ),
+    }
+    for name, (show, hide) in shows.items():
+        show()
+        assert np.abs(scene.image().astype(int) - empty).max() > 60, name
+        hide()
+        assert np.abs(scene.image().astype(int) - empty).max() < 3, name
+
+
+def test_slices_in_3d_show_the_marker_where_it_is(scene: Scene3D) -> None:
+    volume = scan_of([(BALL, 1.0)], DIRECTIONS["mirrored"])
+    source = SliceSource(volume)
+    for plane, letter in zip(Plane, "SLA", strict=True):
+        scene.slices.show([source.image(plane, BALL[plane.axis])], WindowLevel(0, 200))
+        scene.camera.view_from(letter)
+        scene.camera.focus_on(MIDDLE, across_mm=14)
+        rows, columns = np.nonzero(scene.image().min(axis=2) > 150)
+        found = [columns.mean(), rows.mean()]
+        assert found == pytest.approx(scene.display_of(BALL[None])[0], abs=2.0)
+
+
+def test_the_cube_and_the_scale_bar(scene: Scene3D) -> None:
+    empty = scene.image()
+    scene.scale_bar.visible = scene.cube.visible = True
+    changed = np.abs(scene.image().astype(int) - empty).max(axis=2) > 30
+    assert changed[160:, :95].sum() > 800  # lower left
+    assert changed[200:, 180:].sum() > 150  # lower right
+    assert not changed[:150].any()
+    views = []
+    for letter in VIEWPOINTS:
+        scene.camera.view_from(letter)
+        views.append(scene.image()[160:, :95].astype(int))
+    for n, one in enumerate(views):
+        assert all(np.abs(one - other).max() > 60 for other in views[n + 1 :])  # six letters
+
+
+def test_themes_quick_frames_and_sizes(scene: Scene3D, ball: Surface) -> None:
+    coarse = extract_isosurface(scan_of([(BALL, RADIUS / 2)], np.eye(3)), 100)
+    scene.bone.show([ball], quick=[coarse])
+    scene.fit()
+    fine = _unlike_background(scene.image()).sum()
+    scene.render(quick=True)
+    assert _unlike_background(scene.target.pixels()).sum() < 0.4 * fine
+    assert scene.pick(160, 120).point == pytest.approx(BALL + np.array([0, -RADIUS, 0]), abs=0.1)
+    assert _unlike_background(scene.image()).sum() == fine
+    scene.set_colours(LIGHT)
+    assert scene.image()[0, 0].min() > 200
+    scene.set_colours(DARK)
+    large = scene.image(640, 480)
+    assert large.shape == (480, 640, 3)
+    assert _unlike_background(large).sum() == pytest.approx(4 * fine, rel=0.03)
+    assert scene.target.size == (320, 240)
+    scene.set_ambient_occlusion(True)
+    assert _unlike_background(scene.image()).sum() == pytest.approx(fine, rel=0.05)
+    scene.scale = 2.0
+    scene.marks.show([Mark("a", BALL - np.array([0, RADIUS, 0]), "CA")])
+    assert _coloured(scene.image(), DARK.states["placed"]).sum() > 250
+
+
+def test_real_landmarks_are_seen_on_the_real_skull(scene: Scene3D, shared_data: Path) -> None:
+    volume = read_volume(shared_data / "mouse_ct" / "C57BL6_J_.nii.gz")
+    markups = json.loads((shared_data / "mouse_ct" / "C57BL6_J_.mrk.json").read_text())["markups"]
+    points = np.array([point["position"] for point in markups[0]["controlPoints"]])
+    surface = extract_isosurface(volume, 32)
+    normals = np.array([surface.project(point).normal for point in points])
+    scene.bone.show([surface])
+    n_seen = 0
+    for letter in VIEWPOINTS:
+        scene.camera.view_from(letter)
+        scene.fit()
+        facing = (normals @ scene.camera.direction < -0.6) & ~scene.hidden(points)
+        for point, (x, y) in zip(points[facing], scene.display_of(points[facing]), strict=True):
+            hit = scene.pick(x, y)
+            assert hit is not None
+            assert np.linalg.norm(hit.point - point) < 0.2  # they were placed up to 0.1 mm off this surface
+            n_seen += 1
+    assert n_seen > 30
+
+
+def _drawn_objects(scene: Scene3D) -> list[weakref.ref[object]]:
+    stage = scene._stage
+    found: list[object] = [stage.base, stage.overlay, scene.cube.renderer, scene.target.window]
+    for renderer in (stage.base, stage.overlay):
+        props = renderer.GetViewProps()
+        found += [props.GetItemAsObject(n) for n in range(props.GetNumberOfItems())]
+    return [weakref.ref(thing) for thing in found]
+
+
+def test_closing_lets_every_vtk_object_go(ball: Surface) -> None:
+    scene = Scene3D(RenderTarget.offscreen(100, 80))
+    scene.bone.show([ball], quick=[ball])
+    scene.marks.show([Mark("a", BALL, "CA", active=True)])
+    scene.ghosts.show([Ghost("b", BALL, np.eye(3), "IN?", active=True)])
+    scene.crosshair.show(BALL)
+    scene.hover.show(BALL)
+    source = SliceSource(scan_of([(BALL, RADIUS)], DIRECTIONS["oblique"]))
+    scene.slices.show([source.image(Plane.AXIAL, BALL[2])], WindowLevel(0, 200))
+    scene.render()
+    objects = _drawn_objects(scene)
+    assert len(objects) > 20
+    scene.close()
+    source.close()
+    del scene, source
+    gc.collect()
+    assert [ref() for ref in objects if ref() is not None] == []
+
+
+def test_opening_and_closing_again_and_again_leaks_nothing(ball: Surface) -> None:
+    def cycle() -> None:
+        scene = Scene3D(RenderTarget.offscreen(160, 120))
+        scene.bone.show([ball])
+        scene.marks.show([Mark("a", BALL, "CA")])
+        scene.fit()
+        assert scene.image().std() > 5
+        scene.close()
+
+    for _ in range(4):
+        cycle()
+    gc.collect()
+    files, threads, memory = (
+        len(list(Path("/proc/self/fd").iterdir())),
+        threading.active_count(),
+        _resident_mb(),
+    )
+    for _ in range(8):
+        cycle()
+    gc.collect()
+    assert len(list(Path("/proc/self/fd").iterdir())) <= files
+    assert threading.active_count() <= threads
+    assert _resident_mb() - memory < 25
+
+
+def _resident_mb() -> float:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGESIZE") / 1e6
+
+
+def test_two_scenes_share_nothing(ball: Surface) -> None:
+    one, two = (Scene3D(RenderTarget.offscreen(160, 120)) for _ in range(2))
+    one.bone.show([ball])
+    one.fit()
+    two.fit()
+    two.scale_bar.visible = two.cube.visible = False
+    one.render()
+    two.render()
+    assert _unlike_background(one.target.pixels())[30:90, 40:120].any()
+    assert not _unlike_background(two.target.pixels()).any()
+    one.close()
+    assert two.image().shape == (120, 160, 3)
+    two.close()
+    with pytest.raises(RuntimeError, match="closed"):
+        two.target.render()
+
+
+def test_without_a_display_nothing_is_said_on_stderr() -> None:
+    code = (
+        "from gp_labeler.scene.target import RenderTarget\n"
+        "from gp_labeler.scene.scene3d import Scene3D\n"
+        "scene = Scene3D(RenderTarget.offscreen(64, 48))\n"
+        "print(scene.image().shape)\n"
+        "scene.close()\n"
+        "import sys; print([m for m in sys.modules if m.startswith(('PySide6', 'pyvista'))])\n"
+    )
+    without = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", code], env=without, capture_output=True, text=True, timeout=60, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split("\n")[:2] == ["(48, 64, 3)", "[]"]
+    assert done.stderr == ""

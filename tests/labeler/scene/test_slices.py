@@ -1,0 +1,207 @@
+"""Slices show what lies where, in physical axes, on the right side of the screen."""
+
+from __future__ import annotations
+
+import itertools
+import time
+
+import numpy as np
+import pytest
+from scene_cases import DIRECTIONS, MIDDLE, scan_of
+
+from gp_labeler.imaging.surface import extract_isosurface
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.scene.planes import Plane, letter_of, position_text
+from gp_labeler.scene.slice_view import SliceView, scale_bar_length
+from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.window_level import WindowLevel
+
+MARKER = MIDDLE + np.array([2.5, -1.7, 3.1])
+
+
+def _painted(source: SliceSource, view: SliceView) -> np.ndarray:
+    """Sample a slice as a painter would: the value at the centre of each pixel of the view."""
+    image = source.image(view.plane, view.position)
+    width, height = view.size
+    x, y = np.meshgrid(np.arange(width), np.arange(height))
+    flat = view.plane.flat(view.pixel_to_scan(np.stack([x.ravel(), y.ravel()], axis=1)))
+    column, row = np.rint((flat - image.origin) / image.step).astype(int).T
+    inside = (row >= 0) & (row < image.values.shape[0]) & (column >= 0) & (column < image.values.shape[1])
+    painted = np.zeros(len(flat))
+    painted[inside] = image.values[row[inside], column[inside]]
+    return painted.reshape(height, width)
+
+
+@pytest.mark.parametrize("plane", Plane)
+@pytest.mark.parametrize("name", DIRECTIONS)
+def test_a_bright_marker_appears_where_it_is(name: str, plane: Plane) -> None:
+    volume = scan_of([(MARKER, 0.8)], DIRECTIONS[name])
+    source = SliceSource(volume)
+    assert source.oblique == name.startswith("oblique")
+    view = SliceView.fitted(source, plane, (180, 150)).at(source.snap(plane, MARKER[plane.axis]))
+    painted = _painted(source, view)
+    rows, columns = np.nonzero(painted > 100)
+    expected = view.scan_to_pixel(MARKER[None])[0]
+    assert np.array([columns.mean(), rows.mean()]) == pytest.approx(expected, abs=0.12 / view.mm_per_pixel)
+    assert (
+        abs(source.image(plane, view.position).position - MARKER[plane.axis])
+        <= 0.5 * source.step(plane) + 1e-9
+    )
+    elsewhere = view.at(source.snap(plane, MARKER[plane.axis] + 3))
+    assert _painted(source, elsewhere).max() < 20
+
+
+@pytest.mark.parametrize("name", DIRECTIONS)
+def test_patient_left_is_on_the_right_of_the_screen_and_the_nose_on_the_left(name: str) -> None:
+    left, anterior, superior = (
+        MIDDLE + np.array([4, 0, 0]),
+        MIDDLE + np.array([0, -4, 0]),
+        MIDDLE + np.array([0, 0, 4]),
+    )
+    source = SliceSource(scan_of([(left, 1.0), (anterior, 0.7), (superior, 0.5)], DIRECTIONS[name]))
+    seen = {}
+    for plane in Plane:
+        view = SliceView.fitted(source, plane, (120, 120)).at(source.snap(plane, MIDDLE[plane.axis]))
+        painted = _painted(source, view) > 100
+        seen[plane] = [painted[:, 70:].sum(), painted[:, :50].sum(), painted[:50].sum(), painted[70:].sum()]
+    assert [bool(n) for n in seen[Plane.AXIAL]] == [True, False, True, False]  # left: right; anterior: top
+    assert [bool(n) for n in seen[Plane.SAGITTAL]] == [
+        False,
+        True,
+        True,
+        False,
+    ]  # anterior: left; superior: top
+    assert [bool(n) for n in seen[Plane.CORONAL]] == [True, False, True, False]  # left: right; superior: top
+    assert seen[Plane.AXIAL][0] > seen[Plane.AXIAL][2]
+    assert Plane.AXIAL.letters == ("R", "L", "A", "P")
+    assert Plane.CORONAL.letters == ("R", "L", "S", "I")
+    assert Plane.SAGITTAL.letters == ("A", "P", "S", "I")
+
+
+def test_straight_slices_are_the_voxels_themselves() -> None:
+    rng = np.random.default_rng(2)
+    array = rng.integers(0, 1000, (7, 8, 9)).astype(np.int16)
+    directions = [
+        np.eye(3)[list(p)] * signs
+        for p in itertools.permutations(range(3))
+        for signs in ([1, 1, 1], [1, -1, 1], [-1, -1, -1])
+    ]
+    for direction in directions:
+        volume = Volume.from_parts(array, (0.1, 0.2, 0.3), (5, 6, 7), direction)
+        source = SliceSource(volume)
+        for plane in Plane:
+            low, high = source.limits(plane)
+            image = source.image(plane, low + 0.4 * (high - low))
+            assert np.shares_memory(image.values, volume.array)
+            row, column = len(image.values) - 2, 1
+            flat = image.origin + image.step * [column, row]
+            point = plane.scan(flat[None], image.position)
+            assert volume.values_at(point)[0] == image.values[row, column]
+            assert volume.scan_to_voxel(point) == pytest.approx(
+                np.rint(volume.scan_to_voxel(point)), abs=1e-9
+            )
+
+
+def test_every_slice_can_be_reached_and_no_other() -> None:
+    volume = scan_of([(MIDDLE, 2.0)], DIRECTIONS["permuted"])
+    source = SliceSource(volume)
+    for plane in Plane:
+        low, high = source.limits(plane)
+        n = round((high - low) / source.step(plane)) + 1
+        assert n in volume.size
+        seen = {source.image(plane, p).position for p in np.linspace(low - 1, high + 1, 5 * n)}
+        assert len(seen) == n
+        assert source.snap(plane, -1e6) == pytest.approx(low)
+        assert source.snap(plane, 1e6) == pytest.approx(high)
+
+
+@pytest.mark.parametrize("name", ["straight", "mirrored", "oblique"])
+def test_the_outline_is_where_the_mesh_is_cut(name: str) -> None:
+    volume = scan_of([(MARKER, 2.0), (MIDDLE - 3, 1.0)], DIRECTIONS[name])
+    surface = extract_isosurface(volume, 100, smallest_mm=0)
+    source = SliceSource(volume)
+    for plane in Plane:
+        image = source.image(plane, MARKER[plane.axis])
+        outline = image.outline(100)
+        points = plane.scan(outline.reshape(-1, 2), image.position)
+        assert len(outline) > 30
+        away = [np.linalg.norm(surface.project(p).point - p) for p in points[::3]]
+        assert max(away) < (1e-4 if name != "oblique" else 0.06)
+        assert image.outline(250).shape == (0, 2, 2)
+
+
+def test_pixels_and_positions_are_inverse_and_the_view_moves_as_told() -> None:
+    source = SliceSource(scan_of([(MIDDLE, 2.0)], np.eye(3)))
+    rng = np.random.default_rng(4)
+    for plane in Plane:
+        view = SliceView.fitted(source, plane, (301, 201))
+        pixels = rng.uniform(-50, 350, (20, 2))
+        points = view.pixel_to_scan(pixels)
+        assert view.scan_to_pixel(points) == pytest.approx(pixels)
+        assert view.off_slice(points) == pytest.approx(0)
+        anchor = np.array([40.0, 160.0])
+        zoomed = view.zoomed(3.0, about=anchor)
+        assert zoomed.mm_per_pixel == pytest.approx(view.mm_per_pixel / 3)
+        assert zoomed.pixel_to_scan(anchor[None]) == pytest.approx(view.pixel_to_scan(anchor[None]))
+        assert view.panned(10, -5).scan_to_pixel(points) == pytest.approx(pixels + np.array([10, -5]))
+        assert view.centred(points[0]).scan_to_pixel(points[:1])[0] == pytest.approx([150, 100])
+        assert view.showing(MIDDLE).centre == pytest.approx(view.centre)
+        assert view.showing(MIDDLE + 500).off_slice(MIDDLE[None] + 500) == pytest.approx(0)
+        assert view.resized(601, 401).scan_to_pixel(points) == pytest.approx(pixels + np.array([150, 100]))
+        corners = view.image_corners(source.image(plane, view.position))
+        assert (corners[0] > 0).all()
+        assert (corners[1] < [301, 201]).all()
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.int8, np.uint16, np.int16, np.int32, np.float32, np.float64])
+def test_window_and_level_are_linear_for_all_types(dtype: type) -> None:
+    values = (
+        np.array([[-120, -3, 0], [1, 64, 127]])
+        .clip(np.iinfo(dtype).min if dtype(1.5) == 1 else None)
+        .astype(dtype)
+    )
+    window = WindowLevel(-10.0, 110.0)
+    expected = ((values.astype(float) + 10) * 255 / 120).clip(0, 255)
+    assert np.abs(window.grey(values).astype(float) - expected).max() <= 1.0
+    turned = np.asfortranarray(values)[::-1]
+    assert np.array_equal(window.grey(turned), window.grey(np.ascontiguousarray(turned)))
+    wider = window.moved(60, 5)
+    assert (wider.width, wider.level) == pytest.approx((180, 55))
+    assert window.moved(-1e9, 0).width > 0
+
+
+def test_nothing_is_black_and_the_preview_is_tinted() -> None:
+    volume = scan_of([(MIDDLE, 2.0)], np.eye(3))
+    window = WindowLevel.of(volume)
+    image = SliceSource(volume).image(Plane.AXIAL, MIDDLE[2])
+    rgb = image.rgb(window, threshold=100)
+    bone = image.values >= 100
+    assert (rgb[bone, 0] > rgb[bone, 2]).all()
+    assert np.ptp(rgb[~bone].astype(int), axis=1).max() == 0
+    assert window.grey(np.array([np.nan, np.inf, -np.inf])).tolist() == [0, 255, 0]
+    assert WindowLevel.of(Volume(np.zeros((3, 3, 3)), np.eye(4))).width > 0
+
+
+def test_words_and_scale_bars() -> None:
+    assert position_text(Plane.AXIAL, 12.44) == "S 12.4 mm"
+    assert position_text(Plane.SAGITTAL, -3) == "R 3.0 mm"
+    assert position_text(Plane.CORONAL, 9.1) == "P 9.1 mm"
+    assert letter_of([0.2, -0.9, 0.1]) == "A"
+    for zoom in (1e-4, 0.0123, 0.05, 0.7, 9.0):
+        length, pixels = scale_bar_length(zoom, 100)
+        assert 40 <= pixels <= 100.001
+        assert length / 10 ** np.floor(np.log10(length) + 1e-9) == pytest.approx(
+            round(length / 10 ** np.floor(np.log10(length) + 1e-9))
+        )
+        assert pixels * zoom == pytest.approx(length)
+
+
+def test_straight_slices_are_quick() -> None:
+    volume = Volume(np.zeros((256, 256, 256), np.uint16), np.diag([0.1, 0.1, 0.1, 1]))
+    source, window = SliceSource(volume), WindowLevel(0, 100)
+    source.image(Plane.AXIAL, 3.0).grey(window)
+    start = time.perf_counter()
+    for n in range(30):
+        for plane in Plane:
+            source.image(plane, 0.1 * n).grey(window)
+    assert (time.perf_counter() - start) / 30 < 0.03
