@@ -107,8 +107,8 @@ def test_what_is_drawn_is_what_is_hit(scene: Scene3D, ball: Surface) -> None:
     assert (drawn != hit).sum() < 0.03 * hit.sum()
     rows, columns = np.nonzero(hit)
     drawn_rows, drawn_columns = np.nonzero(drawn)
-    assert columns.mean() == pytest.approx(drawn_columns.mean(), abs=0.05)
-    assert rows.mean() == pytest.approx(drawn_rows.mean(), abs=0.05)
+    assert columns.mean() == pytest.approx(drawn_columns.mean(), abs=0.1)
+    assert rows.mean() == pytest.approx(drawn_rows.mean(), abs=0.1)
 
 
 def test_a_click_that_misses_or_meets_what_is_not_seen_hits_nothing(scene: Scene3D, ball: Surface) -> None:
@@ -370,16 +370,20 @@ def test_opening_and_closing_again_and_again_leaks_nothing(ball: Surface) -> Non
         cycle()
     gc.collect()
     files, threads, memory = (
-        len(list(Path("/proc/self/fd").iterdir())),
+        _open_files(),
         threading.active_count(),
         _resident_mb(),
     )
     for _ in range(8):
         cycle()
     gc.collect()
-    assert len(list(Path("/proc/self/fd").iterdir())) <= files
+    assert _open_files() <= files
     assert threading.active_count() <= threads
     assert _resident_mb() - memory < 25
+
+
+def _open_files() -> int:
+    return len(list(Path("/proc/self/fd").iterdir()))
 
 
 def _resident_mb() -> float:
