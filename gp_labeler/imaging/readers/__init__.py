@@ -14,7 +14,6 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
 from gp_labeler.imaging.readers.options import ImportOptions
@@ -147,10 +146,7 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 
 def _load(plan: ImportPlan, report: Report) -> Volume:
     with failing_as_volume_error(plan.path):
-        try:
-            array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
-        except GpError as problem:
-            raise problem if problem.file else VolumeError(problem.problem, file=plan.path) from None
+        array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
     array, filled = _finite(array)
     volume = Volume(
         array,

@@ -63,7 +63,7 @@ def inspect_dicom(
     VolumeError
         None is a DICOM image, or none belongs to a volume.
     """
-    frames, junk = scan_dicom(files, report)
+    frames, junk, damaged = scan_dicom(files, report)
     series = _series(frames)
     if not series:
         raise VolumeError(
@@ -75,6 +75,10 @@ def inspect_dicom(
     ids = [_id(one, candidates) for one in candidates]
     choices = tuple(Choice(id_, _text(one)) for id_, one in zip(ids, candidates, strict=True))
     index, found = _choose(choices, candidates, options, chosen, folder)
+    if damaged:
+        text = f"files are DICOM, but damaged: {names(damaged)}"
+        remedy = "Copy them again, or accept that they are left out (--accept damaged)."
+        found.append(Problem("damaged", text, remedy=remedy, resolved_by=("accept",)))
     if junk:
         found.append(warning("junk", f"files that are no DICOM images are left out: {names(junk)}"))
     if scouts:

@@ -81,28 +81,34 @@ def is_dicom(path: Path) -> bool:
         return file.read(132)[128:] == b"DICM"
 
 
-def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[Frame], list[Path]]:
-    """Read the tags of all files that are DICOM images; the rest comes back as junk."""
+def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[Frame], list[Path], list[Path]]:
+    """Read the tags of all DICOM images; what is none comes back as junk, what is damaged by itself."""
     every = list(files)
-    frames, junk = [], []
+    frames: list[Frame] = []
+    junk: list[Path] = []
+    damaged: list[Path] = []
     for n, file in enumerate(every):
         report(n / max(len(every), 1))
-        frame = _read(file) if is_dicom(file) else None
+        if not is_dicom(file):
+            junk.append(file)
+            continue
+        try:
+            frame = _read(file)
+        except (InvalidDicomError, EOFError, OSError, ValueError, KeyError, TypeError, NotImplementedError):
+            damaged.append(file)
+            continue
         if frame is not None:
             frames.append(frame)
-        elif file.name.upper() != "DICOMDIR":
-            junk.append(file)
-    return frames, junk
+    return frames, [file for file in junk if file.name.upper() != "DICOMDIR"], damaged
 
 
 def _read(path: Path) -> Frame | None:
-    try:
-        tags = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_TAGS)
-    except (InvalidDicomError, EOFError, OSError, ValueError, KeyError):
-        return None
+    tags = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_TAGS)
     rows, columns = _whole(tags, "Rows"), _whole(tags, "Columns")
-    if not rows or not columns:  # a report, a directory: no image
-        return None
+    if not rows or not columns:
+        if "SOPClassUID" not in tags:
+            raise InvalidDicomError("it has neither pixels nor a class")
+        return None  # a report, a directory: no image
     shared = _first(tags.get("SharedFunctionalGroupsSequence"))
     each = list(tags.get("PerFrameFunctionalGroupsSequence") or [])
     measures = _group("PixelMeasuresSequence", shared, each, tags)

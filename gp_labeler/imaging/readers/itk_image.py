@@ -44,7 +44,7 @@ def inspect_itk_image(path: Path, options: ImportOptions, kind: str) -> ImportPl
         if kind in _HEADERS
         else Header(None, (path,), sides_known=False)
     )
-    itk = _nifti_geometry(path) if kind == "NIfTI" else read_itk_header(path)
+    itk = _nifti_geometry(path) if kind == "NIfTI" else read_itk_header(path, kind)
     if itk.dtype.kind not in "iuf":
         raise VolumeError("its voxels are not plain numbers", file=path, remedy="Save the grey values only.")
     source = header.source
@@ -80,7 +80,7 @@ def _nifti_geometry(path: Path) -> ItkHeader:
     with TemporaryDirectory(prefix="gp-labeler-") as folder:
         copy = Path(folder) / "header.nii"
         copy.write_bytes(nifti_head(path))
-        return read_itk_header(copy, shown_path=path)
+        return read_itk_header(copy, "NIfTI", shown_path=path)
 
 
 def _stored_dtype(header: Header, itk: ItkHeader) -> np.dtype[np.generic]:
@@ -93,17 +93,8 @@ def _stored_dtype(header: Header, itk: ItkHeader) -> np.dtype[np.generic]:
 def _findings(
     path: Path, header: Header, itk: ItkHeader, options: ImportOptions
 ) -> tuple[tuple[Problem, ...], tuple[str, ...]]:
-    problems: list[Problem] = []
+    problems = [] if header.source is None else list(header.source.shortage())
     notes: list[str] = []
-    source = header.source
-    if (
-        source is not None
-        and source.compression == "none"
-        and source.path.stat().st_size < source.bytes_needed
-    ):
-        have, need = source.path.stat().st_size, source.bytes_needed
-        text = f"{source.path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete"
-        problems.append(Problem("short-file", text, remedy="Copy it again."))
     if itk.n_volumes > 1:
         problems.append(warning("many-volumes", f"it holds {itk.n_volumes} volumes; the first is taken"))
     if itk.channels > 1:

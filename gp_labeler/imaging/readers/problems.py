@@ -92,8 +92,12 @@ def failing_as_volume_error(path: Path) -> Iterator[None]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             yield
-    except (GpError, Cancelled):
+    except Cancelled:
         raise
+    except GpError as problem:
+        if problem.file is not None:
+            raise
+        raise VolumeError(problem.problem, file=path, remedy=problem.remedy) from None
     except MemoryError:
         raise VolumeError(
             "there is not enough memory to load it", file=path, remedy="Load every second voxel, or a region."

@@ -15,12 +15,14 @@ import numpy as np
 from gp_labeler.imaging.readers.formats import scanco_suffix
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
-from gp_labeler.imaging.readers.problems import Problem, VolumeError
+from gp_labeler.imaging.readers.problems import VolumeError
 from gp_labeler.imaging.readers.source import Plane, RawSource
 
 __all__ = ["inspect_scanco"]
 
 _MAGIC = b"CTDATA-HEADER_V1"
+_AIM_V3 = b"AIMDATA_V030   "
+_AIM_V2 = struct.pack("<2i", 20, 140)  # the lengths of its first two headers
 _BLOCK = 512
 
 
@@ -34,7 +36,13 @@ def inspect_scanco(path: Path, options: ImportOptions) -> ImportPlan:
     """
     with path.open("rb") as file:
         head = file.read(_BLOCK)
-    return _inspect_isq(path, head, options) if head.startswith(_MAGIC) else _inspect_aim(path, options)
+    if head.startswith(_MAGIC):
+        return _inspect_isq(path, head, options)
+    if head.startswith(_AIM_V3) or head[:8] == _AIM_V2:
+        return _inspect_aim(path, options)
+    raise VolumeError(
+        "it is not a Scanco file, though its name says so", file=path, remedy="Check what it is."
+    )
 
 
 def _inspect_isq(path: Path, head: bytes, options: ImportOptions) -> ImportPlan:
@@ -48,11 +56,6 @@ def _inspect_isq(path: Path, head: bytes, options: ImportOptions) -> ImportPlan:
             f"its header speaks of {nx} x {ny} x {nz} voxels", file=path, remedy="Copy it again."
         )
     source = RawSource(path, (blocks + 1) * _BLOCK, np.dtype("<i2"), (ny, nx), nz)
-    found = []
-    if path.stat().st_size < source.bytes_needed:
-        have, need = path.stat().st_size, source.bytes_needed
-        text = f"it holds {have:,} bytes, but {need:,} are needed: it is incomplete"
-        found.append(Problem("short-file", text, remedy="Copy it again."))
     known = min(x_um, y_um, z_um) > 0
     spacing: Spacing | None = (x_um / nx / 1000, y_um / ny / 1000, z_um / nz / 1000) if known else None
     return ImportPlan(
@@ -63,7 +66,7 @@ def _inspect_isq(path: Path, head: bytes, options: ImportOptions) -> ImportPlan:
         stored_dtype=np.dtype(np.int16),
         source=source,
         geometry=Geometry(spacing, sides_known=False),
-        found=tuple(found),
+        found=source.shortage(),
         notes=("values are the scanner's own, not calibrated",),
         options=options,
         name=path.name.partition(".")[0],

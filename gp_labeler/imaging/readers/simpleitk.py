@@ -22,6 +22,9 @@ _sitk: Any = SimpleITK  # its functions carry no types
 __all__ = ["ItkHeader", "ItkSource", "read_itk_header", "read_itk_planes"]
 
 
+_READERS = {"NRRD": "NrrdImageIO", "MetaImage": "MetaImageIO", "NIfTI": "NiftiImageIO"}
+
+
 @dataclass(frozen=True, eq=False)
 class ItkHeader:
     """What SimpleITK says of a file: size (x, y, z), spacing, origin (LPS mm), direction, type, channels."""
@@ -35,8 +38,17 @@ class ItkHeader:
     n_volumes: int
 
 
-def read_itk_header(path: Path, shown_path: Path | None = None) -> ItkHeader:
-    """Read a header; `shown_path` is the file to name in errors where `path` is a stand-in.
+def read_itk_header(path: Path, kind: str = "", shown_path: Path | None = None) -> ItkHeader:
+    """Read the header of a file of a known kind, or of one that SimpleITK recognises.
+
+    Parameters
+    ----------
+    path : Path
+        File to read.
+    kind : str
+        ``"NRRD"``, ``"MetaImage"``, ``"NIfTI"``; anything else is recognised by name and content.
+    shown_path : Path, optional
+        The file to name in errors where `path` is a stand-in.
 
     Raises
     ------
@@ -45,6 +57,7 @@ def read_itk_header(path: Path, shown_path: Path | None = None) -> ItkHeader:
     """
     reader = _sitk.ImageFileReader()
     reader.SetFileName(str(path))
+    reader.SetImageIO(_READERS.get(kind, ""))
     try:
         with _quiet():
             reader.ReadImageInformation()

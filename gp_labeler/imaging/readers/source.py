@@ -18,7 +18,7 @@ from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.options import ImportOptions, Region
-from gp_labeler.imaging.readers.problems import VolumeError
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error
 
 __all__ = ["Compression", "FileSource", "RawSource", "SliceSource", "assemble", "open_stream", "window"]
 
@@ -85,6 +85,14 @@ class RawSource:
             + self.plane_bytes
         )
 
+    def shortage(self) -> tuple[Problem, ...]:
+        """Return the problem that the file is too short, if it is and is not packed."""
+        have, need = self.path.stat().st_size, self.bytes_needed
+        if self.compression != "none" or have >= need:
+            return ()
+        text = f"{self.path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete"
+        return (Problem("short-file", text, remedy="Copy it again."),)
+
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise; each is good until the next."""
         buffer = bytearray(self.plane_bytes)
@@ -128,7 +136,8 @@ class FileSource:
         for number in wanted:
             file = self.files[there[np.abs(there - number).argmin()]]
             assert file is not None
-            plane = self.decode(file)
+            with failing_as_volume_error(file):
+                plane = self.decode(file)
             shape = shape or plane.shape
             if plane.shape != shape:
                 raise VolumeError(f"it is {_times(plane.shape)}, the other slices {_times(shape)}", file=file)

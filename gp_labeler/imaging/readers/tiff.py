@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -44,83 +45,104 @@ def inspect_tiff(path: Path, options: ImportOptions) -> ImportPlan:
         It holds no volume.
     """
     with tifffile.TiffFile(path) as tif:
-        series = max(tif.series, key=lambda one: math.prod(one.shape))
-        pages = _Pages.of(series, options.channel, path)
-        geometry = stack_geometry(tiff_pixel_size(tif))
-        kind = "OME-TIFF" if tif.is_ome else "ImageJ TIFF" if tif.is_imagej else "multi-page TIFF"
-        source = _source(path, tif, series, pages, options.channel)
-        found = _findings(tif, series, pages, options)
-        first = _first_page(series)
+        stack = _Stack.of(tif, options.channel, path)
+        source = stack.source(path, tif, options.channel)
+        first = stack.first
         return ImportPlan(
             path=path,
-            format=kind,
+            format="OME-TIFF" if tif.is_ome else "ImageJ TIFF" if tif.is_imagej else "multi-page TIFF",
             files=(path,),
-            size=(first.imagewidth, first.imagelength, pages.count),
-            stored_dtype=np.dtype(np.uint8) if first.photometric == _PALETTE else np.dtype(series.dtype),
+            size=(first.imagewidth, first.imagelength, len(stack.numbers)),
+            stored_dtype=np.dtype(np.uint8 if first.photometric == _PALETTE else first.dtype),
             source=source,
-            geometry=geometry,
-            found=found,
+            geometry=stack_geometry(tiff_pixel_size(tif)),
+            found=(
+                *(source.shortage() if isinstance(source, RawSource) else ()),
+                *_findings(stack, options),
+            ),
             options=options,
             name=volume_stem(path),
         )
 
 
-@dataclass(frozen=True)
-class _Pages:
-    """Which pages of a series are the slices: `first`, then every `step`, `count` of them."""
+@dataclass(frozen=True, eq=False)
+class _Stack:
+    """The pages that are slices.
 
-    first: int
-    step: int
-    count: int
-    set_aside: str
+    `series` counts among the file's series; None where pages of one kind were gathered one by one. `numbers`
+    count within it, or in the file. `offset` is where its voxels begin, if they lie in one piece.
+    """
+
+    series: int | None
+    numbers: tuple[int, ...]
+    first: tifffile.TiffPage
+    offset: int | None = None
+    aside: str = ""
+    n_others: int = 0
 
     @classmethod
-    def of(cls, series: tifffile.TiffPageSeries, channel: int | None, path: Path) -> _Pages:
-        """Find the stack axis: Z if there is one, else the longest; of the others take the first."""
-        n_lead = len(series.axes) - len(_first_page(series).axes)
-        axes, shape = series.axes[:n_lead], series.shape[:n_lead]
-        if math.prod(shape) < 2 or math.prod(shape) != len(series.pages):
+    def of(cls, tif: tifffile.TiffFile, channel: int | None, path: Path) -> _Stack:
+        """Find the slices: the largest series, or, where no series has depth, all pages like the most."""
+        series = max(tif.series, key=lambda one: math.prod(one.shape))
+        first = series.keyframe
+        shape = series.shape[: len(series.axes) - len(first.axes)]
+        if math.prod(shape) < 2:
+            return cls._gathered(tif, path)
+        numbers, aside = _slices_of(series.axes, shape, channel)
+        n_others = len(tif.pages) - len(series.pages) if len(tif.series) > 1 else 0
+        return cls(tif.series.index(series), numbers, first, series.dataoffset, aside, max(0, n_others))
+
+    @classmethod
+    def _gathered(cls, tif: tifffile.TiffFile, path: Path) -> _Stack:
+        """Gather pages of the same size and type, as programs leave them that write page by page."""
+        kinds: dict[tuple[object, ...], list[int]] = defaultdict(list)
+        for number, page in enumerate(tif.pages):
+            photometric = None if page.keyframe is None else page.keyframe.photometric
+            kinds[page.shape, page.dtype, photometric].append(number)
+        numbers = max(kinds.values(), key=len)
+        if len(numbers) < 2:
             raise VolumeError(
-                f"it holds no stack of slices (axes {series.axes}, {series.shape})",
+                f"it holds no stack of slices, but {len(tif.pages)} pages that differ",
                 file=path,
                 remedy="Give the folder of a stack, or a file of several pages.",
             )
-        stack = axes.index("Z") if "Z" in axes else max(range(n_lead), key=lambda axis: shape[axis])
-        index = [0] * n_lead
-        others = [axis for axis in range(n_lead) if axis != stack and shape[axis] > 1]
-        for axis in others:
-            if axes[axis] == "C" and channel is not None:
-                index[axis] = channel
-                if not 0 <= channel < shape[axis]:
-                    raise GpError(f"channel must be 0 to {shape[axis] - 1}, got {channel}")
-        aside = ", ".join(f"{index[axis] + 1} of {shape[axis]} along {axes[axis]}" for axis in others)
-        first = int(np.ravel_multi_index(index, shape))
-        return cls(first, math.prod(shape[stack + 1 :]), shape[stack], aside)
+        first = tif.pages[numbers[0]].keyframe
+        assert first is not None
+        return cls(None, tuple(numbers), first, n_others=len(tif.pages) - len(numbers))
+
+    def source(self, path: Path, tif: tifffile.TiffFile, channel: int | None) -> SliceSource:
+        """Return where the slices are read."""
+        finish = finishing(self.first, channel)
+        if self.offset is None or self.first.dtype is None:
+            return _PageSource(path, self.series, self.numbers, finish)
+        page_bytes = math.prod(self.first.shape) * self.first.dtype.itemsize
+        return RawSource(
+            path=path,
+            offset=self.offset + self.numbers[0] * page_bytes,
+            dtype=np.dtype(self.first.dtype).newbyteorder(tif.byteorder),
+            plane_shape=self.first.shape,
+            n_planes=len(self.numbers),
+            plane_step=(self.numbers[1] - self.numbers[0]) * page_bytes,
+            finish=finish,
+        )
 
 
-def _first_page(series: tifffile.TiffPageSeries) -> tifffile.TiffPage:
-    page = series.keyframe
-    assert isinstance(page, tifffile.TiffPage)
-    return page
-
-
-def _source(
-    path: Path, tif: tifffile.TiffFile, series: tifffile.TiffPageSeries, pages: _Pages, channel: int | None
-) -> SliceSource:
-    page = _first_page(series)
-    finish = finishing(page, channel)
-    if series.dataoffset is None:
-        return _PageSource(path, tif.series.index(series), pages, finish)
-    page_bytes = math.prod(page.shape) * page.dtype.itemsize  # type: ignore[union-attr]
-    return RawSource(
-        path=path,
-        offset=series.dataoffset + pages.first * page_bytes,
-        dtype=np.dtype(page.dtype).newbyteorder(tif.byteorder),
-        plane_shape=page.shape,
-        n_planes=pages.count,
-        plane_step=pages.step * page_bytes,
-        finish=finish,
+def _slices_of(axes: str, shape: tuple[int, ...], channel: int | None) -> tuple[tuple[int, ...], str]:
+    """Return the pages along Z, else along the longest axis, at the start (or the channel) of all others."""
+    stack = (
+        axes.index("Z") if "Z" in axes[: len(shape)] else max(range(len(shape)), key=lambda axis: shape[axis])
     )
+    others = [axis for axis in range(len(shape)) if axis != stack and shape[axis] > 1]
+    index = [0] * len(shape)
+    for axis in others:
+        if axes[axis] == "C" and channel is not None:
+            if not 0 <= channel < shape[axis]:
+                raise GpError(f"channel must be 0 to {shape[axis] - 1}, got {channel}")
+            index[axis] = channel
+    step = math.prod(shape[stack + 1 :])
+    first = int(np.ravel_multi_index(index, shape))
+    aside = ", ".join(f"{index[axis] + 1} of {shape[axis]} along {axes[axis]}" for axis in others)
+    return tuple(range(first, first + step * shape[stack], step)), aside
 
 
 @dataclass(frozen=True)
@@ -128,16 +150,16 @@ class _PageSource:
     """Slices that are pages, each packed or placed for itself."""
 
     path: Path
-    series: int
-    pages: _Pages
+    series: int | None
+    numbers: tuple[int, ...]
     finish: Callable[[Plane], Plane]
 
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`."""
         with tifffile.TiffFile(self.path) as tif:
-            series = tif.series[self.series]
+            pages: Any = tif.pages if self.series is None else tif.series[self.series].pages
             for number in wanted:
-                page = series.pages[self.pages.first + self.pages.step * number]
+                page = pages[self.numbers[number]]
                 if page is None:
                     raise VolumeError(f"slice {number + 1} is missing in it", file=self.path)
                 yield self.finish(page_array(page, self.path, page.index))
@@ -177,13 +199,11 @@ def _finish(plane: Plane, planar: bool, inverted: bool, channel: int | None) -> 
     return np.iinfo(grey.dtype).max - grey if inverted else grey
 
 
-def _findings(
-    tif: tifffile.TiffFile, series: tifffile.TiffPageSeries, pages: _Pages, options: ImportOptions
-) -> tuple[Problem, ...]:
-    page = _first_page(series)
+def _findings(stack: _Stack, options: ImportOptions) -> tuple[Problem, ...]:
+    page = stack.first
     found = []
-    if pages.set_aside:
-        found.append(warning("channel", f"of several volumes in it, one is taken: {pages.set_aside}"))
+    if stack.aside:
+        found.append(warning("channel", f"of several volumes in it, one is taken: {stack.aside}"))
     if page.photometric == _PALETTE:
         found.append(warning("palette", "its colours come from a palette and become grey"))
     elif page.samplesperpixel > 1:
@@ -191,8 +211,6 @@ def _findings(
         found.append(warning("colour", f"its pixels have {page.samplesperpixel} channels; {taken} is taken"))
     if page.photometric == _MIN_IS_WHITE:
         found.append(warning("inverted", "its values run from white to black and are inverted"))
-    others = [one for one in tif.series if one is not series]
-    if others:
-        pages_aside = sum(len(one.pages) for one in others)
-        found.append(warning("stray-pages", f"{pages_aside} pages of another size or type are left out"))
+    if stack.n_others:
+        found.append(warning("stray-pages", f"{stack.n_others} pages of another size or type are left out"))
     return tuple(found)
