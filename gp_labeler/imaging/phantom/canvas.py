@@ -14,6 +14,9 @@ from gp_labeler.imaging.phantom.solids import Grid, Solid, Values
 __all__ = ["Canvas"]
 
 _WORKERS = 2
+_EDGE = 1.7
+"""Voxels over which the edge of a solid rises; narrower ones leave terraces on slopes."""
+
 _BLOCK = 1_500_000
 """Voxels worked on at a time in one thread: bounds the memory of the temporary arrays."""
 
@@ -61,7 +64,7 @@ class Canvas:
         around = slice(max(z.start - 1, 0), min(z.stop + 1, len(self.axes[2])))  # for slopes at the layer's ends
         distance = solid.distance(self._grid(around, y, x))
         distance = distance[z.start - around.start : z.stop - around.start]
-        share = np.clip(np.float32(0.5) - distance / np.float32(self.spacing), 0, 1)
+        share = np.clip(np.float32(0.5) - distance / np.float32(_EDGE * self.spacing), 0, 1)
         part = self.grey[block]
         part += share * (np.float32(grey) - part)
 

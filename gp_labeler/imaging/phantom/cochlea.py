@@ -12,13 +12,27 @@ from gp_labeler.imaging.phantom import grey
 from gp_labeler.imaging.phantom.canvas import Canvas
 from gp_labeler.imaging.phantom.layout import Ear, unit
 from gp_labeler.imaging.phantom.rim import Rim
-from gp_labeler.imaging.phantom.solids import Grid, Solid, Values, cone, ellipsoid, implicit, sheet, tube, union
+from gp_labeler.imaging.phantom.solids import (
+    Grid,
+    Solid,
+    Values,
+    cone,
+    ellipsoid,
+    implicit,
+    sheet,
+    tip_centre,
+    tube,
+    union,
+)
 
 __all__ = ["Cochlea"]
 
 _CAP = 0.4
 _WALL = 0.34
-_LIP = 0.2
+_LIP = 0.24
+_BRIDGE = 0.4
+"""Bone to leave between the two windows, mm."""
+
 _TURNS = (0.0, 1.0, 2.0, 3.0, 3.6)
 _RISE = (0.13, 0.41, 0.64, 0.83, 0.915)
 """Height of the middle of the duct after so many turns, as a share of CB-CA."""
@@ -75,7 +89,8 @@ class Cochlea:
         outward = unit(outward - (outward @ along) * along)
         away = np.cross(outward, along)
         away *= np.sign(away @ (middle - self.round_window.centre))
-        points = [front, middle + 0.42 * away, back, middle - 0.2 * away]
+        room = float((middle - self.ear["RWM"]) @ away) - _BRIDGE
+        points = [front, middle + 0.42 * away, back, middle - np.clip(room, 0.08, 0.22) * away]
         return Rim.through(points, along=along, outward=outward)
 
     def radius(self, heights: FloatArray) -> FloatArray:
@@ -151,11 +166,11 @@ class Cochlea:
         cl = self.ear["CL"]
         _, _, out = self._polar("CL")
         out = unit(out + 0.35 * self.ear.towards(1, 0, 0))
-        tip = cl - 0.24 * out
+        tip = tip_centre(cl, out, 0.28)
         behind = cl - 0.6 * out
         wall = self.ear.at((2.8, -0.6, -3.6), (2.8, 1.6, -3.4))
         ridge = sheet([behind - 0.6 * self.axis, behind + 0.4 * self.axis], wall, 0.22)
-        return union([cone(cl - 1.3 * out, tip, 0.75, 0.24), ridge])
+        return union([cone(cl - 1.3 * out, tip, 0.75, 0.28), ridge])
 
     def paint_inside(self, canvas: Canvas) -> None:
         """Paint duct, vestibule, nerve canal, modiolus and the open windows."""
@@ -168,9 +183,9 @@ class Cochlea:
         nerve = np.stack([base - 0.45 * axis, base - 1.2 * axis, self.ear.at((1.6, -2.6, 2.6))])
         canvas.paint(tube(nerve, (0.45, 0.5, 0.7)), grey.SOFT)
         canvas.paint(cone(*self._patch(), 0.3), grey.BONE)
-        self.round_window_open(canvas)
         canvas.paint(oval.plug(-0.9, 0.0), grey.FLUID)
-        canvas.paint(oval.plug(0.0, 0.9, flare=0.3), grey.AIR)
+        canvas.paint(oval.plug(0.0, 0.6), grey.AIR)
+        self._open_round_window(canvas)
 
     def _patch(self) -> tuple[FloatArray, FloatArray]:
         """Return the ends of a rod under CC that keeps the bone there whole."""
@@ -178,11 +193,12 @@ class Cochlea:
         inner = self.ear["CC"] - 0.32 * out
         return inner - 0.3 * self.axis, inner
 
-    def round_window_open(self, canvas: Canvas) -> None:
-        """Open the round window: fluid within, its thin membrane, air without."""
+    def _open_round_window(self, canvas: Canvas) -> None:
+        """Open the round window, fluid within and air without, and make its lip whole again beside the oval one."""
         rim = self.round_window
         canvas.paint(rim.plug(-0.9, 0.0), grey.FLUID)
         canvas.paint(rim.plug(0.0, 1.2, flare=0.4), grey.AIR)
+        canvas.paint(rim.ring(_LIP), grey.BONE)
 
     def _paint_lamina(self, canvas: Canvas, line: FloatArray, thick: FloatArray) -> None:
         """Paint the spiral lamina and basilar membrane: a shelf across the duct, thinner than a voxel."""

@@ -10,7 +10,17 @@ from gp_labeler.imaging.phantom.canvas import Canvas
 from gp_labeler.imaging.phantom.cochlea import Cochlea
 from gp_labeler.imaging.phantom.layout import Ear, unit
 from gp_labeler.imaging.phantom.rim import Rim
-from gp_labeler.imaging.phantom.solids import Solid, blend, cone, ellipsoid, inset, sheet, tube, union
+from gp_labeler.imaging.phantom.solids import (
+    Solid,
+    blend,
+    cone,
+    ellipsoid,
+    inset,
+    sheet,
+    tip_centre,
+    tube,
+    union,
+)
 
 __all__ = ["paint_ear"]
 
@@ -18,7 +28,7 @@ _BULLA_WALL = 0.5
 _LIP = 0.42
 _CANAL_DEPTH = 1.9
 _UMBO = (8.2, 1.1, -1.1)
-_RECESS = 1.1
+_RECESS = 0.85
 
 
 def paint_ear(canvas: Canvas, ear: Ear) -> None:
@@ -44,14 +54,14 @@ def paint_ear(canvas: Canvas, ear: Ear) -> None:
 
 def _cavity(ear: Ear) -> Solid:
     """Return the air of the ventral and dorsal bulla; the roof of the ventral one passes through CC."""
-    centre, axes = ear.at((7.2, 1.0, -3.2)), ear.semi_axes(4.3, 6.3, 4.4)
+    centre, axes = ear.at((7.2, 1.0, -3.2)), ear.head.semi_axes(4.3, 6.3, 4.4)
     offset = axes @ (ear["CC"] - centre) / np.sum(axes**2, axis=1)
     axes = axes * np.linalg.norm(offset)
     return blend(
         [
             ellipsoid(centre, axes),
-            ellipsoid(ear.at((8.6, 0.6, 2.8)), ear.semi_axes(2.0, 4.2, 2.0)),
-            ellipsoid(ear.at((9.0, -4.6, 1.4)), ear.semi_axes(1.6, 3.0, 2.6)),
+            ellipsoid(ear.at((8.6, 0.6, 2.8)), ear.head.semi_axes(2.0, 4.2, 2.0)),
+            ellipsoid(ear.at((9.0, -4.6, 1.4)), ear.head.semi_axes(1.6, 3.0, 2.6)),
         ],
         0.8,
     )
@@ -67,8 +77,8 @@ def _recess(ear: Ear, cochlea: Cochlea) -> Solid:
 
 def _petrous(ear: Ear) -> list[Solid]:
     return [
-        ellipsoid(ear.at((3.9, -1.4, 1.1)), ear.semi_axes(2.4, 3.8, 2.4)),
-        ellipsoid(ear.at((3.4, 3.0, -0.4)), ear.semi_axes(2.0, 3.0, 1.5)),
+        ellipsoid(ear.at((3.9, -1.4, 1.1)), ear.head.semi_axes(2.4, 3.8, 2.4)),
+        ellipsoid(ear.at((3.4, 3.0, -0.4)), ear.head.semi_axes(2.0, 3.0, 1.5)),
     ]
 
 
@@ -113,7 +123,7 @@ def _spur(ear: Ear) -> Solid:
     """Return the spur in the dorsal bulla: from the roof, bent to the side, its pointed tip DTL."""
     root, bend = ear.at((8.5, 1.2, 4.8), (8.9, 1.6, 2.75))
     out = unit(ear["DTL"] - bend)
-    return tube([root, bend, ear["DTL"] - 0.16 * out], (0.75, 0.42, 0.16))
+    return tube([root, bend, tip_centre(ear["DTL"], out, 0.24)], (0.8, 0.5, 0.24), steps=3)
 
 
 def _ossicles(ear: Ear) -> Solid:
@@ -122,16 +132,16 @@ def _ossicles(ear: Ear) -> Solid:
     short = ear.at((8.5, 0.2, 1.75), (8.6, -0.7, 2.0))
     up = unit(ear["DTM"] - body)
     window = (ear["RWA"] + ear["RWP"]) / 2
-    limb_end = ear["LLI"] + 0.24 * unit(ear["LLI"] - window)
+    limb_end = tip_centre(ear["LLI"], unit(window - ear["LLI"]), 0.28)
     neck, top, middle, umbo = ear.at((8.7, 1.8, 0.65), (8.55, 1.4, 0.25), (8.4, 1.25, -0.4), _UMBO)
     process = unit(ear["MH"] - top)
     return union(
         [
-            cone(body, ear["DTM"] - 0.38 * up, 0.6, 0.38),
-            tube([body, back, *short], (0.6, 0.5, 0.32, 0.2)),
-            tube([back, ear.at((7.95, 0.5, 0.95)), limb_end], (0.38, 0.26, 0.24)),
-            tube([body, neck, top, middle, umbo], (0.5, 0.3, 0.28, 0.22, 0.26)),
-            cone(top, ear["MH"] - 0.2 * process, 0.26, 0.2),
+            cone(body, tip_centre(ear["DTM"], up, 0.42), 0.6, 0.42),
+            tube([body, back, *short], (0.6, 0.5, 0.32, 0.2), steps=3),
+            tube([back, ear.at((7.95, 0.5, 0.95)), limb_end], (0.38, 0.27, 0.28)),
+            tube([body, neck, top, middle, umbo], (0.5, 0.3, 0.28, 0.22, 0.26), steps=3),
+            cone(top, tip_centre(ear["MH"], process, 0.24), 0.28, 0.24),
         ]
     )
 

@@ -63,6 +63,24 @@ class HeadLayout:
         moved = self.roughly(flat) + _kernel(flat, self._anchors) @ self._weights
         return moved.reshape(points.shape)
 
+    def mean_place(self, point: FloatArray) -> FloatArray:
+        """Return where in the mean head a (3,) scan position lies by size and pose: left, anterior, up."""
+        place: FloatArray = (point - self.shift) @ self.rotation / self.scale * (1.0, -1.0, 1.0)
+        return place
+
+    @cached_property
+    def snout_shift(self) -> FloatArray:
+        """(3,) mm of the mean head: how far this animal's IN is from the mean one after size and pose."""
+        own = self.mean_place(self.specimen.side(Side.LEFT)["IN"])
+        shift: FloatArray = own - self._anchors[-1] * (1.0, -1.0, 1.0)
+        return shift
+
+    def semi_axes(self, lateral: float, anterior: float, up: float) -> FloatArray:
+        """Return the rows of three semi-axes (3, 3) along the axes of the head, mm of the mean head."""
+        lengths = self.scale * np.array([lateral, anterior, up])
+        axes: FloatArray = lengths[:, None] * self.rotation.T
+        return axes
+
     @cached_property
     def ears(self) -> tuple[Ear, Ear]:
         """The left and the right side."""
@@ -94,11 +112,6 @@ class Ear:
     def towards(self, lateral: float, anterior: float, up: float) -> FloatArray:
         """Return a unit direction (3,) in the axes of the scan."""
         return unit([self.sign * lateral, -anterior, up])
-
-    def semi_axes(self, lateral: float, anterior: float, up: float) -> FloatArray:
-        """Return the rows of three semi-axes (3, 3) along the axes of the head, mm of the mean head."""
-        lengths = self.head.scale * np.array([lateral, anterior, up])
-        return lengths[:, None] * self.head.rotation.T
 
 
 def _all_points(specimen: Specimen) -> FloatArray:

@@ -32,7 +32,7 @@ __all__ = ["Phantom", "make_phantom", "write_phantom"]
 
 _SPACINGS_MM = (0.08, 0.5)
 _TILT_DEG = 2.0
-_BLUR_MM = 0.1
+_BLUR_MM = 0.08
 _NOISE = 900.0
 
 

@@ -22,10 +22,12 @@ __all__ = [
     "blend",
     "cone",
     "cut",
+    "cut_smoothly",
     "ellipsoid",
     "implicit",
     "inset",
     "sheet",
+    "tip_centre",
     "tube",
     "union",
 ]
@@ -35,6 +37,9 @@ Grid = tuple[Values, Values, Values]
 """Coordinates x, y, z of a block in mm, of the shapes (1, 1, nx), (1, ny, 1) and (nz, 1, 1)."""
 
 _FAR = np.float32(1e3)
+_NO_AREA = 1e-9
+_BLUR_VARIANCE = 0.02
+"""Of point spread and voxels of 0.2 mm, mm^2; a little more since air is farther from bone than tissue is."""
 
 
 @dataclass(frozen=True)
@@ -82,17 +87,28 @@ def cone(start: ArrayLike, end: ArrayLike, radius: float, end_radius: float | No
     return Solid(distance, np.minimum(a, b) - thick, np.maximum(a, b) + thick)
 
 
-def tube(points: ArrayLike, radii: ArrayLike) -> Solid:
-    """Return a rod along (n, 3) points with one radius, or one for each point."""
-    line = np.asarray(points, dtype=np.float64)
-    widths = np.broadcast_to(np.asarray(radii, dtype=np.float64), len(line))
+def tip_centre(tip: FloatArray, outward: FloatArray, radius: float) -> FloatArray:
+    """Return the centre (3,) of the round end of a rod whose tip is to be seen at `tip` in the scan.
+
+    A scanner's blur rounds a tip off, by about its variance over the radius; the rod is that much longer.
+    """
+    return tip - (radius - _BLUR_VARIANCE / radius) * outward
+
+
+def tube(points: ArrayLike, radii: ArrayLike, *, steps: int = 1) -> Solid:
+    """Return a rod along (n, 3) points with one radius, or one for each point.
+
+    With more than one of `steps` between two points it follows a smooth curve through them, which overshoots
+    them in no coordinate: a point farthest to one side stays the farthest.
+    """
+    line, widths = _smooth(points, radii, steps)
     return union(cone(line[i], line[i + 1], widths[i], widths[i + 1]) for i in range(len(line) - 1))
 
 
-def sheet(first: ArrayLike, second: ArrayLike, radii: ArrayLike) -> Solid:
-    """Return the bony sheet between two lines of (n, 3) points, with one half thickness or one a point."""
-    a, b = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
-    half = np.broadcast_to(np.asarray(radii, dtype=np.float64), len(a))
+def sheet(first: ArrayLike, second: ArrayLike, radii: ArrayLike, *, steps: int = 1) -> Solid:
+    """Return the sheet between two lines of (n, 3) points, with one half thickness or one a point; see `tube`."""
+    a, half = _smooth(first, radii, steps)
+    b, _ = _smooth(second, radii, steps)
     faces = []
     for i in range(len(a) - 1):
         thickness = float(half[i] + half[i + 1]) / 2
@@ -100,13 +116,29 @@ def sheet(first: ArrayLike, second: ArrayLike, radii: ArrayLike) -> Solid:
     return union(faces)
 
 
+def _smooth(points: ArrayLike, radii: ArrayLike, steps: int) -> tuple[FloatArray, FloatArray]:
+    from scipy.interpolate import PchipInterpolator
+
+    line = np.asarray(points, dtype=np.float64)
+    widths = np.broadcast_to(np.asarray(radii, dtype=np.float64), len(line))
+    if steps == 1:
+        return line, widths
+    chords = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    knots = np.concatenate([[0.0], np.cumsum(np.maximum(chords, 1e-3))])
+    fine = np.interp(np.arange(steps * (len(line) - 1) + 1) / steps, np.arange(len(line)), knots)
+    curve = PchipInterpolator(knots, np.column_stack([line, widths]))(fine)
+    return curve[:, :3], curve[:, 3]
+
+
 def _triangle(a: FloatArray, b: FloatArray, c: FloatArray, half: float) -> Solid:
     """Return a triangle thickened by `half` mm on all sides."""
     edges = (b - a, c - b, a - c)
     normal = np.cross(edges[0], c - a)
     area = float(np.linalg.norm(normal))
-    normal = normal / max(area, 1e-12)
     rods = union(cone(p, q, half) for p, q in ((a, b), (b, c), (c, a)))
+    if area < _NO_AREA:
+        return rods
+    normal = normal / area
     inward = [np.cross(normal, edge) for edge in edges]
 
     def distance(grid: Grid) -> Values:
@@ -183,6 +215,17 @@ def cut(solid: Solid, *others: Solid) -> Solid:
 
     def distance(grid: Grid) -> Values:
         return reduce(lambda d, other: np.maximum(d, -other.distance(grid)), others, solid.distance(grid))
+
+    return Solid(distance, solid.low, solid.high)
+
+
+def cut_smoothly(solid: Solid, other: Solid, width: float) -> Solid:
+    """Return a solid without the other, with edges rounded over about `width` mm."""
+
+    def distance(grid: Grid) -> Values:
+        a, b = solid.distance(grid), -other.distance(grid)
+        h = np.maximum(np.float32(width) - np.abs(a - b), 0) / np.float32(width)
+        return np.maximum(a, b) + h * h * np.float32(width / 4)
 
     return Solid(distance, solid.low, solid.high)
 
