@@ -157,7 +157,7 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
         head = file.read(_HEADER_BYTES)
     end = re.search(rb"^[ \t]*ElementDataFile[^\n]*\n?", head, re.MULTILINE)
     fields = _fields(head[: end.end() if end else len(head)].decode("latin-1"), "=")
-    if end is None or "ndims" not in fields:
+    if end is None or not {"ndims", "dimsize", "elementtype"} <= fields.keys():
         raise _not_a("MetaImage", path)
     source = _meta_source(path, fields, end.end(), channel)
     unit, notes = _stated_unit(fields.get("distanceunits", ""))

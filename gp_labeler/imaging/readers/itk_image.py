@@ -60,7 +60,7 @@ def inspect_itk_image(path: Path, options: ImportOptions, kind: str) -> ImportPl
         stored_dtype=_stored_dtype(header, itk),
         source=source or ItkSource(path, options.channel),
         geometry=Geometry(
-            spacing=_scaled(itk.spacing, unit) if min(itk.spacing) > 0 else None,
+            spacing=_scaled(itk.spacing, unit),
             origin=_scaled(itk.origin, unit),
             direction=itk.direction,
             sides_known=header.sides_known,

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.checks import FloatArray
+from gp_core.errors import GpError
 from gp_labeler.imaging.readers.grey import loaded_dtype, narrowing
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.problems import Problem, warning
@@ -20,6 +21,7 @@ __all__ = ["Choice", "Geometry", "ImportPlan"]
 
 _LARGE_BYTES = 2 << 30
 _PREVIEW_VOXELS = 160
+_ORTHOGONAL = 1e-4
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,11 @@ class Geometry:
         A voxel size that the file hints at without saying it.
     reason : str
         Why there is no voxel size, where the reader knows.
+
+    Raises
+    ------
+    GpError
+        The axes are not at right angles, or the origin is not finite.
     """
 
     spacing: Spacing | None = None
@@ -64,6 +71,18 @@ class Geometry:
     sides_known: bool = True
     suggested: Spacing | None = None
     reason: str = ""
+
+    def __post_init__(self) -> None:
+        if self.spacing is not None and not (np.isfinite(self.spacing).all() and min(self.spacing) > 0):
+            object.__setattr__(self, "spacing", None)
+        if not np.isfinite(self.origin).all():
+            raise GpError(f"its origin is not a place: {self.origin}")
+        off = self.direction.T @ self.direction - np.eye(3)
+        if not np.isfinite(off).all() or np.abs(off).max() > _ORTHOGONAL:
+            raise GpError(
+                "its voxel axes are sheared (not at right angles to each other)",
+                remedy="Resample it to a rectangular grid, e.g. in 3D Slicer, or correct its header.",
+            )
 
 
 @dataclass(frozen=True, eq=False)

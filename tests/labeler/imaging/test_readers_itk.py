@@ -374,6 +374,34 @@ def test_a_sheared_grid_is_refused_in_plain_words(tmp_path: Path, capfd: pytest.
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("TransformMatrix", "1 0.3 0 0 1 0 0 0 1"),
+        ("TransformMatrix", "0 0 0 0 0 0 0 0 0"),
+        ("TransformMatrix", "1 0 0 1 0 0 0 0 1"),
+        ("ElementSpacing", "0 0 0"),
+        ("ElementSpacing", "-0.14 0.14 0.14"),
+        ("DimSize", "0 66 61"),
+        ("DimSize", "72 66"),
+        ("ElementType", "MET_WHATEVER"),
+        ("NDims", "7"),
+    ],
+)
+def test_a_header_that_makes_no_sense_is_refused_before_loading(
+    field: str, value: str, tmp_path: Path
+) -> None:
+    path = write_sitk(cropped(), tmp_path / "a.mhd")
+    lines = [
+        f"{field} = {value}" if line.startswith(field) else line for line in path.read_text().splitlines()
+    ]
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(VolumeError) as refused:
+        read_volume(path)
+    assert refused.value.file == str(path)
+    assert refused.value.remedy
+
+
 @pytest.mark.parametrize("name", ["plain.mhd", "plain.mha", "lps.nrrd", "plain.nii", "hand.nhdr"])
 def test_a_short_file_is_named_with_its_bytes(name: str, tmp_path: Path) -> None:
     path = WRITERS[name](cropped(), tmp_path / name)

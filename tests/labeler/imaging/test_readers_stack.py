@@ -414,7 +414,7 @@ def test_a_log_that_disagrees_with_the_slices_is_named(tmp_path: Path) -> None:
         tmp_path, LOG.replace("Last Section=160", "Last Section=161").replace("_rec\n", "_rac\n")
     )
     assert codes(inspect_volume(folder)) == ([], ["scout", "log-prefix", "log-sections"])
-    (folder / "gp04_head__rec.log").write_text(LOG.replace("(pixels)=72", "(pixels)=144"))
+    (folder / "gp04_head__rec.log").write_text(LOG.replace("(pixels)=72", "(pixels)=144"), "latin-1")
     with pytest.raises(
         VolumeError, match=r"speaks of 144 x 66 pixels, the slices have 72 x 66.*--spacing 0.1411"
     ):
@@ -423,7 +423,9 @@ def test_a_log_that_disagrees_with_the_slices_is_named(tmp_path: Path) -> None:
 
 def test_the_log_of_the_right_scan_is_taken(tmp_path: Path) -> None:
     folder = write_skyscan(tmp_path)
-    (folder / "other_rec.log").write_text(LOG.replace("gp04_head__rec", "other_rec").replace("141.1", "35"))
+    (folder / "other_rec.log").write_text(
+        LOG.replace("gp04_head__rec", "other_rec").replace("141.1", "35"), "latin-1"
+    )
     assert inspect_volume(folder).spacing == pytest.approx((SPACING,) * 3)
 
 
