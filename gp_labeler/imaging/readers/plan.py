@@ -219,9 +219,8 @@ class ImportPlan:
     def _size_problems(self) -> tuple[Problem, ...]:
         found = []
         if min(self.size) < 2:
-            found.append(
-                Problem("flat", f"it holds {' x '.join(map(str, self.size))} voxels, which is no volume")
-            )
+            text = f"it holds {' x '.join(map(str, self.size))} voxels, which is no volume"
+            found.append(Problem("flat", text, remedy="Give the whole scan, not one slice of it."))
         if self.n_bytes > _LARGE_BYTES:
             text = f"it takes {self.n_bytes / (1 << 30):.1f} GB of memory; every second voxel takes an eighth"
             found.append(warning("large", text))
