@@ -31,7 +31,6 @@ Document = dict[str, Any]
 T = TypeVar("T")
 
 BOTH = "both"
-_ORDER = {code: i for i, code in enumerate(CODES)}
 
 
 def document_of(state: SpecimenState) -> Document:
@@ -79,8 +78,10 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
 
 def _landmarks_out(landmarks: Mapping[PointKey, Landmark]) -> Document:
     out: Document = {}
-    for (side, code), landmark in sorted(landmarks.items(), key=lambda item: _ORDER[item[0][1]]):
-        out.setdefault(BOTH if side is None else side.value, {})[code] = _landmark_out(landmark)
+    for owner in (*Side, None):
+        marks = {c: _landmark_out(landmarks[owner, c]) for c in CODES if (owner, c) in landmarks}
+        if marks:
+            out[BOTH if owner is None else owner.value] = marks
     return out
 
 

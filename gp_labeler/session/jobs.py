@@ -256,6 +256,7 @@ class QueueDispatcher:
         """
         end = time.monotonic() + timeout
         while jobs.running or not self._calls.empty():
-            if not self.deliver(timeout=0.05) and time.monotonic() > end:
+            self.deliver(timeout=0.05)
+            if time.monotonic() > end and jobs.running:
                 titles = ", ".join(task.job.title for task in jobs.running)
                 raise GpError(f"still not finished after {timeout:g} s: {titles}")

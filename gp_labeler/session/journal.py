@@ -13,6 +13,7 @@ import contextlib
 import errno
 import json
 import os
+import re
 import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -29,6 +30,8 @@ __all__ = ["Entry", "Journal", "JournalContent", "read_journal"]
 VERSION = 1
 KINDS = ("edit", "merge", "undo", "redo", "change")
 """``merge`` continues the edit before it; ``change`` cannot be undone (another volume)."""
+
+_LINE = re.compile(rb'\{"record":(.*),"crc32":([0-9]{1,10})\}\n', re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -256,10 +259,8 @@ def _line(record: Mapping[str, Any]) -> bytes:
 
 
 def _record(line: bytes) -> dict[str, Any] | None:
-    try:
-        content = json.loads(line)
-        record = content["record"]
-        whole = zlib.crc32(dumped(record).encode()) == content["crc32"]
-    except (ValueError, TypeError, LookupError):
+    match = _LINE.fullmatch(line)
+    if match is None or zlib.crc32(match[1]) != int(match[2]):
         return None
-    return record if whole and isinstance(record, dict) else None
+    record = json.loads(match[1])
+    return record if isinstance(record, dict) else None

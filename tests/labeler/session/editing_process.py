@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
@@ -9,7 +10,6 @@ import numpy as np
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
-from gp_labeler.session.changes import dumped
 from gp_labeler.session.document import document_of
 from gp_labeler.session.edits import ClearPoint, LockPoints, MarkUnseen, PlacePoint, SwapPoints, SwapSides
 from gp_labeler.session.opening import new_session
@@ -50,7 +50,7 @@ def main(folder: Path, seed: int) -> None:
                 session.do(random_edit(rng))
         except GpError:
             continue
-        sys.stdout.write(dumped(document_of(session.state)) + "\n")
+        sys.stdout.write(json.dumps(document_of(session.state), sort_keys=True) + "\n")
         sys.stdout.flush()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import json
 import os
@@ -78,19 +79,21 @@ def test_replaying_the_journal_gives_the_last_state_and_its_undo(sequence):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         session = new_session(folder / "state")
-        act(session, sequence, folder)
+        with contextlib.ExitStack() as stack:
+            stack.callback(abandon, session)
+            act(session, sequence, folder)
         expected, was_dirty = session.state, session.dirty
-        abandon(session)
         found = find_recoveries(folder / "state")
         if not found:
             assert not was_dirty or expected.landmarks == {}
             return
         again = recover_session(found[0], folder / "state")
-        assert text_of(again.state) == text_of(expected)
-        while session._history.to_undo and again._history.to_undo:
-            assert again._history.undo().text == session._history.undo().text
-            assert text_of(again.state) == text_of(session.state)
-        again.close(discard=True)
+        with contextlib.ExitStack() as stack:
+            stack.callback(again.close, discard=True)
+            assert text_of(again.state) == text_of(expected)
+            while session._history.to_undo and again._history.to_undo:
+                assert again._history.undo().text == session._history.undo().text
+                assert text_of(again.state) == text_of(session.state)
 
 
 @quick
@@ -98,12 +101,13 @@ def test_replaying_the_journal_gives_the_last_state_and_its_undo(sequence):
 def test_a_torn_or_damaged_line_costs_only_itself(sequence, data):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        session = new_session(folder)
+        session = new_session(folder, clock=lambda: "now")
         states = [text_of(session.state)]
-        for edit in sequence:
-            act(session, [edit], folder)
-            states.append(text_of(session.state))
-        abandon(session)
+        with contextlib.ExitStack() as stack:
+            stack.callback(abandon, session)
+            for edit in sequence:
+                act(session, [edit], folder)
+                states.append(text_of(session.state))
         (path,) = (folder / "journals").glob("*.jsonl")
         content = path.read_bytes()
         header = content.index(b"\n") + 1
