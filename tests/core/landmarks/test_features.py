@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from gp_core.errors import FeatureError
@@ -62,3 +64,9 @@ def test_sides_are_read_as_people_write_them(word: str) -> None:
 def test_other_sides_are_refused() -> None:
     with pytest.raises(FeatureError, match="must be L or R, got 'up'"):
         Side.parse("up")
+
+
+def test_the_documented_table_is_this_one() -> None:
+    text = (Path(__file__).resolve().parents[3] / "docs" / "landmarks.md").read_text(encoding="utf-8")
+    for row in FEATURES:
+        assert f"| {row.code} | {row.name} | {row.definition} | {row.where} | {row.view} |" in text
