@@ -1,0 +1,227 @@
+"""Long work behind the window, as frozen jobs: looking into scans, reading, meshing, making the phantom."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from math import ceil, sqrt
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from gp_core.checks import FloatArray
+from gp_core.landmarks.features import Side
+from gp_labeler.imaging.progress import Progress as Told
+from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
+from gp_labeler.imaging.surface import Surface, extract_isosurface, overview_stride
+from gp_labeler.imaging.threshold import propose_threshold
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session.ghosts import Predict
+from gp_labeler.session.jobs import Progress
+
+__all__ = [
+    "Demo",
+    "InspectScan",
+    "LoadAtlas",
+    "MakeDemo",
+    "MeshEars",
+    "MeshFirst",
+    "MeshOverview",
+    "Meshes",
+    "ProposeThreshold",
+    "ReadScan",
+]
+
+FIRST_LOOK_VOXELS = 96**3
+"""A mesh of so many voxels is there in a moment, and turns smoothly without a graphics card."""
+
+QUICK_TRIANGLES = 60_000
+
+
+@dataclass(frozen=True)
+class InspectScan:
+    """Look into a file or folder; gives an `ImportPlan`."""
+
+    path: str | PathLike[str]
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Looking into {Path(self.path).name}"
+
+    def run(self, progress: Progress) -> ImportPlan:
+        """Read headers and names."""
+        return inspect_volume(self.path, progress=progress, cancel=progress.cancelled, **self.options)
+
+
+@dataclass(frozen=True)
+class ReadScan:
+    """Load a scan."""
+
+    plan: ImportPlan
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Reading {self.plan.name}"
+
+    def run(self, progress: Progress) -> Volume:
+        """Read the voxels, and find the window that suits them."""
+        volume = read_volume(self.plan, progress=progress, cancel=progress.cancelled)
+        _ = volume.intensity_range  # remembered by the volume: found here, it costs the window nothing
+        return volume
+
+
+@dataclass(frozen=True)
+class ProposeThreshold:
+    """Propose the grey value at which bone begins."""
+
+    volume: Volume
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Looking for bone"
+
+    def run(self, progress: Progress) -> float:
+        """Look at the histogram."""
+        progress(0.0)
+        return propose_threshold(self.volume)
+
+
+@dataclass(frozen=True)
+class Meshes:
+    """The bone as it is drawn: parts that do not overlap, and a coarse stand-in while the camera moves."""
+
+    parts: tuple[Surface, ...] = ()
+    quick: tuple[Surface, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeshFirst:
+    """Mesh a scan so coarsely that there is something to see at once."""
+
+    volume: Volume
+    threshold: float
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "First look"
+
+    def run(self, progress: Progress) -> Meshes:
+        """Mesh few voxels."""
+        stride = overview_stride(self.volume, FIRST_LOOK_VOXELS)
+        return Meshes((_mesh(self.volume, self.threshold, progress, stride=stride),))
+
+
+@dataclass(frozen=True)
+class MeshOverview:
+    """Mesh a whole scan as finely as can be turned by hand."""
+
+    volume: Volume
+    threshold: float
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Making the bone surface"
+
+    def run(self, progress: Progress) -> Meshes:
+        """Mesh all of it, and a stand-in of few triangles."""
+        stride = overview_stride(self.volume)
+        whole = _mesh(self.volume, self.threshold, progress, end=0.8, stride=stride)
+        coarser = ceil(sqrt(whole.n_triangles / QUICK_TRIANGLES))
+        if coarser < 2:
+            return Meshes((whole,))
+        quick = _mesh(self.volume, self.threshold, progress, start=0.8, stride=stride * coarser)
+        return Meshes((whole,), (quick,))
+
+
+@dataclass(frozen=True, eq=False)
+class MeshEars:
+    """Mesh boxes around the ears at full resolution, and cut them out of the overview."""
+
+    volume: Volume
+    threshold: float
+    overview: Meshes
+    boxes: Mapping[Side, FloatArray]
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        ears = " and ".join(side.word for side in self.boxes)
+        return f"{ears.capitalize()} ear{'s' if len(self.boxes) > 1 else ''} at full resolution"
+
+    def run(self, progress: Progress) -> Meshes:
+        """Mesh the boxes; parts cut off by a box's walls are kept, however small."""
+        rest, ears = list(self.overview.parts), []
+        for n, box in enumerate(self.boxes.values()):
+            start, end = n / len(self.boxes), (n + 1) / len(self.boxes)
+            ear = _mesh(self.volume, self.threshold, progress, start=start, end=end, box=box, smallest_mm=0.3)
+            rest = [part.outside(ear.region) for part in rest]
+            ears.append(ear)
+        parts = tuple(part.prepare() for part in (*rest, *ears) if part.n_triangles)
+        return Meshes(parts, self.overview.quick)
+
+
+@dataclass(frozen=True)
+class LoadAtlas:
+    """Make the published atlas ready to say where features should be."""
+
+    title = "Loading the atlas"
+
+    def run(self, progress: Progress) -> Predict:
+        """Build it from the published table."""
+        from gp_core.atlas.atlas import Atlas  # here: SciPy takes a moment that the window need not wait for
+        from gp_core.atlas.shape import predict
+
+        progress(0.0)
+        return partial(predict, Atlas.published())
+
+
+@dataclass(frozen=True)
+class Demo:
+    """A synthetic scan, and where its features really are."""
+
+    volume: Volume
+    specimen: Any
+
+
+@dataclass(frozen=True)
+class MakeDemo:
+    """Make the phantom: a synthetic head of a guinea pig that never lived."""
+
+    seed: int = 0
+    spacing: float = 0.2
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Making the phantom head"
+
+    def run(self, progress: Progress) -> Demo:
+        """Draw the animal and scan it."""
+        from gp_labeler.imaging.phantom import make_phantom
+
+        progress(0.05)
+        phantom = make_phantom(self.seed, spacing=self.spacing)
+        progress(1.0)
+        _ = phantom.volume.intensity_range, phantom.volume.checksum
+        return Demo(phantom.volume, phantom.specimen)
+
+
+def _mesh(
+    volume: Volume,
+    threshold: float,
+    progress: Progress,
+    *,
+    start: float = 0.0,
+    end: float = 1.0,
+    **how: Any,
+) -> Surface:
+    """Mesh as one part, from `start` to `end`, of a job."""
+    told: Told = lambda fraction: progress(start + (end - start) * fraction)  # noqa: E731
+    return extract_isosurface(volume, threshold, progress=told, cancel=progress.cancelled, **how)

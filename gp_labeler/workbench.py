@@ -1,0 +1,390 @@
+"""One desk: a session, the scan it lies on, the bone meshed from it, and the work that goes on behind.
+
+It knows no Qt and draws nothing. The window, the offscreen script and plain Python all drive it, on one
+thread; results of long work come back through the dispatcher it was given.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from psygnal import Signal
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import Specimen
+from gp_labeler.bone import Bone
+from gp_labeler.imaging.readers import ImportPlan
+from gp_labeler.imaging.surface import Surface
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session import labelling
+from gp_labeler.session.edited_specimen import VolumeChangedError
+from gp_labeler.session.ghosts import Predict
+from gp_labeler.session.jobs import Dispatcher, Jobs, Task
+from gp_labeler.session.opening import new_session, open_session, recover_session, tidy_name
+from gp_labeler.session.recent import RecentFiles
+from gp_labeler.session.recovery import Recovery
+from gp_labeler.session.session import Session
+from gp_labeler.session.specimen_edits import SetThreshold
+from gp_labeler.session.specimen_file import SUFFIX
+from gp_labeler.session.state import How
+from gp_labeler.work import Demo, InspectScan, LoadAtlas, MakeDemo, ReadScan
+
+__all__ = ["TOOLS", "Drag", "Workbench"]
+
+TOOLS = ("place", "look", "grey")
+"""What a plain left click or drag over a slice does: place, move the crosshair, set window and level."""
+
+_RELAYED = (
+    "landmarks_changed",
+    "active_changed",
+    "crosshair_changed",
+    "ghosts_changed",
+    "threshold_changed",
+    "details_changed",
+    "history_changed",
+    "dirty_changed",
+    "saved",
+)
+
+
+class Drag:
+    """A placed point on its way: shown where the hand has it, and not yet an edit."""
+
+    def __init__(self, side: Side, code: str, position: FloatArray, how: How) -> None:
+        self.side, self.code, self.position, self.how = side, code, position, how
+
+
+class Workbench:
+    """What one window works on; see the module.
+
+    Its signals of the session's names repeat those of whatever session is open, so a listener connects once;
+    `session_replaced` tells it to look at everything anew.
+
+    Parameters
+    ----------
+    directory : Path, optional
+        State directory (`session.places.default_directory()` in the window); None keeps no journal and no
+        list of recent files.
+    dispatcher : callable, optional
+        Brings results of jobs to this thread.
+    predict : callable, optional
+        The atlas for ghosts; by default the published one, loaded as a job by `load_atlas`.
+    author : str, optional
+        Who labels.
+    """
+
+    session_replaced = Signal(object)
+    """Another session is open: look at everything anew."""
+    landmarks_changed = Signal(frozenset)
+    active_changed = Signal(object)
+    crosshair_changed = Signal(object)
+    ghosts_changed = Signal()
+    threshold_changed = Signal(object)
+    """The threshold in effect, set or proposed; None while there is none."""
+    details_changed = Signal()
+    history_changed = Signal()
+    dirty_changed = Signal(bool)
+    saved = Signal(object)
+    view_changed = Signal(frozenset)
+    """Names of the fields of `session.view.state` that changed."""
+
+    volume_opened = Signal(object)
+    surfaces_changed = Signal()
+    threshold_previewed = Signal(object)
+    """A threshold that is being tried out on the slices; None when that is over."""
+    doubts_changed = Signal()
+    """Doubts were found or went away: ask `session.point_states(side, wait=False)` again."""
+    dragged = Signal(object)
+    """The `Drag` that goes on; None when it is over."""
+    tool_changed = Signal(str)
+    import_asked = Signal(object)
+    """An `ImportPlan` that needs answers: change its options, then `read_scan` it."""
+    scan_differs = Signal(object, object)
+    """(VolumeChangedError, Volume): the scan is not the one labelled; `accept_scan` takes it nevertheless."""
+    message = Signal(str, str)
+    """Text, and ``info``, ``warning`` or ``error``."""
+
+    def __init__(
+        self,
+        directory: Path | None = None,
+        dispatcher: Dispatcher | None = None,
+        *,
+        predict: Predict | None = None,
+        author: str | None = None,
+    ) -> None:
+        self.directory = directory
+        self.jobs = Jobs(dispatcher)
+        self.recent = RecentFiles(directory) if directory else None
+        self.truth: Specimen | None = None  # of a phantom: where its features really are
+        self.drag: Drag | None = None
+        self.tool = "place"
+        self._predict, self._author = predict, author
+        self._links: list[tuple[Any, Callable[..., object]]] = []
+        self.session: Session = new_session(directory, predict=predict, author=author)
+        self._bone = Bone(self)
+        self._connect()
+        self.jobs.failed.connect(self._on_failed)
+        self.landmarks_changed.connect(self._on_landmarks)
+
+    # What is there
+
+    @property
+    def volume(self) -> Volume | None:
+        """The scan, with its voxels; None before one is loaded."""
+        volume = self.session.volume
+        return volume if isinstance(volume, Volume) else None
+
+    @property
+    def threshold(self) -> float | None:
+        """The grey value at which bone begins: what the user set, else what was proposed."""
+        chosen = self.session.state.threshold
+        return self._bone.proposed if chosen is None else chosen
+
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The bone: parts that do not overlap, the ears at full resolution once that is done."""
+        return self._bone.meshes.parts
+
+    @property
+    def quick_surfaces(self) -> tuple[Surface, ...]:
+        """A coarse stand-in to draw while the camera moves; may be empty."""
+        return self._bone.meshes.quick
+
+    @property
+    def title(self) -> str:
+        """Name of the specimen, with a star while it has unsaved edits."""
+        return self.session.state.specimen + (" *" if self.session.dirty else "")
+
+    # Opening
+
+    def load_atlas(self) -> None:
+        """Get the published atlas ready in the background; ghosts appear when it is."""
+        if self._predict is None:
+            self.jobs.submit(LoadAtlas(), self._take_atlas, key="atlas")
+
+    def open(self, path: str | PathLike[str], **options: Any) -> None:
+        """Open a specimen file, or a scan as a new specimen; see `open_specimen` and `open_scan`."""
+        if Path(path).name.endswith(SUFFIX):
+            self.open_specimen(path)
+        else:
+            self.open_scan(path, **options)
+
+    def open_scan(self, path: str | PathLike[str], **options: Any) -> None:
+        """Look into a scan, then read it as a new specimen; `import_asked` first where that needs answers."""
+        ask = "spacing" not in options
+        self.jobs.submit(InspectScan(path, options), lambda plan: self._take_plan(plan, ask), key="open")
+
+    def read_scan(self, plan: ImportPlan) -> None:
+        """Read a scan as planned, as a new specimen."""
+        self.jobs.submit(ReadScan(plan), self._begin_with, key="open")
+
+    def open_specimen(
+        self, path: str | PathLike[str], *, unsaved: str = "ask", as_copy: bool = False
+    ) -> None:
+        """Open a specimen file, and its scan; raises as `session.opening.open_session` does."""
+        session = open_session(
+            path, self.directory, unsaved=unsaved, as_copy=as_copy, predict=self._predict, author=self._author
+        )
+        self._remember(path)
+        self._replace(session)
+
+    def recover(self, recovery: Recovery) -> None:
+        """Go on where a killed program stopped."""
+        if self.directory is not None:
+            options = {"predict": self._predict, "author": self._author}
+            self._replace(recover_session(recovery, self.directory, **options))
+
+    def open_demo(self, seed: int = 0, spacing: float = 0.2) -> None:
+        """Make the phantom and open it as a new specimen."""
+        self.jobs.submit(MakeDemo(seed, spacing), self._begin_demo, key="open")
+
+    def open_volume(self, volume: Volume) -> None:
+        """Begin a new specimen on a scan that is in memory already."""
+        self._begin_with(volume)
+
+    def find_scan(self, path: str | PathLike[str]) -> None:
+        """Say where the scan of this specimen is now, and read it from there."""
+        self.session.relink(path)
+        self._read_own_scan()
+
+    def accept_scan(self, volume: Volume) -> None:
+        """Go on with a scan that is not the one that was labelled."""
+        self._attach(volume, accept_changes=True)
+
+    # Working
+
+    def set_tool(self, tool: str) -> None:
+        """Choose what a left click over a slice does, one of `TOOLS`."""
+        if tool not in TOOLS:
+            raise GpError(f"tool must be one of {', '.join(TOOLS)}, got {tool!r}")
+        if tool != self.tool:
+            self.tool = tool
+            self.tool_changed.emit(tool)
+
+    def preview_threshold(self, value: float | None) -> None:
+        """Try a threshold out on the slices; None ends that."""
+        self.threshold_previewed.emit(value)
+
+    def set_threshold(self, value: float) -> None:
+        """Set the bone threshold, one undoable edit, and mesh anew."""
+        self.threshold_previewed.emit(None)
+        self.session.do(SetThreshold(float(value)))
+
+    def mesh_ears(self, half_mm: float | None = None) -> None:
+        """Mesh around the ears at full resolution now, wherever their place is known."""
+        self._bone.mesh_ears(half_mm=half_mm, anew=True)
+
+    def begin_drag(self, side: Side, code: str) -> bool:
+        """Take up a placed point; False where it cannot be moved."""
+        mark = self.session.state.landmark(side, code)
+        if mark.position is None or mark.locked:
+            return False
+        how = mark.provenance.how if mark.provenance else How.SLICE
+        self.drag = Drag(side, code, np.array(mark.position), how)
+        self.dragged.emit(self.drag)
+        return True
+
+    def drag_to(self, position: FloatArray, how: How) -> None:
+        """Show the point that is dragged somewhere else, (3,) mm, scan frame."""
+        if self.drag is not None:
+            self.drag.position, self.drag.how = np.array(position, dtype=np.float64), how
+            self.session.set_crosshair(position)
+            self.dragged.emit(self.drag)
+
+    def end_drag(self, *, keep: bool = True) -> bool:
+        """Let go of the point: one edit, or none where it was not moved or shall go back."""
+        drag, self.drag = self.drag, None
+        self.dragged.emit(None)
+        if drag is None or not keep:
+            return False
+        here = self.session.state.landmark(drag.side, drag.code).position
+        if here is not None and np.allclose(here, drag.position, atol=1e-9):
+            return False
+        return labelling.place(self.session, drag.position, drag.how, side=drag.side, code=drag.code)
+
+    def say(self, text: str, level: str = "info") -> None:
+        """Tell the user something."""
+        self.message.emit(text, level)
+
+    def close(self, *, discard: bool = False) -> None:
+        """Stop all work and let go of journal and locks; see `Session.close`."""
+        self.jobs.close()
+        self._disconnect()
+        self.session.close(discard=discard)
+        self._bone.forget()
+
+    # Inside
+
+    def _take_atlas(self, predict: Predict) -> None:
+        self._predict = predict
+        self.session.set_predict(predict)
+        self.doubts_changed.emit()
+
+    def _take_plan(self, plan: ImportPlan, ask: bool) -> None:
+        if plan.errors or (ask and not plan.sides_known) or (ask and len(plan.choices) > 1):
+            self.import_asked.emit(plan)
+        else:
+            self.read_scan(plan)
+
+    def _begin_demo(self, demo: Demo) -> None:
+        self._begin_with(demo.volume)
+        self.truth = demo.specimen
+
+    def _begin_with(self, volume: Volume) -> None:
+        name = tidy_name(volume.name)
+        options = {"predict": self._predict, "author": self._author}
+        self._replace(new_session(self.directory, specimen=name, **options))
+        self._attach(volume)
+        if volume.path is not None:
+            self._remember(volume.path)
+
+    def _replace(self, session: Session) -> None:
+        """Close one session and take another; the old one's unsaved edits stay in its journal."""
+        self._disconnect()
+        old, self.session = self.session, session
+        old.close(discard=not old.dirty)
+        self.truth = None
+        self.drag = None
+        self._bone.forget()
+        session.view.update(**_kept(old.view.state))
+        self._connect()
+        self.session_replaced.emit(session)
+        self.surfaces_changed.emit()
+        self._read_own_scan()
+
+    def _read_own_scan(self) -> None:
+        reference = self.session.state.volume
+        if reference is None or self.volume is not None:
+            return
+        if reference.path is None or self.session.volume_is_lost:
+            where = f" at {reference.path}" if reference.path else ""
+            self.say(f"The scan {reference.name} is not{where} any more. Use File > Find scan.", "warning")
+            return
+        job = InspectScan(reference.path, dict(self.session.state.import_choices))
+        self.jobs.submit(job, self._read_known, key="open")
+
+    def _read_known(self, plan: ImportPlan) -> None:
+        self.jobs.submit(ReadScan(plan), self._attach, key="open")
+
+    def _attach(self, volume: Volume, *, accept_changes: bool = False) -> None:
+        try:
+            warnings = self.session.attach_volume(volume, accept_changes=accept_changes)
+        except VolumeChangedError as error:
+            self.scan_differs.emit(error, volume)
+            return
+        for text in warnings:
+            self.say(text, "warning")
+        self.session.set_crosshair(volume.extent.mean(axis=0))
+        self._bone.begin(volume)
+        self.volume_opened.emit(volume)
+
+    def _remember(self, path: str | PathLike[str]) -> None:
+        if self.recent is not None:
+            self.recent.add(path)
+
+    def _connect(self) -> None:
+        for name in _RELAYED:
+            self._link(getattr(self.session, name), getattr(self, f"_relay_{name}", self._relay(name)))
+        self._link(self.session.view.changed, self._relay("view_changed"))
+
+    def _relay(self, name: str) -> Callable[..., None]:
+        def repeat(*values: object) -> None:
+            getattr(self, name).emit(*values)
+
+        return repeat
+
+    def _link(self, signal: Any, slot: Callable[..., object]) -> None:
+        signal.connect(slot)
+        self._links.append((signal, slot))
+
+    def _disconnect(self) -> None:
+        for signal, slot in self._links:
+            signal.disconnect(slot, missing_ok=True)
+        self._links.clear()
+
+    def _relay_threshold_changed(self, _: object) -> None:
+        self._bone.mesh()
+        self.threshold_changed.emit(self.threshold)
+
+    def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
+        for side in {side for side, _ in changed}:
+            job = self.session.judging(side)
+            self.jobs.submit(job, lambda _: self.doubts_changed.emit(), key=f"judging {side.value}")
+        self._bone.mesh_ears()
+
+    def _on_failed(self, task: Task[Any]) -> None:
+        self.say(task.message, "error")
+
+
+def _kept(state: Any) -> dict[str, Any]:
+    """Return how the user likes to look at things; grey window and camera belong to one specimen."""
+    fields = dict(vars(state))
+    for name in ("level", "width", "camera"):
+        fields.pop(name)
+    return fields
