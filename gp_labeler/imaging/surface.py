@@ -7,26 +7,29 @@ compiled loops.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonCore import vtkSMPTools
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GpError
-from gp_labeler.imaging.islands import kept_triangles
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple
+from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple, vtk_ready
 
-__all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
+__all__ = ["QUICK_VOXELS", "Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
 
 OVERVIEW_VOXELS = 256**3
+"""For the first look."""
+
+QUICK_VOXELS = 128**3
+"""For the stand-in that is drawn while the camera is dragged."""
+
 SMALLEST_PART_MM = 1.0
 """Ossicles are larger than this across; specks of noise are smaller."""
 
@@ -90,6 +93,8 @@ def extract_isosurface(
     ----------
     Schroeder, Maynard and Geveci 2015, Flying edges, doi:10.1109/LDAV.2015.7348069.
     """
+    from gp_labeler.imaging.islands import kept_triangles  # numba takes long to import: not at start-up
+
     report = Report(progress, cancel)
     report(0.0)
     region = _region(volume, box)
@@ -111,7 +116,7 @@ def extract_isosurface(
 
 
 def _no_surface(volume: Volume, threshold: float, box: ArrayLike | None) -> GpError:
-    low, high = volume.array.min(), volume.array.max()
+    low, high = float(np.nanmin(volume.array)), float(np.nanmax(volume.array))
     where = "in the volume" if box is None else "in the box"
     return GpError(
         f"no surface {where} at threshold {threshold:g}; the volume's values are {low:g} to {high:g}",
@@ -145,17 +150,8 @@ def _image(volume: Volume, region: FloatArray, stride: int) -> vtkImageData:
     image.SetOrigin(triple(volume.voxel_to_scan(region[:1])[0]))
     image.SetSpacing(triple(np.array(volume.spacing) * stride))
     image.SetDirectionMatrix(volume.direction.ravel().tolist())
-    image.GetPointData().SetScalars(to_vtk(_vtk_ready(part).ravel(), share=True))
+    image.GetPointData().SetScalars(to_vtk(vtk_ready(part).ravel(), share=True))
     return image
-
-
-def _vtk_ready(array: NDArray[Any]) -> NDArray[Any]:
-    """Return the voxels contiguous and of a type that VTK has."""
-    if array.dtype == bool:
-        array = array.astype(np.uint8)
-    elif array.dtype == np.float16:
-        array = array.astype(np.float32)
-    return np.ascontiguousarray(array)
 
 
 def _contour(image: vtkImageData, level: float) -> vtkPolyData:

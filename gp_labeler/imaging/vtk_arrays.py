@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonCore import vtkPoints
 from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
 from vtkmodules.vtkCommonMath import vtkMatrix4x4
 
-__all__ = ["cells_of", "matrix_of", "points_of", "to_numpy", "to_vtk", "triangles_of", "triple"]
+__all__ = ["cells_of", "matrix_of", "points_of", "to_numpy", "to_vtk", "triangles_of", "triple", "vtk_ready"]
 
 
 def to_numpy(array: Any) -> NDArray[Any]:
@@ -36,6 +36,15 @@ def to_vtk(array: NDArray[Any], name: str = "", *, share: bool = False) -> Any:
     if name:
         made.SetName(name)
     return made
+
+
+def vtk_ready(array: NDArray[Any]) -> NDArray[Any]:
+    """Return voxels contiguous and of a type that VTK has; a copy only where they are not."""
+    if array.dtype == bool:
+        array = array.astype(np.uint8)
+    elif array.dtype == np.float16:
+        array = array.astype(np.float32)
+    return np.ascontiguousarray(array)
 
 
 def points_of(positions: NDArray[Any]) -> vtkPoints:

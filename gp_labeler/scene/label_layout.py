@@ -17,8 +17,11 @@ _RELUCTANCE = 0.02
 _MARK_WEIGHT = 0.5
 """Covering a mark a little is better than covering a word."""
 
-_HIDDEN_ABOVE = 0.35
-"""A label covered more than this is left out rather than drawn into a heap."""
+_COVERED_AT_MOST = 0.35
+"""A label covered more than this is left out rather than drawn into a heap ..."""
+
+_COVERED_AT_MOST_MINOR = 0.05
+"""... and one of a negative rank sooner."""
 
 
 def place_labels(
@@ -37,7 +40,8 @@ def place_labels(
     gaps : (N,) array_like
         Distance between each mark and its label, pixels.
     ranks : (N,) array_like
-        Labels of a higher rank are placed earlier; one of a positive rank is never left out.
+        Labels of a higher rank are placed earlier; one of a positive rank is never left out, and those of a
+        negative one only fill free room.
 
     Returns
     -------
@@ -59,7 +63,8 @@ def place_labels(
         boxes = _candidates(marks[n], size[n], gap[n])
         bad = (_covered(boxes, taken) @ weights + _outside(boxes, view)) / size[n].prod()
         best = int((bad + _RELUCTANCE * np.arange(len(boxes))).argmin())
-        if bad[best] <= _HIDDEN_ABOVE or rank[n] > 0:
+        allowed = _COVERED_AT_MOST if rank[n] >= 0 else _COVERED_AT_MOST_MINOR
+        if bad[best] <= allowed or rank[n] > 0:
             corners[n], shown[n] = boxes[best, :2], True
             taken, weights = np.vstack([taken, boxes[best]]), np.append(weights, 1.0)
     return corners, shown

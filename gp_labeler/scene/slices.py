@@ -15,7 +15,7 @@ from vtkmodules.vtkImagingCore import vtkImageReslice
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk
+from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.window_level import WindowLevel
 
@@ -84,7 +84,7 @@ class SliceImage:
         image.SetDimensions(width, height, 1)
         image.SetOrigin((*self.origin.tolist(), 0.0))
         image.SetSpacing((*self.step.tolist(), 1.0))
-        values = np.ascontiguousarray(self.values)
+        values = vtk_ready(self.values)
         image.GetPointData().SetScalars(to_vtk(values.ravel(), share=True))
         edges = vtkFlyingEdges2D()
         edges.SetInputData(image)
@@ -190,7 +190,7 @@ class SliceSource:
 def _reslice(volume: Volume) -> vtkImageReslice:
     image = vtkImageData()
     image.SetDimensions(volume.size)
-    image.GetPointData().SetScalars(to_vtk(volume.array.reshape(-1), share=True))
+    image.GetPointData().SetScalars(to_vtk(vtk_ready(volume.array).reshape(-1), share=True))
     reslice = vtkImageReslice()
     reslice.SetInputData(image)
     reslice.SetInterpolationModeToLinear()

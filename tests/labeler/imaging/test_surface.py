@@ -262,3 +262,16 @@ def test_a_surface_is_let_go_with_its_locator() -> None:
     gc.collect()
     assert mesh() is None
     assert locator() is None
+
+
+@pytest.mark.parametrize(
+    "dtype", [bool, np.int8, np.uint8, np.uint16, np.int32, np.int64, np.float16, np.float64]
+)
+def test_every_voxel_type_is_meshed(dtype: type) -> None:
+    array = np.zeros((12, 12, 12), dtype)
+    array[3:9, 3:9, 3:9] = 1
+    surface = extract_isosurface(Volume(array, np.eye(4)), 1)
+    assert surface.level == 0.5
+    assert surface.bounds == pytest.approx(np.array([[2.5] * 3, [8.5] * 3]))
+    with pytest.raises(GpError, match="values are 0 to 1"):
+        extract_isosurface(Volume(array, np.eye(4)), 3)
