@@ -89,6 +89,7 @@ def draw_sides(atlas: Atlas, *, rng: np.random.Generator) -> tuple[FloatArray, F
     # the right ear given that its midline feature is the left one's: keeps the covariance of each side
     gain = covariance[:, shared] @ np.linalg.pinv(covariance[np.ix_(shared, shared)])
     right = right + gain @ (left[shared] - right[shared])
+    right[shared] = left[shared]
     return mean + left.reshape(-1, 3), mean + right.reshape(-1, 3)
 
 
@@ -106,7 +107,7 @@ def _in_head(atlas: Atlas, left: FloatArray, right: FloatArray, name: str) -> Sp
     sides = {}
     for side, shape in ((Side.LEFT, left), (Side.RIGHT, right)):
         points = shape @ (_turn(T_head_ear @ shape[row], towards) @ T_head_ear).T + aside
-        points[row, 0] = 0.0
+        points[row, 0] = 0.0  # so it is, but for rounding
         points = points if side is Side.LEFT else mirror_x(points)
         named = dict(zip(_PLACED, points, strict=True))
         sides[side] = LandmarkSet.from_mapping(named, side, frame="scan")
@@ -128,7 +129,7 @@ def _turn(source: FloatArray, target: FloatArray) -> FloatArray:
     """Return the smallest rotation (3, 3) that brings one direction to another, not opposite, one."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis = np.cross(a, b)
-    cross = np.cross(np.eye(3), -axis)
+    cross = np.cross(np.eye(3), axis)
     rotation: FloatArray = np.eye(3) + cross + cross @ cross / (1.0 + a @ b)
     return rotation
 

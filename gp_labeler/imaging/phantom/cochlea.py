@@ -16,6 +16,7 @@ from gp_labeler.imaging.phantom.solids import (
     Grid,
     Solid,
     Values,
+    blend,
     cone,
     ellipsoid,
     implicit,
@@ -39,6 +40,9 @@ _RISE = (0.13, 0.41, 0.64, 0.83, 0.915)
 
 _DUCT = (0.5, 0.44, 0.37, 0.31, 0.26)
 _DENT_MM = 0.5
+_FILLET = 0.3
+_BULGE = 0.07
+"""How far each turn stands out from the capsule's surface, mm."""
 
 
 @dataclass(frozen=True)
@@ -114,23 +118,32 @@ class Cochlea:
         return np.asarray(np.sqrt(np.maximum(squared, 0)) - beyond)
 
     def capsule(self) -> Solid:
-        """Return the body of bone around the duct; its surface passes through CC."""
-        height, radius, _ = self._polar("CC")
+        """Return the body of bone around the duct, bulging along its turns; its surface passes through CC."""
         steps = np.linspace(-2.5, self.length + 2.0, 2048)
-        table = self.radius(steps)
-        table = (np.sign(table) * table**2).astype(np.float32)
-        misfit = float(np.interp(height, steps, table)) - radius**2
-        base, cc, axis = self.ear["CB"], self.ear["CC"], self.axis
+        radii = self.radius(steps).astype(np.float32)
+        turns = np.interp(steps / self.length, _RISE, _TURNS).astype(np.float32)
+        bulge = (_BULGE * np.clip(steps, 0, 1) * np.clip(self.length - steps, 0, 1)).astype(np.float32)
+        cc = self.ear["CC"]
+        misfit = float(self._beyond(_as_grid(cc), steps, radii, turns, bulge)[0, 0, 0])
 
         def value(grid: Grid) -> Values:
-            x, y, z = (a - np.float32(c) for a, c in zip(grid, base, strict=True))
-            s = np.float32(axis[0]) * x + np.float32(axis[1]) * y + np.float32(axis[2]) * z
             to_cc = sum((a - np.float32(c)) ** 2 for a, c in zip(grid, cc, strict=True))
             fit = np.float32(misfit) * np.exp(to_cc / np.float32(-2 * _DENT_MM**2))
-            return x * x + y * y + z * z - s * s - np.interp(s, steps, table).astype(np.float32) + fit
+            return self._beyond(grid, steps, radii, turns, bulge) - fit
 
-        ends = np.stack([base - 1.5 * axis, self.ear["CA"] + _CAP * axis])
+        ends = np.stack([self.ear["CB"] - 1.5 * self.axis, self.ear["CA"] + _CAP * self.axis])
         return implicit(value, ends.min(axis=0) - 2.4, ends.max(axis=0) + 2.4)
+
+    def _beyond(self, grid: Grid, steps: FloatArray, *tables: Values) -> Values:
+        """Return squared distance from the axis less the capsule's squared radius there, mm^2."""
+        x, y, z = (a - np.float32(c) for a, c in zip(grid, self.ear["CB"], strict=True))
+        s, u, v = (
+            np.float32(d[0]) * x + np.float32(d[1]) * y + np.float32(d[2]) * z for d in (self.axis, *self.across)
+        )
+        radius, turn, bulge = (np.interp(s, steps, table).astype(np.float32) for table in tables)
+        wave = np.cos(np.float32(2 * np.pi) * turn - np.arctan2(v, u))
+        radius = radius + bulge * wave
+        return u * u + v * v - radius * np.abs(radius)
 
     def duct_line(self, per_turn: int = 32) -> tuple[FloatArray, FloatArray]:
         """Return the middle (n, 3) of the coiled duct from base to apex, and its radius (n,)."""
@@ -159,7 +172,7 @@ class Cochlea:
             oval.ring(_LIP),
             self._corner(),
         ]
-        canvas.paint(union(parts), grey.BONE)
+        canvas.paint(blend(parts, _FILLET), grey.BONE)
 
     def _corner(self) -> Solid:
         """Return the corner of the basal turn that ends in CL, with the ridge from it to the bulla wall."""
@@ -219,3 +232,8 @@ class Cochlea:
         limbs = [tube([foot, (foot + head) / 2 + 0.35 * (foot - oval.centre), head], 0.12) for foot in feet]
         canvas.paint(union(limbs), grey.BONE)
         canvas.paint(ellipsoid(head, 0.17 * np.eye(3)), grey.BONE)
+
+
+def _as_grid(point: FloatArray) -> Grid:
+    x, y, z = (np.full((1, 1, 1), c, np.float32) for c in point)
+    return x, y, z

@@ -72,7 +72,9 @@ def _recess(ear: Ear, cochlea: Cochlea) -> Solid:
     offset = ear["CC"] - ear["CO"]
     radial = unit(offset - (offset @ cochlea.axis) * cochlea.axis)
     ahead = unit(0.87 * cochlea.axis + 0.5 * radial)
-    return ellipsoid(ear["CC"] + _RECESS * ahead, _RECESS * np.eye(3))
+    aside = unit(np.cross(ahead, radial))
+    axes = _RECESS * np.stack([ahead, 1.8 * aside, np.cross(ahead, aside)])
+    return ellipsoid(ear["CC"] + _RECESS * ahead, axes)
 
 
 def _petrous(ear: Ear) -> list[Solid]:

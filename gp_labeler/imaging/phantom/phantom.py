@@ -33,7 +33,6 @@ __all__ = ["Phantom", "make_phantom", "write_phantom"]
 _SPACINGS_MM = (0.08, 0.5)
 _TILT_DEG = 2.0
 _BLUR_MM = 0.08
-_NOISE = 900.0
 
 
 @dataclass(frozen=True)
@@ -58,6 +57,7 @@ def make_phantom(
     spacing: float = 0.2,
     box: FloatArray | None = None,
     specimen: Specimen | None = None,
+    noise: float = 900.0,
 ) -> Phantom:
     """Make the synthetic scan of a guinea pig drawn from the published atlas.
 
@@ -71,6 +71,8 @@ def make_phantom(
         Make this part only; by default the whole head.
     specimen : Specimen, optional
         Make this animal instead of a drawn one: all 20 features on both sides.
+    noise : float
+        Standard deviation of the noise in grey values; bone is 22000 above soft tissue.
 
     Returns
     -------
@@ -93,7 +95,7 @@ def make_phantom(
     low, high = head_box(head) if box is None else box
     canvas = Canvas(low, high, spacing, grey.AIR)
     _paint(canvas, head)
-    voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=_NOISE)
+    voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=noise)
     notes = (f"synthetic head, seed {seed}: no animal was scanned",)
     volume = Volume.from_parts(voxels, [spacing] * 3, canvas.origin, name=name, notes=notes)
     return Phantom(volume, animal)
