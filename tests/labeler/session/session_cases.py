@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
 from gp_core.landmarks.features import CODES, FEATURES, Side
@@ -27,7 +27,9 @@ from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, S
 from gp_labeler.session.state import How, PoseCheck, Provenance, SpecimenState
 
 PLACEABLE = tuple(f.code for f in FEATURES if not f.computed)
-quick = settings(deadline=None, max_examples=50, derandomize=True)
+quick = settings(
+    deadline=None, max_examples=40, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
 MARK = Provenance(How.MESH, "2026-01-01T00:00:00+00:00", "AB", (0.1, 0.1, 0.2))
 
 

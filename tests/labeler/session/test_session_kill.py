@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -13,7 +14,9 @@ import numpy as np
 import pytest
 from session_cases import text_of
 
-from gp_labeler.session.opening import open_session, recover_session
+from gp_labeler.session.lock import FileLock
+from gp_labeler.session.opening import new_session, open_session, recover_session
+from gp_labeler.session.places import lock_path
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.session.specimen_edits import SetNotes
 
@@ -21,59 +24,53 @@ HERE = Path(__file__).parent
 ROOT = HERE.parents[2]
 
 
-def killed_after(folder: Path, seed: int, seconds: float) -> tuple[list[str], list[str]]:
-    """Let a process edit, kill it, and return the states it printed; a torn last one is not one."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+def killed_after(folder: Path, seed: int, n_lines: int, seconds: float) -> list[str]:
+    """Let a process edit, kill it `seconds` after its n-th print; return all states it printed whole."""
     process = subprocess.Popen(
         [sys.executable, str(HERE / "editing_process.py"), str(folder), str(seed)],
         stdout=subprocess.PIPE,
-        env=environment,
+        env={**os.environ, "PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"},
     )
     assert process.stdout is not None
-    first = process.stdout.readline()
-    drained = []
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        drained.append(process.stdout.readline())
+    lines = [process.stdout.readline() for _ in range(n_lines)]
+    time.sleep(seconds)
     process.send_signal(signal.SIGKILL)
-    rest = process.stdout.read()
+    lines += process.stdout.read().splitlines(keepends=True)
     process.stdout.close()
-    process.wait()
-    lines = b"".join([first, *drained, rest]).decode().split("\n")
-    return lines[:-1], lines[-1:]
+    assert process.wait() == -signal.SIGKILL
+    return [line.decode().rstrip("\n") for line in lines if line.endswith(b"\n")]
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="this system cannot kill -9")
 @pytest.mark.parametrize("seed", range(10))
 def test_killed_at_any_moment_nothing_confirmed_is_lost(tmp_path, seed):
-    seconds = float(np.random.default_rng(seed).uniform(0.0, 0.3))
-    confirmed, _ = killed_after(tmp_path, seed, seconds)
+    rng = np.random.default_rng(seed)
+    confirmed = killed_after(tmp_path, seed, int(rng.integers(1, 100)), float(rng.uniform(0, 0.02)))
     found = find_recoveries(tmp_path / "state")
-    file = tmp_path / "GP-014.gpspecimen.json"
     if found:
         (recovery,) = found
         session = recover_session(recovery, tmp_path / "state")
-    else:  # it was saved just then
+    elif (file := tmp_path / "GP-014.gpspecimen.json").exists():  # it was saved just then
         session = open_session(file, tmp_path / "state")
-    assert len(confirmed) > 5
-    assert text_of(session.state) in _at_most_one_later(confirmed, session)
-    session.do(SetNotes(session.state.notes + "!"))  # and the journal can go on
-    session.close(discard=True)
+    else:  # it came to no edit
+        session = new_session(tmp_path / "state", specimen="GP-014")
+    with contextlib.ExitStack() as stack:
+        stack.callback(session.close, discard=True)
+        assert text_of(session.state) in _accepted(confirmed, session)
+        session.do(SetNotes(session.state.notes + "!"))  # and the journal can go on
 
 
-def _at_most_one_later(confirmed: list[str], session) -> set[str]:
-    """The last confirmed state, or what one more edit made of it (killed between journal and print)."""
-    accepted = {confirmed[-1]}
+def _accepted(confirmed: list[str], session) -> set[str]:
+    """The last confirmed state, or what one more step made of it: killed between journal and print."""
     history = session._history
-    before = history.to_undo or history.to_redo
-    neighbours = [step.state for step in (history.to_undo, history.to_redo) if step is not None]
-    if before is not None and confirmed[-1] in {text_of(state) for state in neighbours}:
-        accepted.add(text_of(session.state))
-    return accepted
+    neighbours = {text_of(step.state) for step in (history.to_undo, history.to_redo) if step is not None}
+    one_more = {text_of(session.state)} if confirmed[-1] in neighbours else set()
+    return {confirmed[-1], *one_more}
 
 
 def test_the_lock_of_a_killed_process_is_free(tmp_path):
-    killed_after(tmp_path, 0, 0.05)
+    killed_after(tmp_path, 0, 30, 0.0)
     locks = list((tmp_path / "state" / "journals").glob("*.lock"))
     assert any(lock.read_text() for lock in locks)  # it was left behind
-    find_recoveries(tmp_path / "state")
+    for journal in (tmp_path / "state" / "journals").glob("*.jsonl"):
+        FileLock(lock_path(journal), "it").release()
