@@ -6,6 +6,8 @@ from collections.abc import Iterable
 from os import PathLike, fspath
 from pathlib import Path
 
+import numpy as np
+
 from gp_core.errors import FeatureError, FileFormatError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import Side
@@ -16,6 +18,7 @@ from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["load_specimens"]
 
+_SAME_MM = 1e-6
 _IN_FOLDERS = (".mrk.json", ".fcsv")
 
 
@@ -34,7 +37,7 @@ def load_specimens(
     -------
     list of Specimen
         By name, GP2 before GP10. Files belong together by the specimen in their ``gpLabeler`` object,
-        else by their name without ``_L`` or ``_R``. CO is computed, whatever the file says.
+        else by their name without ``_L`` or ``_R``. CO is computed where a file lacks it or differs.
 
     Raises
     ------
@@ -60,8 +63,15 @@ def load_specimens(
                 specimen=name,
                 remedy="Give one file a side, or name the specimens apart.",
             )
-        sides.setdefault(name, {})[landmarks.side] = with_cochlea_origin(landmarks)
+        sides.setdefault(name, {})[landmarks.side] = _with_true_origin(landmarks)
     return [Specimen(name, sides[name]) for name in sorted(sides, key=natural_key)]
+
+
+def _with_true_origin(landmarks: LandmarkSet) -> LandmarkSet:
+    """Compute CO, but keep the file's own number, to the last bit, where it says the same."""
+    computed = with_cochlea_origin(landmarks)
+    same = "CO" in landmarks and np.abs(computed["CO"] - landmarks["CO"]).max() < _SAME_MM
+    return landmarks if same else computed
 
 
 def _files(paths: list[str | PathLike[str]]) -> list[Path]:
