@@ -214,7 +214,7 @@ def _subset(mesh: vtkPolyData, kept: NDArray[np.bool_]) -> vtkPolyData:
     part.SetPolys(cells_of(number[triangles]))
     normals = mesh.GetPointData().GetNormals()
     if normals is not None:
-        part.GetPointData().SetNormals(to_vtk(to_numpy(normals)[used]))
+        part.GetPointData().SetNormals(to_vtk(to_numpy(normals)[used], share=True))
     return part
 
 

@@ -48,16 +48,16 @@ def vtk_ready(array: NDArray[Any]) -> NDArray[Any]:
 
 
 def points_of(positions: NDArray[Any]) -> vtkPoints:
-    """Return (N, 3) positions as VTK points."""
+    """Return (N, 3) positions as VTK points; they share memory, so leave the array alone afterwards."""
     points = vtkPoints()
-    points.SetData(to_vtk(positions))
+    points.SetData(to_vtk(positions, share=True))
     return points
 
 
 def cells_of(corners: NDArray[Any]) -> vtkCellArray:
-    """Return (M, n) point numbers as cells of n corners."""
+    """Return (M, n) point numbers as cells of n corners; like `points_of` without a copy."""
     cells = vtkCellArray()
-    cells.SetData(corners.shape[1], to_vtk(np.asarray(corners, dtype=np.int64).ravel()))
+    cells.SetData(corners.shape[1], to_vtk(np.asarray(corners, dtype=np.int64).ravel(), share=True))
     return cells
 
 

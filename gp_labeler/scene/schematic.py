@@ -1,0 +1,133 @@
+"""A flat schematic of the ear, made from the atlas: what the small pictures of the features are drawn from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.checks import FloatArray
+from gp_core.landmarks.features import CODES, Side, feature
+
+__all__ = ["FAR", "Schematic", "schematic_of"]
+
+FAR = ("IN", "ZL")
+"""Features so far from the ear that the picture must show the head."""
+
+_LEVEL_RAD = np.deg2rad(-19.0)
+"""Turns the CO frame about the ear-to-ear axis until the head is level, as in a side view of a skull."""
+
+_TURNS, _BASE_RADIUS, _TOP_RADIUS, _FIRST, _LAST = 3.6, 1.75, 0.35, 0.55, 3.95
+"""The cochlear tube around the axis CB-CA: turns, and mm; drawn, not measured."""
+
+_PLANES: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], str]] = {
+    "coronal": ((0, 1, 0), (0, 0, 1), "RLIS"),
+    "axial": ((0, 1, 0), (1, 0, 0), "RLPA"),
+    "sagittal": ((-1, 0, 0), (0, 0, 1), "APIS"),
+    "3D": ((-0.93, -0.36, 0.0), (0.10, -0.27, 0.96), "APIS"),
+}
+"""Of the left side: what points right and up on the picture, and the letters left, right, below, above."""
+
+_HEAD = np.array(
+    [(-15, -1), (-15.5, 6), (-11, 12.5), (-2, 15.5), (10, 15.5), (22, 13.2), (34, 9.6), (43, 6), (49, 2)]
+    + [(49, -2.5), (46, -5.5), (46.6, -11.5), (44.6, -13), (41, -13.4), (30, -17), (16, -18.5), (4, -17)]
+    + [(-3, -11), (-8, -5)],
+    dtype=np.float64,
+)
+"""Outline of a guinea pig's skull from its left: mm forwards and upwards of the ear; drawn, not measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Schematic:
+    """What is to be drawn, in mm of the picture: x to the right, y upwards.
+
+    Parameters
+    ----------
+    code : str
+        The feature it is about.
+    view : str
+        From where it is seen: ``coronal``, ``axial``, ``sagittal`` or ``3D``.
+    points : mapping of str to (2,) array
+        The features.
+    depths : mapping of str to float
+        How near the beholder each of them is, mm.
+    spiral : (n, 2) array
+        The cochlear tube, from the round window to the apex.
+    head : (n, 2) array
+        Outline of the skull; empty where the picture is of the ear alone.
+    letters : str
+        Left, right, below and above on the picture, as on slices.
+    box : (2, 2) array
+        Lower left and upper right corner of what the picture should show.
+    """
+
+    code: str
+    view: str
+    points: Mapping[str, FloatArray]
+    depths: Mapping[str, float]
+    spiral: FloatArray
+    head: FloatArray
+    letters: str
+    box: FloatArray
+
+
+@cache
+def schematic_of(code: str, side: Side) -> Schematic:
+    """Return the schematic that shows a feature best, of the left or the right ear."""
+    row, atlas = feature(code), Atlas.published()
+    far = row.code in FAR
+    view = "sagittal" if far else row.view
+    right, up, letters = _PLANES[view]
+    axes = np.array([right, up, np.cross(right, up)], dtype=np.float64)
+    if far:
+        axes[:2, [0, 2]] = _turned(axes[:2, [0, 2]])
+    if side is Side.RIGHT:
+        axes, letters = _mirrored(axes, view, letters)
+    shown = {c: axes @ atlas[c] for c in CODES}
+    points = {c: xyz[:2] for c, xyz in shown.items()}
+    head = _HEAD * (1 if side is Side.RIGHT else -1, 1) if far else np.empty((0, 2))
+    inside = list(points.values()) if far else [points[c] for c in CODES if c not in FAR]
+    corners = np.vstack([np.array(inside), head])
+    return Schematic(
+        row.code,
+        row.view,
+        points,
+        {c: float(xyz[2]) for c, xyz in shown.items()},
+        (_spiral() @ axes.T)[:, :2],
+        head,
+        letters,
+        np.stack([corners.min(axis=0), corners.max(axis=0)]),
+    )
+
+
+def _turned(directions: FloatArray) -> FloatArray:
+    """Turn (n, 2) directions (x, z) so that what they show is turned level."""
+    c, s = np.cos(_LEVEL_RAD), np.sin(_LEVEL_RAD)
+    turned: FloatArray = directions @ np.array([[c, -s], [s, c]])
+    return turned
+
+
+def _mirrored(axes: FloatArray, view: str, letters: str) -> tuple[FloatArray, str]:
+    """Return axes and letters for the right ear, whose outward direction is the other way.
+
+    The atlas is a left ear; mirrored between left and right, outwards becomes left on coronal and axial
+    pictures, and from the side the nose points to the right.
+    """
+    flipped = axes.copy()
+    flipped[0] *= -1
+    if view in ("coronal", "axial"):
+        return flipped, letters
+    return flipped, letters[1] + letters[0] + letters[2:]
+
+
+def _spiral() -> FloatArray:
+    """Return the (n, 3) middle line of the cochlear tube in the atlas frame of a left ear."""
+    t = np.linspace(0.0, 1.0, 160)
+    angle = 2 * np.pi * _TURNS * t
+    radius = _BASE_RADIUS + (_TOP_RADIUS - _BASE_RADIUS) * t
+    along = _FIRST + (_LAST - _FIRST) * t
+    line: FloatArray = np.stack([along, radius * np.cos(angle), -radius * np.sin(angle)], axis=1)
+    return line
