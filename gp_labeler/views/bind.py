@@ -1,0 +1,137 @@
+"""Between models and widgets: signals that let go in time, errors that are told, numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+import weakref
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from PySide6.QtCore import QObject, QSignalBlocker
+from PySide6.QtWidgets import QWidget
+
+from gp_core.errors import GpError
+
+__all__ = [
+    "attempt",
+    "blocked",
+    "degrees_text",
+    "follow",
+    "mm_text",
+    "position_text",
+    "set_role",
+    "size_text",
+    "spacing_text",
+    "value_text",
+    "voxel_text",
+]
+
+_AXES = (("L", "R"), ("P", "A"), ("S", "I"))
+
+
+class Teller(Protocol):
+    """What errors are told to: a `Workbench`."""
+
+    def say(self, text: str, level: str = "info") -> None:
+        """Tell the user."""
+        ...
+
+
+def follow(owner: QObject, signal: Any, slot: Callable[..., object]) -> None:
+    """Connect a psygnal signal to a method of a Qt object, for as long as `owner` exists.
+
+    Neither end is kept alive by this.
+
+    Parameters
+    ----------
+    owner : QObject
+        Whose end ends the connection, usually the object itself.
+    signal : psygnal.SignalInstance
+        What to listen to.
+    slot : bound method
+        What to call.
+    """
+    signal.connect(slot)
+    method = weakref.WeakMethod(slot)  # a strong one would keep a widget alive that nobody holds
+
+    def let_go() -> None:
+        living = method()
+        if living is not None:
+            signal.disconnect(living, missing_ok=True)
+
+    owner.destroyed.connect(let_go)
+
+
+def attempt(teller: Teller, action: Callable[[], object]) -> bool:
+    """Do what a user asked for, and tell them where it cannot be done; return whether it was."""
+    try:
+        action()
+    except GpError as error:
+        teller.say(str(error), "error")
+        return False
+    return True
+
+
+@contextmanager
+def blocked(*objects: QObject) -> Iterator[None]:
+    """Change widgets without their telling of it."""
+    blockers = [QSignalBlocker(each) for each in objects]
+    try:
+        yield
+    finally:
+        for blocker in blockers:
+            blocker.unblock()
+
+
+def set_role(widget: QWidget, role: str) -> None:
+    """Give a widget one of the looks of the style sheet, also after it was shown."""
+    if widget.property("role") != role:
+        widget.setProperty("role", role)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)
+
+
+def mm_text(length: float) -> str:
+    """Return a length such as ``2.6 mm``; finer below a tenth of a millimetre."""
+    if not math.isfinite(length):
+        return "–"
+    digits = 1 if abs(length) >= 0.995 else 2 if abs(length) >= 0.0995 else 3
+    return f"{length:.{digits}f} mm".replace("-", "−")
+
+
+def degrees_text(angle_rad: float) -> str:
+    """Return an angle in radians such as ``4.3°``."""
+    return f"{math.degrees(angle_rad):.1f}°".replace("-", "−") if math.isfinite(angle_rad) else "–"
+
+
+def position_text(position: Iterable[float]) -> str:
+    """Return a position in the scan frame (LPS, mm) such as ``L 4.6  P 9.1  S 12.4 mm``."""
+    parts = []
+    for value, (plus, minus) in zip(position, _AXES, strict=True):
+        if not math.isfinite(value):
+            return "–"
+        shown = round(float(value), 1)
+        parts.append(f"{plus if shown >= 0 else minus} {abs(shown):.1f}")
+    return "  ".join(parts) + " mm"
+
+
+def voxel_text(index: Iterable[float]) -> str:
+    """Return the voxel that a fractional index lies in, such as ``(74, 65, 88)``."""
+    return f"({', '.join(str(math.floor(i + 0.5)) for i in index)})"
+
+
+def value_text(value: float | None) -> str:
+    """Return a grey value with as many digits as it has a meaning for."""
+    return "–" if value is None or not math.isfinite(value) else f"{value:.5g}".replace("-", "−")
+
+
+def size_text(size: Sequence[int]) -> str:
+    """Return voxels along x, y, z such as ``512 × 512 × 600``."""
+    return " × ".join(str(n) for n in size)
+
+
+def spacing_text(spacing: Sequence[float]) -> str:
+    """Return a voxel size such as ``0.035 mm``, or all three numbers where they differ."""
+    texts = [f"{length:.4g}" for length in spacing]
+    return f"{texts[0] if len(set(texts)) == 1 else ' × '.join(texts)} mm"

@@ -1,0 +1,95 @@
+"""What of a session is drawn in every view: marks, ghosts and lines, before any view turns them into pixels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_core.landmarks.features import CODES, Side, feature
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.scene.colours import SceneColours
+from gp_labeler.scene.ghosts import Ghost
+from gp_labeler.scene.marks import Mark
+from gp_labeler.scene.segments import Segment
+from gp_labeler.session.workflow import PointState
+from gp_labeler.workbench import Workbench
+
+__all__ = ["drawn_ghosts", "drawn_marks", "drawn_segments", "key_of", "point_of"]
+
+_BEYOND_MM = 1.0
+"""The modiolar axis is drawn this much longer at each end."""
+
+_MARK_STATES: Mapping[PointState, str] = {
+    PointState.COMPUTED: "computed",
+    PointState.DOUBTFUL: "doubtful",
+}
+
+
+def key_of(side: Side, code: str) -> str:
+    """Return the key of a point among marks and ghosts."""
+    return f"{side.value}:{code}"
+
+
+def point_of(key: str) -> tuple[Side, str]:
+    """Return the point that a key is of."""
+    side, code = key.split(":")
+    return Side(side), code
+
+
+def drawn_marks(workbench: Workbench) -> list[Mark]:
+    """Return the placed points of both sides; a shared one once, on the side being worked on."""
+    session, drag, marks = workbench.session, workbench.drag, []
+    active = session.active
+    for side in (active.side.other, active.side):
+        landmarks, states = session.landmarks(side), session.point_states(side, wait=False)
+        for code in CODES:
+            if code not in landmarks or (feature(code).shared and side is not active.side):
+                continue
+            dragged = drag is not None and (drag.side, drag.code) == (side, code)
+            position = drag.position if drag is not None and dragged else landmarks[code]
+            state = _MARK_STATES.get(states[code], "placed" if side is active.side else "other")
+            is_active = dragged or (side, code) == (active.side, active.code)
+            marks.append(Mark(key_of(side, code), position, code, state, is_active))
+    return marks
+
+
+def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
+    """Return where points to do are expected: all of the active side faintly, the active one boldly."""
+    session = workbench.session
+    if not session.view.state.ghosts_visible:
+        return []
+    active, drawn = session.active, []
+    for code, ghost in session.ghosts(active.side).items():
+        is_active = code == active.code
+        label = f"{code}?" if is_active else ""
+        drawn.append(Ghost(key_of(active.side, code), ghost.position, ghost.covariance, label, is_active))
+    return [ghost for ghost in drawn if ghost.active]
+
+
+def drawn_segments(workbench: Workbench, colours: SceneColours) -> list[Segment]:
+    """Return the modiolar axis, the line across the round window and the one that joins them, each side."""
+    session = workbench.session
+    if not session.view.state.axis_visible:
+        return []
+    return [line for side in Side for line in _lines(session.landmarks(side), colours.states["computed"])]
+
+
+def _lines(landmarks: LandmarkSet, colour: str) -> list[Segment]:
+    found = []
+    if "CA" in landmarks and "CB" in landmarks:
+        base, apex = landmarks["CB"], landmarks["CA"]
+        beyond = _BEYOND_MM * _unit(apex - base)
+        found.append(Segment(base - beyond, apex + beyond, colour, 2.5))
+    if "RWA" in landmarks and "RWP" in landmarks:
+        found.append(Segment(landmarks["RWA"], landmarks["RWP"], colour, 2.5))
+        if "CO" in landmarks:
+            middle = (landmarks["RWA"] + landmarks["RWP"]) / 2
+            found.append(Segment(landmarks["CO"], middle, colour, 1.5))
+    return found
+
+
+def _unit(vector: FloatArray) -> FloatArray:
+    unit: FloatArray = vector / max(float(np.linalg.norm(vector)), 1e-9)
+    return unit

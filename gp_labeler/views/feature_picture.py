@@ -1,0 +1,293 @@
+"""Small pictures of the features: where in the ear, or on the head, to look for each."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from PySide6.QtCore import QPointF, QRectF, QSize, Qt
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QFontMetricsF,
+    QLinearGradient,
+    QPainter,
+    QPainterPath,
+    QPen,
+    QPixmap,
+    QPolygonF,
+)
+from PySide6.QtWidgets import QWidget
+
+from gp_core.checks import FloatArray
+from gp_core.landmarks.features import CODES, Side
+from gp_labeler.scene.schematic import FAR, Schematic, schematic_of
+from gp_labeler.views.theme import Theme, base_font, theme_of
+
+__all__ = ["FeaturePicture", "feature_picture"]
+
+_MARGIN = 18.0
+_OSSICLES = (("DTM", "MH"), ("DTM", "LLI"), ("DTM", "DTL"))
+_WORDS = {
+    "coronal": "coronal, from the front",
+    "axial": "axial, from below",
+    "sagittal": "from the side",
+    "3D": "3D, from the side",
+}
+
+
+def feature_picture(code: str, side: Side | str, size: QSize, theme: Theme, *, ratio: float = 2.0) -> QPixmap:
+    """Draw the picture of a feature: it, among the others, in the view in which it is found best.
+
+    Parameters
+    ----------
+    code : str
+        The feature.
+    side : Side or str
+        Which ear.
+    size : QSize
+        Logical pixels.
+    theme : Theme
+        Its colours.
+    ratio : float
+        Device pixels for each logical one.
+    """
+    pixmap = QPixmap(round(size.width() * ratio), round(size.height() * ratio))
+    pixmap.setDevicePixelRatio(ratio)
+    pixmap.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(pixmap)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    _Picture(painter, schematic_of(code, Side.parse(side)), QRectF(0, 0, size.width(), size.height()), theme).draw()
+    painter.end()
+    return pixmap
+
+
+class FeaturePicture(QWidget):
+    """Shows the picture of a feature at whatever size there is room for."""
+
+    def __init__(self, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._shown: tuple[str, Side] | None = None
+        self.setMinimumSize(96, 72)
+
+    def show_feature(self, code: str | None, side: Side) -> None:
+        """Show another feature, or none."""
+        self._shown = None if code is None else (code, side)
+        self.setAccessibleName("" if code is None else f"Picture of {code}, {side.word} ear")
+        self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(320, 170)
+
+    def paintEvent(self, event: object) -> None:  # noqa: D102, N802 - Qt's name
+        if self._shown is not None:
+            picture = feature_picture(*self._shown, self.size(), theme_of(self), ratio=self.devicePixelRatioF())
+            painter = QPainter(self)
+            painter.drawPixmap(0, 0, picture)
+            painter.end()
+
+
+class _Picture:
+    """One drawing under way."""
+
+    def __init__(self, painter: QPainter, schematic: Schematic, frame: QRectF, theme: Theme) -> None:
+        self._painter, self._it, self._frame, self._theme = painter, schematic, frame, theme
+        low, high = schematic.box
+        room = frame.adjusted(_MARGIN, _MARGIN, -_MARGIN, -_MARGIN)
+        self._scale = float(min(room.width() / (high - low)[0], room.height() / (high - low)[1]))
+        self._middle = (low + high) / 2
+        self._taken: list[QRectF] = []
+
+    def draw(self) -> None:
+        self._ground()
+        if len(self._it.head):
+            self._head()
+        self._ear()
+        self._points()
+        self._words()
+
+    def _at(self, point: FloatArray) -> QPointF:
+        x, y = (point - self._middle) * self._scale
+        return self._frame.center() + QPointF(float(x), -float(y))
+
+    def _of(self, code: str) -> QPointF:
+        return self._at(self._it.points[code])
+
+    def _tint(self, colour: str, opacity: float) -> QColor:
+        tinted = QColor(colour)
+        tinted.setAlphaF(opacity)
+        return tinted
+
+    def _ground(self) -> None:
+        ground = QLinearGradient(self._frame.topLeft(), self._frame.bottomLeft())
+        ground.setColorAt(0, QColor(self._theme.scene.top))
+        ground.setColorAt(1, QColor(self._theme.scene.bottom))
+        self._painter.setPen(Qt.PenStyle.NoPen)
+        self._painter.setBrush(ground)
+        self._painter.drawRoundedRect(self._frame, 5, 5)
+        self._painter.setClipRect(self._frame)
+
+    def _head(self) -> None:
+        outline = [self._at(p) for p in self._it.head]
+        self._painter.setPen(QPen(self._tint(self._theme.scene.bone, 0.9 if self._theme.is_dark else 1.0), 1.4))
+        self._painter.setBrush(self._tint(self._theme.scene.bone, 0.16 if self._theme.is_dark else 0.35))
+        self._painter.drawPath(_smooth(outline))
+
+    def _ear(self) -> None:
+        bone = self._theme.scene.bone if self._theme.is_dark else "#B9A57E"
+        self._tube(bone)
+        self._painter.setBrush(Qt.BrushStyle.NoBrush)
+        self._canal(bone)
+        width = max(1.5, 0.5 * self._scale)
+        self._painter.setPen(_round_pen(self._tint(bone, 0.35), width))
+        for a, b in _OSSICLES:
+            self._painter.drawLine(self._of(a), self._of(b))
+        self._painter.setPen(_round_pen(self._tint(bone, 0.55), max(1.2, 0.35 * self._scale)))
+        self._painter.drawLine(self._of("FPA"), self._of("FPP"))
+        self._window()
+        self._axis()
+
+    def _tube(self, bone: str) -> None:
+        """Draw the coil from the base to the apex, each part over those before, thinner towards the apex."""
+        line = [self._at(p) for p in self._it.spiral]
+        n = len(line)
+        for pen_of in (self._edge_pen, self._fill_pen):
+            for i in range(n - 1):
+                self._painter.setPen(pen_of(bone, i / n))
+                self._painter.drawLine(line[i], line[i + 1])
+
+    def _edge_pen(self, bone: str, t: float) -> QPen:
+        return _round_pen(QColor(bone).darker(175), self._tube_width(t) + 1.6)
+
+    def _fill_pen(self, bone: str, t: float) -> QPen:
+        shade = QColor(bone)
+        return _round_pen(shade.darker(round(150 - 45 * t)), self._tube_width(t))
+
+    def _tube_width(self, t: float) -> float:
+        return max(1.0, self._scale * (0.95 - 0.45 * t))
+
+    def _canal(self, bone: str) -> None:
+        """Draw the opening of the ear canal, whose lower and upper edge are OI and OS."""
+        low, high = self._of("OI"), self._of("OS")
+        across = high - low
+        length = float(np.hypot(across.x(), across.y()))
+        self._painter.save()
+        self._painter.translate((low + high) / 2)
+        self._painter.rotate(float(np.degrees(np.arctan2(across.y(), across.x()))))
+        self._painter.setPen(QPen(self._tint(bone, 0.6), 1.3, Qt.PenStyle.DashLine))
+        self._painter.drawEllipse(QPointF(), length / 2, length * 0.38)
+        self._painter.restore()
+
+    def _window(self) -> None:
+        rim = [self._of(code) for code in ("RWA", "RWL", "RWP", "RWM")]
+        self._painter.setPen(QPen(QColor(self._theme.accent_text), 1.3))
+        self._painter.setBrush(self._tint(self._theme.accent_text, 0.25))
+        self._painter.drawPath(_smooth(rim))
+        self._painter.setBrush(Qt.BrushStyle.NoBrush)
+
+    def _axis(self) -> None:
+        """Draw the modiolar axis, with an arrow at the apex, and the line to the round window."""
+        points, colour = self._it.points, QColor(self._theme.states["computed"])
+        along = points["CA"] - points["CB"]
+        start, end = self._at(points["CB"] - 0.25 * along), self._at(points["CA"] + 0.35 * along)
+        self._painter.setPen(QPen(colour, 1.3, Qt.PenStyle.DashLine))
+        self._painter.drawLine(start, end)
+        self._painter.drawLine(self._of("CO"), (self._of("RWA") + self._of("RWP")) / 2)
+        ahead = end - start
+        length = float(np.hypot(ahead.x(), ahead.y()))
+        if length > 14:
+            unit, side = ahead / length, QPointF(-ahead.y(), ahead.x()) / length
+            self._painter.setPen(Qt.PenStyle.NoPen)
+            self._painter.setBrush(colour)
+            self._painter.drawPolygon(QPolygonF([end + 3 * unit, end - 5 * unit + 3 * side, end - 5 * unit - 3 * side]))
+
+    def _points(self) -> None:
+        order = sorted(CODES, key=lambda code: self._it.depths[code])
+        near = [c for c in order if c != self._it.code and (c not in FAR or len(self._it.head))]
+        self._painter.setPen(QPen(QColor(self._theme.scene.halo), 1))
+        self._painter.setBrush(QColor(self._theme.muted))
+        for code in near:
+            self._painter.drawEllipse(self._of(code), 2.4, 2.4)
+        self._target()
+        for code in near:
+            self._label(code, self._font(9), QColor(self._theme.muted), 4.0, must=False)
+
+    def _target(self) -> None:
+        colour, where = QColor(self._theme.states["placed"]), self._of(self._it.code)
+        self._painter.setBrush(Qt.BrushStyle.NoBrush)
+        for width, shade in ((4.0, QColor(self._theme.scene.halo)), (1.8, colour)):
+            self._painter.setPen(QPen(shade, width))
+            self._painter.drawEllipse(where, 9, 9)
+        self._painter.setPen(QPen(QColor(self._theme.scene.halo), 1.2))
+        self._painter.setBrush(colour)
+        self._painter.drawEllipse(where, 4.6, 4.6)
+        self._taken.append(QRectF(where.x() - 10, where.y() - 10, 20, 20))
+        self._label(self._it.code, self._font(13, bold=True), colour, 12.0, must=True)
+
+    def _label(self, code: str, font: QFont, colour: QColor, gap: float, *, must: bool) -> None:
+        """Write a feature's code beside it, where there is room."""
+        size = QFontMetricsF(font).size(0, code)
+        boxes = list(_beside(self._of(code), size.width(), size.height(), gap))
+        frame = self._frame.adjusted(2, 2, -2, -2)
+        free = [b for b in boxes if frame.contains(b) and not any(b.intersects(t) for t in self._taken)]
+        if not free and not must:
+            return
+        box = free[0] if free else boxes[0]
+        self._taken.append(box)
+        path = QPainterPath()
+        path.addText(box.left(), box.top() + QFontMetricsF(font).ascent(), font, code)
+        self._painter.setPen(_round_pen(QColor(self._theme.scene.halo), 3))
+        self._painter.setBrush(Qt.BrushStyle.NoBrush)
+        self._painter.drawPath(path)
+        self._painter.setPen(Qt.PenStyle.NoPen)
+        self._painter.setBrush(colour)
+        self._painter.drawPath(path)
+
+    def _words(self) -> None:
+        """Write the directions at the edges, and from where it is seen."""
+        self._painter.setFont(self._font(10, bold=True))
+        self._painter.setPen(QColor(self._theme.muted))
+        inner, flag = self._frame.adjusted(5, 3, -5, -3), Qt.AlignmentFlag
+        left, right, below, above = self._it.letters
+        for letter, where in (
+            (left, flag.AlignLeft | flag.AlignVCenter),
+            (right, flag.AlignRight | flag.AlignVCenter),
+            (above, flag.AlignHCenter | flag.AlignTop),
+        ):
+            self._painter.drawText(inner, where, letter)
+        if self._frame.width() >= 180:
+            self._painter.setFont(self._font(10))
+            text = "from the side" if len(self._it.head) else _WORDS[self._it.view]
+            self._painter.drawText(inner, flag.AlignLeft | flag.AlignBottom, text)
+            self._painter.drawText(inner, flag.AlignRight | flag.AlignBottom, "schematic")
+        else:
+            self._painter.drawText(inner, flag.AlignHCenter | flag.AlignBottom, below)
+
+    def _font(self, pixels: int, *, bold: bool = False) -> QFont:
+        font = base_font()
+        font.setPixelSize(pixels)
+        font.setBold(bold)
+        return font
+
+
+def _beside(where: QPointF, width: float, height: float, gap: float) -> Iterator[QRectF]:
+    x, y = where.x(), where.y()
+    yield QRectF(x + gap, y - height / 2, width, height)
+    yield QRectF(x - gap - width, y - height / 2, width, height)
+    yield QRectF(x - width / 2, y - gap - height, width, height)
+    yield QRectF(x - width / 2, y + gap, width, height)
+    yield QRectF(x + 0.7 * gap, y - 0.7 * gap - height, width, height)
+    yield QRectF(x - 0.7 * gap - width, y - 0.7 * gap - height, width, height)
+
+
+def _round_pen(colour: QColor, width: float) -> QPen:
+    return QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
+
+
+def _smooth(corners: list[QPointF]) -> QPainterPath:
+    """Return a closed curve through points (Catmull and Rom's spline as cubic pieces)."""
+    n, path = len(corners), QPainterPath(corners[0])
+    for i in range(n):
+        before, a, b, after = (corners[(i + k) % n] for k in (-1, 0, 1, 2))
+        path.cubicTo(a + (b - before) / 6, b - (after - a) / 6, b)
+    return path

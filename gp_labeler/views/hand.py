@@ -1,0 +1,116 @@
+"""What the left button does in any view: place on release, drag a point at once, choose one by a click."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import feature
+from gp_labeler.scene.gestures import CLICK_PIXELS
+from gp_labeler.session import labelling
+from gp_labeler.session.state import How
+from gp_labeler.views.drawn import point_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["Hand"]
+
+_TYPED_INTO = (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)
+
+
+class Hand:
+    """The left hand of one view.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What it works on.
+    """
+
+    def __init__(self, workbench: Workbench) -> None:
+        self._desk = workbench
+        self._mark: str | None = None
+        self._start = (0.0, 0.0)
+        self._placed = False
+        self.is_click = True
+
+    @property
+    def holds(self) -> bool:
+        """Whether the button went down on a point."""
+        return self._mark is not None
+
+    def press(self, mark: str | None, x: float, y: float) -> None:
+        """Take a press, on the mark of this key or on none."""
+        self._mark = mark if mark is not None and self._can_drag(mark) else None
+        self._start, self.is_click, self._placed = (x, y), True, False
+
+    def move(self, x: float, y: float) -> bool:
+        """Take a movement; return whether a point is being dragged."""
+        if self._mark is None:
+            return False
+        if max(abs(x - self._start[0]), abs(y - self._start[1])) >= CLICK_PIXELS and self.is_click:
+            self.is_click = False
+            self._desk.begin_drag(*point_of(self._mark))
+        return self._desk.drag is not None
+
+    def release(self) -> str | None:
+        """Take a release; return the mark it all began on."""
+        mark, self._mark = self._mark, None
+        if self._desk.drag is not None:
+            self._guarded(self._desk.end_drag)
+        return mark
+
+    def cancel(self) -> None:
+        """Let a dragged point go back to where it was."""
+        self._mark = None
+        self._desk.end_drag(keep=False)
+
+    def click(self, position: FloatArray | None, how: How, mark: str | None) -> None:
+        """Take a click at a scan position (None: it missed) and on a mark (None: on none).
+
+        A point that is to do is placed; else a mark is chosen; else the chosen point moves here.
+        """
+        desk, active = self._desk, self._desk.session.active
+        is_new = active.code is not None and not desk.session.state.landmark(active.side, active.code).settled
+        if mark is not None and not (desk.tool == "place" and is_new):
+            desk.go_to(*point_of(mark))
+        elif position is None:
+            return
+        elif desk.tool != "place" or active.code is None:
+            desk.session.set_crosshair(position)
+        else:
+            self._guarded(lambda: self._place(position, how))
+
+    def take_back(self) -> None:
+        """Take back the point that the first click of a double click placed."""
+        if self._placed:
+            self._placed = False
+            self._desk.session.undo()
+
+    def cursor(self, on_target: bool, mark: str | None) -> Qt.CursorShape:
+        """Return the pointer that says what a click would do."""
+        if mark is not None and self._can_drag(mark):
+            return Qt.CursorShape.OpenHandCursor
+        if self._desk.tool == "grey":
+            return Qt.CursorShape.SizeAllCursor
+        return Qt.CursorShape.CrossCursor if on_target else Qt.CursorShape.ArrowCursor
+
+    def take_focus(self, view: QWidget) -> None:
+        """Let keys go to the view under the pointer, unless somebody is typing."""
+        if not isinstance(QApplication.focusWidget(), _TYPED_INTO) and view.isActiveWindow():
+            view.setFocus(Qt.FocusReason.MouseFocusReason)
+
+    def _place(self, position: FloatArray, how: How) -> bool:
+        self._desk.session.set_crosshair(position)
+        self._placed = labelling.place(self._desk.session, position, how)
+        return self._placed
+
+    def _can_drag(self, mark: str) -> bool:
+        return not feature(point_of(mark)[1]).computed
+
+    def _guarded(self, edit: object) -> None:
+        try:
+            edit()  # type: ignore[operator]
+        except GpError as error:
+            self._desk.say(str(error), "warning")

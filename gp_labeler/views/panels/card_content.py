@@ -1,0 +1,189 @@
+"""What the feature card says, in words: which feature, how far it is, and the one next thing to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_labeler.session.edits import point_text
+from gp_labeler.session.session import Session
+from gp_labeler.session.workflow import OPENING, PointState
+from gp_labeler.views.bind import mm_text
+
+__all__ = ["CardContent", "content_of"]
+
+_VIEWS = {"3D": "the 3D view", "axial": "axial slices", "coronal": "coronal slices", "sagittal": "sagittal slices"}
+
+
+@dataclass(frozen=True)
+class CardContent:
+    """Everything that the card shows.
+
+    Parameters
+    ----------
+    eyebrow, code, name, aside : str
+        Such as ``Place next · left · 3 of 20``, ``IN``, ``Incisors``, ``shared by both sides``.
+    definition, where : str
+        What the feature is, and how to find it.
+    status, status_role : str
+        How far it is, and the look of that line: ``ghost``, ``good``, ``danger`` or ``hint``.
+    state : str
+        State for the chip beside it.
+    action, action_text : str
+        Id and words of the one next action.
+    can_skip, can_unsee : bool
+        Whether the two other buttons mean anything.
+    """
+
+    eyebrow: str
+    code: str = ""
+    name: str = ""
+    aside: str = ""
+    definition: str = ""
+    where: str = ""
+    status: str = ""
+    status_role: str = "hint"
+    state: str = "to do"
+    action: str = ""
+    action_text: str = ""
+    can_skip: bool = True
+    can_unsee: bool = True
+
+
+def content_of(session: Session, *, has_scan: bool) -> CardContent:
+    """Return what the card says now.
+
+    Parameters
+    ----------
+    session : Session
+        What the user is doing.
+    has_scan : bool
+        Whether there is a scan to place anything on.
+    """
+    active = session.active
+    if not has_scan:
+        return _without_scan()
+    if active.code is None:
+        return _between(session)
+    side, row = active.side, feature(active.code)
+    state, mark = session.point_states(side, wait=False)[row.code], session.state.landmark(side, row.code)
+    status, role = _status(session, side, row.code, state)
+    action, words = ("unlock", "Unlock") if mark.locked else _ACTIONS[state]
+    shared = "shared by both sides" if row.shared else "can be touched" if row.external else ""
+    return CardContent(
+        eyebrow=f"{_VERBS[state]} · {side.word} · {session.progress(side).text}",
+        code=row.code,
+        name=row.name,
+        aside=shared,
+        definition=row.definition,
+        where=f"{row.where} Best seen in {_VIEWS[row.view]}.",
+        status=f"{status} Locked." if mark.locked else status,
+        status_role=role,
+        state="locked" if mark.locked else state.value,
+        action=action,
+        action_text=words,
+        can_unsee=not mark.locked and state is not PointState.UNSEEN,
+    )
+
+
+_VERBS = {
+    PointState.TO_DO: "Place next",
+    PointState.GHOST: "Place next",
+    PointState.PLACED: "Placed",
+    PointState.CHECKED: "Checked",
+    PointState.DOUBTFUL: "Look again",
+    PointState.UNSEEN: "Not seen",
+}
+_ACTIONS = {
+    PointState.TO_DO: ("crosshair", "Place at crosshair"),
+    PointState.GHOST: ("ghost", "Accept ghost"),
+    PointState.PLACED: ("check", "Mark as checked"),
+    PointState.CHECKED: ("next", "Next feature"),
+    PointState.DOUBTFUL: ("check", "It is right"),
+    PointState.UNSEEN: ("crosshair", "Place at crosshair"),
+}
+
+
+def _status(session: Session, side: Side, code: str, state: PointState) -> tuple[str, str]:
+    """Return one sentence on how far the point is, and its look."""
+    if state is PointState.GHOST:
+        ghost = session.ghosts(side)[code]
+        who = "The atlas expects it" if ghost.source == "atlas" else "Mirrored from the other side:"
+        return f"{who} within {mm_text(ghost.radius_95)} (95 %) of the ghost.", "ghost"
+    if state is PointState.DOUBTFUL:
+        doubt = session.doubts(side)[code]
+        return f"{mm_text(doubt.distance)} from where the other points make the atlas expect it.", "danger"
+    if state is PointState.CHECKED:
+        return "Placed, looked at again and found right.", "good"
+    if state is PointState.PLACED:
+        return f"Placed {_how(session, side, code)}. Drag it or nudge it to correct it.", "hint"
+    if state is PointState.UNSEEN:
+        return "Looked for, and not seen. Click to place it after all.", "hint"
+    return _first_ones(session, side), "hint"
+
+
+def _how(session: Session, side: Side, code: str) -> str:
+    provenance = session.state.landmark(side, code).provenance
+    words = {"mesh": "on bone", "slice": "on a slice", "accepted ghost": "where the atlas expected it"}
+    how = provenance.how.value if provenance else ""
+    return words.get(how, how)
+
+
+def _first_ones(session: Session, side: Side) -> str:
+    missing = [code for code in OPENING if code not in session.landmarks(side)]
+    n_short = 3 - len(session.landmarks(side).placed)
+    if n_short <= 0:
+        return "Click on bone or a slice to place it."
+    if len(missing) == n_short:
+        names = " and ".join([", ".join(missing[:-1]), missing[-1]] if len(missing) > 1 else missing)
+        return f"Once {names} {'are' if len(missing) > 1 else 'is'} placed, the atlas shows where to look."
+    return f"After {n_short} more of this side, the atlas shows where to look."
+
+
+def _without_scan() -> CardContent:
+    return CardContent(
+        "No scan yet",
+        name="Open a scan to begin",
+        definition="The features are placed on the bone surface, or on slices of the scan.",
+        action="open",
+        action_text="Open scan…",
+        can_skip=False,
+        can_unsee=False,
+    )
+
+
+def _between(session: Session) -> CardContent:
+    """Say what comes when no feature is active."""
+    to_do = [
+        point_text(side, row.code)
+        for side in Side
+        for row in FEATURES
+        if not row.computed and not session.state.landmark(side, row.code).settled
+    ]
+    totals = " · ".join(f"{side.word} {session.progress(side).text}" for side in Side)
+    if to_do:
+        return CardContent(
+            totals,
+            name="No feature is chosen",
+            definition="Choose one in the table, or go on with the next that is to do.",
+            action="next",
+            action_text="Next feature",
+            can_skip=False,
+            can_unsee=False,
+        )
+    doubtful = sum(
+        s is PointState.DOUBTFUL for side in Side for s in session.point_states(side, wait=False).values()
+    )
+    doubts = "" if not doubtful else f"{doubtful} of them should be looked at again: see the red triangles. "
+    return CardContent(
+        totals,
+        name="Everything is labelled",
+        definition=f"{doubts}Export the landmarks of both sides when you are content with them.",
+        status="Nothing is left to do.",
+        status_role="good",
+        state="checked",
+        action="export",
+        action_text="Export landmarks…",
+        can_skip=False,
+        can_unsee=False,
+    )

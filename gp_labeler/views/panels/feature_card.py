@@ -1,0 +1,238 @@
+"""The feature card: what is being placed, where to look for it, and the one next thing to do."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtGui import QResizeEvent
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QHBoxLayout,
+    QLabel,
+    QPushButton,
+    QSizePolicy,
+    QToolButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.landmarks.features import Side
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import CheckPoint
+from gp_labeler.session.state import How
+from gp_labeler.views.bind import attempt, blocked, follow, set_role
+from gp_labeler.views.chips import SHAPES, chip_pixmap
+from gp_labeler.views.feature_picture import FeaturePicture
+from gp_labeler.views.panels.card_content import CardContent, content_of
+from gp_labeler.views.theme import theme_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["FeatureCard"]
+
+_TALL = 420
+"""From this height on, logical pixels, the picture stands above the words; below, beside them."""
+
+
+class FeatureCard(QWidget):
+    """Shows the active feature.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose session it shows and edits.
+    actions : object, optional
+        Not needed here; all panels are made alike.
+    """
+
+    open_asked = Signal()
+    export_asked = Signal()
+
+    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self._content = CardContent("")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("role", "card")
+        self._make_widgets()
+        self._lay_out()
+        self._listen()
+        self.refresh()
+
+    @property
+    def content(self) -> CardContent:
+        """What it says now."""
+        return self._content
+
+    def refresh(self, *_: object) -> None:
+        """Show the active feature as it stands."""
+        session = self._workbench.session
+        self._content = now = content_of(session, has_scan=self._workbench.volume is not None)
+        self._eyebrow.setText(now.eyebrow)
+        self._title.setText(f"{now.code}  {now.name}" if now.code else now.name)
+        for label, text in ((self._aside, now.aside), (self._where, now.where), (self._status, now.status)):
+            label.setText(text)
+            label.setVisible(bool(text))
+        self._definition.setText(now.definition)
+        set_role(self._status, now.status_role)
+        self._chip.setVisible(bool(now.status))
+        self._show_chip()
+        self.picture.show_feature(now.code or None, session.active.side)
+        self.picture.setVisible(bool(now.code))
+        self._refresh_buttons(now)
+
+    def _make_widgets(self) -> None:
+        self._eyebrow, self._title = _label("eyebrow"), _label("title", wrap=True)
+        self._aside, self._definition = _label("shared"), _label("", wrap=True)
+        self._where, self._status = _label("hint", wrap=True), _label("hint", wrap=True)
+        self._chip = QLabel()
+        self._chip.setFixedSize(14, 14)
+        self.picture = FeaturePicture()
+        self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.primary = QPushButton()
+        self.primary.setProperty("role", "primary")
+        self.primary.clicked.connect(self._on_primary)
+        self.skip = QPushButton("Skip")
+        self.skip.setToolTip("Leave it for later and go on to the next feature")
+        self.skip.clicked.connect(lambda: self._do(lambda: labelling.skip(self._workbench.session)))
+        self.unseen = QPushButton("Unseen")
+        self.unseen.setToolTip("It was looked for and cannot be seen in this scan")
+        self.unseen.clicked.connect(lambda: self._do(lambda: labelling.mark_unseen(self._workbench.session)))
+        self.sides = {side: self._side_button(side) for side in Side}
+
+    def _side_button(self, side: Side) -> QToolButton:
+        button = QToolButton()
+        button.setText(side.value)
+        button.setCheckable(True)
+        button.setAutoExclusive(True)
+        button.setFixedSize(QSize(28, 24))
+        button.setToolTip(f"Label the {side.word} side")
+        button.setAccessibleName(f"{side.word} side")
+        button.clicked.connect(lambda: self._go_to_side(side))
+        return button
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.addWidget(self._eyebrow, 1)
+        top.setSpacing(4)
+        for button in self.sides.values():
+            top.addWidget(button)
+        status = QHBoxLayout()
+        status.setSpacing(6)
+        status.addWidget(self._chip, 0, Qt.AlignmentFlag.AlignTop)
+        status.addWidget(self._status, 1)
+        words = QVBoxLayout()
+        words.setSpacing(4)
+        for label in (self._definition, self._where):
+            words.addWidget(label)
+        words.addStretch(1)
+        self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._body.setSpacing(10)
+        self._body.addWidget(self.picture, 5)
+        self._body.addLayout(words, 6)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(6)
+        buttons.addWidget(self.primary, 2)
+        buttons.addWidget(self.skip, 1)
+        buttons.addWidget(self.unseen, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(12, 10, 12, 12)
+        layout.setSpacing(6)
+        layout.addLayout(top)
+        layout.addWidget(self._title)
+        layout.addWidget(self._aside)
+        layout.addLayout(self._body, 1)
+        layout.addLayout(status)
+        layout.addLayout(buttons)
+
+    def _listen(self) -> None:
+        desk = self._workbench
+        for signal in (
+            desk.session_replaced,
+            desk.active_changed,
+            desk.landmarks_changed,
+            desk.ghosts_changed,
+            desk.doubts_changed,
+            desk.volume_opened,
+        ):
+            follow(self, signal, self.refresh)
+
+    def _refresh_buttons(self, now: CardContent) -> None:
+        self.primary.setText(now.action_text)
+        self.primary.setAccessibleName(now.action_text)
+        self.skip.setVisible(now.can_skip)
+        self.unseen.setVisible(now.can_skip)
+        self.unseen.setEnabled(now.can_unsee)
+        active = self._workbench.session.active
+        for side, button in self.sides.items():
+            button.setVisible(bool(now.code))
+            with blocked(button):
+                button.setChecked(side is active.side)
+
+    def _show_chip(self) -> None:
+        state = self._content.state
+        if state in SHAPES:
+            self._chip.setPixmap(chip_pixmap(state, 14, theme_of(self), self.devicePixelRatioF()))
+
+    def _on_primary(self) -> None:
+        """Do the one next thing."""
+        session, action = self._workbench.session, self._content.action
+        if action == "open":
+            self.open_asked.emit()
+        elif action == "export":
+            self.export_asked.emit()
+        else:
+            self._do(lambda: _EDITS[action](self._workbench))
+        if session.active.code is None and not self.primary.isVisible():
+            self.setFocus()
+
+    def _go_to_side(self, side: Side) -> None:
+        code = self._workbench.session.active.code
+        if code is not None:
+            self._do(lambda: labelling.go_to(self._workbench.session, side, code))
+
+    def _do(self, edit: Callable[[], object]) -> None:
+        attempt(self._workbench, edit)
+        self.refresh()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.StyleChange and hasattr(self, "_chip"):
+            self._show_chip()
+            self.picture.update()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        tall = event.size().height() >= _TALL
+        way = QBoxLayout.Direction.TopToBottom if tall else QBoxLayout.Direction.LeftToRight
+        if self._body.direction() is not way:
+            self._body.setDirection(way)
+        super().resizeEvent(event)
+
+
+def _check(workbench: Workbench) -> None:
+    session = workbench.session
+    active = session.active
+    if active.code is not None:
+        session.do(CheckPoint(active.side, active.code))
+
+
+def _place_at_crosshair(workbench: Workbench) -> None:
+    labelling.place(workbench.session, workbench.session.crosshair, How.SLICE)
+
+
+_EDITS: Mapping[str, Callable[[Workbench], object]] = {
+    "ghost": lambda desk: labelling.accept_ghost(desk.session),
+    "crosshair": _place_at_crosshair,
+    "check": _check,
+    "unlock": lambda desk: labelling.lock(desk.session, False),
+    "next": lambda desk: labelling.skip(desk.session),
+}
+
+
+def _label(role: str, *, wrap: bool = False) -> QLabel:
+    label = QLabel()
+    if role:
+        label.setProperty("role", role)
+    label.setWordWrap(wrap)
+    label.setTextFormat(Qt.TextFormat.PlainText)
+    return label

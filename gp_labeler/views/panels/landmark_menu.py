@@ -1,0 +1,78 @@
+"""What can be done to one point of the table, as a menu."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtGui import QGuiApplication
+from PySide6.QtWidgets import QMenu, QWidget
+
+from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import CheckPoint, ClearPoint, MarkUnseen, SwapPoints, point_text
+from gp_labeler.session.state import How, Landmark
+from gp_labeler.views.bind import attempt
+from gp_labeler.workbench import Workbench
+
+__all__ = ["landmark_menu"]
+
+
+def landmark_menu(workbench: Workbench, side: Side, code: str, parent: QWidget) -> QMenu:
+    """Return the menu of a point: go there, check, clear, not seen, lock, swap, copy its position."""
+    menu = QMenu(parent)
+    session = workbench.session
+
+    def add(text: str, edit: Callable[[], object], *, enabled: bool = True, to: QMenu = menu) -> None:
+        action = to.addAction(text)
+        action.setEnabled(enabled)
+        action.triggered.connect(lambda: attempt(workbench, edit))
+
+    add(f"Go to {point_text(side, code)}", lambda: labelling.go_to(session, side, code))
+    position = session.landmarks(side).as_mapping().get(code)
+    copied = "" if position is None else " ".join(f"{x:.4f}" for x in position)
+    if not feature(code).computed:
+        _add_edits(add, workbench, side, code)
+        _add_swaps(add, menu, workbench, side, code)
+    menu.addSeparator()
+    clipboard = QGuiApplication.clipboard()
+    add("Copy position (LPS, mm)", lambda: clipboard.setText(copied), enabled=position is not None)
+    return menu
+
+
+def _add_edits(add: Callable[..., None], workbench: Workbench, side: Side, code: str) -> None:
+    session = workbench.session
+    mark: Landmark = session.state.landmark(side, code)
+    placed, free = mark.position is not None, not mark.locked
+    ghost = code in session.ghosts(side)
+    add("Accept ghost", lambda: labelling.accept_ghost(session, side=side, code=code), enabled=ghost)
+    checked = mark.checked
+    add(
+        "Take back the check" if checked else "Mark as checked",
+        lambda: session.do(CheckPoint(side, code, not checked)),
+        enabled=placed,
+    )
+    unseen = MarkUnseen(side, code, labelling.provenance(session, How.UNSEEN))
+    add("Cannot be seen", lambda: session.do(unseen), enabled=free and not mark.unseen)
+    add("Clear", lambda: session.do(ClearPoint(side, code)), enabled=free and mark.settled)
+    locked = mark.locked
+    add(
+        "Unlock" if locked else "Lock",
+        lambda: labelling.lock(session, not locked, side=side, code=code),
+        enabled=mark.settled,
+    )
+
+
+def _add_swaps(
+    add: Callable[..., None], menu: QMenu, workbench: Workbench, side: Side, code: str
+) -> None:
+    """Offer to swap with each settled feature of the same side that is not locked."""
+    session = workbench.session
+    others = menu.addMenu("Swap with")
+    for row in FEATURES:
+        if row.computed or row.shared != feature(code).shared or row.code == code:
+            continue
+        other = session.state.landmark(side, row.code)
+        if other.settled and not other.locked:
+            swap = SwapPoints(side, code, row.code)
+            add(f"{row.code}  {row.name}", lambda swap=swap: session.do(swap), to=others)
+    others.setEnabled(not others.isEmpty() and not session.state.landmark(side, code).locked)

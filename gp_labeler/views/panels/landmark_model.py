@@ -1,0 +1,121 @@
+"""The table of features as a Qt model: one row a feature, one column a side."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+
+from gp_core.landmarks.features import CODES, FEATURES, Side, feature
+from gp_labeler.session.workflow import PointState
+from gp_labeler.views.bind import follow, mm_text
+from gp_labeler.workbench import Workbench
+
+__all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkModel"]
+
+SIDES = (Side.LEFT, Side.RIGHT)
+"""Of the columns after the first."""
+
+_USER = int(Qt.ItemDataRole.UserRole)
+STATE_ROLE, ACTIVE_ROLE, LOCKED_ROLE, CODE_ROLE = (_USER + n for n in range(1, 5))
+
+Index = QModelIndex | QPersistentModelIndex
+
+
+class LandmarkModel(QAbstractTableModel):
+    """States of the 20 features on both sides, as words and as roles for the chips.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose session it shows.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self._states: dict[Side, dict[str, PointState]] = {}
+        for signal in (
+            workbench.session_replaced,
+            workbench.landmarks_changed,
+            workbench.ghosts_changed,
+            workbench.doubts_changed,
+            workbench.active_changed,
+        ):
+            follow(self, signal, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Ask the session anew."""
+        session = self._workbench.session
+        self._states = {side: session.point_states(side, wait=False) for side in SIDES}
+        last = self.index(len(CODES) - 1, len(SIDES))
+        self.dataChanged.emit(self.index(0, 0), last)
+        self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, len(SIDES))
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's way
+        return 0 if parent.isValid() else len(CODES)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's way
+        return 0 if parent.isValid() else 1 + len(SIDES)
+
+    def headerData(  # noqa: D102, N802 - Qt's name
+        self, section: int, orientation: Qt.Orientation, role: int = int(Qt.ItemDataRole.DisplayRole)
+    ) -> Any:
+        if orientation is not Qt.Orientation.Horizontal or role != Qt.ItemDataRole.DisplayRole:
+            return None
+        if section == 0:
+            return "Feature"
+        side = SIDES[section - 1]
+        progress = self._workbench.session.progress(side)
+        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
+
+    def data(self, index: Index, role: int = int(Qt.ItemDataRole.DisplayRole)) -> Any:  # noqa: D102
+        if not index.isValid():
+            return None
+        row = FEATURES[index.row()]
+        if role == CODE_ROLE:
+            return row.code
+        if index.column() == 0:
+            return self._name(row.code, role)
+        return self._cell(row.code, SIDES[index.column() - 1], role)
+
+    def _name(self, code: str, role: int) -> Any:
+        row = feature(code)
+        if role == Qt.ItemDataRole.DisplayRole:
+            return row.name
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
+            return f"{code}: {row.name}. {row.definition}"
+        return None
+
+    def _cell(self, code: str, side: Side, role: int) -> Any:
+        state = self._states[side][code]
+        active = self._workbench.session.active
+        is_active = active.code == code and (active.side is side or feature(code).shared)
+        if role == STATE_ROLE:
+            return state.value
+        if role == ACTIVE_ROLE:
+            return is_active
+        if role == LOCKED_ROLE:
+            return not feature(code).computed and self._workbench.session.state.landmark(side, code).locked
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._word(code, side, state, is_active)
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
+            return self._sentence(code, side, state)
+        return None
+
+    def _word(self, code: str, side: Side, state: PointState, is_active: bool) -> str:
+        if is_active and state in (PointState.TO_DO, PointState.GHOST):
+            return "place"
+        if state is PointState.DOUBTFUL:
+            return mm_text(self._workbench.session.doubts(side)[code].distance)
+        return state.value
+
+    def _sentence(self, code: str, side: Side, state: PointState) -> str:
+        text = f"{code} {side.word}: {state.value}"
+        if state is PointState.DOUBTFUL:
+            distance = mm_text(self._workbench.session.doubts(side)[code].distance)
+            text += f", {distance} from where the atlas expects it"
+        if state is PointState.GHOST:
+            text += f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"
+        return text

@@ -1,0 +1,252 @@
+"""The table of landmarks: 20 features, both sides, each with the shape and colour of its state."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import ClearPoint
+from gp_labeler.views.bind import attempt, blocked, follow
+from gp_labeler.views.chips import draw_chip
+from gp_labeler.views.panels.landmark_menu import landmark_menu
+from gp_labeler.views.panels.landmark_model import (
+    ACTIVE_ROLE,
+    CODE_ROLE,
+    LOCKED_ROLE,
+    SIDES,
+    STATE_ROLE,
+    LandmarkModel,
+)
+from gp_labeler.views.theme import FONT_PX, Theme, theme_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["LandmarkTable"]
+
+_LOWEST, _HIGHEST = 19, 30
+_CHIP, _CODE_WIDTH, _PAD = 12, 34, 8
+
+
+class LandmarkTable(QWidget):
+    """The table; a click or the arrow keys go to a point, a right click says what else can be done.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose session it shows and edits.
+    actions : object, optional
+        Not needed here; all panels are made alike.
+    """
+
+    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self.model = LandmarkModel(workbench, self)
+        self.view = _TableView(self.model, self)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(self.view)
+        self.view.selectionModel().currentChanged.connect(self._on_current)
+        self.view.clicked.connect(self._on_clicked)
+        self.view.customContextMenuRequested.connect(self._open_menu)
+        follow(self, workbench.active_changed, self._show_active)
+        follow(self, workbench.session_replaced, self._show_active)
+        self._show_active()
+
+    def target_of(self, index: QModelIndex) -> tuple[Side, str]:
+        """Return which point a cell is about; a feature's name means the side being worked on."""
+        side = self._workbench.session.active.side if index.column() == 0 else SIDES[index.column() - 1]
+        return side, FEATURES[index.row()].code
+
+    def _on_current(self, current: QModelIndex, previous: QModelIndex) -> None:
+        if current.isValid():
+            self._go_to(current)
+
+    def _on_clicked(self, index: QModelIndex) -> None:
+        self._go_to(index)
+
+    def _go_to(self, index: QModelIndex) -> None:
+        side, code = self.target_of(index)
+        attempt(self._workbench, lambda: labelling.go_to(self._workbench.session, side, code))
+
+    def _show_active(self, *_: object) -> None:
+        """Bring the cursor of the table to the active point."""
+        active = self._workbench.session.active
+        index = QModelIndex() if active.code is None else self._index(active.side, active.code)
+        with blocked(self.view.selectionModel()):
+            self.view.setCurrentIndex(index)
+        if index.isValid():
+            self.view.scrollTo(index)
+        self.view.viewport().update()
+
+    def _index(self, side: Side, code: str) -> QModelIndex:
+        return self.model.index(index_of(code), 1 + SIDES.index(side))
+
+    def _open_menu(self, position: QPoint) -> None:
+        index = self.view.indexAt(position)
+        if index.isValid():
+            menu = landmark_menu(self._workbench, *self.target_of(index), self)
+            menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+            menu.popup(self.view.viewport().mapToGlobal(position))
+
+    def clear_current(self) -> None:
+        """Clear the point of the current cell."""
+        side, code = self.target_of(self.view.currentIndex())
+        if self.view.currentIndex().isValid() and not feature(code).computed:
+            attempt(self._workbench, lambda: self._workbench.session.do(ClearPoint(side, code)))
+
+
+class _TableView(QTableView):
+    """Twenty rows that share the height there is."""
+
+    def __init__(self, model: LandmarkModel, parent: LandmarkTable) -> None:
+        super().__init__(parent)
+        self._table = parent
+        self.setModel(model)
+        self.setItemDelegate(_ChipDelegate(self))
+        self.setAccessibleName("Landmarks")
+        self.setShowGrid(False)
+        self.setMouseTracking(True)
+        self.setTabKeyNavigation(False)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.verticalHeader().hide()
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.verticalHeader().setMinimumSectionSize(_LOWEST)
+        header = self.horizontalHeader()
+        header.setHighlightSections(False)
+        header.setSectionsClickable(False)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        self._fit_columns()
+
+    def _fit_columns(self) -> None:
+        self.horizontalHeader().setFixedHeight(28)
+        font = self.font()
+        font.setPixelSize(FONT_PX)
+        words = QFontMetrics(font)
+        width = max(words.horizontalAdvance(text) for text in ("computed", "Right 20/20", "doubtful"))
+        for column in (1, 2):
+            self.setColumnWidth(column, width + _CHIP + 3 * _PAD)
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(340, 30 + 22 * len(CODES))
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(300, 30 + 6 * _LOWEST)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        height = (self.viewport().height() - 2) // len(CODES)
+        self.verticalHeader().setDefaultSectionSize(min(max(height, _LOWEST), _HIGHEST))
+        super().resizeEvent(event)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802 - Qt's name
+        if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self._table.clear_current()
+        elif event.key() == Qt.Key.Key_Menu:
+            where = self.visualRect(self.currentIndex()).center()
+            self.customContextMenuRequested.emit(where)
+        elif event.text().isprintable() and event.text():
+            event.ignore()  # letters are the window's shortcuts, not a search
+        else:
+            super().keyPressEvent(event)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().leaveEvent(event)
+        self.viewport().update()
+
+
+class _ChipDelegate(QStyledItemDelegate):
+    """Paints a feature's code and name, or the state of a point as a chip and a word."""
+
+    def paint(  # noqa: D102
+        self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
+    ) -> None:
+        view = self.parent()
+        assert isinstance(view, QTableView)
+        theme, box = theme_of(view), QRectF(option.rect)  # type: ignore[attr-defined]
+        painter.save()
+        self._ground(painter, option, index, theme, view)
+        painter.setClipRect(box)
+        font = QFont(view.font())
+        font.setPixelSize(FONT_PX)
+        if index.column() == 0:
+            self._name(painter, font, box, index, theme)
+        else:
+            self._state(painter, font, box, index, theme)
+        painter.restore()
+
+    def _ground(
+        self,
+        painter: QPainter,
+        option: QStyleOptionViewItem,
+        index: QModelIndex | QPersistentModelIndex,
+        theme: Theme,
+        view: QTableView,
+    ) -> None:
+        box = QRectF(option.rect)  # type: ignore[attr-defined]
+        is_row = view.currentIndex().row() == index.row()
+        is_over = bool(option.state & QStyle.StateFlag.State_MouseOver)  # type: ignore[attr-defined]
+        if bool(index.data(ACTIVE_ROLE)) or (is_row and index.column() == 0):
+            painter.fillRect(box, QColor(theme.selected))
+        elif is_over:
+            painter.fillRect(box, QColor(theme.hover))
+        if view.hasFocus() and view.currentIndex() == index:
+            painter.setPen(QPen(QColor(theme.accent_text), 1))
+            painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
+
+    def _name(
+        self,
+        painter: QPainter,
+        font: QFont,
+        box: QRectF,
+        index: QModelIndex | QPersistentModelIndex,
+        theme: Theme,
+    ) -> None:
+        bold = QFont(font)
+        bold.setBold(True)
+        painter.setFont(bold)
+        painter.setPen(QColor(theme.text))
+        middle = Qt.AlignmentFlag.AlignVCenter
+        painter.drawText(box.adjusted(_PAD, 0, 0, 0), middle, str(index.data(CODE_ROLE)))
+        painter.setFont(font)
+        painter.setPen(QColor(theme.muted))
+        words = box.adjusted(_PAD + _CODE_WIDTH, 0, -4, 0)
+        name = QFontMetrics(font).elidedText(
+            str(index.data()), Qt.TextElideMode.ElideRight, round(words.width())
+        )
+        painter.drawText(words, middle, name)
+
+    def _state(
+        self,
+        painter: QPainter,
+        font: QFont,
+        box: QRectF,
+        index: QModelIndex | QPersistentModelIndex,
+        theme: Theme,
+    ) -> None:
+        state, active = str(index.data(STATE_ROLE)), bool(index.data(ACTIVE_ROLE))
+        waiting = state in ("to do", "ghost")
+        shape = "active" if active and waiting else state
+        chip = QRectF(box.left() + _PAD - 2, box.center().y() - _CHIP / 2, _CHIP, _CHIP)
+        draw_chip(painter, shape, chip, theme)
+        painter.setFont(font)
+        painter.setPen(theme.state(shape))
+        words = box.adjusted(_PAD + _CHIP + 4, 0, 0, 0)
+        painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, str(index.data()))
+        if index.data(LOCKED_ROLE):
+            draw_chip(painter, "locked", QRectF(box.right() - 13, box.center().y() - 5.5, 11, 11), theme)

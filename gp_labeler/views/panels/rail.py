@@ -1,0 +1,176 @@
+"""The rail: the four steps of the work, at the left edge of the window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from PySide6.QtCore import QEvent, QRectF, QSize, Qt, Signal
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayout, QWidget
+
+from gp_core.landmarks.features import Side
+from gp_labeler.views.bind import follow
+from gp_labeler.views.chips import draw_chip
+from gp_labeler.views.icons import draw_icon
+from gp_labeler.views.theme import theme_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["STEPS", "Rail", "Step"]
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of the work."""
+
+    id: str
+    title: str
+    icon: str
+    hint: str
+
+
+STEPS = (
+    Step("scan", "Scan", "scan", "The scan: what it is, its grey window, where bone begins"),
+    Step("label", "Label", "label", "Place the 20 features on both sides"),
+    Step("atlas", "Atlas", "atlas", "Fit an atlas from labelled specimens"),
+    Step("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
+)
+_NOT_BUILT = " (not in this version; the command gp-core does it)"
+
+
+class Rail(QWidget):
+    """The steps, one of which is the current one.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose progress it shows.
+    actions : object, optional
+        Not needed here; all panels are made alike.
+    built : tuple of str
+        Steps that can be chosen; the others say that they cannot.
+    """
+
+    step_chosen = Signal(str)
+    keys_asked = Signal()
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        actions: object = None,
+        parent: QWidget | None = None,
+        *,
+        built: tuple[str, ...] = ("scan", "label"),
+    ) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("role", "rail")
+        self.setFixedWidth(84)
+        self._group = QButtonGroup(self)
+        self.buttons = {step.id: self._button(n, step, built) for n, step in enumerate(STEPS, 1)}
+        self.keys_button = _RailButton("keys", "Keys", "?", "info", self)
+        self.keys_button.setToolTip("All keyboard shortcuts (?)")
+        self.keys_button.clicked.connect(self.keys_asked)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 8, 0, 8)
+        layout.setSpacing(4)
+        for button in self.buttons.values():
+            layout.addWidget(button)
+        layout.addStretch(1)
+        layout.addWidget(self.keys_button)
+        self.buttons["scan"].setChecked(True)
+        for signal in (workbench.volume_opened, workbench.session_replaced, workbench.landmarks_changed):
+            follow(self, signal, self._refresh)
+        self._refresh()
+
+    @property
+    def step(self) -> str:
+        """The current step."""
+        return next(id for id, button in self.buttons.items() if button.isChecked())
+
+    def set_step(self, step: str) -> None:
+        """Make a step the current one; tells `step_chosen` where that is news."""
+        button = self.buttons[step]
+        if not button.isChecked():
+            button.setChecked(True)
+            self.step_chosen.emit(step)
+
+    def _button(self, number: int, step: Step, built: tuple[str, ...]) -> _RailButton:
+        button = _RailButton(step.id, step.title, str(number), step.icon, self)
+        button.setCheckable(True)
+        button.setEnabled(step.id in built)
+        button.setToolTip(step.hint + ("" if step.id in built else _NOT_BUILT))
+        button.setAccessibleDescription(button.toolTip())
+        button.clicked.connect(lambda: self.step_chosen.emit(step.id))
+        self._group.addButton(button)
+        return button
+
+    def _refresh(self, *_: object) -> None:
+        session = self._workbench.session
+        done = [session.progress(side) for side in Side]
+        self.buttons["scan"].set_done(self._workbench.volume is not None)
+        self.buttons["label"].set_done(all(p.n_placed + p.n_unseen >= p.n_total for p in done))
+
+
+class _RailButton(QAbstractButton):
+    """One step: a picture, its number and its name."""
+
+    def __init__(self, id: str, title: str, number: str, icon: str, parent: QWidget) -> None:
+        super().__init__(parent)
+        self.setObjectName(f"rail-{id}")
+        self.setText(title)
+        self.setAccessibleName(title)
+        self._number, self._icon, self._done = number, icon, False
+        self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setCursor(Qt.CursorShape.PointingHandCursor)
+        self.setAttribute(Qt.WidgetAttribute.WA_Hover)
+
+    def set_done(self, done: bool) -> None:
+        """Mark the step as finished, or not."""
+        if done != self._done:
+            self._done = done
+            self.setAccessibleDescription(self.toolTip() + (" · done" if done else ""))
+            self.update()
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(84, 64)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802 - Qt's name
+        if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
+            self.click()
+        else:
+            super().keyPressEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
+        self.update()
+        super().changeEvent(event)
+
+    def paintEvent(self, event: QPaintEvent) -> None:  # noqa: D102, N802 - Qt's name
+        theme = theme_of(self)
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        box = QRectF(self.rect()).adjusted(4, 1, -4, -1)
+        if self.isChecked() or self.underMouse() and self.isEnabled():
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(theme.selected if self.isChecked() else theme.hover))
+            painter.drawRoundedRect(box, 8, 8)
+        if self.isChecked():
+            painter.fillRect(QRectF(0, 10, 3, self.height() - 20), QColor(theme.accent_text))
+        if self.hasFocus():
+            painter.setPen(QColor(theme.accent_text))
+            painter.setBrush(Qt.BrushStyle.NoBrush)
+            painter.drawRoundedRect(box, 8, 8)
+        colour = theme.text if self.isChecked() else theme.muted if self.isEnabled() else theme.faint
+        if not self.isEnabled():
+            painter.setOpacity(0.75)
+        draw_icon(painter, self._icon, QRectF(self.width() / 2 - 11, 10, 22, 22), QColor(colour))
+        if self._done:
+            draw_chip(painter, "checked", QRectF(self.width() / 2 + 9, 5, 13, 13), theme)
+        font = self.font()
+        font.setBold(self.isChecked())
+        painter.setFont(font)
+        painter.setPen(QColor(colour))
+        words = f"{self._number} {self.text()}"
+        painter.drawText(box.adjusted(0, 34, 0, -4), Qt.AlignmentFlag.AlignCenter, words)
+        painter.end()

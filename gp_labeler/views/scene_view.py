@@ -1,0 +1,318 @@
+"""The 3D view as a widget: the scene drawn in memory and painted, so that it needs no OpenGL of the display.
+
+What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over the
+last frame: the bone need not be drawn again for it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QEvent, QPointF, Qt, QTimer, Signal
+from PySide6.QtGui import (
+    QColor,
+    QEnterEvent,
+    QImage,
+    QKeyEvent,
+    QMouseEvent,
+    QPainter,
+    QPaintEvent,
+    QPen,
+    QWheelEvent,
+)
+from PySide6.QtWidgets import QWidget
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.gestures import Button, Modifier
+from gp_labeler.scene.marks import GlyphSize
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.scene3d import Scene3D
+from gp_labeler.scene.target import RenderTarget
+from gp_labeler.session.state import How
+from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+from gp_labeler.views.hand import Hand
+from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.theme import theme_of
+from gp_labeler.workbench import Drag, Workbench
+
+__all__ = ["SceneView"]
+
+_FINE_AFTER_MS = 180
+_FIRST_LOOK = (-0.45, 0.75, -0.48)
+"""Direction of the first look: from the front, the left and above."""
+
+_ARROWS = {
+    Qt.Key.Key_Left: (-24.0, 0.0),
+    Qt.Key.Key_Right: (24.0, 0.0),
+    Qt.Key.Key_Up: (0.0, -24.0),
+    Qt.Key.Key_Down: (0.0, 24.0),
+}
+
+
+class SceneView(QWidget):
+    """Shows bone and points in 3D, and takes clicks on them.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What is shown.
+    parent : QWidget, optional
+        Qt's parent.
+    """
+
+    hovered = Signal(object)
+    """(3,) scan position where a click would land, or None."""
+    maximise_asked = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setMinimumSize(120, 90)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self._desk = workbench
+        self.scene = Scene3D(RenderTarget.offscreen())
+        self._hand = Hand(workbench)
+        self._frame: QImage | None = None
+        self._stale, self._quick, self._fitted = True, False, False
+        self._hover: FloatArray | None = None
+        self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
+        self._fine_timer.timeout.connect(self.redraw)
+        self.scene.camera.look(_FIRST_LOOK, (0, 0, 1))
+        self._listen()
+        self.take_theme()
+
+    # What is shown
+
+    def redraw(self, *, quick: bool = False) -> None:
+        """Draw the scene again as soon as Qt paints."""
+        self._stale, self._quick = True, quick
+        if quick:
+            self._fine_timer.start()
+        self.update()
+
+    def reset(self) -> None:
+        """Show everything, from the direction looked in now."""
+        self.scene.fit()
+        self.redraw()
+
+    def view_from(self, letter: str) -> None:
+        """Look from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
+        self.scene.camera.view_from(letter)
+        self.redraw()
+
+    def go_to(self, position: FloatArray) -> None:
+        """Bring a (3,) scan position to the middle of the view."""
+        self.scene.camera.focus_on(position)
+        self.redraw()
+
+    def take_theme(self) -> None:
+        """Draw in the colours of the window's theme."""
+        self.scene.set_colours(theme_of(self).scene)
+        self._show_points()
+
+    def pixel_at(self, position: FloatArray) -> tuple[float, float]:
+        """Return the logical pixel at which a (3,) scan position is seen, for tests and scripts."""
+        x, y = self.scene.display_of(np.reshape(position, (1, 3)))[0]
+        point = painted(self, x, y)
+        return point.x(), point.y()
+
+    def _listen(self) -> None:
+        desk = self._desk
+        desk.surfaces_changed.connect(self._show_bone)
+        desk.session_replaced.connect(self._on_session_replaced)
+        for signal in (desk.landmarks_changed, desk.active_changed, desk.ghosts_changed, desk.doubts_changed):
+            signal.connect(self._show_points)
+        desk.crosshair_changed.connect(self.update)
+        desk.point_shown.connect(self.go_to)
+        desk.dragged.connect(self._on_dragged)
+        desk.view_changed.connect(self._on_view_changed)
+
+    def _on_session_replaced(self, _: object) -> None:
+        self._fitted = False
+        self._show_points()
+
+    def _show_bone(self) -> None:
+        self.scene.bone.show(self._desk.surfaces, self._desk.quick_surfaces)
+        if self._desk.surfaces and not self._fitted:
+            self._fitted = True
+            self.scene.fit()
+        self.redraw()
+
+    def _show_points(self, *_: object) -> None:
+        view = self._desk.session.view.state
+        self.scene.marks.size = GlyphSize() if view.glyph_mm is None else GlyphSize(view.glyph_mm, "mm")
+        self.scene.labels.visible = view.labels_visible
+        self.scene.marks.show(drawn_marks(self._desk))
+        self.scene.ghosts.show(drawn_ghosts(self._desk))
+        self.scene.lines.show(drawn_segments(self._desk, theme_of(self).scene))
+        self.redraw()
+
+    def _on_view_changed(self, changed: frozenset[str]) -> None:
+        if "mesh_opacity" in changed:
+            self.scene.bone.opacity = self._desk.session.view.state.mesh_opacity
+        self._show_points()
+
+    def _on_dragged(self, drag: Drag | None) -> None:
+        if drag is None:
+            self._show_points()
+        self.update()
+
+    # Painting
+
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
+        if self._stale:
+            self._draw_frame()
+        painter = QPainter(self)
+        painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        if self._frame is not None:
+            painter.drawImage(QPointF(0, 0), self._frame)
+        self._paint_crosshair(painter)
+        self._paint_pointer(painter)
+        painter.end()
+
+    def _draw_frame(self) -> None:
+        ratio = self.devicePixelRatioF()
+        self.scene.scale = ratio
+        self.scene.target.resize(round(self.width() * ratio), round(self.height() * ratio))
+        self.scene.render(quick=self._quick)
+        pixels = self.scene.target.pixels()
+        height, width, _ = pixels.shape
+        frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+        frame.setDevicePixelRatio(ratio)
+        self._frame, self._stale = frame, False
+
+    def _paint_crosshair(self, painter: QPainter) -> None:
+        """A cross with an open centre, each arm in the colour of the plane that it stands upon."""
+        if self._desk.volume is None:
+            return
+        middle = self._desk.session.crosshair
+        ends = np.array([middle + s * r * p.normal for p in Plane for s in (-1, 1) for r in (0.8, 4.0)])
+        pixels = self.scene.display_of(ends)
+        views = theme_of(self).views
+        for n, plane in enumerate(plane for plane in Plane for _ in range(2)):
+            painter.setPen(QPen(QColor(views[plane.value]), 1.4))
+            near, far = (painted(self, *pixels[2 * n + k]) for k in range(2))
+            painter.drawLine(near, far)
+
+    def _paint_pointer(self, painter: QPainter) -> None:
+        drag = self._desk.drag
+        shown = self._hover if drag is None else drag.position
+        if shown is None:
+            return
+        colours = theme_of(self).scene
+        centre = painted(self, *self.scene.display_of(shown[None])[0])
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        for colour, width in ((colours.halo, 4.0), (colours.states["active"], 1.8)):
+            painter.setPen(QPen(QColor(colour), width))
+            painter.drawEllipse(centre, 6.0, 6.0)
+        if drag is not None:
+            painter.setPen(Qt.PenStyle.NoPen)
+            painter.setBrush(QColor(colours.states["placed"]))
+            painter.drawEllipse(centre, 4.0, 4.0)
+
+    # Mouse and keys
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        button, held = button_of(event), modifiers_of(event)
+        if button is None:
+            return
+        x, y = pixel_of(self, event.position())
+        if button is Button.LEFT and held is Modifier.NONE:
+            self._hand.press(self.scene.mark_at(x, y, 8.0), x, y)
+        if not self._hand.holds:
+            self.scene.control.press(button, x, y, held)
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        x, y = pixel_of(self, event.position())
+        if self._hand.holds:
+            if self._hand.move(x, y):
+                self._drag_to(x, y)
+        elif event.buttons() == Qt.MouseButton.NoButton:
+            self._look_at(x, y, modifiers_of(event))
+        elif self.scene.control.move(x, y):
+            self._set_hover(None)
+            self.redraw(quick=True)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        x, y = pixel_of(self, event.position())
+        clicked = self._hand.is_click if self._hand.holds else self.scene.control.release(x, y)
+        mark = self._hand.release()
+        if event.button() == Qt.MouseButton.LeftButton and clicked:
+            self._click(x, y, mark)
+        self._look_at(x, y, Modifier.NONE)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._hand.take_back()
+            self.maximise_asked.emit()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
+        if self.scene.control.wheel(notches_of(event)):
+            self.redraw(quick=True)
+        event.accept()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
+        arrow = _ARROWS.get(Qt.Key(event.key()))
+        if event.key() == Qt.Key.Key_Escape and self._desk.drag is not None:
+            self._hand.cancel()
+        elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
+            self.scene.camera.rotate(*arrow)
+            self.redraw(quick=True)
+        else:
+            super().keyPressEvent(event)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        self._set_hover(None)
+        super().leaveEvent(event)
+
+    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
+        self._hand.take_focus(self)
+        super().enterEvent(event)
+
+    def _click(self, x: float, y: float, mark: str | None) -> None:
+        hit = self.scene.pick(x, y)
+        self._hand.click(None if hit is None else hit.point, How.MESH, mark)
+
+    def _drag_to(self, x: float, y: float) -> None:
+        drag = self._desk.drag
+        hit = self.scene.pick(x, y)
+        if drag is None:
+            return
+        if hit is not None:
+            self._desk.drag_to(hit.point, How.MESH)
+        elif drag.how is not How.MESH:  # a point that is on no surface slides in the plane of the screen
+            view = self.scene.camera.viewpoint()
+            depth = view.display(drag.position[None])[0, 2]
+            self._desk.drag_to(view.scan([[x, y, depth]])[0], drag.how)
+
+    def _look_at(self, x: float, y: float, held: Modifier) -> None:
+        hit = self.scene.pick(x, y)
+        self._set_hover(None if hit is None else hit.point)
+        if hit is not None and Modifier.SHIFT in held:
+            self._desk.session.set_crosshair(hit.point)
+        self.setCursor(self._hand.cursor(hit is not None, self.scene.mark_at(x, y, 8.0)))
+
+    def _set_hover(self, point: FloatArray | None) -> None:
+        if point is not None or self._hover is not None:
+            self._hover = point
+            self.hovered.emit(point)
+            self.update()
+
+    # Life
+
+    def resizeEvent(self, event: Any) -> None:  # noqa: D102, N802
+        self.redraw()
+        super().resizeEvent(event)
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        if event.type() == QEvent.Type.StyleChange:
+            self.take_theme()
+        super().changeEvent(event)
+
+    def release(self) -> None:
+        """Let go of the scene; the widget shows its last frame from then on."""
+        self._stale = False
+        self._fine_timer.stop()
+        self.scene.close()

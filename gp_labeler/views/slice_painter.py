@@ -1,0 +1,279 @@
+"""What a slice view paints, in device pixels."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPolygonF
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.ghosts import ellipse
+from gp_labeler.scene.label_layout import place_labels
+from gp_labeler.scene.marks import Mark
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_view import scale_bar_length
+from gp_labeler.scene.slices import SliceImage, SliceSource
+from gp_labeler.views.drawn import drawn_ghosts, drawn_marks
+from gp_labeler.views.theme import Theme, base_font, theme_of
+from gp_labeler.workbench import Workbench
+
+if TYPE_CHECKING:
+    from gp_labeler.views.slice_view import SliceView
+
+__all__ = ["SlicePainter", "reach_of"]
+
+_REACH_MM = 1.0
+_TEXT, _HALO = "#E8EDF2", "#0B0F14"
+"""Slices are black in every theme, and what is written on them light."""
+
+
+def reach_of(source: SliceSource, plane: Plane) -> float:
+    """Return how far off a slice points are still drawn on it, mm."""
+    return max(_REACH_MM, 1.5 * source.step(plane))
+
+
+class SlicePainter:
+    """Paints one slice view; remembers the picture of the slice while only what lies over it changes.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What is shown.
+    view : SliceView
+        Where.
+    """
+
+    def __init__(self, workbench: Workbench, view: SliceView) -> None:
+        self._desk, self._view = workbench, view
+        self._preview: float | None = None
+        self._slice: SliceImage | None = None
+        self._picture: tuple[object, QImage] | None = None
+        self._outline: tuple[object, list[QLineF]] | None = None
+        workbench.threshold_previewed.connect(self._on_preview)
+
+    def forget(self) -> None:
+        """Let go of the pictures."""
+        self._slice, self._picture, self._outline = None, None, None
+
+    def paint(self, painter: QPainter) -> None:
+        """Paint everything."""
+        theme, view = theme_of(self._view), self._view
+        painter.fillRect(view.rect(), QColor("#000000" if view.source else theme.window))
+        if view.source is None or view.shown is None:
+            return
+        ratio = view.devicePixelRatioF()
+        painter.setRenderHints(
+            QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform, True
+        )
+        painter.scale(1 / ratio, 1 / ratio)
+        self._paint_image(painter, view.source, view.shown)
+        self._paint_outline(painter, view.shown, ratio)
+        self._paint_crosshair(painter, view.shown, theme, ratio)
+        self._paint_letters(painter, view.shown, ratio)
+        self._paint_scale_bar(painter, view.shown, ratio)
+        self._paint_ghosts(painter, view.shown, theme, ratio)
+        self._paint_marks(painter, view.source, view.shown, theme, ratio)
+
+    def _on_preview(self, threshold: float | None) -> None:
+        self._preview = threshold
+
+    def _paint_image(self, painter: QPainter, source: SliceSource, shown: Shown) -> None:
+        position = source.snap(shown.plane, shown.position)
+        if self._slice is None or self._slice_is_old(source, position):
+            self._slice = source.image(shown.plane, position)
+            self._where = (source, position)
+            self._picture = self._outline = None
+        window = self._view.window_level()
+        wanted = (window, self._preview)
+        if self._picture is None or self._picture[0] != wanted:
+            self._picture = (wanted, _picture(self._slice, window, self._preview))
+        (left, top), (right, bottom) = shown.image_corners(self._slice)
+        painter.drawImage(QRectF(left, top, right - left, bottom - top), self._picture[1])
+
+    def _slice_is_old(self, source: SliceSource, position: float) -> bool:
+        return self._where[0] is not source or self._where[1] != position
+
+    def _paint_outline(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+        threshold = self._desk.threshold if self._preview is None else self._preview
+        if threshold is None or self._slice is None or not self._desk.session.view.state.outline_visible:
+            return
+        if self._outline is None or self._outline[0] != threshold:
+            segments = self._slice.outline(threshold).reshape(-1, 4).tolist()
+            self._outline = (threshold, [QLineF(*segment) for segment in segments])
+        pen = QPen(QColor(246, 190, 110, 190), 1.1 * ratio)
+        pen.setCosmetic(True)
+        painter.save()
+        corner = shown.flat_to_pixel(np.zeros(2)) + 0.5
+        painter.translate(*corner.tolist())
+        painter.scale(1 / shown.mm_per_pixel, 1 / shown.mm_per_pixel)
+        painter.setPen(pen)
+        painter.drawLines(self._outline[1])
+        painter.restore()
+
+    def _paint_crosshair(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
+        """The other two slices as dashed lines in their colours."""
+        x, y = shown.scan_to_pixel(self._desk.session.crosshair[None])[0] + 0.5
+        width, height = shown.size
+        for plane in Plane:
+            if plane is shown.plane:
+                continue
+            pen = QPen(QColor(theme.views[plane.value] if theme.is_dark else plane.colour), 1.0 * ratio)
+            pen.setDashPattern([4, 3])
+            painter.setPen(pen)
+            if np.abs(shown.plane.right[plane.axis]) > 0.5:  # it stands on this one as an upright line
+                painter.drawLine(QPointF(x, 0), QPointF(x, height))
+            else:
+                painter.drawLine(QPointF(0, y), QPointF(width, y))
+
+    def _paint_letters(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+        width, height = shown.size
+        left, right, top, bottom = shown.plane.letters
+        inset = 12 * ratio
+        for letter, x, y in (
+            (left, inset, height / 2),
+            (right, width - inset, height / 2),
+            (top, width / 2, inset),
+            (bottom, width / 2, height - inset),
+        ):
+            text = _outlined(letter, _font(13, ratio, bold=True))
+            box = text.boundingRect()
+            text.translate(x - box.center().x(), y - box.center().y())
+            _draw_text(painter, text, _TEXT, ratio)
+
+    def _paint_scale_bar(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+        length, pixels = scale_bar_length(shown.mm_per_pixel, 90 * ratio)
+        width, height = shown.size
+        right, y = width - 14 * ratio, height - 12 * ratio
+        for colour, thick in ((_HALO, 4.5), (_TEXT, 2.5)):
+            painter.setPen(QPen(QColor(colour), thick * ratio))
+            painter.drawLine(QPointF(right - pixels, y), QPointF(right, y))
+        text = _outlined(f"{length:g} mm", _font(12, ratio))
+        box = text.boundingRect()
+        text.translate(right - pixels / 2 - box.center().x(), y - 6 * ratio - box.bottom())
+        _draw_text(painter, text, _TEXT, ratio)
+
+    def _paint_ghosts(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
+        axes = np.stack([shown.plane.right, shown.plane.down])
+        colour = QColor(_on_black("ghost"))
+        for ghost in drawn_ghosts(self._desk):
+            centre = shown.scan_to_pixel(ghost.mean[None])[0] + 0.5
+            covariance = axes @ ghost.covariance @ axes.T / shown.mm_per_pixel**2
+            ring = QPolygonF([QPointF(*corner) for corner in ellipse(centre, covariance)])
+            painter.setBrush(QColor(colour.red(), colour.green(), colour.blue(), 26))
+            painter.setPen(QPen(colour, 1.8 * ratio))
+            painter.drawPolygon(ring)
+            text = _outlined(ghost.label, _font(13, ratio, bold=True))
+            box = ring.boundingRect()
+            text.translate(box.right() + 4 * ratio, box.top())
+            _draw_text(painter, text, colour.name(), ratio)
+
+    def _paint_marks(
+        self, painter: QPainter, source: SliceSource, shown: Shown, theme: Theme, ratio: float
+    ) -> None:
+        marks = drawn_marks(self._desk)
+        if not marks:
+            return
+        positions = np.array([mark.position for mark in marks])
+        pixels, off = shown.scan_to_pixel(positions) + 0.5, np.abs(shown.off_slice(positions))
+        near = off <= reach_of(source, shown.plane)
+        in_slice = off <= 0.75 * source.step(shown.plane)
+        for n in np.flatnonzero(near):
+            fade = 1.0 if in_slice[n] else 1.0 - 0.65 * off[n] / reach_of(source, shown.plane)
+            _draw_mark(painter, marks[n], pixels[n], bool(in_slice[n]), float(fade), ratio)
+        if self._desk.session.view.state.labels_visible:
+            drawn = [(marks[n], pixels[n]) for n in np.flatnonzero(near)]
+            _draw_labels(painter, drawn, shown.size, ratio)
+
+
+def _picture(image: SliceImage, window: object, preview: float | None) -> QImage:
+    if preview is None:
+        grey = image.grey(window)  # type: ignore[arg-type]
+        height, width = grey.shape
+        return QImage(grey.data, width, height, width, QImage.Format.Format_Grayscale8).copy()
+    rgb = np.ascontiguousarray(image.rgb(window, threshold=preview))  # type: ignore[arg-type]
+    height, width, _ = rgb.shape
+    return QImage(rgb.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+
+
+def _on_black(state: str) -> str:
+    from gp_labeler.scene.colours import DARK
+
+    return DARK.states[state]
+
+
+def _font(pixels: float, ratio: float, *, bold: bool = False) -> QFont:
+    font = base_font()
+    font.setPixelSize(round(pixels * ratio))
+    font.setBold(bold)
+    return font
+
+
+def _outlined(text: str, font: QFont) -> QPainterPath:
+    path = QPainterPath()
+    path.addText(QPointF(0, 0), font, text)
+    return path
+
+
+def _draw_text(painter: QPainter, text: QPainterPath, colour: str, ratio: float, fade: float = 1.0) -> None:
+    """Draw letters with an edge that keeps them legible on bone."""
+    painter.save()
+    painter.setOpacity(fade)
+    painter.strokePath(text, QPen(QColor(_HALO), 3 * ratio))
+    painter.fillPath(text, QColor(colour))
+    painter.restore()
+
+
+def _draw_mark(
+    painter: QPainter, mark: Mark, pixel: FloatArray, in_slice: bool, fade: float, ratio: float
+) -> None:
+    """Draw a point: full where the slice passes through it, its outline where it lies behind or before."""
+    radius, centre = (5.0 if mark.active else 4.0) * ratio, QPointF(*pixel)
+    colour = QColor(_on_black(mark.state))
+    shape = QPainterPath()
+    if mark.state in _CORNERS:
+        corners = [QPointF(*(pixel + 1.3 * radius * np.array(c))) for c in _CORNERS[mark.state]]
+        shape.addPolygon(QPolygonF(corners))
+        shape.closeSubpath()
+    else:
+        shape.addEllipse(centre, radius, radius)
+    painter.save()
+    painter.setOpacity(fade)
+    painter.strokePath(shape, QPen(QColor(_HALO), 3.2 * ratio))
+    if in_slice:
+        painter.fillPath(shape, colour)
+    painter.strokePath(shape, QPen(colour, 1.6 * ratio))
+    if mark.active:
+        painter.setPen(QPen(QColor(_on_black("active")), 1.8 * ratio))
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawEllipse(centre, radius + 4 * ratio, radius + 4 * ratio)
+    painter.restore()
+
+
+_CORNERS = {
+    "computed": ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)),
+    "doubtful": ((0.0, -1.0), (0.9, 0.7), (-0.9, 0.7)),
+}
+
+
+def _draw_labels(
+    painter: QPainter, drawn: list[tuple[Mark, FloatArray]], size: tuple[int, int], ratio: float
+) -> None:
+    if not drawn:
+        return
+    font = _font(12, ratio, bold=True)
+    metrics = QFontMetricsF(font)
+    sizes = [(metrics.horizontalAdvance(mark.label), metrics.capHeight() + 4 * ratio) for mark, _ in drawn]
+    corners, shown = place_labels(
+        [pixel for _, pixel in drawn],
+        sizes,
+        size,
+        gaps=[8 * ratio + (4 * ratio if mark.active else 0) for mark, _ in drawn],
+        ranks=[2.0 * mark.active for mark, _ in drawn],
+    )
+    for n in np.flatnonzero(shown):
+        text = _outlined(drawn[n][0].label, font)
+        text.translate(corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)
+        _draw_text(painter, text, _on_black(drawn[n][0].state), ratio)

@@ -1,0 +1,332 @@
+"""A slice as a widget: grey values, bone's edge, points, crosshair; wheel, pan, zoom, window and level."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
+from PySide6.QtWidgets import QWidget
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.scene.gestures import Button, Modifier, SliceControl
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.window_level import WindowLevel
+from gp_labeler.session import labelling
+from gp_labeler.session.state import How
+from gp_labeler.views.drawn import drawn_marks
+from gp_labeler.views.hand import Hand
+from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.slice_painter import SlicePainter, reach_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["SliceView"]
+
+_DRAG_FOR_RANGE = 400.0
+"""Pixels of a drag that change window or level by as much as the whole range of greys."""
+
+_ARROWS = {
+    Qt.Key.Key_Left: (-1.0, 0.0),
+    Qt.Key.Key_Right: (1.0, 0.0),
+    Qt.Key.Key_Up: (0.0, -1.0),
+    Qt.Key.Key_Down: (0.0, 1.0),
+}
+_STEPS = {Qt.Key.Key_F: 1, Qt.Key.Key_PageUp: 1, Qt.Key.Key_B: -1, Qt.Key.Key_PageDown: -1}
+
+
+class SliceView(QWidget):
+    """Shows the slice through the crosshair in one plane, and takes clicks on it.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What is shown.
+    plane : Plane
+        Which way it is cut.
+    parent : QWidget, optional
+        Qt's parent.
+    """
+
+    hovered = Signal(object)
+    """(3,) scan position under the pointer, or None."""
+    moved = Signal(float)
+    """The position of the slice along its axis, mm."""
+    maximise_asked = Signal()
+
+    def __init__(self, workbench: Workbench, plane: Plane, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setMinimumSize(120, 90)
+        self.setMouseTracking(True)
+        self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
+        self.plane = plane
+        self._desk = workbench
+        self.source: SliceSource | None = None
+        self.shown: Shown | None = None
+        self._control, self._hand = SliceControl(), Hand(workbench)
+        self._painter = SlicePainter(workbench, self)
+        self._greying: tuple[float, float] | None = None
+        self._grip = np.zeros(3)
+        self._listen()
+
+    # What is shown
+
+    def reset(self) -> None:
+        """Show the whole slice."""
+        if self.source is not None:
+            fitted = Shown.fitted(self.source, self.plane, self._size())
+            self.shown = fitted.at(self._position())
+            self.update()
+
+    def go_to(self, position: FloatArray) -> None:
+        """Bring a (3,) scan position into sight."""
+        if self.shown is not None:
+            self.shown = self.shown.showing(position, 0.2)
+            self.update()
+
+    def step(self, n: int) -> None:
+        """Go so many slices on."""
+        if self.source is not None:
+            self._move_to(self._position() + n * self.source.step(self.plane))
+
+    def pixel_at(self, position: FloatArray) -> tuple[float, float]:
+        """Return the logical pixel over which a (3,) scan position lies, for tests and scripts."""
+        if self.shown is None:
+            raise GpError("no scan is open")
+        x, y = self.shown.scan_to_pixel(np.reshape(position, (1, 3)))[0]
+        point = painted(self, x, y)
+        return point.x(), point.y()
+
+    def window_level(self) -> WindowLevel:
+        """Return the grey scale: what the user set, else what suits the volume."""
+        view, volume = self._desk.session.view.state, self._desk.volume
+        if view.level is not None and view.width is not None:
+            return WindowLevel(view.level - view.width / 2, view.level + view.width / 2)
+        return WindowLevel(0.0, 1.0) if volume is None else WindowLevel.of(volume)
+
+    def _listen(self) -> None:
+        desk = self._desk
+        desk.volume_opened.connect(self._on_volume)
+        desk.session_replaced.connect(self._on_session_replaced)
+        desk.crosshair_changed.connect(self._on_crosshair)
+        desk.point_shown.connect(self.go_to)
+        for signal in (
+            desk.landmarks_changed,
+            desk.active_changed,
+            desk.ghosts_changed,
+            desk.doubts_changed,
+            desk.threshold_changed,
+            desk.threshold_previewed,
+            desk.view_changed,
+            desk.dragged,
+        ):
+            signal.connect(self._repaint)
+
+    def _repaint(self, *_: object) -> None:
+        self.update()
+
+    def _on_volume(self, volume: Volume) -> None:
+        self.source = SliceSource(volume)
+        self.reset()
+        self._on_crosshair(self._desk.session.crosshair)
+
+    def _on_session_replaced(self, _: object) -> None:
+        if self._desk.volume is None:
+            self.source = self.shown = None
+            self._painter.forget()
+            self.update()
+
+    def _on_crosshair(self, position: FloatArray) -> None:
+        if self.shown is not None:
+            self.shown = self.shown.at(float(position[self.plane.axis]))
+            self.moved.emit(self.shown.position)
+            self.update()
+
+    def _position(self) -> float:
+        return float(self._desk.session.crosshair[self.plane.axis])
+
+    def _move_to(self, position: float) -> None:
+        if self.source is not None:
+            crosshair = np.array(self._desk.session.crosshair)
+            crosshair[self.plane.axis] = self.source.snap(self.plane, position)
+            self._desk.session.set_crosshair(crosshair)
+
+    def _size(self) -> tuple[int, int]:
+        ratio = self.devicePixelRatioF()
+        return max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
+
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
+        if self.shown is not None and self.shown.size != self._size():
+            self.shown = self.shown.resized(*self._size())
+        painter = QPainter(self)
+        self._painter.paint(painter)
+        painter.end()
+
+    # Mouse and keys
+
+    def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        button, held = button_of(event), modifiers_of(event)
+        if button is None or self.shown is None:
+            return
+        x, y = pixel_of(self, event.position())
+        if self._control.press(button, x, y, held) or button is not Button.LEFT:
+            return
+        mark = self._mark_at(x, y)
+        self._hand.press(mark, x, y)
+        if self._hand.holds:
+            self._grip = self._position_of(mark) - self.shown.pixel_to_scan([[x, y]])[0]
+        elif self._desk.tool == "grey":
+            self._greying = (x, y)
+        elif self._desk.tool == "look":
+            self._desk.session.set_crosshair(self.shown.pixel_to_scan([[x, y]])[0])
+
+    def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        if self.shown is None:
+            return
+        x, y = pixel_of(self, event.position())
+        here = self.shown.pixel_to_scan([[x, y]])[0]
+        self.hovered.emit(here)
+        if event.buttons() == Qt.MouseButton.NoButton:
+            if Modifier.SHIFT in modifiers_of(event):
+                self._desk.session.set_crosshair(here)
+            self.setCursor(self._hand.cursor(self._is_inside(here), self._mark_at(x, y)))
+            return
+        view = self._control.move(self.shown, x, y)
+        if view is not self.shown:
+            self.shown = view
+            self.update()
+        elif self._hand.move(x, y):
+            self._drag_to(here)
+        elif self._greying is not None:
+            self._change_greys(x, y)
+        elif self._desk.tool == "look" and event.buttons() == Qt.MouseButton.LeftButton:
+            self._desk.session.set_crosshair(here)
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        if self.shown is None:
+            return
+        x, y = pixel_of(self, event.position())
+        clicked = self._control.release(x, y)
+        self._greying = None
+        dragged = self._hand.holds and not self._hand.is_click
+        mark = self._hand.release()
+        plain = event.button() == Qt.MouseButton.LeftButton and not modifiers_of(event)
+        here = self.shown.pixel_to_scan([[x, y]])[0]
+        if clicked and plain and not dragged and (self._desk.tool != "grey" or mark):
+            self._hand.click(here if self._is_inside(here) else None, How.SLICE, mark)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
+        if event.button() == Qt.MouseButton.LeftButton:
+            self._hand.take_back()
+            self.maximise_asked.emit()
+
+    def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
+        event.accept()
+        if self.shown is None or self.source is None:
+            return
+        x, y = pixel_of(self, event.position())
+        held, step = modifiers_of(event), self.source.step(self.plane)
+        view = self._control.wheel(self.shown, notches_of(event), x, y, held, step)
+        if Modifier.CTRL in held:
+            self.shown = view
+            self.update()
+        else:
+            self._move_to(view.position)
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
+        key = Qt.Key(event.key())
+        plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
+        if key == Qt.Key.Key_Escape and self._desk.drag is not None:
+            self._hand.cancel()
+        elif key in _ARROWS and plain and self.source is not None:
+            self._nudge(*_ARROWS[key])
+        elif key in _STEPS and plain:
+            self.step(_STEPS[key])
+        else:
+            super().keyPressEvent(event)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        self.hovered.emit(None)
+        super().leaveEvent(event)
+
+    def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
+        self._hand.take_focus(self)
+        super().enterEvent(event)
+
+    def _nudge(self, right: float, down: float) -> None:
+        """Move the point that was placed last, or is chosen, by a voxel; where there is none, the crosshair."""
+        assert self.source is not None
+        across, along = (float(np.abs(d) @ self._voxel()) for d in (self.plane.right, self.plane.down))
+        offset = right * across * self.plane.right + down * along * self.plane.down
+        target, session = self._desk.nudged_point(), self._desk.session
+        if target is None:
+            session.set_crosshair(session.crosshair + offset)
+            return
+        side, code = target
+        try:
+            labelling.nudge(session, offset, side=side, code=code)
+        except GpError as error:
+            self._desk.say(str(error), "warning")
+            return
+        session.set_crosshair(session.landmarks(side)[code])
+
+    def _voxel(self) -> FloatArray:
+        """Return the (3,) distance of slices along each scan axis, mm."""
+        assert self.source is not None
+        steps = {plane.axis: self.source.step(plane) for plane in Plane}
+        return np.array([steps[axis] for axis in range(3)])
+
+    def _drag_to(self, here: FloatArray) -> None:
+        to = here + self._grip
+        if self._desk.volume is not None and bool(self._desk.volume.contains(to[None])[0]):
+            self._desk.drag_to(to, How.SLICE)
+
+    def _change_greys(self, x: float, y: float) -> None:
+        assert self._greying is not None
+        per_pixel = self.window_level_range() / (_DRAG_FOR_RANGE * self.devicePixelRatioF())
+        dx, dy = x - self._greying[0], y - self._greying[1]
+        self._greying = (x, y)
+        scale = self.window_level().moved(dx * per_pixel, -dy * per_pixel, smallest=per_pixel)
+        self._desk.session.view.update(level=scale.level, width=scale.width)
+
+    def window_level_range(self) -> float:
+        """Return the range of greys that the volume has."""
+        return 1.0 if self._desk.volume is None else WindowLevel.of(self._desk.volume).width
+
+    def _is_inside(self, position: FloatArray) -> bool:
+        return self._desk.volume is not None and bool(self._desk.volume.contains(position[None])[0])
+
+    def _position_of(self, key: str | None) -> FloatArray:
+        marks = {mark.key: mark.position for mark in drawn_marks(self._desk)}
+        return marks[key or ""]
+
+    def _mark_at(self, x: float, y: float) -> str | None:
+        """Return the key of the nearest mark that is drawn within 8 logical pixels."""
+        if self.shown is None or self.source is None:
+            return None
+        marks = drawn_marks(self._desk)
+        if not marks:
+            return None
+        positions = np.array([mark.position for mark in marks])
+        away = np.linalg.norm(self.shown.scan_to_pixel(positions) - [x, y], axis=1)
+        away[np.abs(self.shown.off_slice(positions)) > reach_of(self.source, self.plane)] = np.inf
+        nearest = int(away.argmin())
+        return marks[nearest].key if away[nearest] <= 8.0 * self.devicePixelRatioF() else None
+
+    def resizeEvent(self, event: Any) -> None:  # noqa: D102, N802
+        """Keep middle and zoom; a view that was never seen shows the whole slice."""
+        if self.shown is not None and event.oldSize().width() <= 1:
+            self.reset()
+        super().resizeEvent(event)
+
+    def release(self) -> None:
+        """Let go of the voxels."""
+        self._painter.forget()
+        if self.source is not None:
+            self.source.close()
+        self.source = self.shown = None

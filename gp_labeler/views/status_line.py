@@ -1,0 +1,174 @@
+"""The line at the bottom: where the pointer is, what the next click does, and what goes on behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.planes import LETTERS
+from gp_labeler.session.jobs import Task
+from gp_labeler.views.icons import icon
+from gp_labeler.views.theme import theme_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["StatusLine", "where_text"]
+
+_SHOWN_AFTER_MS = 150
+"""Work that is done sooner does not flicker by."""
+
+_MESSAGE_MS = {"info": 5000, "warning": 12000, "error": 0}
+
+
+def where_text(position: FloatArray) -> str:
+    """Say a (3,) scan position, such as ``L 4.62  P 9.10  S 12.44 mm``."""
+    parts = [f"{LETTERS[axis][int(mm >= 0)]} {abs(mm):.2f}" for axis, mm in enumerate(position)]
+    return "  ".join(parts) + " mm"
+
+
+class StatusLine(QWidget):
+    """The line at the bottom.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What it tells of.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk = workbench
+        self.setFixedHeight(30)
+        self.where, self.next_click = QLabel(), QLabel()
+        self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
+        self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.work = _Work(workbench)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 0, 8, 0)
+        row.setSpacing(12)
+        row.addWidget(self.where, 3)
+        row.addWidget(self.next_click, 4)
+        row.addWidget(self.work, 3)
+        self._message_timer = QTimer(self, singleShot=True)
+        self._message_timer.timeout.connect(self._say_next)
+        for signal in (
+            workbench.landmarks_changed,
+            workbench.active_changed,
+            workbench.session_replaced,
+            workbench.tool_changed,
+            workbench.volume_opened,
+        ):
+            signal.connect(self._on_changed)
+        workbench.message.connect(self.say)
+        self._say_next()
+
+    def show_position(self, position: FloatArray | None) -> None:
+        """Tell what lies at a (3,) scan position."""
+        volume = self._desk.volume
+        if position is None or volume is None:
+            self.where.setText("")
+            return
+        i, j, k = np.rint(volume.scan_to_voxel(position[None])[0]).astype(int)
+        value = volume.value_at(position)
+        grey = "outside" if value is None else f"{value:.6g}"
+        self.where.setText(f"{where_text(position)}  ·  voxel {i}, {j}, {k}  ·  {grey}")
+
+    def say(self, text: str, level: str = "info") -> None:
+        """Show a message in the middle for a while; an error until the next edit."""
+        self._show(text, {"info": "good"}.get(level, "danger" if level == "error" else level))
+        if _MESSAGE_MS[level]:
+            self._message_timer.start(_MESSAGE_MS[level])
+        else:
+            self._message_timer.stop()
+
+    def _on_changed(self, *_: object) -> None:
+        self._message_timer.stop()
+        self._say_next()
+
+    def _say_next(self) -> None:
+        desk = self._desk
+        if desk.volume is None:
+            self._show("Open a scan, or try the demo", "hint")
+        elif desk.tool == "look":
+            self._show("Drag over a slice to move the crosshair", "hint")
+        elif desk.tool == "grey":
+            self._show("Drag over a slice: sideways for contrast, up and down for brightness", "hint")
+        else:
+            self._show(desk.session.click_text, "next")
+
+    def _show(self, text: str, role: str) -> None:
+        self.next_click.setText(text)
+        self.next_click.setToolTip(text)
+        theme = theme_of(self)
+        colours = {
+            "next": theme.states["placed"],
+            "hint": theme.muted,
+            "good": theme.good,
+            "warning": theme.warning,
+            "danger": theme.danger,
+        }
+        self.next_click.setStyleSheet(f"color: {colours[role]}")
+        self._role = role
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        if event.type() == QEvent.Type.StyleChange:
+            self._show(self.next_click.text(), self._role)
+        super().changeEvent(event)
+
+
+class _Work(QWidget):
+    """The oldest running task that matters to the user, how far it is, and a button that stops it."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__()
+        self._desk = workbench
+        self.text, self.bar, self.stop = QLabel(), QProgressBar(), QToolButton()
+        self.text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        self.bar.setTextVisible(False)
+        self.bar.setFixedWidth(110)
+        self.stop.setProperty("role", "quiet")
+        self.stop.setToolTip("Stop this work")
+        self.stop.setAccessibleName("Stop the work in the background")
+        self.stop.setFixedSize(22, 22)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(0, 0, 0, 0)
+        row.setSpacing(8)
+        row.addStretch(1)
+        for widget in (self.text, self.bar, self.stop):
+            row.addWidget(widget)
+        self._timer = QTimer(self, interval=_SHOWN_AFTER_MS, singleShot=True)
+        self._timer.timeout.connect(self._refresh)
+        self.stop.clicked.connect(self._stop)
+        jobs = workbench.jobs
+        for signal in (jobs.started, jobs.progressed, jobs.done, jobs.failed, jobs.cancelled):
+            signal.connect(self._on_task)
+        self.stop.setIcon(icon("close", theme_of(self).muted, size=12))
+        self._refresh()
+
+    @property
+    def _task(self) -> Task[Any] | None:
+        shown = [t for t in self._desk.jobs.running if not t.progress.cancelled() and "judging" not in t.key]
+        return shown[0] if shown else None
+
+    def _on_task(self, _: Task[Any]) -> None:
+        if self._task is None or self.bar.isVisible():
+            self._refresh()
+        elif not self._timer.isActive():
+            self._timer.start()
+
+    def _refresh(self) -> None:
+        task = self._task
+        for widget in (self.text, self.bar, self.stop):
+            widget.setVisible(task is not None)
+        if task is not None:
+            self.text.setText(task.text or task.job.title)
+            self.bar.setRange(0, 100 if task.fraction > 0 else 0)
+            self.bar.setValue(round(100 * task.fraction))
+
+    def _stop(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+        self._refresh()

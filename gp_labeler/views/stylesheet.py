@@ -1,0 +1,133 @@
+"""The Qt style sheet of a theme."""
+
+from __future__ import annotations
+
+from string import Template
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from gp_labeler.views.theme import Theme
+
+__all__ = ["stylesheet"]
+
+_TEMPLATE = Template("""
+QMainWindow, QDialog { background: $panel; }
+QWidget { color: $text; font-size: 12px; }
+QWidget:disabled { color: $faint; }
+QLabel { background: transparent; }
+QToolTip { background: $raised; color: $text; border: 1px solid $border_strong; padding: 4px 6px; }
+
+*[role="panel"] { background: $panel; }
+*[role="card"] { background: $card; border: 1px solid $border; border-radius: 8px; }
+*[role="rail"] { background: $window; border-right: 1px solid $border; }
+QLabel[role="title"] { font-size: 17px; font-weight: 600; }
+QLabel[role="heading"] { font-size: 13px; font-weight: 600; }
+QLabel[role="eyebrow"] { color: $muted; }
+QLabel[role="hint"] { color: $muted; }
+QLabel[role="ghost"] { color: $ghost; }
+QLabel[role="shared"] { color: $good; }
+QLabel[role="good"] { color: $good; }
+QLabel[role="warning"] { color: $warning; }
+QLabel[role="danger"] { color: $danger; }
+QLabel[role="mono"], QPlainTextEdit[role="mono"] { font-family: "DejaVu Sans Mono", "Consolas", monospace; }
+
+QPushButton, QToolButton {
+    background: $raised; border: 1px solid $border_strong; border-radius: 6px; padding: 5px 12px;
+}
+QToolButton { padding: 4px 8px; }
+QPushButton:hover, QToolButton:hover { background: $hover; }
+QPushButton:pressed, QToolButton:pressed, QToolButton:checked { background: $selected; }
+QToolButton:checked { border-color: $accent_text; }
+QPushButton:focus, QToolButton:focus { border-color: $accent_text; }
+QPushButton:disabled, QToolButton:disabled { background: transparent; border-color: $border; color: $faint; }
+QPushButton[role="primary"] {
+    background: $accent; border-color: $accent; color: $on_accent; font-weight: 600;
+}
+QPushButton[role="primary"]:hover { background: $accent_hover; }
+QPushButton[role="primary"]:focus { border: 2px solid $accent_text; padding: 4px 11px; }
+QPushButton[role="primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
+QPushButton[role="link"] {
+    background: transparent; border: 1px solid transparent; color: $accent_text;
+    text-align: left; padding: 3px 6px;
+}
+QPushButton[role="link"]:hover { background: $hover; }
+QPushButton[role="link"]:focus { border-color: $accent_text; }
+QToolButton[role="quiet"] { background: transparent; border-color: transparent; }
+QToolButton[role="quiet"]:hover { background: $hover; }
+QToolButton[role="quiet"]:focus { border-color: $accent_text; }
+QToolButton::menu-indicator { image: none; }
+
+QLineEdit, QPlainTextEdit, QTextEdit, QSpinBox, QDoubleSpinBox, QComboBox {
+    background: $field; border: 1px solid $border_strong; border-radius: 5px; padding: 4px 6px;
+    selection-background-color: $accent; selection-color: $on_accent;
+}
+QLineEdit:focus, QPlainTextEdit:focus, QTextEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus,
+QComboBox:focus { border-color: $accent_text; }
+QLineEdit[wrong="true"] { border-color: $danger; }
+QComboBox::drop-down { border: none; width: 20px; }
+QComboBox QAbstractItemView {
+    background: $card; border: 1px solid $border_strong; selection-background-color: $selected;
+    selection-color: $text; outline: none;
+}
+QCheckBox, QRadioButton { spacing: 6px; background: transparent; padding: 2px; }
+QCheckBox:focus, QRadioButton:focus { color: $accent_text; }
+
+QTableView, QListView, QTreeView {
+    background: $card; border: 1px solid $border; border-radius: 8px; outline: none; gridline-color: $border;
+    selection-background-color: $selected; selection-color: $text;
+}
+QHeaderView { background: transparent; }
+QHeaderView::section {
+    background: transparent; color: $muted; border: none; border-bottom: 1px solid $border; padding: 4px 6px;
+}
+QListView::item { padding: 5px 8px; border-radius: 4px; }
+QListView::item:hover { background: $hover; }
+QListView::item:selected { background: $selected; color: $text; }
+
+QMenuBar { background: $window; color: $text; }
+QMenuBar::item { padding: 4px 10px; background: transparent; border-radius: 4px; }
+QMenuBar::item:selected { background: $hover; }
+QMenu { background: $card; border: 1px solid $border_strong; padding: 4px; }
+QMenu::item { padding: 5px 24px 5px 12px; border-radius: 4px; }
+QMenu::item:selected { background: $selected; }
+QMenu::item:disabled { color: $faint; }
+QMenu::separator { height: 1px; background: $border; margin: 4px 8px; }
+QToolBar { background: $window; border: none; spacing: 4px; padding: 4px 8px; }
+QStatusBar { background: $window; border-top: 1px solid $border; color: $text; }
+QStatusBar::item { border: none; }
+QDockWidget::title { background: $panel; padding: 6px; }
+
+QScrollArea { background: transparent; border: none; }
+QScrollArea > QWidget > QWidget[role="panel"] { background: $panel; }
+QScrollBar:vertical { background: transparent; width: 10px; margin: 2px; }
+QScrollBar:horizontal { background: transparent; height: 10px; margin: 2px; }
+QScrollBar::handle { background: $border_strong; border-radius: 3px; min-height: 24px; min-width: 24px; }
+QScrollBar::handle:hover { background: $faint; }
+QScrollBar::add-line, QScrollBar::sub-line, QScrollBar::add-page, QScrollBar::sub-page {
+    background: none; border: none; height: 0; width: 0;
+}
+QSplitter::handle { background: $window; }
+QSplitter::handle:hover { background: $border_strong; }
+
+QProgressBar { background: $field; border: 1px solid $border; border-radius: 4px; text-align: center; height: 8px; }
+QProgressBar::chunk { background: $accent_hover; border-radius: 3px; }
+QSlider::groove:horizontal { background: $border_strong; height: 4px; border-radius: 2px; }
+QSlider::sub-page:horizontal { background: $accent_hover; border-radius: 2px; }
+QSlider::handle:horizontal {
+    background: $text; width: 14px; height: 14px; margin: -5px 0; border-radius: 7px;
+}
+QSlider::handle:horizontal:focus { background: $accent_text; }
+QSlider:disabled::sub-page:horizontal { background: $border_strong; }
+QSlider::handle:horizontal:disabled { background: $faint; }
+QTabBar::tab { background: transparent; color: $muted; padding: 6px 12px; border-bottom: 2px solid transparent; }
+QTabBar::tab:selected { color: $text; border-bottom-color: $accent_text; }
+QTabWidget::pane { border: none; }
+QGroupBox { border: none; margin-top: 20px; font-weight: 600; }
+QGroupBox::title { subcontrol-origin: margin; left: 0; }
+""")
+
+
+def stylesheet(theme: Theme) -> str:
+    """Return the style sheet for a window in this theme."""
+    colours = {name: value for name, value in vars(theme).items() if isinstance(value, str)}
+    return _TEMPLATE.substitute(colours, ghost=theme.states["ghost"])

@@ -1,0 +1,256 @@
+"""Colours, type and spacing of the window, dark and light.
+
+A theme is put on a top-level widget with `apply_theme`; whatever lies inside asks `theme_of` when it paints
+itself, and hears of a change as Qt's own style change event.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from PySide6.QtCore import QObject
+from PySide6.QtGui import QColor, QFont, QPalette
+from PySide6.QtWidgets import QApplication, QWidget
+
+from gp_labeler.scene.colours import DARK as DARK_SCENE
+from gp_labeler.scene.colours import LIGHT as LIGHT_SCENE
+from gp_labeler.scene.colours import SceneColours
+from gp_labeler.views.stylesheet import stylesheet
+
+__all__ = [
+    "CAPTION_PX",
+    "DARK",
+    "FONT_PX",
+    "GRID",
+    "LIGHT",
+    "THEMES",
+    "TITLE_PX",
+    "Theme",
+    "apply_theme",
+    "contrast",
+    "theme_of",
+]
+
+GRID = 4
+"""All distances are multiples of this many logical pixels."""
+
+CAPTION_PX, FONT_PX, TITLE_PX = 11, 12, 17
+FAMILIES = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")
+
+_PROPERTY = "gpTheme"
+
+_VIEWS_DARK = MappingProxyType(
+    {"3d": "#5CB8F5", "axial": "#F34A33", "sagittal": "#EDD54C", "coronal": "#6EB04B"}
+)
+_VIEWS_LIGHT = MappingProxyType(
+    {"3d": "#1273BE", "axial": "#D2331D", "sagittal": "#A88A00", "coronal": "#4A8A2A"}
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Theme:
+    """The colours of the window, as ``#RRGGBB``.
+
+    Parameters
+    ----------
+    name : str
+        ``dark`` or ``light``.
+    window, panel, card, raised, hover, field : str
+        Backgrounds: between the views, of panels, of cards, of buttons, under the pointer, of entry fields.
+    border, border_strong : str
+        Around cards, and around what can be clicked or typed into.
+    text, muted, faint : str
+        Words to read, beside them, and hints; all legible on every background.
+    accent, on_accent, accent_hover, accent_text : str
+        The one next action, what is written on it, and links.
+    selected : str
+        Background of the row being worked on.
+    warning, danger, good : str
+        What to look at, what stands against it, what is done.
+    states : mapping
+        Colour of each state of a point, by its name in `PointState`, and ``active`` and ``locked``.
+    views : mapping
+        Colour of each view: ``3d``, ``axial``, ``sagittal``, ``coronal``.
+    scene : SceneColours
+        What the scene draws with.
+    """
+
+    name: str
+    window: str
+    panel: str
+    card: str
+    raised: str
+    hover: str
+    field: str
+    border: str
+    border_strong: str
+    text: str
+    muted: str
+    faint: str
+    accent: str
+    accent_hover: str
+    on_accent: str
+    accent_text: str
+    selected: str
+    warning: str
+    danger: str
+    good: str
+    states: Mapping[str, str]
+    views: Mapping[str, str] = field(default_factory=lambda: _VIEWS_DARK)
+    scene: SceneColours = DARK_SCENE
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether words are lighter than what they stand on."""
+        return self.name == "dark"
+
+    def state(self, name: str) -> QColor:
+        """Return the colour of a state."""
+        return QColor(self.states[name])
+
+    def palette(self) -> QPalette:
+        """Return the same as a Qt palette, for what no style sheet reaches."""
+        palette, role = QPalette(), QPalette.ColorRole
+        for which, colour in (
+            (role.Window, self.panel),
+            (role.WindowText, self.text),
+            (role.Base, self.field),
+            (role.AlternateBase, self.card),
+            (role.Text, self.text),
+            (role.Button, self.raised),
+            (role.ButtonText, self.text),
+            (role.BrightText, self.danger),
+            (role.Highlight, self.accent),
+            (role.HighlightedText, self.on_accent),
+            (role.PlaceholderText, self.faint),
+            (role.Link, self.accent_text),
+            (role.ToolTipBase, self.raised),
+            (role.ToolTipText, self.text),
+        ):
+            palette.setColor(which, QColor(colour))
+        for which in (role.WindowText, role.Text, role.ButtonText):
+            palette.setColor(QPalette.ColorGroup.Disabled, which, QColor(self.faint))
+        return palette
+
+
+DARK = Theme(
+    name="dark",
+    window="#0E1318",
+    panel="#141A21",
+    card="#1A212A",
+    raised="#242D38",
+    hover="#2E3946",
+    field="#10161C",
+    border="#2A343F",
+    border_strong="#5B6B7C",
+    text="#E8EDF2",
+    muted="#A9B5C1",
+    faint="#98A5B2",
+    accent="#2A6FB8",
+    accent_hover="#2D76C2",
+    on_accent="#FFFFFF",
+    accent_text="#7CC4FA",
+    selected="#22364B",
+    warning="#F6B44C",
+    danger="#FF8086",
+    good="#6FE3B4",
+    states=MappingProxyType(
+        {
+            "to do": "#93A0AD",
+            "ghost": "#6FC1F8",
+            "placed": "#F6A43C",
+            "checked": "#A6DB6C",
+            "doubtful": "#FF7B81",
+            "unseen": "#A9B5C1",
+            "computed": "#6FE3B4",
+            "active": "#FFFFFF",
+            "locked": "#A9B5C1",
+        }
+    ),
+)
+
+LIGHT = Theme(
+    name="light",
+    window="#E3E8ED",
+    panel="#F4F6F8",
+    card="#FFFFFF",
+    raised="#FFFFFF",
+    hover="#E8EDF3",
+    field="#FFFFFF",
+    border="#D3DAE1",
+    border_strong="#8492A0",
+    text="#18222C",
+    muted="#475563",
+    faint="#5A6775",
+    accent="#1C67B3",
+    accent_hover="#17568F",
+    on_accent="#FFFFFF",
+    accent_text="#125FA8",
+    selected="#D9E8F7",
+    warning="#8A5200",
+    danger="#B3202B",
+    good="#08704A",
+    states=MappingProxyType(
+        {
+            "to do": "#5A6775",
+            "ghost": "#0F66A9",
+            "placed": "#9A5200",
+            "checked": "#3F6D12",
+            "doubtful": "#B81C27",
+            "unseen": "#475563",
+            "computed": "#08704A",
+            "active": "#101820",
+            "locked": "#475563",
+        }
+    ),
+    views=_VIEWS_LIGHT,
+    scene=LIGHT_SCENE,
+)
+
+THEMES: Mapping[str, Theme] = MappingProxyType({theme.name: theme for theme in (DARK, LIGHT)})
+
+
+def apply_theme(target: QWidget | QApplication, theme: Theme) -> None:
+    """Give a window, with all that it holds and opens, the look of a theme."""
+    target.setProperty(_PROPERTY, theme.name)
+    target.setFont(base_font())
+    target.setPalette(theme.palette())
+    target.setStyleSheet(stylesheet(theme))
+
+
+def base_font() -> QFont:
+    """Return the font of all text that says nothing else."""
+    font = QFont()
+    font.setFamilies(list(FAMILIES))
+    font.setPixelSize(FONT_PX)
+    return font
+
+
+def theme_of(widget: QObject | None) -> Theme:
+    """Return the theme that a widget is drawn in: that of the nearest one around it that has one."""
+    while widget is not None:
+        name = widget.property(_PROPERTY)
+        if name in THEMES:
+            return THEMES[name]
+        widget = widget.parent()
+    app = QApplication.instance()
+    return THEMES.get(app.property(_PROPERTY), DARK) if app is not None else DARK
+
+
+def contrast(one: str, other: str) -> float:
+    """Return the contrast of two colours ``#RRGGBB``, 1 to 21.
+
+    References
+    ----------
+    Web Content Accessibility Guidelines 2.1, relative luminance; 4.5 is its level AA for text.
+    """
+    lighter, darker = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    channels = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    red, green, blue = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in channels)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -1,0 +1,202 @@
+"""The four views, each under its coloured header, in a four-up or single layout."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QToolButton, QVBoxLayout, QWidget
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.planes import Plane, position_text
+from gp_labeler.views.icons import icon
+from gp_labeler.views.scene_view import SceneView
+from gp_labeler.views.slice_view import SliceView
+from gp_labeler.views.theme import theme_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["ViewFrame", "ViewGrid"]
+
+_HEADER_HEIGHT = 24
+
+
+class ViewHeader(QWidget):
+    """A bar with the view's colour, its name, where it is, and a button to maximise it.
+
+    Parameters
+    ----------
+    name : str
+        ``3d``, ``axial``, ``sagittal`` or ``coronal``.
+    """
+
+    maximise_asked = Signal()
+
+    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setFixedHeight(_HEADER_HEIGHT)
+        self._name = name
+        title = QLabel("3D" if name == "3d" else name.capitalize())
+        title.setProperty("role", "heading")
+        self.where = QLabel()
+        self.where.setProperty("role", "hint")
+        self._button = QToolButton()
+        self._button.setProperty("role", "quiet")
+        self._button.setFixedSize(22, 20)
+        self._button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._button.setToolTip("Maximise or restore this view (double click)")
+        self._button.setAccessibleName(f"Maximise the {name} view")
+        self._button.clicked.connect(self.maximise_asked)
+        row = QHBoxLayout(self)
+        row.setContentsMargins(10, 0, 2, 0)
+        row.setSpacing(8)
+        row.addWidget(title)
+        row.addWidget(self.where)
+        row.addStretch(1)
+        row.addWidget(self._button)
+        self.take_theme()
+
+    def take_theme(self) -> None:
+        """Draw in the colours of the window's theme."""
+        self._button.setIcon(icon("layout", theme_of(self).muted, size=14))
+
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
+        theme = theme_of(self)
+        painter = QPainter(self)
+        painter.fillRect(self.rect(), QColor(theme.card))
+        painter.fillRect(0, 0, 3, self.height(), QColor(theme.views[self._name]))
+        painter.end()
+
+    def mouseDoubleClickEvent(self, _: QMouseEvent) -> None:  # noqa: D102, N802
+        self.maximise_asked.emit()
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        if event.type() == QEvent.Type.StyleChange:
+            self.take_theme()
+        super().changeEvent(event)
+
+
+class ViewFrame(QWidget):
+    """A view under its header.
+
+    Parameters
+    ----------
+    name : str
+        See `ViewHeader`.
+    view : SceneView or SliceView
+        The view.
+    """
+
+    maximise_asked = Signal(str)
+
+    def __init__(self, name: str, view: SceneView | SliceView) -> None:
+        super().__init__()
+        self.name, self.view = name, view
+        self.header = ViewHeader(name)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(0, 0, 0, 0)
+        column.setSpacing(0)
+        column.addWidget(self.header)
+        column.addWidget(view, 1)
+        self.header.maximise_asked.connect(self._ask)
+        view.maximise_asked.connect(self._ask)
+
+    def _ask(self) -> None:
+        self.maximise_asked.emit(self.name)
+
+
+class ViewGrid(QWidget):
+    """3D and axial above, sagittal and coronal below; any of them alone.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What is shown; its session says in which layout.
+    """
+
+    hovered = Signal(object)
+    """(3,) scan position under the pointer in any view, or None."""
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk = workbench
+        self.scene_view = SceneView(workbench)
+        self.slice_views = {plane: SliceView(workbench, plane) for plane in Plane}
+        self.frames = {"3d": ViewFrame("3d", self.scene_view)}
+        self.frames |= {p.value: ViewFrame(p.value, self.slice_views[p]) for p in Plane}
+        self._rows = [self._row("3d", "axial"), self._row("sagittal", "coronal")]
+        self._column = QSplitter(Qt.Orientation.Vertical)
+        for row in self._rows:
+            self._column.addWidget(row)
+        self._column.setSizes([1000, 1000])
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.addWidget(self._column)
+        self._listen()
+        self._lay_out()
+
+    @property
+    def views(self) -> tuple[SceneView | SliceView, ...]:
+        """The four views."""
+        return (self.scene_view, *self.slice_views.values())
+
+    def reset(self) -> None:
+        """Show everything in every view."""
+        for view in self.views:
+            view.reset()
+
+    def release(self) -> None:
+        """Let go of scene and voxels."""
+        for view in self.views:
+            view.release()
+
+    def _row(self, left: str, right: str) -> QSplitter:
+        row = QSplitter(Qt.Orientation.Horizontal)
+        for name in (left, right):
+            row.addWidget(self.frames[name])
+        row.setSizes([1000, 1000])
+        for splitter in (row,):
+            splitter.setChildrenCollapsible(False)
+            splitter.setHandleWidth(6)
+        return row
+
+    def _listen(self) -> None:
+        self._column.setChildrenCollapsible(False)
+        self._column.setHandleWidth(6)
+        for frame in self.frames.values():
+            frame.maximise_asked.connect(self._maximise)
+            frame.view.hovered.connect(self.hovered)
+        for plane, view in self.slice_views.items():
+            view.moved.connect(lambda mm, p=plane: self._say_where(p, mm))
+        self._desk.view_changed.connect(self._on_view_changed)
+        self._desk.threshold_changed.connect(self._say_threshold)
+        self._desk.session_replaced.connect(self._on_session_replaced)
+
+    def _maximise(self, name: str) -> None:
+        view = self._desk.session.view
+        view.update(layout="four-up" if view.state.layout == name else name)
+
+    def _on_view_changed(self, changed: frozenset[str]) -> None:
+        if "layout" in changed:
+            self._lay_out()
+
+    def _on_session_replaced(self, _: object) -> None:
+        self._lay_out()
+        for frame in self.frames.values():
+            frame.header.where.setText("")
+
+    def _lay_out(self) -> None:
+        layout = self._desk.session.view.state.layout
+        for name, frame in self.frames.items():
+            frame.setVisible(layout in ("four-up", name))
+        for row, names in zip(self._rows, (("3d", "axial"), ("sagittal", "coronal")), strict=True):
+            row.setVisible(layout == "four-up" or layout in names)
+
+    def _say_where(self, plane: Plane, position: float) -> None:
+        self.frames[plane.value].header.where.setText(position_text(plane, position))
+
+    def _say_threshold(self, threshold: float | None) -> None:
+        self.frames["3d"].header.where.setText("" if threshold is None else f"bone from {threshold:.4g}")
+
+    def fly_to(self, position: FloatArray) -> None:
+        """Bring a (3,) scan position into sight in every view."""
+        for view in self.views:
+            view.go_to(position)
