@@ -16,7 +16,7 @@ from psygnal import Signal
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_core.landmarks.features import Side
+from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
 from gp_labeler.bone import Bone
 from gp_labeler.imaging.readers import ImportPlan
@@ -103,6 +103,8 @@ class Workbench:
     dragged = Signal(object)
     """The `Drag` that goes on; None when it is over."""
     tool_changed = Signal(str)
+    point_shown = Signal(object)
+    """(3,) scan position that every view shall bring into sight, mm."""
     import_asked = Signal(object)
     """An `ImportPlan` that needs answers: change its options, then `read_scan` it."""
     scan_differs = Signal(object, object)
@@ -125,6 +127,7 @@ class Workbench:
         self.drag: Drag | None = None
         self.tool = "place"
         self._predict, self._author = predict, author
+        self._last: tuple[Side, str] | None = None
         self._links: list[tuple[Any, Callable[..., object]]] = []
         self.session: Session = new_session(directory, predict=predict, author=author)
         self._bone = Bone(self)
@@ -227,6 +230,22 @@ class Workbench:
             self.tool = tool
             self.tool_changed.emit(tool)
 
+    def go_to(self, side: Side, code: str) -> None:
+        """Choose a point, and bring it, or where it is expected, into sight in every view."""
+        labelling.go_to(self.session, side, code)
+        landmarks, ghosts = self.session.landmarks(side), self.session.ghosts(side)
+        if code in landmarks or code in ghosts:
+            self.point_shown.emit(self.session.crosshair)
+
+    def nudged_point(self) -> tuple[Side, str] | None:
+        """Return the point that arrow keys move: the chosen one where it is placed, else the one placed last."""
+        active, last = self.session.active, self._last
+        if active.code is not None and self.session.state.landmark(active.side, active.code).position:
+            return active.side, active.code
+        if last is not None and self.session.state.landmark(*last).position is not None:
+            return last
+        return None
+
     def preview_threshold(self, value: float | None) -> None:
         """Try a threshold out on the slices; None ends that."""
         self.threshold_previewed.emit(value)
@@ -310,7 +329,7 @@ class Workbench:
         old, self.session = self.session, session
         old.close(discard=not old.dirty)
         self.truth = None
-        self.drag = None
+        self.drag = self._last = None
         self._bone.forget()
         session.view.update(**_kept(old.view.state))
         self._connect()
@@ -373,6 +392,8 @@ class Workbench:
         self.threshold_changed.emit(self.threshold)
 
     def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
+        touched = [point for point in changed if not feature(point[1]).computed]
+        self._last = touched[0] if len({code for _, code in touched}) == 1 else None
         for side in {side for side, _ in changed}:
             job = self.session.judging(side)
             self.jobs.submit(job, lambda _: self.doubts_changed.emit(), key=f"judging {side.value}")

@@ -30,6 +30,7 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.target import RenderTarget
 from gp_labeler.session.state import How
+from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
@@ -120,14 +121,17 @@ class SceneView(QWidget):
 
     def _listen(self) -> None:
         desk = self._desk
-        desk.surfaces_changed.connect(self._show_bone)
-        desk.session_replaced.connect(self._on_session_replaced)
+        follow(self, desk.surfaces_changed, self._show_bone)
+        follow(self, desk.session_replaced, self._on_session_replaced)
         for signal in (desk.landmarks_changed, desk.active_changed, desk.ghosts_changed, desk.doubts_changed):
-            signal.connect(self._show_points)
-        desk.crosshair_changed.connect(self.update)
-        desk.point_shown.connect(self.go_to)
-        desk.dragged.connect(self._on_dragged)
-        desk.view_changed.connect(self._on_view_changed)
+            follow(self, signal, self._show_points)
+        follow(self, desk.crosshair_changed, self._repaint)
+        follow(self, desk.point_shown, self.go_to)
+        follow(self, desk.dragged, self._on_dragged)
+        follow(self, desk.view_changed, self._on_view_changed)
+
+    def _repaint(self, *_: object) -> None:
+        self.update()
 
     def _on_session_replaced(self, _: object) -> None:
         self._fitted = False

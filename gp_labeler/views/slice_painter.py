@@ -16,6 +16,7 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
+from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks
 from gp_labeler.views.theme import Theme, base_font, theme_of
 from gp_labeler.workbench import Workbench
@@ -52,7 +53,7 @@ class SlicePainter:
         self._slice: SliceImage | None = None
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, list[QLineF]] | None = None
-        workbench.threshold_previewed.connect(self._on_preview)
+        follow(view, workbench.threshold_previewed, self._on_preview)
 
     def forget(self) -> None:
         """Let go of the pictures."""

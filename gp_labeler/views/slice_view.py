@@ -19,6 +19,7 @@ from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How
+from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks
 from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
@@ -111,10 +112,10 @@ class SliceView(QWidget):
 
     def _listen(self) -> None:
         desk = self._desk
-        desk.volume_opened.connect(self._on_volume)
-        desk.session_replaced.connect(self._on_session_replaced)
-        desk.crosshair_changed.connect(self._on_crosshair)
-        desk.point_shown.connect(self.go_to)
+        follow(self, desk.volume_opened, self._on_volume)
+        follow(self, desk.session_replaced, self._on_session_replaced)
+        follow(self, desk.crosshair_changed, self._on_crosshair)
+        follow(self, desk.point_shown, self.go_to)
         for signal in (
             desk.landmarks_changed,
             desk.active_changed,
@@ -125,7 +126,7 @@ class SliceView(QWidget):
             desk.view_changed,
             desk.dragged,
         ):
-            signal.connect(self._repaint)
+            follow(self, signal, self._repaint)
 
     def _repaint(self, *_: object) -> None:
         self.update()
@@ -318,7 +319,7 @@ class SliceView(QWidget):
         nearest = int(away.argmin())
         return marks[nearest].key if away[nearest] <= 8.0 * self.devicePixelRatioF() else None
 
-    def resizeEvent(self, event: Any) -> None:  # noqa: D102, N802
+    def resizeEvent(self, event: Any) -> None:  # noqa: N802
         """Keep middle and zoom; a view that was never seen shows the whole slice."""
         if self.shown is not None and event.oldSize().width() <= 1:
             self.reset()

@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QT
 from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import LETTERS
 from gp_labeler.session.jobs import Task
+from gp_labeler.views.bind import follow
 from gp_labeler.views.icons import icon
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
@@ -61,8 +62,8 @@ class StatusLine(QWidget):
             workbench.tool_changed,
             workbench.volume_opened,
         ):
-            signal.connect(self._on_changed)
-        workbench.message.connect(self.say)
+            follow(self, signal, self._on_changed)
+        follow(self, workbench.message, self.say)
         self._say_next()
 
     def show_position(self, position: FloatArray | None) -> None:
@@ -144,7 +145,7 @@ class _Work(QWidget):
         self.stop.clicked.connect(self._stop)
         jobs = workbench.jobs
         for signal in (jobs.started, jobs.progressed, jobs.done, jobs.failed, jobs.cancelled):
-            signal.connect(self._on_task)
+            follow(self, signal, self._on_task)
         self.stop.setIcon(icon("close", theme_of(self).muted, size=12))
         self._refresh()
 

@@ -8,6 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QToolButton, QVBox
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import Plane, position_text
+from gp_labeler.views.bind import follow
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.slice_view import SliceView
@@ -58,17 +59,17 @@ class ViewHeader(QWidget):
         """Draw in the colours of the window's theme."""
         self._button.setIcon(icon("layout", theme_of(self).muted, size=14))
 
-    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
+    def paintEvent(self, _: QPaintEvent) -> None:  # noqa: N802
         theme = theme_of(self)
         painter = QPainter(self)
         painter.fillRect(self.rect(), QColor(theme.card))
         painter.fillRect(0, 0, 3, self.height(), QColor(theme.views[self._name]))
         painter.end()
 
-    def mouseDoubleClickEvent(self, _: QMouseEvent) -> None:  # noqa: D102, N802
+    def mouseDoubleClickEvent(self, _: QMouseEvent) -> None:  # noqa: N802
         self.maximise_asked.emit()
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+    def changeEvent(self, event: QEvent) -> None:  # noqa: N802
         if event.type() == QEvent.Type.StyleChange:
             self.take_theme()
         super().changeEvent(event)
@@ -166,9 +167,9 @@ class ViewGrid(QWidget):
             frame.view.hovered.connect(self.hovered)
         for plane, view in self.slice_views.items():
             view.moved.connect(lambda mm, p=plane: self._say_where(p, mm))
-        self._desk.view_changed.connect(self._on_view_changed)
-        self._desk.threshold_changed.connect(self._say_threshold)
-        self._desk.session_replaced.connect(self._on_session_replaced)
+        follow(self, self._desk.view_changed, self._on_view_changed)
+        follow(self, self._desk.threshold_changed, self._say_threshold)
+        follow(self, self._desk.session_replaced, self._on_session_replaced)
 
     def _maximise(self, name: str) -> None:
         view = self._desk.session.view
