@@ -30,6 +30,8 @@ from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
+from gp_core.study.simulation import SimulationReport, simulate
+from gp_core.study.subset_search import SearchReport, search_features
 
 __version__ = "0.1.0"
 
@@ -50,7 +52,9 @@ __all__ = [
     "LandmarkSet",
     "LeaveOneOutReport",
     "RigidTransform",
+    "SearchReport",
     "Side",
+    "SimulationReport",
     "Specimen",
     "Status",
     "__version__",
@@ -65,5 +69,7 @@ __all__ = [
     "predict",
     "read_landmarks",
     "read_touches",
+    "search_features",
+    "simulate",
     "write_markups",
 ]

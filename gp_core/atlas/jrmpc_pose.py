@@ -6,7 +6,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gp_core.atlas.pose import CochleaPose
 from gp_core.checks import FloatArray
@@ -160,6 +159,8 @@ def _pose_frame(points: FloatArray, frame: str) -> RigidTransform:
 
 def _scatter(frames: Sequence[RigidTransform], mean: RigidTransform) -> FloatArray:
     """Return the (6, 6) covariance of the animals' cochlea frames about the mean one."""
+    from scipy.spatial.transform import Rotation  # slow to load, and the study needs the rest of this module
+
     shifts = np.array([frame.translation - mean.translation for frame in frames])
     turns = [Rotation.from_matrix(frame.rotation @ mean.rotation.T).as_rotvec() for frame in frames]
     deviations = np.hstack([shifts, turns])

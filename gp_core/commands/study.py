@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from gp_core.atlas.pose import METHODS
 from gp_core.commands.options import Subparsers, add_command, add_json, add_specimens, save_json, say
 from gp_core.commands.study_options import (
     add_features,
     add_figure,
+    add_method,
     add_settings,
     features_of,
     save_figure_of,
@@ -44,7 +44,7 @@ def add(commands: Subparsers) -> None:
         example="gp-core leave-one-out labelled/ --method jrmpc --figure figure6ab.png",
     )
     add_specimens(held_out)
-    held_out.add_argument("--method", choices=METHODS, default="robust", help="default: robust")
+    add_method(held_out)
     add_features(held_out)
     add_settings(held_out, "estimation")
     add_figure(held_out)

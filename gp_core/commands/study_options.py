@@ -1,15 +1,36 @@
-"""Options that the commands of the study share: features, JRMPC settings, figures."""
+"""Options that the commands of the study share: features, JRMPC settings, workers, figures."""
 
 from __future__ import annotations
 
 import argparse
+import math
+import sys
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
+from gp_core.atlas.pose import METHODS
 from gp_core.landmarks.features import CODES, EXTERNAL, PROBE, TRAINING, check_codes
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings
+from gp_core.study.elimination import Progress
+from gp_core.study.mapping import open_executor
 
-__all__ = ["add_features", "add_figure", "add_settings", "features_of", "save_figure_of", "settings_of"]
+__all__ = [
+    "ProgressLine",
+    "add_features",
+    "add_figure",
+    "add_method",
+    "add_settings",
+    "add_workers",
+    "codes_of",
+    "executor_of",
+    "features_of",
+    "save_figure_of",
+    "settings_of",
+]
+
+_SECONDS_BETWEEN_LINES = 20.0
 
 SETTINGS = {"estimation": ESTIMATION, "defaults": DEFAULTS}
 
@@ -32,17 +53,23 @@ def add_features(parser: argparse.ArgumentParser) -> None:
 
 def features_of(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Return the training and the probe features that were asked for."""
-    training = _codes(args.training, "--training", TRAINING, CODES)
-    return training, _codes(args.probe, "--probe", PROBE, tuple(c for c in EXTERNAL if c in training))
+    training = codes_of(args.training, "--training", TRAINING, CODES)
+    return training, codes_of(args.probe, "--probe", PROBE, tuple(c for c in EXTERNAL if c in training))
 
 
-def _codes(
+def codes_of(
     words: list[str] | None, option: str, default: tuple[str, ...], everything: tuple[str, ...]
 ) -> tuple[str, ...]:
+    """Return the features an option names, apart by blanks or commas; ``all`` stands for `everything`."""
     if words is None:
         return default
     codes = [code for word in words for code in word.split(",") if code]
     return everything if [code.lower() for code in codes] == ["all"] else check_codes(codes, option)
+
+
+def add_method(parser: argparse.ArgumentParser) -> None:
+    """Add ``--method``."""
+    parser.add_argument("--method", choices=METHODS, default="jrmpc", help="default: jrmpc, as in the paper")
 
 
 def add_settings(parser: argparse.ArgumentParser, default: str) -> None:
@@ -66,6 +93,51 @@ def settings_of(args: argparse.Namespace, default: JrmpcSettings) -> JrmpcSettin
     named = default if args.settings is None else SETTINGS[args.settings]
     numbers = {name: getattr(args, name) for name in ("max_iterations", "gamma", "epsilon")}
     return replace(named, **{name: value for name, value in numbers.items() if value is not None})
+
+
+def add_workers(parser: argparse.ArgumentParser) -> None:
+    """Add ``--workers`` and ``--scheduler``."""
+    parser.add_argument("--workers", type=int, metavar="N", help="processes to use; default: one a core")
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, such as tcp://host:8786"
+    )
+
+
+def executor_of(args: argparse.Namespace) -> AbstractContextManager[Executor | None]:
+    """Return what the study runs on, to be opened by ``with``."""
+    return open_executor(args.workers, args.scheduler)
+
+
+class ProgressLine:
+    """Says on stderr how far a study is: in one line of a terminal, elsewhere in a line now and then."""
+
+    def __init__(self) -> None:
+        self._live = sys.stderr.isatty()
+        self._shown = False
+        self._next = _SECONDS_BETWEEN_LINES
+
+    def __enter__(self) -> ProgressLine:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._live and self._shown:
+            sys.stderr.write("\n")
+
+    def __call__(self, progress: Progress) -> None:
+        """Show the progress."""
+        if not self._live and progress.seconds < self._next:
+            return
+        self._next = progress.seconds + _SECONDS_BETWEEN_LINES
+        left = "" if math.isnan(progress.left) else f", {_duration(progress.left)} left"
+        text = f"{100 * progress.fraction:3.0f} %  {progress.text}, {progress.fits} estimates{left}"
+        sys.stderr.write(f"\r{text:<100}" if self._live else f"{text}\n")
+        sys.stderr.flush()
+        self._shown = True
+
+
+def _duration(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    return f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
 def add_figure(parser: argparse.ArgumentParser) -> None:

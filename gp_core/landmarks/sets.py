@@ -93,6 +93,10 @@ class LandmarkSet:
             rows[index_of(code)] = _position(position, code)
         return cls(rows, Side.parse(side), frame)
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let pickle carry the set to other processes, though it cannot carry a read-only mapping."""
+        return LandmarkSet, (self.points, self.side, self.frame, self.unseen, dict(self.extra))
+
     def __getitem__(self, code: str) -> FloatArray:
         """Return the (3,) position of a feature, NaN where it is not placed."""
         point: FloatArray = self.points[index_of(code)]
@@ -200,6 +204,10 @@ class Specimen:
                     f"the {side.word} side holds {landmarks.side.word} landmarks", specimen=self.name
                 )
         object.__setattr__(self, "sides", MappingProxyType(dict(self.sides)))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Let pickle carry the animal to other processes, though it cannot carry a read-only mapping."""
+        return Specimen, (self.name, dict(self.sides))
 
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side.

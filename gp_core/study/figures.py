@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from os import PathLike
 from typing import Any
 
@@ -14,18 +15,22 @@ from matplotlib.ticker import MaxNLocator
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_core.landmarks.features import CODES
+from gp_core.landmarks.features import CODES, PROBE
 from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
+from gp_core.study.subset_search import SearchReport
 
-__all__ = ["distance_matrix", "error_histograms", "save_figure"]
+__all__ = ["distance_matrix", "error_histograms", "save_figure", "search_curves"]
 
 LEFT, RIGHT = "#2f6f9f", "#e0a458"
 """Colours of the two sides; told apart in grey print and by colour-blind readers."""
 
 AXIS_ERROR, ORIGIN_ERROR = "Modiolar-axis error (degrees)", "Cochlea-origin error (mm)"
 
-_INK, _FAINT = "#222222", "#d9d9d9"
+ACCENT = "#b5403a"
+"""Colour of what stands out."""
+
+_INK = "#222222"
 _SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 200
 
@@ -125,3 +130,49 @@ def _histogram(ax: Axes, values: FloatArray, sides: Any, width: float) -> None:
     ax.axvline(median, color=_INK, lw=1.0, ls="--", label=f"median {median:.2g}")
     ax.set_xlim(0, edges[-1])
     ax.yaxis.set_major_locator(MaxNLocator(integer=True, nbins=6))
+
+
+def search_curves(report: SearchReport) -> Figure:
+    """Draw E_T over the number of training features, and of touched ones at the best of these (Figure 5)."""
+    figure, (first, second) = new_figure(1, 2, (7.0, 3.1))
+    curve = report.best.probe_curve
+    dropped = [step.dropped or "" for step in report.training]
+    _curve(first, [(step.n, step.e_t) for step in report.training], dropped)
+    gone = ["", *(next(iter(set(a.features) - set(b.features))) for a, b in pairwise(curve))]
+    _curve(second, [(step.n, step.e_t) for step in curve], gone)
+    for step in curve:
+        if set(step.features) == set(PROBE):
+            second.plot(step.n, step.e_t, "o", mfc="none", mec=_INK, ms=9)
+            second.annotate(
+                f"the paper's {step.n}: {step.e_t:.2f}",
+                (step.n, step.e_t),
+                (0, -17),
+                textcoords="offset points",
+                fontsize=8,
+                ha="center",
+            )
+    label(first, "A", "Training features", "Total error $E_T$")
+    label(second, "B", f"Touched features, with {report.best.n} training features", "Total error $E_T$")
+    return figure
+
+
+def _curve(ax: Axes, points: Sequence[tuple[int, float]], dropped: Sequence[str]) -> None:
+    """Draw a curve with its lowest point marked, and below each point the feature that was dropped for it."""
+    n, e_t = zip(*points, strict=True)
+    ax.plot(n, e_t, "o-", color=LEFT, lw=1.2, ms=4)
+    lowest = min(points, key=lambda point: point[1])
+    ax.plot(*lowest, "o", color=ACCENT, ms=6)
+    ax.annotate(f"{lowest[1]:.2f}", lowest, (0, -13), textcoords="offset points", fontsize=8, ha="center")
+    span = max(e_t) - min(e_t) or 1.0
+    ax.set_ylim(min(e_t) - 0.45 * span, max(e_t) + 0.08 * span)
+    for position, code in zip(n, dropped, strict=True):
+        place: dict[str, Any] = {
+            "transform": ax.get_xaxis_transform(),
+            "ha": "center",
+            "va": "bottom",
+            "rotation": 90,
+        }
+        style = "normal" if code else "italic"
+        ax.text(position, 0.02, code or "dropped", fontsize=7, fontstyle=style, color=_INK, **place)
+    ax.invert_xaxis()
+    ax.set_xticks(range(max(n), min(n) - 1, -2 if len(n) > 12 else -1))

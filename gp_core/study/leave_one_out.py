@@ -8,18 +8,29 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.jrmpc_pose import training_sides
 from gp_core.atlas.pose import METHODS
 from gp_core.checks import FloatArray, check_option
+from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import round_window_frame, with_cochlea_origin
 from gp_core.landmarks.features import PROBE, TRAINING
-from gp_core.landmarks.sets import Specimen
+from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
 from gp_core.study.scoring import PoseErrors, jrmpc_errors, robust_errors, touched
 from gp_core.study.subsets import check_labels, check_subsets, sides_of
 
-__all__ = ["Folds", "LeaveOneOutReport", "Row", "folds_of", "leave_one_out", "summarise"]
+__all__ = [
+    "Folds",
+    "LeaveOneOutReport",
+    "Row",
+    "describe",
+    "folds_of",
+    "held_out_sides",
+    "leave_one_out",
+    "summarise",
+]
 
 
 @dataclass(frozen=True)
@@ -97,10 +108,11 @@ def _summary(values: FloatArray) -> dict[str, float]:
 def leave_one_out(
     specimens: Sequence[Specimen],
     *,
-    method: str = "robust",
+    method: str = "jrmpc",
     training: Iterable[str] = TRAINING,
     probe: Iterable[str] = PROBE,
     settings: JrmpcSettings = ESTIMATION,
+    held_out: Iterable[str] | None = None,
 ) -> LeaveOneOutReport:
     """Estimate the cochlea of every labelled side from the other animals, and measure the errors.
 
@@ -112,13 +124,15 @@ def leave_one_out(
     ----------
     specimens : sequence of Specimen
         At least three animals that have the features on every labelled side.
-    method : {"robust", "jrmpc"}
+    method : {"jrmpc", "robust"}
     training : iterable of str
         Features of the training animals, CO may be among them.
     probe : iterable of str
         Features touched on the held-out side: external ones among `training`.
     settings : JrmpcSettings
         Of ``jrmpc``; not used by ``robust``.
+    held_out : iterable of str, optional
+        Names of the animals to hold out, each by itself; by default all.
 
     Raises
     ------
@@ -128,18 +142,30 @@ def leave_one_out(
     check_option(method, "method", METHODS)
     features, touches = check_subsets(training, probe)
     check_labels(specimens, features)
-    groups = sides_of(specimens)
+    names = _checked_names(specimens, held_out)
+    owners = [(specimens[i].name, side.value) for side, which in sides_of(specimens) for i in which]
     if method == "robust":
-        errors = _robust(specimens, features, touches)
+        owners = [owner for owner in owners if owner[0] in names]
+        atlases, truths = held_out_sides(specimens, features, names)
+        errors = robust_errors(atlases, [touched(truth, touches) for truth in truths], truths)
     else:
-        folds = folds_of(specimens)
-        errors = PoseErrors.joined([fold.errors(features, touches, settings) for fold in folds])
-    owners = [(specimens[i].name, side.value) for side, which in groups for i in which]
+        errors = PoseErrors.joined([fold.errors(features, touches, settings) for fold in folds_of(specimens)])
     rows = [
         Row(name, side, float(e_co), float(e_ma))
         for (name, side), e_co, e_ma in zip(owners, errors.e_co_mm, errors.e_ma_deg, strict=True)
+        if name in names
     ]
-    return LeaveOneOutReport(method, features, touches, settings if method == "jrmpc" else None, tuple(rows))
+    used = settings if method == "jrmpc" else None
+    return LeaveOneOutReport(method, features, touches, used, tuple(rows))
+
+
+def _checked_names(specimens: Sequence[Specimen], held_out: Iterable[str] | None) -> tuple[str, ...]:
+    known = tuple(specimen.name for specimen in specimens)
+    names = known if held_out is None else tuple(held_out)
+    for name in names:
+        if name not in known:
+            raise GpError("is not among the animals", specimen=name, remedy=f"These are {' '.join(known)}.")
+    return names
 
 
 @dataclass(frozen=True)
@@ -175,15 +201,28 @@ def folds_of(specimens: Sequence[Specimen]) -> list[Folds]:
     return folds
 
 
-def _robust(specimens: Sequence[Specimen], features: tuple[str, ...], probe: tuple[str, ...]) -> PoseErrors:
+def held_out_sides(
+    specimens: Sequence[Specimen], features: Iterable[str], names: Iterable[str] | None = None
+) -> tuple[list[Atlas], list[LandmarkSet]]:
+    """Return each labelled side, left ones first, with an atlas fitted without its animal.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+    features : iterable of str
+        What the atlases hold, beside the features that define the cochlea.
+    names : iterable of str, optional
+        The animals to hold out, by default all.
+    """
+    wanted = {specimen.name for specimen in specimens} if names is None else set(names)
+    features = tuple(features)
     atlases = {
-        held_out.name: fit_atlas([s for s in specimens if s is not held_out], features=features)
-        for held_out in specimens
+        name: fit_atlas([s for s in specimens if s.name != name], features=features) for name in wanted
     }
-    sides = [(specimens[i], side) for side, which in sides_of(specimens) for i in which]
-    truths = [with_cochlea_origin(specimen.side(side)) for specimen, side in sides]
-    return robust_errors(
-        [atlases[specimen.name] for specimen, _ in sides],
-        [touched(truth, probe) for truth in truths],
-        truths,
-    )
+    held_out = [
+        (specimens[i].name, with_cochlea_origin(specimens[i].side(side)))
+        for side, which in sides_of(specimens)
+        for i in which
+        if specimens[i].name in wanted
+    ]
+    return [atlases[name] for name, _ in held_out], [truth for _, truth in held_out]

@@ -60,6 +60,21 @@ def test_features_and_settings_reach_the_study(folder: str, tmp_path: Path) -> N
     assert len(json.loads(report.read_text())["settings"]["probe"]) == 10
 
 
+def test_search(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report, figure, checkpoint = (str(tmp_path / name) for name in ("s.json", "s.png", "c.json"))
+    features = ["--training", "CA,CB,CL,LLI,MN,OS,RWA", "--fewest-training", "6", "--max-iterations", "10"]
+    files = ["--json", report, "--figure", figure, "--checkpoint", checkpoint]
+    assert main(["search", folder, "--workers", "1", *features, *files]) == 0
+    first = capsys.readouterr().out
+    assert "Best:" in first
+    content = json.loads(Path(report).read_text())
+    assert [step["n"] for step in content["training"]] == [7, 6]
+    assert content["settings"]["max_iterations"] == 10
+    assert Path(figure).read_bytes().startswith(b"\x89PNG")
+    assert main(["search", folder, "--workers", "1", *features, "--checkpoint", checkpoint]) == 0
+    assert capsys.readouterr().out.splitlines()[1:] == first.splitlines()[1:]
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [

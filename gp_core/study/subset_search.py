@@ -1,0 +1,187 @@
+"""The search for the best features: backward elimination over training and probe features (Figure 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import asdict, dataclass
+from os import PathLike
+from typing import Any
+
+from gp_core.atlas.pose import METHODS
+from gp_core.checks import check_option
+from gp_core.errors import FeatureError, GpError
+from gp_core.landmarks.features import CODES, check_codes
+from gp_core.landmarks.sets import Specimen
+from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
+from gp_core.study.checkpoint import Checkpoint, fingerprint
+from gp_core.study.elimination import (
+    FEWEST,
+    Codes,
+    Elimination,
+    Problem,
+    Progress,
+    Ticker,
+    TrainingStep,
+    external,
+)
+from gp_core.study.leave_one_out import Folds, folds_of, held_out_sides
+from gp_core.study.scoring import PoseErrors, robust_errors, touched
+from gp_core.study.subsets import check_labels
+
+__all__ = ["SearchReport", "check_start", "problem_of", "search_features"]
+
+
+@dataclass(frozen=True)
+class SearchReport:
+    """The two curves of the search.
+
+    Attributes
+    ----------
+    method : str
+    settings : JrmpcSettings or None
+        Of ``jrmpc``.
+    training : tuple of TrainingStep
+        From all training features downward.
+    fits : int
+        How many sides were estimated in all, those of a resumed run included.
+    seconds : float
+        Time this run took.
+    """
+
+    method: str
+    settings: JrmpcSettings | None
+    training: tuple[TrainingStep, ...]
+    fits: int
+    seconds: float
+
+    @property
+    def best(self) -> TrainingStep:
+        """The step with the least E_T."""
+        return min(self.training, key=lambda step: step.e_t)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report as the JSON file holds it."""
+        best = self.best
+        numbers = {} if self.settings is None else asdict(self.settings)
+        return {
+            "training": [asdict(step) for step in self.training],
+            "best": {"n": best.n, "features": best.features, "probe": best.probe, "e_t": best.e_t},
+            "fits": self.fits,
+            "seconds": self.seconds,
+            "settings": {"method": self.method, **numbers},
+        }
+
+
+@dataclass(frozen=True)
+class JrmpcProblem:
+    """Leave-one-out by JRMPC, as `Elimination` takes it."""
+
+    folds: tuple[Folds, ...]
+    settings: JrmpcSettings
+
+    @property
+    def n_sides(self) -> int:
+        """How many sides are estimated for one score."""
+        return sum(len(fold.cochlea) for fold in self.folds)
+
+    def scorer(self, training: Codes) -> Callable[[Codes], float]:
+        """Return what gives E_T of probe features."""
+        return lambda probe: (
+            PoseErrors.joined([fold.errors(training, probe, self.settings) for fold in self.folds]).e_t
+        )
+
+
+@dataclass(frozen=True)
+class RobustProblem:
+    """Leave-one-out by the robust method, as `Elimination` takes it."""
+
+    specimens: tuple[Specimen, ...]
+
+    @property
+    def n_sides(self) -> int:
+        """How many sides are estimated for one score."""
+        return sum(len(specimen.sides) for specimen in self.specimens)
+
+    def scorer(self, training: Codes) -> Callable[[Codes], float]:
+        """Fit the atlases, and return what gives E_T of probe features."""
+        atlases, truths = held_out_sides(self.specimens, training)
+        return lambda probe: robust_errors(atlases, [touched(truth, probe) for truth in truths], truths).e_t
+
+
+def search_features(
+    specimens: Sequence[Specimen],
+    *,
+    method: str = "jrmpc",
+    training: Iterable[str] = CODES,
+    fewest_training: int | None = None,
+    settings: JrmpcSettings = DEFAULTS,
+    executor: Executor | None = None,
+    checkpoint: str | PathLike[str] | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> SearchReport:
+    """Find the features whose leave-one-out error E_T is least, dropping one at a time.
+
+    From the best training features of one number, each is left out in turn; each of these candidates is
+    scored by the least E_T of a backward elimination over its own external features, and the best is the next
+    step. Features are chosen on the animals that they are scored on, so the errors are optimistic: see
+    `gp_core.study.nested`.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        At least three animals that have the features on every labelled side.
+    method : {"jrmpc", "robust"}
+    training : iterable of str
+        Where the elimination starts, by default at all 20 features.
+    fewest_training : int, optional
+        Where it ends: by default at three with ``jrmpc``. With ``robust`` it ends where it starts, so that
+        probe features alone are chosen: an atlas loses nothing by features that are not touched.
+    settings : JrmpcSettings
+        Of ``jrmpc``.
+    executor : concurrent.futures.Executor, optional
+        What candidates run on; the answer does not depend on it.
+    checkpoint : path, optional
+        Where results are kept as they come in; a search that finds this file goes on from there.
+    progress : callable, optional
+        Told about each candidate; what it raises stops the search.
+
+    Raises
+    ------
+    GpError
+        Too few animals or features, or a checkpoint of another study.
+
+    References
+    ----------
+    Usevitch et al., "Estimating the pose of a guinea-pig cochlea without medical imaging", 2021, Figure 5.
+    """
+    start, fewest = check_start(specimens, method, training, fewest_training)
+    used = settings if method == "jrmpc" else None
+    memory = Checkpoint(checkpoint, fingerprint(specimens, used, ("search", method)))
+    ticker = Ticker(progress)
+    elimination = Elimination(problem_of(specimens, method, settings), executor, memory, ticker)
+    steps = elimination.run(start, fewest)
+    return SearchReport(method, used, steps, ticker.fits, ticker.seconds)
+
+
+def check_start(
+    specimens: Sequence[Specimen], method: str, training: Iterable[str], fewest: int | None
+) -> tuple[Codes, int]:
+    """Return the training features that a search starts from, and the number that it ends at."""
+    check_option(method, "method", METHODS)
+    start = check_codes(training, "the training features", at_least=FEWEST)
+    if len(external(start)) < FEWEST:
+        raise FeatureError(f"the training features hold fewer than {FEWEST} that can be touched")
+    check_labels(specimens, start)
+    if fewest is None:
+        fewest = FEWEST if method == "jrmpc" else len(start)
+    if not FEWEST <= fewest <= len(start):
+        raise GpError(f"the search must end at {FEWEST} to {len(start)} training features, got {fewest}")
+    return start, fewest
+
+
+def problem_of(specimens: Sequence[Specimen], method: str, settings: JrmpcSettings) -> Problem:
+    """Return the leave-one-out problem of some animals."""
+    if method == "robust":
+        return RobustProblem(tuple(specimens))
+    return JrmpcProblem(tuple(folds_of(specimens)), settings)
