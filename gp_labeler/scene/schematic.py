@@ -31,13 +31,17 @@ _PLANES: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], str]] = {
 }
 """Of the left side: what points right and up on the picture, and the letters left, right, below, above."""
 
-_HEAD = np.array(
-    [(-15, -1), (-15.5, 6), (-11, 12.5), (-2, 15.5), (10, 15.5), (22, 13.2), (34, 9.6), (43, 6), (49, 2)]
-    + [(49, -2.5), (46, -5.5), (46.6, -11.5), (44.6, -13), (41, -13.4), (30, -17), (16, -18.5), (4, -17)]
-    + [(-3, -11), (-8, -5)],
-    dtype=np.float64,
+_HEAD: tuple[tuple[tuple[float, float], ...], ...] = (
+    ((-14, -3), (-15.5, 5), (-11, 12), (-2, 15), (10, 15), (21, 12.6), (33, 8.6), (42, 5), (48.5, 1.5))
+    + ((48.5, -2), (46.2, -4.6), (47.4, -10.5), (46.8, -12.6), (45.4, -11), (44.2, -6.5), (36, -5))
+    + ((28, -6), (20, -5.5), (12, -4.5), (6, -3), (3, -5.5), (-3, -6), (-8, -5)),
+    ((45.6, -10.5), (45.4, -12.6), (42, -14.2), (35, -12.6), (30, -16.2), (20, -18), (9, -18.6), (-2, -17))
+    + ((1, -13), (4, -10), (6.4, -1), (9, -4), (13, -7.5), (24, -8.2), (33, -8.6), (40, -11.6)),
+    ((19, 3.5), (22, 8), (27.5, 8.2), (30.5, 4), (28.5, -0.5), (22.5, -1.2)),
+    ((5.5, 2.2), (13, 0.8), (20, -1), (27, -2.2), (27, -4), (19, -3.2), (12, -1), (5.5, 0.6)),
 )
-"""Outline of a guinea pig's skull from its left: mm forwards and upwards of the ear; drawn, not measured."""
+"""A guinea pig's skull, mandible, orbit and zygoma from the left: mm forwards and upwards of the ear; drawn, not
+measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,8 +60,8 @@ class Schematic:
         How near the beholder each of them is, mm.
     spiral : (n, 2) array
         The cochlear tube, from the round window to the apex.
-    head : (n, 2) array
-        Outline of the skull; empty where the picture is of the ear alone.
+    head : tuple of (n, 2) arrays
+        Outlines of the skull and what is on it; empty where the picture is of the ear alone.
     letters : str
         Left, right, below and above on the picture, as on slices.
     box : (2, 2) array
@@ -69,7 +73,7 @@ class Schematic:
     points: Mapping[str, FloatArray]
     depths: Mapping[str, float]
     spiral: FloatArray
-    head: FloatArray
+    head: tuple[FloatArray, ...]
     letters: str
     box: FloatArray
 
@@ -88,15 +92,17 @@ def schematic_of(code: str, side: Side) -> Schematic:
         axes, letters = _mirrored(axes, view, letters)
     shown = {c: axes @ atlas[c] for c in CODES}
     points = {c: xyz[:2] for c, xyz in shown.items()}
-    head = _HEAD * (1 if side is Side.RIGHT else -1, 1) if far else np.empty((0, 2))
-    inside = list(points.values()) if far else [points[c] for c in CODES if c not in FAR]
-    corners = np.vstack([np.array(inside), head])
+    forwards = np.array([1.0 if side is Side.RIGHT else -1.0, 1.0])
+    head = tuple(np.array(outline) * forwards for outline in _HEAD) if far else ()
+    spiral = (_spiral() @ axes.T)[:, :2]
+    inside = [points[c] for c in CODES if far or c == row.code or c not in (*FAR, "MN")]
+    corners = np.vstack([np.array(inside), spiral, *head])
     return Schematic(
         row.code,
         row.view,
         points,
         {c: float(xyz[2]) for c, xyz in shown.items()},
-        (_spiral() @ axes.T)[:, :2],
+        spiral,
         head,
         letters,
         np.stack([corners.min(axis=0), corners.max(axis=0)]),

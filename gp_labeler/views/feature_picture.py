@@ -27,7 +27,13 @@ from gp_labeler.views.theme import Theme, base_font, theme_of
 __all__ = ["FeaturePicture", "feature_picture"]
 
 _MARGIN = 18.0
+_ROOMY = 180
+"""Logical pixels: in a narrower picture only the feature itself is named."""
+
 _OSSICLES = (("DTM", "MH"), ("DTM", "LLI"), ("DTM", "DTL"))
+_ORBIT = 2
+"""Which outline of the head is a hole."""
+
 _WORDS = {
     "coronal": "coronal, from the front",
     "axial": "axial, from below",
@@ -77,7 +83,7 @@ class FeaturePicture(QWidget):
         self.update()
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(320, 170)
+        return QSize(200, 110)
 
     def paintEvent(self, event: object) -> None:  # noqa: D102, N802 - Qt's name
         if self._shown is not None:
@@ -100,7 +106,7 @@ class _Picture:
 
     def draw(self) -> None:
         self._ground()
-        if len(self._it.head):
+        if self._it.head:
             self._head()
         self._ear()
         self._points()
@@ -128,10 +134,13 @@ class _Picture:
         self._painter.setClipRect(self._frame)
 
     def _head(self) -> None:
-        outline = [self._at(p) for p in self._it.head]
-        self._painter.setPen(QPen(self._tint(self._theme.scene.bone, 0.9 if self._theme.is_dark else 1.0), 1.4))
-        self._painter.setBrush(self._tint(self._theme.scene.bone, 0.16 if self._theme.is_dark else 0.35))
-        self._painter.drawPath(_smooth(outline))
+        dark, bone = self._theme.is_dark, QColor(self._theme.scene.bone)
+        edge = QPen(bone if dark else bone.darker(170), 1.3)
+        for n, outline in enumerate(self._it.head):
+            fill = self._tint(self._theme.scene.halo, 0.35) if n == _ORBIT else bone.darker(210 if dark else 100)
+            self._painter.setPen(edge)
+            self._painter.setBrush(fill)
+            self._painter.drawPath(_smooth([self._at(p) for p in outline]))
 
     def _ear(self) -> None:
         bone = self._theme.scene.bone if self._theme.is_dark else "#B9A57E"
@@ -151,20 +160,16 @@ class _Picture:
         """Draw the coil from the base to the apex, each part over those before, thinner towards the apex."""
         line = [self._at(p) for p in self._it.spiral]
         n = len(line)
-        for pen_of in (self._edge_pen, self._fill_pen):
-            for i in range(n - 1):
-                self._painter.setPen(pen_of(bone, i / n))
-                self._painter.drawLine(line[i], line[i + 1])
-
-    def _edge_pen(self, bone: str, t: float) -> QPen:
-        return _round_pen(QColor(bone).darker(175), self._tube_width(t) + 1.6)
-
-    def _fill_pen(self, bone: str, t: float) -> QPen:
-        shade = QColor(bone)
-        return _round_pen(shade.darker(round(150 - 45 * t)), self._tube_width(t))
+        for i in range(1, n - 1):
+            edge = _round_pen(QColor(bone).darker(230), self._tube_width(i / n) + 1.8)
+            edge.setCapStyle(Qt.PenCapStyle.FlatCap)  # so it does not stain the part before
+            self._painter.setPen(edge)
+            self._painter.drawLine(line[i], line[i + 1])
+            self._painter.setPen(_round_pen(QColor(bone).darker(round(150 - 40 * i / n)), self._tube_width(i / n)))
+            self._painter.drawPolyline(QPolygonF(line[i - 1 : i + 2]))
 
     def _tube_width(self, t: float) -> float:
-        return max(1.0, self._scale * (0.95 - 0.45 * t))
+        return max(1.0, self._scale * (0.88 - 0.4 * t))
 
     def _canal(self, bone: str) -> None:
         """Draw the opening of the ear canal, whose lower and upper edge are OI and OS."""
@@ -203,13 +208,13 @@ class _Picture:
 
     def _points(self) -> None:
         order = sorted(CODES, key=lambda code: self._it.depths[code])
-        near = [c for c in order if c != self._it.code and (c not in FAR or len(self._it.head))]
+        near = [c for c in order if c != self._it.code and (c not in FAR or self._it.head)]
         self._painter.setPen(QPen(QColor(self._theme.scene.halo), 1))
         self._painter.setBrush(QColor(self._theme.muted))
         for code in near:
             self._painter.drawEllipse(self._of(code), 2.4, 2.4)
         self._target()
-        for code in near:
+        for code in near if self._frame.width() >= _ROOMY and not self._it.head else ():
             self._label(code, self._font(9), QColor(self._theme.muted), 4.0, must=False)
 
     def _target(self) -> None:
@@ -255,9 +260,9 @@ class _Picture:
             (above, flag.AlignHCenter | flag.AlignTop),
         ):
             self._painter.drawText(inner, where, letter)
-        if self._frame.width() >= 180:
+        if self._frame.width() >= _ROOMY:
             self._painter.setFont(self._font(10))
-            text = "from the side" if len(self._it.head) else _WORDS[self._it.view]
+            text = "from the side" if self._it.head else _WORDS[self._it.view]
             self._painter.drawText(inner, flag.AlignLeft | flag.AlignBottom, text)
             self._painter.drawText(inner, flag.AlignRight | flag.AlignBottom, "schematic")
         else:

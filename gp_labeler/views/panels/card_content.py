@@ -21,8 +21,8 @@ class CardContent:
 
     Parameters
     ----------
-    eyebrow, code, name, aside : str
-        Such as ``Place next · left · 3 of 20``, ``IN``, ``Incisors``, ``shared by both sides``.
+    eyebrow, code, name, aside, aside_hint : str
+        Such as ``Place next · left · 3 of 20``, ``IN``, ``Incisors``, ``both sides``, and what that means.
     definition, where : str
         What the feature is, and how to find it.
     status, status_role : str
@@ -39,6 +39,7 @@ class CardContent:
     code: str = ""
     name: str = ""
     aside: str = ""
+    aside_hint: str = ""
     definition: str = ""
     where: str = ""
     status: str = ""
@@ -69,12 +70,13 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     state, mark = session.point_states(side, wait=False)[row.code], session.state.landmark(side, row.code)
     status, role = _status(session, side, row.code, state)
     action, words = ("unlock", "Unlock") if mark.locked else _ACTIONS[state]
-    shared = "shared by both sides" if row.shared else "can be touched" if row.external else ""
+    aside, hint = _SHARED if row.shared else _EXTERNAL if row.external else ("", "")
     return CardContent(
         eyebrow=f"{_VERBS[state]} · {side.word} · {session.progress(side).text}",
         code=row.code,
         name=row.name,
-        aside=shared,
+        aside=aside,
+        aside_hint=hint,
         definition=row.definition,
         where=f"{row.where} Best seen in {_VIEWS[row.view]}.",
         status=f"{status} Locked." if mark.locked else status,
@@ -86,6 +88,8 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     )
 
 
+_SHARED = ("both sides", "One point, shared by both sides")
+_EXTERNAL = ("touchable", "The probe can touch it on an opened animal: it serves to estimate the pose")
 _VERBS = {
     PointState.TO_DO: "Place next",
     PointState.GHOST: "Place next",
@@ -108,23 +112,23 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
     """Return one sentence on how far the point is, and its look."""
     if state is PointState.GHOST:
         ghost = session.ghosts(side)[code]
-        who = "The atlas expects it" if ghost.source == "atlas" else "Mirrored from the other side:"
-        return f"{who} within {mm_text(ghost.radius_95)} (95 %) of the ghost.", "ghost"
+        who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
+        return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
     if state is PointState.DOUBTFUL:
         doubt = session.doubts(side)[code]
-        return f"{mm_text(doubt.distance)} from where the other points make the atlas expect it.", "danger"
+        return f"{mm_text(doubt.distance)} from where the atlas expects it.", "danger"
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"
     if state is PointState.PLACED:
-        return f"Placed {_how(session, side, code)}. Drag it or nudge it to correct it.", "hint"
+        return f"Placed {_how(session, side, code)}. Drag or nudge it to correct it.", "hint"
     if state is PointState.UNSEEN:
-        return "Looked for, and not seen. Click to place it after all.", "hint"
+        return "Looked for, not seen. Click to place it after all.", "hint"
     return _first_ones(session, side), "hint"
 
 
 def _how(session: Session, side: Side, code: str) -> str:
     provenance = session.state.landmark(side, code).provenance
-    words = {"mesh": "on bone", "slice": "on a slice", "accepted ghost": "where the atlas expected it"}
+    words = {"mesh": "on bone", "slice": "on a slice", "accepted ghost": "on its ghost"}
     how = provenance.how.value if provenance else ""
     return words.get(how, how)
 
@@ -136,7 +140,7 @@ def _first_ones(session: Session, side: Side) -> str:
         return "Click on bone or a slice to place it."
     if len(missing) == n_short:
         names = " and ".join([", ".join(missing[:-1]), missing[-1]] if len(missing) > 1 else missing)
-        return f"Once {names} {'are' if len(missing) > 1 else 'is'} placed, the atlas shows where to look."
+        return f"After {names}, the atlas shows where to look."
     return f"After {n_short} more of this side, the atlas shows where to look."
 
 

@@ -34,8 +34,9 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkTable"]
 
-_LOWEST, _HIGHEST = 19, 30
-_CHIP, _CODE_WIDTH, _PAD = 12, 34, 8
+_LOWEST, _HIGHEST = 18, 30
+_WIDEST = "Right 20/20"
+_CHIP, _CODE_WIDTH, _PAD = 12, 35, 8
 
 
 class LandmarkTable(QWidget):
@@ -139,22 +140,22 @@ class _TableView(QTableView):
         font = self.font()
         font.setPixelSize(FONT_PX)
         words = QFontMetrics(font)
-        width = max(words.horizontalAdvance(text) for text in ("computed", "Right 20/20", "doubtful"))
+        width = max(words.horizontalAdvance(text) for text in ("computed", "checked", "0.99 mm"))
         for column in (1, 2):
-            self.setColumnWidth(column, width + _CHIP + 3 * _PAD)
+            self.setColumnWidth(column, max(_PAD + _CHIP + 4 + width, words.horizontalAdvance(_WIDEST) + 14))
 
-    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         return QSize(340, 30 + 22 * len(CODES))
 
-    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(300, 30 + 6 * _LOWEST)
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        return QSize(340, 32 + _LOWEST * len(CODES))
 
-    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         height = (self.viewport().height() - 2) // len(CODES)
         self.verticalHeader().setDefaultSectionSize(min(max(height, _LOWEST), _HIGHEST))
         super().resizeEvent(event)
 
-    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802 - Qt's name
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
             self._table.clear_current()
         elif event.key() == Qt.Key.Key_Menu:
@@ -165,7 +166,7 @@ class _TableView(QTableView):
         else:
             super().keyPressEvent(event)
 
-    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         super().leaveEvent(event)
         self.viewport().update()
 
@@ -173,7 +174,7 @@ class _TableView(QTableView):
 class _ChipDelegate(QStyledItemDelegate):
     """Paints a feature's code and name, or the state of a point as a chip and a word."""
 
-    def paint(  # noqa: D102
+    def paint(
         self, painter: QPainter, option: QStyleOptionViewItem, index: QModelIndex | QPersistentModelIndex
     ) -> None:
         view = self.parent()
@@ -225,7 +226,7 @@ class _ChipDelegate(QStyledItemDelegate):
         painter.drawText(box.adjusted(_PAD, 0, 0, 0), middle, str(index.data(CODE_ROLE)))
         painter.setFont(font)
         painter.setPen(QColor(theme.muted))
-        words = box.adjusted(_PAD + _CODE_WIDTH, 0, -4, 0)
+        words = box.adjusted(_PAD + _CODE_WIDTH, 0, -1, 0)
         name = QFontMetrics(font).elidedText(
             str(index.data()), Qt.TextElideMode.ElideRight, round(words.width())
         )

@@ -1,0 +1,40 @@
+"""The panel of the step Label: the feature card over the table of landmarks."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from gp_labeler.views.panels.feature_card import FeatureCard
+from gp_labeler.views.panels.landmark_table import LandmarkTable
+from gp_labeler.workbench import Workbench
+
+__all__ = ["PANEL_WIDTH", "LabelPanel"]
+
+PANEL_WIDTH = 372
+"""Logical pixels; all names and states of the table fit into it."""
+
+
+class LabelPanel(QWidget):
+    """Card and table; the card gets what the table leaves.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose session they show and edit.
+    actions : object, optional
+        Handed on.
+    """
+
+    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("role", "panel")
+        self.setFixedWidth(PANEL_WIDTH)
+        self.card = FeatureCard(workbench, actions)
+        self.table = LandmarkTable(workbench, actions)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(4, 8, 8, 8)
+        layout.setSpacing(6)
+        layout.addWidget(self.card, 2)
+        layout.addWidget(self.table, 3)
