@@ -30,7 +30,7 @@ __all__ = ["Cochlea"]
 
 _CAP = 0.4
 _WALL = 0.34
-_LIP = 0.24
+_LIP = 0.2
 _BRIDGE = 0.4
 """Bone to leave between the two windows, mm."""
 
@@ -192,12 +192,13 @@ class Cochlea:
         vestibule = oval.centre - 0.85 * oval.normal
         canvas.paint(union([tube(line, thick), cone(vestibule, line[0], 0.62, 0.4)]), grey.FLUID)
         self._paint_lamina(canvas, line[1:-1], thick[1:-1])
-        canvas.paint(cone(base + 0.5 * axis, base + 0.7 * self.length * axis, 0.4, 0.2), grey.CANCELLOUS)
+        canvas.paint(cone(base + 0.9 * axis, base + 0.7 * self.length * axis, 0.4, 0.2), grey.CANCELLOUS)
         nerve = np.stack([base - 0.45 * axis, base - 1.2 * axis, self.ear.at((1.6, -2.6, 2.6))])
         canvas.paint(tube(nerve, (0.45, 0.5, 0.7)), grey.SOFT)
         canvas.paint(cone(*self._patch(), 0.3), grey.BONE)
         canvas.paint(oval.plug(-0.9, 0.0), grey.FLUID)
         canvas.paint(oval.plug(0.0, 0.6), grey.AIR)
+        canvas.paint(oval.ring(_LIP), grey.BONE)  # again: an edge cut along an edge would be worn away
         self._open_round_window(canvas)
 
     def _patch(self) -> tuple[FloatArray, FloatArray]:
@@ -224,8 +225,8 @@ class Cochlea:
     def paint_stapes(self, canvas: Canvas) -> None:
         """Paint the stapes: its footplate free in the oval window, two limbs and the head."""
         oval = self.oval_window
-        gap = 0.22
-        canvas.paint(oval.plug(-0.28, -0.02, grow=-gap), grey.BONE)
+        gap = 0.38
+        canvas.paint(oval.plug(-0.3, -0.04, grow=-gap), grey.BONE)
         reach = oval.radii[np.argmin(np.abs(oval.angles))] - gap - 0.12
         head = oval.centre + 0.85 * oval.normal
         feet = [oval.centre + side * reach * oval.axes[0] - 0.1 * oval.normal for side in (-1, 1)]

@@ -22,11 +22,11 @@ from gp_labeler.imaging.phantom.solids import (
     union,
 )
 
-__all__ = ["paint_ear"]
+__all__ = ["paint_ear", "pinna"]
 
 _BULLA_WALL = 0.5
 _LIP = 0.42
-_CANAL_DEPTH = 1.9
+_CANAL_DEPTH = (0.7, 1.9)
 _UMBO = (8.2, 1.1, -1.1)
 _RECESS = 0.85
 
@@ -39,15 +39,16 @@ def paint_ear(canvas: Canvas, ear: Ear) -> None:
     outer = [inset(cavity, -_BULLA_WALL), inset(recess, -_BULLA_WALL), *_petrous(ear)]
     canvas.paint(union([*outer, *(tube(line, 0.5) for line in canals)]), grey.BONE)
     canvas.paint(union([cavity, recess]), grey.AIR)
-    canvas.paint(union([canal.plug(-_CANAL_DEPTH, 0.0, grow=_LIP, flare=0.3), canal.ring(_LIP)]), grey.BONE)
-    canvas.paint(canal.plug(-_CANAL_DEPTH - 0.2, 0.0, flare=0.3), grey.AIR)
-    canvas.paint(canal.plug(0.0, 1.0, flare=0.3), grey.AIR)
+    depth = _canal_depth(ear, canal)
+    canvas.paint(union([canal.plug(-depth, 0.0, grow=_LIP, flare=0.3), canal.ring(_LIP)]), grey.BONE)
+    canvas.paint(canal.plug(-depth - 0.2, 1.0, flare=0.3), grey.AIR)
     _paint_outer_ear(canvas, ear, canal)
+    canvas.paint(canal.ring(_LIP), grey.BONE)
     canvas.paint(_spur(ear), grey.BONE)
     cochlea.paint_bone(canvas)
     cochlea.paint_inside(canvas)
     canvas.paint(union([tube(line, 0.2) for line in canals]), grey.FLUID)
-    _paint_drum(canvas, ear, canal)
+    _paint_drum(canvas, ear, canal, depth)
     canvas.paint(_ossicles(ear), grey.BONE)
     cochlea.paint_stapes(canvas)
 
@@ -111,35 +112,45 @@ def _canal(ear: Ear) -> Rim:
     return Rim.through([top, middle + side, bottom, middle - side], along=along, outward=outward)
 
 
+def _canal_depth(ear: Ear, canal: Rim) -> float:
+    """Return how deep the bony canal reaches, mm: no nearer to the malleus than leaves MH free."""
+    room = float((canal.centre - ear["MH"]) @ canal.normal) - 0.75
+    return float(np.clip(room, *_CANAL_DEPTH))
+
+
 def _paint_outer_ear(canvas: Canvas, ear: Ear, canal: Rim) -> None:
     """Paint the soft ear canal out to the skin, and the ear."""
     start = canal.centre + 0.5 * canal.normal
     way = np.stack([start, ear.at((15.5, -1.5, 2.0)), ear.at((21.5, -2.5, 4.5))])
-    flap = ear.at((18.6, 1.5, 7.0), (18.2, -2.0, 10.5), (17.0, -5.0, 9.0))
-    edge = ear.at((23.5, 0.5, 6.0), (25.5, -4.0, 8.5), (23.5, -7.0, 4.0))
-    canvas.paint(sheet(flap, edge, (0.7, 0.6, 0.6)), grey.SOFT)
+    canvas.paint(pinna(ear), grey.SOFT)
     canvas.paint(tube(way, (1.5, 1.1, 1.5)), grey.AIR)
+
+
+def pinna(ear: Ear) -> Solid:
+    """Return the outer ear."""
+    root = ear.at((18.6, 1.5, 7.0), (18.2, -2.0, 10.5), (17.0, -5.0, 9.0))
+    edge = ear.at((22.5, 1.5, 6.5), (24.5, -3.5, 8.0), (23.0, -7.5, 3.5))
+    return sheet(root, edge, (0.7, 0.6, 0.6), steps=4)
 
 
 def _spur(ear: Ear) -> Solid:
     """Return the spur in the dorsal bulla: from the roof, bent to the side, its pointed tip DTL."""
-    root, bend = ear.at((8.5, 1.2, 4.8), (8.9, 1.6, 2.75))
-    out = unit(ear["DTL"] - bend)
-    return tube([root, bend, tip_centre(ear["DTL"], out, 0.24)], (0.8, 0.5, 0.24), steps=3)
+    root, bend = ear.at((8.4, 1.2, 4.8), (8.8, 1.6, 2.8))
+    tip = tip_centre(ear["DTL"], ear.towards(1, 0, 0), 0.24)
+    return tube([root, bend, tip], (0.6, 0.4, 0.24), steps=3)
 
 
 def _ossicles(ear: Ear) -> Solid:
     """Return malleus and incus, fused: head DTM, handle with MH at its upper end, long limb ending in LLI."""
-    body, back = ear.at((8.75, 1.9, 1.2), (8.35, 1.15, 1.45))
-    short = ear.at((8.5, 0.2, 1.75), (8.6, -0.7, 2.0))
-    up = unit(ear["DTM"] - body)
+    body, back = ear.at((8.75, 2.0, 1.0), (8.35, 1.15, 1.35))
+    short = ear.at((8.5, 0.2, 1.6), (8.6, -0.7, 1.8))
     window = (ear["RWA"] + ear["RWP"]) / 2
     limb_end = tip_centre(ear["LLI"], unit(window - ear["LLI"]), 0.28)
     neck, top, middle, umbo = ear.at((8.7, 1.8, 0.65), (8.55, 1.4, 0.25), (8.4, 1.25, -0.4), _UMBO)
     process = unit(ear["MH"] - top)
     return union(
         [
-            cone(body, tip_centre(ear["DTM"], up, 0.42), 0.6, 0.42),
+            cone(body, tip_centre(ear["DTM"], ear.towards(0, 0, 1), 0.42), 0.55, 0.42),
             tube([body, back, *short], (0.6, 0.5, 0.32, 0.2), steps=3),
             tube([back, ear.at((7.95, 0.5, 0.95)), limb_end], (0.38, 0.27, 0.28)),
             tube([body, neck, top, middle, umbo], (0.5, 0.3, 0.28, 0.22, 0.26), steps=3),
@@ -148,8 +159,8 @@ def _ossicles(ear: Ear) -> Solid:
     )
 
 
-def _paint_drum(canvas: Canvas, ear: Ear, canal: Rim) -> None:
+def _paint_drum(canvas: Canvas, ear: Ear, canal: Rim, depth: float) -> None:
     """Paint the eardrum: a thin cone of membrane from the inner end of the canal to the tip of the handle."""
-    edge = canal.curve(-0.3 * _CANAL_DEPTH + 0.1, 24) - _CANAL_DEPTH * canal.normal
+    edge = canal.curve(0.1 - 0.3 * depth, 24) - depth * canal.normal
     tip = np.broadcast_to(ear.at(_UMBO), edge.shape)
     canvas.paint(sheet(edge, tip, 0.09), grey.THIN_MEMBRANE)

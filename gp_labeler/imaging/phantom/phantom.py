@@ -16,15 +16,15 @@ from gp_core.landmarks.files.markups import write_markups
 from gp_core.landmarks.sets import Specimen
 from gp_labeler.imaging.phantom import grey
 from gp_labeler.imaging.phantom.canvas import Canvas
-from gp_labeler.imaging.phantom.ear import paint_ear
+from gp_labeler.imaging.phantom.ear import paint_ear, pinna
 from gp_labeler.imaging.phantom.jaw import paint_jaw
 from gp_labeler.imaging.phantom.layout import HeadLayout
 from gp_labeler.imaging.phantom.skull import (
-    head_box,
     paint_arches,
     paint_skin,
     paint_skull,
     paint_upper_teeth,
+    skin,
 )
 from gp_labeler.imaging.volume import Volume
 
@@ -33,6 +33,7 @@ __all__ = ["Phantom", "make_phantom", "write_phantom"]
 _SPACINGS_MM = (0.08, 0.5)
 _TILT_DEG = 2.0
 _BLUR_MM = 0.08
+_AIR_MM = 1.5
 
 
 @dataclass(frozen=True)
@@ -92,13 +93,21 @@ def make_phantom(
     name = f"phantom-{seed}"
     animal = specimen or draw_animal(atlas, rng=rng, tilt_deg=_TILT_DEG, name=name)
     head = HeadLayout(animal, atlas)
-    low, high = head_box(head) if box is None else box
+    low, high = _head_box(head) if box is None else box
     canvas = Canvas(low, high, spacing, grey.AIR)
     _paint(canvas, head)
     voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=noise)
     notes = (f"synthetic head, seed {seed}: no animal was scanned",)
     volume = Volume.from_parts(voxels, [spacing] * 3, canvas.origin, name=name, notes=notes)
     return Phantom(volume, animal)
+
+
+def _head_box(head: HeadLayout) -> FloatArray:
+    """Return the (2, 3) corners of a box in the scan around the whole head, with some air, mm."""
+    parts = [skin(head), *(pinna(ear) for ear in head.ears)]
+    low = np.min([part.low for part in parts], axis=0)
+    high = np.max([part.high for part in parts], axis=0)
+    return np.stack([low - _AIR_MM, high + _AIR_MM])
 
 
 def _paint(canvas: Canvas, head: HeadLayout) -> None:

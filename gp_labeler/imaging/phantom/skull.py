@@ -26,7 +26,7 @@ from gp_labeler.imaging.phantom.solids import (
     union,
 )
 
-__all__ = ["head_box", "paint_arches", "paint_skin", "paint_skull", "paint_upper_teeth"]
+__all__ = ["paint_arches", "paint_skin", "paint_skull", "paint_upper_teeth", "skin"]
 
 # Cross-sections: anterior position, half width, top, bottom (mm of the mean head, see HeadLayout)
 _SKIN = (
@@ -72,13 +72,6 @@ _SNOUT = (16.0, 46.0)
 _FINE = 8192
 
 
-def head_box(head: HeadLayout) -> FloatArray:
-    """Return the (2, 3) corners of a box in the scan around the whole head, with some air, mm."""
-    skin = _loft(head, _SKIN, 2.3)
-    margin = 2.0
-    return np.stack([skin.low - margin, skin.high + margin])
-
-
 def _loft(head: HeadLayout, sections: ArrayLike, power: float) -> Solid:
     """Return the body with superelliptic cross-sections along the midline of the head."""
     from scipy.interpolate import PchipInterpolator
@@ -118,9 +111,14 @@ def _with_own_snout(head: HeadLayout, table: FloatArray) -> FloatArray:
     return table + share * (tip[1], 0.0, tip[2], tip[2])
 
 
+def skin(head: HeadLayout) -> Solid:
+    """Return the soft outline of the head without the outer ears."""
+    return _loft(head, _SKIN, 2.3)
+
+
 def paint_skin(canvas: Canvas, head: HeadLayout) -> None:
     """Paint the soft outline of the head, with eyes and nostrils."""
-    canvas.paint(_loft(head, _SKIN, 2.3), grey.SOFT)
+    canvas.paint(skin(head), grey.SOFT)
     for ear in head.ears:
         eye = ear.at((11.8, 21.5, 5.8))
         canvas.paint(ellipsoid(eye, head.semi_axes(4.2, 4.2, 4.2)), grey.SOFT)
@@ -148,7 +146,7 @@ def _skull(head: HeadLayout) -> Solid:
     body = _loft(head, _SKULL, 2.5)
     hollows = []
     for ear in head.ears:
-        hollows.append(ellipsoid(ear.at((12.6, 20.4, 3.9)), head.semi_axes(6.2, 6.6, 4.9)))
+        hollows.append(ellipsoid(ear.at((12.8, 20.6, 3.6)), head.semi_axes(7.4, 6.6, 5.4)))
         hollows.append(ellipsoid(ear.at((11.6, 27.4, 0.4)), head.semi_axes(4.6, 4.2, 3.6)))
         hollows.append(ellipsoid(ear.at((11.2, 11.0, 1.2)), head.semi_axes(2.4, 4.6, 3.2)))
     return cut_smoothly(body, blend(hollows, 1.5), 1.6)
@@ -202,7 +200,7 @@ def _paint_crests(canvas: Canvas, head: HeadLayout) -> None:
     crest = head.at([(x, -11.0 + 0.012 * x * x, 11.2 - 0.035 * x * x) for x in np.linspace(-7.5, 7.5, 13)])
     parts = [tube(crest, 0.6)]
     for ear in head.ears:
-        parts.append(tube(ear.at((2.2, -12.6, -0.6), (3.4, -12.6, 1.0), (3.5, -12.0, 2.8)), (1.0, 1.2, 0.8), steps=4))
+        parts.append(tube(ear.at((2.2, -12.4, -0.4), (3.3, -12.5, 0.9), (3.4, -11.9, 2.6)), (0.8, 1.0, 0.6), steps=4))
         process = ear.at((7.4, -9.0, 0.5), (7.9, -8.4, -3.0), (7.9, -7.2, -6.2))
         parts.append(tube(process, (1.3, 0.9, 0.5), steps=4))
     canvas.paint(union(parts), grey.BONE)
@@ -235,11 +233,11 @@ def _arch(ear: Ear) -> Solid:
     half = 0.6
     upper = ear.at(
         (11.4, 26.4, -2.0), (13.6, 23.0, -1.2), (14.8, 18.4, -0.3), (15.0, 13.4, 0.0), (14.2, 10.0, 1.0),
-        (12.7, 7.9, 2.4), (10.0, 5.6, 4.0),
+        (12.7, 7.9, 2.9), (9.8, 5.0, 5.4),
     )  # fmt: skip
     lower = ear.at(
         (11.3, 25.4, -6.0), (13.5, 22.0, -6.4), (14.8, 17.8, -5.2), (15.1, 13.4, -3.8), (14.4, 10.4, -2.2),
-        (12.9, 8.6, 0.7), (10.0, 6.4, 2.2),
+        (12.9, 8.8, 0.6), (9.8, 7.6, 1.6),
     )  # fmt: skip
     middle = (upper + lower) / 2
     middle[3] = tip_centre(ear["ZL"], ear.towards(1, 0, 0), half)
@@ -281,7 +279,7 @@ def paint_upper_teeth(canvas: Canvas, head: HeadLayout) -> None:
 def upper_incisor(ear: Ear) -> Solid:
     """Return an upper incisor: an arc from its root in the snout down past IN."""
     line = ear.at(
-        (1.7, 36.0, -0.6), (1.6, 39.5, 1.1), (1.4, 43.0, 0.9), (1.25, 45.8, -1.2), (1.1, 47.2, -4.6),
-        (1.05, 47.5, -8.0), (1.02, 46.9, -11.2),
+        (1.7, 36.0, -0.6), (1.6, 39.5, 1.1), (1.4, 43.0, 0.9), (1.3, 45.8, -1.2), (1.17, 47.2, -4.6),
+        (1.1, 47.5, -8.0), (1.05, 46.9, -11.2),
     )  # fmt: skip
     return tube(line, (0.7, 0.9, 0.95, 0.92, 0.9, 0.85, 0.55), steps=4)
