@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.progress import Report
-from gp_labeler.imaging.readers.dicom_tags import Frame, scan_dicom
+from gp_labeler.imaging.readers.dicom_tags import Frame, Pixels, scan_dicom
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.plan import Choice, Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 from gp_labeler.imaging.readers.simpleitk import ItkSource, read_itk_planes
-from gp_labeler.imaging.readers.source import FileSource, Plane, SliceSource
+from gp_labeler.imaging.readers.source import FileSource, Plane, RawSource, SliceSource
 
 __all__ = ["inspect_dicom"]
 
@@ -174,7 +174,7 @@ def _single_frames(
         files=tuple(frame.path for frame in there),
         size=(first.shape[1], first.shape[0], len(files)),
         stored_dtype=_dtype(there),
-        source=FileSource(files, partial(_decode, channel=options.channel)),
+        source=FileSource(files, partial(_decode, frames=_by_path(there), channel=options.channel)),
         geometry=_geometry(first, order, first.positions[0] if order.placed else np.zeros(3)),
         found=(*found, *order.problems, *_pixel_problems(first)),
         notes=_value_notes(there),
@@ -195,14 +195,13 @@ def _multi_frame(
 ) -> ImportPlan:
     frame = frames[0]
     order = _order_within(frame)
-    source: SliceSource = ItkSource(frame.path, options.channel)
     return ImportPlan(
         path=folder,
         format="DICOM multi-frame",
         files=(frame.path,),
         size=(frame.shape[1], frame.shape[0], frame.n_frames),
         stored_dtype=_dtype([frame]),
-        source=source,
+        source=_frames_source(frame, options.channel),
         geometry=_geometry(frame, order, frame.positions[0] if order.placed else np.zeros(3)),
         found=(*found, *order.problems, *_pixel_problems(frame)),
         notes=_value_notes([frame]),
@@ -359,8 +358,39 @@ def _value_notes(frames: Sequence[Frame]) -> tuple[str, ...]:
     return ("values were scaled by the rescale slope of the slices and are held as float32",)
 
 
-def _decode(path: Path, channel: int | None) -> Plane:
-    return to_grey(read_itk_planes(path)[0], channel)
+def _by_path(frames: Sequence[Frame]) -> dict[Path, Frame]:
+    return {frame.path: frame for frame in frames}
+
+
+def _decode(path: Path, frames: Mapping[Path, Frame], channel: int | None) -> Plane:
+    """Read the values of one slice, through SimpleITK where its pixels are packed."""
+    frame = frames[path]
+    if frame.pixels is None:
+        return to_grey(read_itk_planes(path)[0], channel)
+    n_pixels = frame.shape[0] * frame.shape[1]
+    stored = np.fromfile(path, frame.pixels.dtype, n_pixels, offset=frame.pixels.offset)
+    if stored.size < n_pixels:
+        raise VolumeError("it ends before its last pixel", file=path, remedy="Copy it again.")
+    return _value(stored.reshape(frame.shape), frame.pixels)
+
+
+def _value(stored: Plane, pixels: Pixels) -> Plane:
+    """Return the values of stored numbers: their unused bits removed, scaled and shifted."""
+    unused = 8 * pixels.dtype.itemsize - pixels.bits
+    if unused:  # old files keep overlays there
+        stored = (stored.astype(stored.dtype.newbyteorder("=")) << unused) >> unused
+    if (pixels.slope, pixels.intercept) == (1.0, 0.0):
+        return stored
+    return stored * pixels.slope + pixels.intercept
+
+
+def _frames_source(frame: Frame, channel: int | None) -> SliceSource:
+    if frame.pixels is None:
+        return ItkSource(frame.path, channel)
+    finish = partial(_value, pixels=frame.pixels)
+    return RawSource(
+        frame.path, frame.pixels.offset, frame.pixels.dtype, frame.shape, frame.n_frames, finish=finish
+    )
 
 
 def _times(shape: tuple[int, int]) -> str:

@@ -2,27 +2,48 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pydicom
 from pydicom.errors import InvalidDicomError
+from pydicom.uid import ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.progress import Report
 
-__all__ = ["Frame", "is_dicom", "scan_dicom"]
+__all__ = ["Frame", "Pixels", "is_dicom", "scan_dicom"]
 
 _TAGS = [
     "SOPClassUID", "ImageType", "SeriesInstanceUID", "SeriesNumber", "SeriesDescription", "InstanceNumber",
     "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness",
+    "NominalScannedPixelSpacing",
     "SpacingBetweenSlices", "Rows", "Columns", "NumberOfFrames", "SamplesPerPixel", "BitsAllocated",
-    "BitsStored", "PixelRepresentation", "RescaleSlope", "RescaleIntercept",
+    "BitsStored", "HighBit", "PixelRepresentation", "RescaleSlope", "RescaleIntercept",
     "SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence",
 ]  # fmt: skip
+
+
+_NUMBERS = {(8, 0): "u1", (8, 1): "i1", (16, 0): "u2", (16, 1): "i2", (32, 0): "u4", (32, 1): "i4"}
+
+
+@dataclass(frozen=True)
+class Pixels:
+    """Where the unpacked pixels of a file begin, and how they are stored: then no library need decode them.
+
+    `dtype` has its byte order, `bits` of each number count; values are scaled and shifted.
+    """
+
+    offset: int
+    dtype: np.dtype[Any]
+    bits: int
+    slope: float
+    intercept: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +78,8 @@ class Frame:
         Samples of a pixel.
     localizer : bool
         Whether it calls itself a scout image.
+    pixels : Pixels, optional
+        Where its pixels lie; None where they are packed or in colour.
     """
 
     path: Path
@@ -73,6 +96,7 @@ class Frame:
     integral: bool
     channels: int
     localizer: bool
+    pixels: Pixels | None
 
 
 def is_dicom(path: Path) -> bool:
@@ -103,7 +127,10 @@ def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[Frame], list
 
 
 def _read(path: Path) -> Frame | None:
-    tags = pydicom.dcmread(path, stop_before_pixels=True, specific_tags=_TAGS)
+    with path.open("rb") as file:
+        tags = pydicom.dcmread(file, stop_before_pixels=True, specific_tags=_TAGS)
+        pixel_header = file.read(12)
+        offset = file.tell()
     rows, columns = _whole(tags, "Rows"), _whole(tags, "Columns")
     if not rows or not columns:
         if "SOPClassUID" not in tags:
@@ -112,7 +139,8 @@ def _read(path: Path) -> Frame | None:
     shared = _first(tags.get("SharedFunctionalGroupsSequence"))
     each = list(tags.get("PerFrameFunctionalGroupsSequence") or [])
     measures = _group("PixelMeasuresSequence", shared, each, tags)
-    pixel = _numbers(measures, "PixelSpacing", 2)
+    # A secondary capture, as SimpleITK writes it, keeps its pixel size under another name.
+    pixel = _numbers(measures, "PixelSpacing", 2) or _numbers(tags, "NominalScannedPixelSpacing", 2)
     distance = _numbers(measures, "SpacingBetweenSlices", 1) or _numbers(measures, "SliceThickness", 1)
     orientation = _numbers(
         _group("PlaneOrientationSequence", shared, each, tags), "ImageOrientationPatient", 6
@@ -135,6 +163,7 @@ def _read(path: Path) -> Frame | None:
         value_range=values,
         integral=integral,
         channels=max(1, _whole(tags, "SamplesPerPixel")),
+        pixels=_pixels(tags, rescale, pixel_header, offset),
         localizer="LOCALIZER" in [str(word).upper() for word in _listed(tags.get("ImageType"))],
     )
 
@@ -162,6 +191,7 @@ def _positions(tags: Any, each: list[Any]) -> FloatArray:
     return np.array(known) if known and len(known) == len(each) else np.empty((0, 3))
 
 
+@lru_cache(maxsize=64)
 def _axes(orientation: tuple[float, ...]) -> FloatArray | None:
     x, y = np.array(orientation[:3]), np.array(orientation[3:])
     if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.5 or abs(x @ y) > 1e-3:
@@ -172,12 +202,36 @@ def _axes(orientation: tuple[float, ...]) -> FloatArray | None:
     return np.column_stack([x, y, np.cross(x, y)])
 
 
+def _pixels(tags: Any, rescale: Any, header: bytes, offset: int) -> Pixels | None:
+    """Find the pixels behind the tag (7FE0,0010) and its length, if they are plain numbers."""
+    syntax = tags.file_meta.get("TransferSyntaxUID")
+    if syntax not in (ImplicitVRLittleEndian, ExplicitVRLittleEndian, ExplicitVRBigEndian):
+        return None
+    order = ">" if syntax == ExplicitVRBigEndian else "<"
+    implicit = syntax == ImplicitVRLittleEndian
+    start = offset - 4 if implicit else offset
+    tag = struct.unpack(order + "2H", header[:4]) if len(header) == 12 else None
+    length = struct.unpack(order + "I", header[4:8] if implicit else header[8:12])[0] if tag else 0
+    allocated, code = _whole(tags, "BitsAllocated"), _whole(tags, "PixelRepresentation")
+    number, bits = _NUMBERS.get((allocated, code)), _whole(tags, "BitsStored")
+    n_pixels = _whole(tags, "Rows") * _whole(tags, "Columns") * max(1, _whole(tags, "NumberOfFrames"))
+    plain = _whole(tags, "SamplesPerPixel") <= 1 and _whole(tags, "HighBit") == bits - 1
+    if tag != (0x7FE0, 0x0010) or number is None or not plain or length < n_pixels * allocated // 8:
+        return None
+    slope, intercept = _rescaling(rescale)
+    return Pixels(start, np.dtype(order + number), bits, slope, intercept)
+
+
+def _rescaling(rescale: Any) -> tuple[float, float]:
+    slope = (_numbers(rescale, "RescaleSlope", 1) or (1.0,))[0] or 1.0
+    return slope, (_numbers(rescale, "RescaleIntercept", 1) or (0.0,))[0]
+
+
 def _values(tags: Any, rescale: Any) -> tuple[tuple[float, float], bool]:
     bits = _whole(tags, "BitsStored") or _whole(tags, "BitsAllocated") or 16
     signed = _whole(tags, "PixelRepresentation") == 1
     low, high = (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) if signed else (0.0, 2.0**bits - 1)
-    slope = (_numbers(rescale, "RescaleSlope", 1) or (1.0,))[0] or 1.0
-    shift = (_numbers(rescale, "RescaleIntercept", 1) or (0.0,))[0]
+    slope, shift = _rescaling(rescale)
     ends = sorted((low * slope + shift, high * slope + shift))
     return (ends[0], ends[1]), float(slope).is_integer() and float(shift).is_integer()
 

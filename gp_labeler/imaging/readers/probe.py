@@ -29,6 +29,7 @@ from gp_labeler.imaging.readers.tiff import inspect_tiff, is_multi_page
 
 __all__ = ["inspect_path"]
 
+_FEW_IMAGES = 20  # more than that are slices, and need not be opened to see it
 _HINTS = {
     ".raw": "A raw file needs its header: give the MHD or NHDR file that belongs to it.",
     ".vol": "Save it as TIFF stack, DICOM or MHD in the scanner's software.",
@@ -74,15 +75,16 @@ def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportP
 def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> ImportPlan:
     files = _files(folder)
     images = _images(files)
-    dicom = [file for file in files if file not in set(images) and is_dicom(file)]
-    volumes = [file for file in files if _is_volume(file)]
-    if dicom and len(dicom) >= len(images):
-        return inspect_dicom(folder, [file for file in files if file not in set(images)], options, report)
-    if len(images) > 1 and not volumes:
-        return inspect_stack(folder, images, options, report)
-    if len(volumes) == 1 and len(images) <= 1 + (volumes[0] in images):
+    others = [file for file in files if file.suffix.lower() not in SLICE_SUFFIXES]
+    n_dicom = sum(map(is_dicom, others))
+    if n_dicom and n_dicom >= len(images):
+        return inspect_dicom(folder, others, options, report)
+    few = images if len(images) <= _FEW_IMAGES else []
+    volumes = [file for file in (*others, *few) if _is_volume(file)]
+    n_slices = len(images) - sum(file in volumes for file in images)
+    if len(volumes) == 1 and n_slices <= 1:
         return _inspect_file(volumes[0], options, report)
-    if len(volumes) > 1 and len(images) <= len(volumes):
+    if len(volumes) > 1 and n_slices <= len(volumes):
         raise VolumeError(
             f"it holds several volumes: {names(volumes, 12)}", file=folder, remedy="Give one of them."
         )

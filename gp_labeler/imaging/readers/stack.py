@@ -46,7 +46,6 @@ class _Slice:
     dtype: np.dtype[np.generic]
     channels: int
     palette: bool
-    pixel_size: PixelSize
 
 
 def inspect_stack(
@@ -127,7 +126,7 @@ def _left_out(
     candidates: Sequence[SliceGroup],
 ) -> list[Problem]:
     found = []
-    scouts = [file for file in files if file not in set(slices)]
+    scouts = sorted(set(files) - set(slices))
     if scouts:
         found.append(warning("scout", f"scout images are left out: {names(scouts)}"))
     stray = [file for group in groups if group not in candidates for file in group.files]
@@ -157,19 +156,24 @@ def _tiff_slice(path: Path) -> _Slice:
         assert isinstance(page, tifffile.TiffPage)
         shape = (page.imagelength, page.imagewidth)
         palette = page.photometric == _PALETTE
-        return _Slice(shape, np.dtype(page.dtype), page.samplesperpixel, palette, tiff_pixel_size(tif))
+        return _Slice(shape, np.dtype(page.dtype), page.samplesperpixel, palette)
 
 
 def _image_slice(path: Path) -> _Slice:
     with Image.open(path) as image:
+        wide = {"I": "int32", "F": "float32"}
+        dtype = np.dtype(wide.get(image.mode, "uint16" if ";16" in image.mode else "uint8"))
+        shape = (image.height, image.width)
+        return _Slice(shape, dtype, len(image.getbands()), image.mode in ("P", "PA"))
+
+
+def _pixel_size(path: Path) -> PixelSize:
+    if path.suffix.lower() in TIFF_SUFFIXES:
+        with tifffile.TiffFile(path) as tif:
+            return tiff_pixel_size(tif)
+    with Image.open(path) as image:
         dpi = image.info.get("dpi")
-        size = dots_per_inch(float(dpi[0]), float(dpi[1])) if dpi else UNKNOWN
-        dtype = np.dtype(
-            {"I": "int32", "F": "float32"}.get(image.mode, "uint16" if ";16" in image.mode else "uint8")
-        )
-        return _Slice(
-            (image.height, image.width), dtype, len(image.getbands()), image.mode in ("P", "PA"), size
-        )
+        return dots_per_inch(float(dpi[0]), float(dpi[1])) if dpi else UNKNOWN
 
 
 def _plan(
@@ -193,8 +197,8 @@ def _plan(
     found += _numbering_problems(group, numbering)
     found += _odd_sizes(strays, odd, headers, shape)
     found += _mixtures(usable, options)
-    first = next(iter(usable.values()))
-    geometry, log_problems = _geometry(first.pixel_size, numbering, log, shape, group)
+    size = _pixel_size(next(iter(usable)))
+    geometry, log_problems = _geometry(size, numbering, log, shape, group)
     dtypes = [np.dtype(np.uint8) if header.palette else header.dtype for header in usable.values()]
     return ImportPlan(
         path=folder,
