@@ -31,6 +31,7 @@ __all__ = [
     "Meshes",
     "ProposeThreshold",
     "ReadScan",
+    "SaveMesh",
 ]
 
 FIRST_LOOK_VOXELS = 96**3
@@ -211,6 +212,25 @@ class MakeDemo:
         progress(1.0)
         _ = phantom.volume.intensity_range, phantom.volume.checksum
         return Demo(phantom.volume, phantom.specimen)
+
+
+@dataclass(frozen=True, eq=False)
+class SaveMesh:
+    """Write the whole bone surface at full resolution."""
+
+    volume: Volume
+    threshold: float
+    path: Path
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Writing {self.path.name}"
+
+    def run(self, progress: Progress) -> Path:
+        """Mesh and write."""
+        _mesh(self.volume, self.threshold, progress, end=0.9).save(self.path)
+        return self.path
 
 
 def _mesh(

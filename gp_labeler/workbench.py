@@ -33,7 +33,7 @@ from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import SetThreshold
 from gp_labeler.session.specimen_file import SUFFIX
 from gp_labeler.session.state import How
-from gp_labeler.work import Demo, InspectScan, LoadAtlas, MakeDemo, ReadScan
+from gp_labeler.work import Demo, InspectScan, LoadAtlas, MakeDemo, ReadScan, SaveMesh
 
 __all__ = ["TOOLS", "Drag", "Workbench"]
 
@@ -258,6 +258,12 @@ class Workbench:
     def mesh_ears(self, half_mm: float | None = None) -> None:
         """Mesh around the ears at full resolution now, wherever their place is known."""
         self._bone.mesh_ears(half_mm=half_mm, anew=True)
+
+    def save_mesh(self, path: Path) -> None:
+        """Write the whole bone surface at full resolution, in the background."""
+        if self.volume is not None and self.threshold is not None:
+            job = SaveMesh(self.volume, self.threshold, Path(path))
+            self.jobs.submit(job, lambda file: self.say(f"Wrote {file.name}"))
 
     def begin_drag(self, side: Side, code: str) -> bool:
         """Take up a placed point; False where it cannot be moved."""

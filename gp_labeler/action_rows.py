@@ -1,0 +1,289 @@
+"""The rows of the table of commands, a menu at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gp_core.landmarks.features import FEATURES
+from gp_labeler.action import Action, Run, Test, Ui
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import CheckPoint, SwapSides
+from gp_labeler.session.state import How, Landmark
+from gp_labeler.workbench import Workbench
+
+__all__ = ["edit_rows", "file_rows", "help_rows", "landmark_rows", "view_rows"]
+
+
+# When something can be done
+
+
+def _always(desk: Workbench) -> bool:
+    return True
+
+
+def _lacks_scan(desk: Workbench) -> bool:
+    return desk.volume is None and desk.session.state.volume is not None
+
+
+def _has_scan(desk: Workbench) -> bool:
+    return desk.volume is not None
+
+
+def _has_labels(desk: Workbench) -> bool:
+    return bool(desk.session.state.landmarks)
+
+
+def _mark(desk: Workbench) -> Landmark | None:
+    active = desk.session.active
+    return None if active.code is None else desk.session.state.landmark(active.side, active.code)
+
+
+def _has_active(desk: Workbench) -> bool:
+    return _mark(desk) is not None
+
+
+def _is_free(desk: Workbench) -> bool:
+    mark = _mark(desk)
+    return mark is not None and not mark.locked
+
+
+def _is_settled(desk: Workbench) -> bool:
+    mark = _mark(desk)
+    return mark is not None and mark.settled
+
+
+def _is_placed(desk: Workbench) -> bool:
+    mark = _mark(desk)
+    return mark is not None and mark.position is not None
+
+
+def _is_checked(desk: Workbench) -> bool:
+    mark = _mark(desk)
+    return mark is not None and mark.checked
+
+
+def _is_locked(desk: Workbench) -> bool:
+    mark = _mark(desk)
+    return mark is not None and mark.locked
+
+
+def _has_ghost(desk: Workbench) -> bool:
+    active = desk.session.active
+    return active.code is not None and active.code in desk.session.ghosts(active.side)
+
+
+# What is done
+
+
+def _toggle(field: str) -> Run:
+    def change(desk: Workbench, ui: Ui) -> None:
+        desk.session.view.update(**{field: not getattr(desk.session.view.state, field)})
+
+    return change
+
+
+def _is_on(field: str) -> Test:
+    return lambda desk: bool(getattr(desk.session.view.state, field))
+
+
+def _set_layout(layout: str) -> Run:
+    return lambda desk, ui: desk.session.view.update(layout=layout)
+
+
+def _has_layout(layout: str) -> Test:
+    return lambda desk: desk.session.view.state.layout == layout
+
+
+def _set_tool(tool: str) -> Run:
+    return lambda desk, ui: desk.set_tool(tool)
+
+
+def _has_tool(tool: str) -> Test:
+    return lambda desk: desk.tool == tool
+
+
+def _change_opacity(step: float) -> Run:
+    def change(desk: Workbench, ui: Ui) -> None:
+        opacity = min(max(desk.session.view.state.mesh_opacity + step, 0.0), 1.0)
+        desk.session.view.update(mesh_opacity=round(opacity, 3))
+
+    return change
+
+
+def _auto_greys(desk: Workbench, ui: Ui) -> None:
+    desk.session.view.update(level=None, width=None)
+
+
+def _look_from(letter: str) -> Run:
+    return lambda desk, ui: ui.look_from(letter)
+
+
+def _place_at_crosshair(desk: Workbench, ui: Ui) -> None:
+    labelling.place(desk.session, desk.session.crosshair, How.SLICE)
+
+
+def _toggle_lock(desk: Workbench, ui: Ui) -> None:
+    mark = _mark(desk)
+    labelling.lock(desk.session, mark is None or not mark.locked)
+
+
+def _toggle_check(desk: Workbench, ui: Ui) -> None:
+    active, mark = desk.session.active, _mark(desk)
+    if active.code is not None and mark is not None:
+        desk.session.do(CheckPoint(active.side, active.code, not mark.checked))
+
+
+def _all_locked(desk: Workbench) -> bool:
+    marks = [mark for mark in desk.session.state.landmarks.values() if mark.settled]
+    return bool(marks) and all(mark.locked for mark in marks)
+
+
+def _step_point(step: int) -> Run:
+    def go(desk: Workbench, ui: Ui) -> None:
+        codes = [row.code for row in FEATURES if not row.computed]
+        active = desk.session.active
+        at = codes.index(active.code) if active.code in codes else -1 if step > 0 else 0
+        desk.go_to(active.side, codes[(at + step) % len(codes)])
+
+    return go
+
+
+def _other_side(desk: Workbench, ui: Ui) -> None:
+    active = desk.session.active
+    if active.code is not None:
+        desk.go_to(active.side.other, active.code)
+
+
+def _show_active(desk: Workbench, ui: Ui) -> None:
+    active = desk.session.active
+    if active.code is not None:
+        desk.go_to(active.side, active.code)
+
+
+# The rows: id, menu, title, keys, what is done, when it can be
+
+
+# fmt: off
+def file_rows() -> Iterator[Action]:
+    """Return the commands of the menu File."""
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _always, *,
+            hint: str = "", group: str = "", icon: str = "") -> Action:
+        return Action(f"file.{id}", "File", title, keys, run, enabled, hint=hint, group=group, icon=icon)
+
+    yield row("open", "Open…", ("Ctrl+O",), lambda d, ui: ui.ask_open_file(),
+              hint="A scan, or a specimen saved before", group="open", icon="file")
+    yield row("open_folder", "Open folder…", ("Ctrl+Shift+O",), lambda d, ui: ui.ask_open_folder(),
+              hint="A DICOM series or a stack of slices", group="open", icon="folder")
+    yield row("demo", "Open the demo", (), lambda d, ui: ui.open_demo(),
+              hint="A synthetic guinea-pig head to try everything on", group="open", icon="play")
+    yield row("find_scan", "Find scan…", (), lambda d, ui: ui.ask_find_scan(), _lacks_scan, group="open")
+    yield row("save", "Save", ("Ctrl+S",), lambda d, ui: ui.save(), _has_scan, group="save", icon="save")
+    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda d, ui: ui.save(ask=True), _has_scan, group="save")
+    yield row("import", "Import landmarks…", ("Ctrl+I",), lambda d, ui: ui.ask_import(), _has_scan,
+              group="exchange", icon="import")
+    yield row("export", "Export landmarks…", ("Ctrl+E",), lambda d, ui: ui.ask_export(), _has_labels,
+              hint="For 3D Slicer and gp-core", group="exchange", icon="export")
+    yield row("save_mesh", "Save bone surface…", (), lambda d, ui: ui.ask_save_mesh(),
+              lambda d: bool(d.surfaces), group="exchange")
+    yield row("screenshot", "Save picture…", (), lambda d, ui: ui.ask_screenshot(), group="exchange")
+    yield row("close", "Close", ("Ctrl+Q",), lambda d, ui: ui.close_window(), group="close")
+
+
+def edit_rows() -> Iterator[Action]:
+    """Return the commands of the menu Edit."""
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test, icon: str = "",
+            hint: str = "") -> Action:
+        group = "undo" if id in ("undo", "redo") else "swap"
+        return Action(f"edit.{id}", "Edit", title, keys, run, enabled, hint=hint, group=group, icon=icon)
+
+    yield row("undo", "Undo", ("Ctrl+Z",), lambda d, ui: d.session.undo(),
+              lambda d: d.session.undo_text is not None, "undo")
+    yield row("redo", "Redo", ("Ctrl+Y", "Ctrl+Shift+Z"), lambda d, ui: d.session.redo(),
+              lambda d: d.session.redo_text is not None, "redo")
+    yield row("swap", "Swap with…", (), lambda d, ui: ui.ask_swap(), _is_free, "swap",
+              "Exchange two points placed under each other's names")
+    yield row("swap_sides", "Swap left and right", (), lambda d, ui: d.session.do(SwapSides()), _has_labels)
+
+
+def view_rows() -> Iterator[Action]:
+    """Return the commands of the menu View."""
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _always, *,
+            checked: Test | None = None, group: str = "", hint: str = "", icon: str = "") -> Action:
+        return Action(id, "View", title, keys, run, enabled, checked, hint, group, icon)
+
+    for title, layout, key in _LAYOUTS:
+        yield row(f"view.{layout}", title, (key,), _set_layout(layout), checked=_has_layout(layout), group="layout")
+    yield row("view.reset", "Show everything", ("R",), lambda d, ui: ui.reset_views(), _has_scan, group="show")
+    yield row("view.go_to_point", "Go to the chosen point", ("Shift+R",), _show_active, _has_active, group="show")
+    for word, letter, keys in _VIEWPOINTS:
+        yield row(f"view.from_{word}", f"Look from {word}", keys, _look_from(letter), group="from")
+    for title, tool, key in _TOOLS:
+        yield row(f"tool.{tool}", title, (key,), _set_tool(tool), checked=_has_tool(tool), group="tool",
+                  hint="What the left button does over a slice")
+    yield row("view.auto_greys", "Automatic contrast", ("Shift+W",), _auto_greys, _has_scan, group="tool")
+    for title, field, key in _SHOWN:
+        yield row(f"view.{field}", title, (key,), _toggle(field), checked=_is_on(field), group="what")
+    yield row("view.fainter", "Bone more transparent", ("[",), _change_opacity(-0.1), group="bone")
+    yield row("view.solider", "Bone more solid", ("]",), _change_opacity(0.1), group="bone")
+    yield row("view.projection", "Perspective on or off", ("5", "Num+5"),
+              lambda d, ui: ui.toggle_projection(), group="bone")
+    yield row("view.theme", "Dark or light", ("Ctrl+T",), lambda d, ui: ui.toggle_theme(), group="theme",
+              icon="moon")
+
+
+_LAYOUTS = (
+    ("Four views", "four-up", "V"), ("3D only", "3d", "D"), ("Axial only", "axial", "Z"),
+    ("Sagittal only", "sagittal", "S"), ("Coronal only", "coronal", "C"),
+)
+_VIEWPOINTS = (
+    ("anterior", "A", ("1", "Num+1")), ("left", "L", ("3", "Num+3")), ("superior", "S", ("7", "Num+7")),
+    ("posterior", "P", ("Ctrl+1",)), ("right", "R", ("Ctrl+3",)), ("inferior", "I", ("Ctrl+7",)),
+)
+_TOOLS = (
+    ("Tool: place points", "place", "P"), ("Tool: move the crosshair", "look", "H"),
+    ("Tool: contrast and brightness", "grey", "W"),
+)
+_SHOWN = (
+    ("Bone edge on slices", "outline_visible", "O"), ("Names of points", "labels_visible", "T"),
+    ("Expected places (ghosts)", "ghosts_visible", "G"), ("Axis and round window lines", "axis_visible", "M"),
+)
+
+
+def landmark_rows() -> Iterator[Action]:
+    """Return the commands of the menu Landmarks."""
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _always, *,
+            checked: Test | None = None, group: str = "place", hint: str = "", icon: str = "") -> Action:
+        return Action(id, "Landmarks", title, keys, run, enabled, checked, hint, group, icon)
+
+    yield row("point.accept_ghost", "Accept the ghost", ("Return", "Enter"),
+              lambda d, ui: labelling.accept_ghost(d.session), lambda d: _has_ghost(d) and _is_free(d),
+              hint="Place the point where the atlas expects it", icon="check")
+    yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair,
+              lambda d: _has_scan(d) and _is_free(d), icon="label")
+    yield row("point.skip", "Skip for now", ("N",), lambda d, ui: labelling.skip(d.session), _has_active,
+              icon="skip")
+    yield row("point.unseen", "Cannot be seen", ("X",), lambda d, ui: labelling.mark_unseen(d.session), _is_free,
+              icon="unseen")
+    yield row("point.clear", "Clear", ("Delete", "Backspace"), lambda d, ui: labelling.clear(d.session),
+              lambda d: _is_free(d) and _is_settled(d))
+    yield row("point.check", "Mark as checked", ("K",), _toggle_check, _is_placed, checked=_is_checked,
+              group="state")
+    yield row("point.lock", "Lock", ("L",), _toggle_lock, _is_settled, checked=_is_locked, group="state",
+              icon="lock")
+    yield row("point.lock_all", "Lock all", ("Ctrl+L",),
+              lambda d, ui: labelling.lock_all(d.session, not _all_locked(d)), _has_labels, checked=_all_locked,
+              group="state")
+    yield row("point.next", "Next feature", (".",), _step_point(1), group="go")
+    yield row("point.previous", "Previous feature", (",",), _step_point(-1), group="go")
+    yield row("point.other_side", "Same feature, other side", ("Q",), _other_side, _has_active, group="go")
+    for title, field in (
+        ("Go on to the next after placing", "auto_advance"), ("Show where the next is expected", "follow_ghost"),
+    ):
+        yield row(f"view.{field}", title, (), _toggle(field), checked=_is_on(field), group="how")
+
+
+def help_rows() -> Iterator[Action]:
+    """Return the commands of the menu Help."""
+    yield Action("help.shortcuts", "Help", "Keyboard and mouse", ("?", "F1"), lambda d, ui: ui.show_shortcuts())
+    yield Action("help.about", "Help", "About gp-labeler", (), lambda d, ui: ui.show_about())
+# fmt: on

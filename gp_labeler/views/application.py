@@ -1,0 +1,103 @@
+"""Qt set up for this program, and a window on a scan."""
+
+from __future__ import annotations
+
+import logging
+import os
+import sys
+import traceback
+from pathlib import Path
+from types import TracebackType
+
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtWidgets import QApplication
+
+from gp_labeler.session.places import default_directory
+from gp_labeler.session.recovery import find_recoveries
+from gp_labeler.views.dispatch import QtDispatcher
+from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.window_state import WindowState
+from gp_labeler.workbench import Workbench
+
+__all__ = ["make_application", "make_window", "run_window"]
+
+_log = logging.getLogger(__name__)
+
+
+def make_application() -> QApplication:
+    """Return the one Qt application, made if need be; without a display, off screen."""
+    existing = QApplication.instance()
+    if isinstance(existing, QApplication):
+        return existing
+    if sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+    app = QApplication(["gp-labeler"])
+    app.setApplicationName("gp-labeler")
+    app.setApplicationDisplayName("gp-labeler")
+    app.setStyle("Fusion")
+    return app
+
+
+def make_window(directory: Path | None = None) -> MainWindow:
+    """Return a window with nothing open.
+
+    Parameters
+    ----------
+    directory : Path, optional
+        State directory; None keeps nothing on disk.
+    """
+    make_application()
+    dispatcher = QtDispatcher()
+    workbench = Workbench(directory, dispatcher)
+    memory = WindowState(None if directory is None else directory / "window.json")
+    window = MainWindow(workbench, memory)
+    dispatcher.setParent(window)
+    workbench.load_atlas()
+    return window
+
+
+def run_window(path: Path | None = None, *, demo: bool = False, directory: Path | None = None) -> int:
+    """Open the window and stay until it is closed.
+
+    Parameters
+    ----------
+    path : Path, optional
+        Scan or specimen to open.
+    demo : bool
+        Whether to open the phantom.
+    directory : Path, optional
+        State directory; the user's by default.
+
+    Returns
+    -------
+    int
+        Exit status.
+    """
+    app = make_application()
+    directory = directory or default_directory()
+    window = make_window(directory)
+    sys.excepthook = lambda kind, error, trace: _report(window, kind, error, trace)
+    window.show()
+
+    def begin() -> None:
+        window.ui.take_recoveries(find_recoveries(directory))
+        if demo:
+            window.ui.open_demo()
+        elif path is not None:
+            window.ui.open_path(path)
+
+    QTimer.singleShot(0, begin)
+    return int(app.exec())
+
+
+def _report(
+    window: MainWindow, kind: type[BaseException], error: BaseException, trace: TracebackType | None
+) -> None:
+    """Tell of a fault of the program; the work goes on, every edit is in the journal."""
+    _log.error("%s", "".join(traceback.format_exception(kind, error, trace)))
+    window.workbench.say(
+        f"Something went wrong in the program ({kind.__name__}: {error}). Save your work.", "error"
+    )

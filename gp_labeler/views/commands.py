@@ -1,0 +1,127 @@
+"""The table of actions as Qt has it: menus with keys, and buttons that follow them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from PySide6.QtCore import QObject, Qt
+from PySide6.QtGui import QAction, QKeySequence
+from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
+
+from gp_labeler.actions import ACTIONS, MENUS, Action, Ui, run
+from gp_labeler.views.bind import follow
+from gp_labeler.workbench import Workbench
+
+__all__ = ["Commands"]
+
+_VIEW_KEYS = {"Return", "Enter", "Space", "Delete", "Backspace"}
+"""Keys that buttons, tables and text fields need themselves: they act while the pointer is in a view."""
+
+
+class Commands(QObject):
+    """A `QAction` for each row of the table.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What they act on.
+    ui : Ui
+        What they ask.
+    window, views : QWidget
+        Where keys work: everywhere, or only in the views.
+    """
+
+    def __init__(self, workbench: Workbench, ui: Ui, window: QWidget, views: QWidget) -> None:
+        super().__init__(window)
+        self._desk, self._ui = workbench, ui
+        self.actions = {row.id: self._made(row, window, views) for row in ACTIONS.values()}
+        for signal in (
+            workbench.session_replaced,
+            workbench.landmarks_changed,
+            workbench.active_changed,
+            workbench.ghosts_changed,
+            workbench.history_changed,
+            workbench.view_changed,
+            workbench.volume_opened,
+            workbench.surfaces_changed,
+            workbench.tool_changed,
+        ):
+            follow(self, signal, self.refresh)
+        self.refresh()
+
+    def fill(self, bar: QMenuBar) -> None:
+        """Make the menus."""
+        for name in MENUS:
+            menu, group = bar.addMenu(f"&{name}"), None
+            menu.setToolTipsVisible(True)
+            for row in ACTIONS.values():
+                if row.menu != name:
+                    continue
+                if group is not None and row.group != group:
+                    menu.addSeparator()
+                group = row.group
+                menu.addAction(self.actions[row.id])
+                if row.id == "file.demo" and self._desk.recent is not None:
+                    self._add_recent(menu)
+
+    def refresh(self, *_: object) -> None:
+        """Bring what can be done, and what is on, up to date."""
+        for row in ACTIONS.values():
+            made = self.actions[row.id]
+            made.setEnabled(row.enabled(self._desk))
+            if row.checked is not None:
+                made.setChecked(row.checked(self._desk))
+        session = self._desk.session
+        for id, word, what in (
+            ("edit.undo", "Undo", session.undo_text),
+            ("edit.redo", "Redo", session.redo_text),
+        ):
+            self.actions[id].setText(f"{word} {what}" if what else word)
+
+    def _made(self, row: Action, window: QWidget, views: QWidget) -> QAction:
+        made = QAction(row.title, self)
+        made.setObjectName(row.id)
+        made.setShortcuts([QKeySequence(keys) for keys in row.shortcuts])
+        made.setCheckable(row.checked is not None)
+        keys = (
+            QKeySequence(row.shortcuts[0]).toString(QKeySequence.SequenceFormat.NativeText)
+            if row.shortcuts
+            else ""
+        )
+        made.setToolTip((row.hint or row.title.rstrip("…")) + (f"  ({keys})" if keys else ""))
+        made.triggered.connect(partial(self._run, row.id))
+        if _VIEW_KEYS & set(row.shortcuts):
+            made.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
+            views.addAction(made)
+        else:
+            window.addAction(made)
+        return made
+
+    def _run(self, id: str, *_: object) -> None:
+        run(id, self._desk, self._ui)
+        self.refresh()
+
+    def _add_recent(self, menu: QMenu) -> None:
+        recent = menu.addMenu("Open recent")
+        recent.aboutToShow.connect(partial(self._fill_recent, recent))
+
+    def _fill_recent(self, menu: QMenu) -> None:
+        menu.clear()
+        files = self._desk.recent.all() if self._desk.recent is not None else ()
+        for path in files:
+            entry = menu.addAction(_short(path))
+            entry.setEnabled(path.exists())
+            entry.setToolTip(str(path))
+            entry.triggered.connect(partial(self._open, path))
+        if not files:
+            menu.addAction("Nothing was opened yet").setEnabled(False)
+
+    def _open(self, path: Path, *_: object) -> None:
+        opener: Callable[[Path], None] = self._ui.open_path
+        opener(path)
+
+
+def _short(path: Path) -> str:
+    return f"{path.name}   ({path.parent.name})"

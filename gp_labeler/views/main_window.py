@@ -1,0 +1,169 @@
+"""The main window: rail, views and panels docked together; everything else happens elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+
+from PySide6.QtCore import QByteArray, QEvent
+from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+
+from gp_labeler.session.view import View as SessionView
+from gp_labeler.session.view import ViewState
+from gp_labeler.views.bind import follow
+from gp_labeler.views.commands import Commands
+from gp_labeler.views.panels.label_panel import LabelPanel
+from gp_labeler.views.panels.rail import Rail
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.status_line import StatusLine
+from gp_labeler.views.theme import THEMES, apply_theme
+from gp_labeler.views.top_bar import TopBar
+from gp_labeler.views.view_grid import ViewGrid
+from gp_labeler.views.window_state import WindowState
+from gp_labeler.views.window_ui import WindowUi
+from gp_labeler.workbench import Workbench
+
+__all__ = ["MainWindow"]
+
+_LIKED = (
+    "outline_visible",
+    "labels_visible",
+    "ghosts_visible",
+    "axis_visible",
+    "auto_advance",
+    "follow_ghost",
+)
+"""How the user likes to look at things, kept from one day to the next."""
+
+
+class MainWindow(QMainWindow):
+    """One window on one workbench, which it closes with itself.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        What it shows and edits.
+    memory : WindowState, optional
+        What it remembers; by default nothing.
+    prompts : Prompts, optional
+        Who asks the user; dialogs by default.
+    """
+
+    def __init__(
+        self, workbench: Workbench, memory: WindowState | None = None, prompts: Prompts | None = None
+    ) -> None:
+        super().__init__()
+        self.workbench, self.memory = workbench, memory or WindowState()
+        self.ui = WindowUi(self, workbench, prompts or Prompts(self))
+        self.setAcceptDrops(True)
+        self.setMinimumSize(900, 600)
+        self._recall_view(workbench.session.view)
+        self.theme_name = self.memory.get("theme", str, "dark")
+        apply_theme(self, THEMES.get(self.theme_name, THEMES["dark"]))
+        self.grid = ViewGrid(workbench)
+        self.commands = Commands(workbench, self.ui, self, self.grid)
+        self.commands.fill(self.menuBar())
+        self.rail, self.panels = Rail(workbench), QStackedWidget()
+        self.status = StatusLine(workbench)
+        self._dock()
+        self._listen()
+        self._recall_place()
+        self._show_title()
+
+    def set_theme(self, name: str) -> None:
+        """Look dark or light."""
+        self.theme_name = name
+        apply_theme(self, THEMES[name])
+        self.memory.set(theme=name)
+
+    def set_step(self, step: str) -> None:
+        """Show the panel of a step: ``scan`` or ``label``."""
+        self.rail.set_step(step)
+        self.panels.setCurrentWidget(self._steps[step])
+
+    def _dock(self) -> None:
+        self._steps: dict[str, QWidget] = {"label": LabelPanel(self.workbench)}
+        for panel in self._steps.values():
+            self.panels.addWidget(panel)
+        middle = QHBoxLayout()
+        middle.setContentsMargins(0, 0, 0, 0)
+        middle.setSpacing(6)
+        middle.addWidget(self.rail)
+        middle.addWidget(self.grid, 1)
+        middle.addWidget(self.panels)
+        whole = QVBoxLayout()
+        whole.setContentsMargins(0, 0, 0, 0)
+        whole.setSpacing(0)
+        whole.addWidget(TopBar(self.workbench, self.commands.actions))
+        whole.addLayout(middle, 1)
+        whole.addWidget(self.status)
+        centre = QWidget()
+        centre.setLayout(whole)
+        self.setCentralWidget(centre)
+
+    def _listen(self) -> None:
+        desk = self.workbench
+        self.grid.hovered.connect(self.status.show_position)
+        self.rail.step_chosen.connect(self.set_step)
+        self.rail.keys_asked.connect(self.ui.show_shortcuts)
+        follow(self, desk.import_asked, self._on_import_asked)
+        follow(self, desk.scan_differs, self._on_scan_differs)
+        for signal in (desk.session_replaced, desk.details_changed, desk.dirty_changed):
+            follow(self, signal, self._show_title)
+
+    def _on_import_asked(self, plan: object) -> None:
+        self.ui.take_plan(plan)  # type: ignore[arg-type]
+
+    def _on_scan_differs(self, error: object, volume: object) -> None:
+        self.ui.take_other_scan(error, volume)  # type: ignore[arg-type]
+
+    def _show_title(self, *_: object) -> None:
+        session = self.workbench.session
+        name = session.state.specimen if session.state.volume else ""
+        self.setWindowTitle(f"{name}[*] – gp-labeler" if name else "gp-labeler[*]")  # noqa: RUF001
+        self.setWindowModified(session.dirty)
+
+    # What is remembered
+
+    def _recall_view(self, view: SessionView) -> None:
+        known = {field.name for field in fields(ViewState)} & set(_LIKED)
+        liked = self.memory.fields("view")
+        view.update(**{name: liked[name] for name in known if isinstance(liked.get(name), bool)})
+
+    def _recall_place(self) -> None:
+        geometry = QByteArray.fromBase64(self.memory.get("geometry", str, "").encode())
+        if geometry.isEmpty() or not self.restoreGeometry(geometry):
+            self.resize(1440, 900)
+
+    def _remember(self) -> None:
+        view = self.workbench.session.view.state
+        self.memory.set(
+            geometry=bytes(self.saveGeometry().toBase64().data()).decode(),
+            theme=self.theme_name,
+            view={name: getattr(view, name) for name in _LIKED},
+        )
+        self.memory.save()
+
+    # Qt's events
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
+        if not self.ui.settle():
+            event.ignore()
+            return
+        self._remember()
+        self.workbench.close(discard=self.ui.discarded)
+        self.grid.release()
+        event.accept()
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: D102, N802
+        if event.mimeData().hasUrls():
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802
+        for url in event.mimeData().urls()[:1]:
+            from pathlib import Path
+
+            self.ui.open_path(Path(url.toLocalFile()))
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        super().changeEvent(event)

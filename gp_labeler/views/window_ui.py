@@ -1,0 +1,293 @@
+"""What actions ask of the window: files, folders, what to do about unsaved edits, and what the screen shows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import FEATURES, feature
+from gp_labeler.imaging.readers import ImportPlan
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session.edited_specimen import VolumeChangedError
+from gp_labeler.session.edits import SwapPoints
+from gp_labeler.session.landmark_export import export_landmarks
+from gp_labeler.session.landmark_import import MisfitError, import_landmarks
+from gp_labeler.session.lock import InUseError
+from gp_labeler.session.opening import UnsavedEditsError
+from gp_labeler.session.recovery import Recovery
+from gp_labeler.session.specimen_file import SUFFIX
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+from gp_labeler.workbench import Workbench
+
+if TYPE_CHECKING:
+    from gp_labeler.views.main_window import MainWindow
+
+__all__ = ["WindowUi"]
+
+_SCANS = (
+    "Scans and specimens (*.nrrd *.nhdr *.mha *.mhd *.nii *.nii.gz *.tif *.tiff *.bmp *.png *.jpg *.dcm *.isq "
+    "*.ISQ *.log *.gpspecimen.json);;All files (*)"
+)
+_POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
+_MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
+_NEAR_BONE_VOXELS = 3.0
+
+
+class WindowUi:
+    """The answers that a main window gives to actions.
+
+    Parameters
+    ----------
+    window : MainWindow
+        The window.
+    workbench : Workbench
+        What it works on.
+    prompts : Prompts
+        Who asks the user.
+    """
+
+    def __init__(self, window: MainWindow, workbench: Workbench, prompts: Prompts) -> None:
+        self._window, self._desk, self.prompts = window, workbench, prompts
+
+    # Files
+
+    def open_path(self, path: Path) -> None:
+        """Open a scan or specimen, once unsaved edits are settled."""
+        if not self.settle():
+            return
+        self._remember_folder(path)
+        try:
+            self._desk.open(path)
+        except UnsavedEditsError as error:
+            self._open_unsaved(path, error)
+        except InUseError as error:
+            if self.prompts.choose(
+                "Open elsewhere", error.problem, ["Open a copy"], detail=error.remedy or ""
+            ):
+                self._desk.open_specimen(path, as_copy=True)
+        except GpError as error:
+            self._desk.say(str(error), "error")
+
+    def ask_open_file(self) -> None:
+        """Ask for a scan or specimen file, and open it."""
+        for path in self.prompts.open_files("Open a scan or specimen", self._folder, _SCANS):
+            self.open_path(path)
+
+    def ask_open_folder(self) -> None:
+        """Ask for a folder of slices, and open it."""
+        path = self.prompts.folder("Open a folder of slices", self._folder)
+        if path is not None:
+            self.open_path(path)
+
+    def ask_find_scan(self) -> None:
+        """Ask where the scan of this specimen is now."""
+        for path in self.prompts.open_files("Where is the scan now?", self._folder, _SCANS):
+            self._desk.find_scan(path)
+
+    def open_demo(self) -> None:
+        """Open the phantom, once unsaved edits are settled."""
+        if self.settle():
+            self._desk.open_demo()
+
+    def save(self, *, ask: bool = False) -> bool:
+        """Save the specimen, asking where it has no file yet; return whether it is saved."""
+        session = self._desk.session
+        path: Path | None = None
+        if ask or session.path is None:
+            suggestion = Path(self._folder) / f"{session.state.specimen}{SUFFIX}"
+            path = self.prompts.save_file("Save the specimen", str(suggestion), f"Specimens (*{SUFFIX})")
+            if path is None:
+                return False
+        try:
+            saved = session.save(path, overwrite=path is not None)
+        except GpError as error:
+            self._desk.say(str(error), "error")
+            return False
+        self._remember_folder(saved)
+        if self._desk.recent is not None:
+            self._desk.recent.add(saved)
+        self._desk.say(f"Saved {saved.name}")
+        return True
+
+    def settle(self) -> bool:
+        """Settle what is not saved before something else is opened; return whether to go on."""
+        session = self._desk.session
+        if not session.dirty:
+            return True
+        text = f"Save the changes to {session.state.specimen}?"
+        detail = "Without saving, they are lost when this specimen is closed."
+        answer = self.prompts.choose("Not saved", text, ["Save", "Do not save"], detail=detail)
+        self.discarded = answer == "Do not save"
+        return self.discarded or (answer == "Save" and self.save())
+
+    discarded = False
+
+    def ask_import(self) -> None:
+        """Ask for landmark files, and take them over."""
+        files = self.prompts.open_files("Import landmarks", self._folder, _POINTS, many=True)
+        if files:
+            self._remember_folder(files[0])
+            self._import(files)
+
+    def _import(self, files: list[Path], **how: Any) -> None:
+        try:
+            notes = import_landmarks(self._desk.session, files, near_bone=self._near_bone, **how)
+        except MisfitError as error:
+            if self.prompts.choose(
+                "Do they belong here?",
+                error.problem,
+                ["Import nevertheless"],
+                detail=error.remedy or "",
+                kind="warning",
+            ):
+                self._import(files, accept_misfit=True)
+            return
+        self._desk.say(
+            ". ".join(notes) or f"Imported {', '.join(f.name for f in files)}", "warning" if notes else "info"
+        )
+
+    def ask_export(self) -> None:
+        """Ask for a folder, and write the landmarks of both sides into it."""
+        folder = self.prompts.folder("Export landmarks into this folder", self._folder)
+        if folder is None:
+            return
+        state = self._desk.session.state
+        try:
+            report = export_landmarks(state, folder)
+        except GpError as error:
+            if "exists already" not in error.problem:
+                raise
+            if not self.prompts.choose("Replace?", str(error), ["Replace"], kind="warning"):
+                return
+            report = export_landmarks(state, folder, overwrite=True)
+        self._desk.say(report.text.replace("\n", "  "), "info" if report.is_complete else "warning")
+
+    def ask_save_mesh(self) -> None:
+        """Ask where, and write the bone surface."""
+        name = f"{self._desk.session.state.specimen}.ply"
+        path = self.prompts.save_file("Save the bone surface", str(Path(self._folder) / name), _MESHES)
+        if path is not None and self._desk.surfaces:
+            self._desk.save_mesh(path)
+
+    def ask_screenshot(self) -> None:
+        """Ask where, and write a picture of the window."""
+        name = f"{self._desk.session.state.specimen}.png"
+        path = self.prompts.save_file(
+            "Save a picture of the window", str(Path(self._folder) / name), "PNG (*.png)"
+        )
+        if path is not None and not self._window.grab().save(str(path)):
+            raise GpError("cannot be written", file=path)
+
+    # Questions of the workbench
+
+    def take_recoveries(self, recoveries: tuple[Recovery, ...]) -> None:
+        """Offer what programs that were killed left unsaved."""
+        for recovery in recoveries:
+            answer = self.prompts.choose(
+                "Unsaved work was found",
+                recovery.text,
+                ["Recover", "Later", "Delete it"],
+                detail="The program ended before this was saved. Nothing of it is lost.",
+            )
+            if answer == "Recover":
+                self._desk.recover(recovery)
+                return
+            if answer == "Delete it":
+                recovery.discard()
+
+    def take_plan(self, plan: ImportPlan) -> None:
+        """Ask what a scan's files do not say, then read it."""
+        from gp_labeler.views.import_question import ask_about
+
+        answered = ask_about(plan, self._window, self.prompts)
+        if answered is not None:
+            self._desk.read_scan(answered)
+
+    def take_other_scan(self, error: VolumeChangedError, volume: Volume) -> None:
+        """Ask whether to go on with a scan that is not the one that was labelled."""
+        detail = f"{'; '.join(error.differences).capitalize()}. {error.remedy or ''}"
+        if self.prompts.choose(
+            "Another scan?", error.problem, ["Use it nevertheless"], detail=detail, kind="warning"
+        ):
+            self._desk.accept_scan(volume)
+
+    def ask_swap(self) -> None:
+        """Ask with which other point of the side the active one shall be exchanged."""
+        session, active = self._desk.session, self._desk.session.active
+        if active.code is None:
+            return
+        others = [f for f in FEATURES if not (f.computed or f.shared or f.code == active.code)]
+        if feature(active.code).shared:
+            raise GpError(f"{active.code} is shared by both sides and cannot be swapped")
+        text = f"Exchange {active.code} {active.side.word} with"
+        chosen = self.prompts.item("Swap", text, [f"{f.code}  {f.name}" for f in others])
+        if chosen:
+            session.do(SwapPoints(active.side, active.code, chosen.split()[0]))
+
+    # The screen
+
+    def close_window(self) -> None:
+        """Close the window."""
+        self._window.close()
+
+    def reset_views(self) -> None:
+        """Show everything in every view."""
+        self._window.grid.reset()
+
+    def look_from(self, letter: str) -> None:
+        """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
+        self._window.grid.scene_view.view_from(letter)
+
+    def toggle_theme(self) -> None:
+        """Change between dark and light."""
+        self._window.set_theme("light" if self._window.theme_name == "dark" else "dark")
+
+    def toggle_projection(self) -> None:
+        """Change between parallel and perspective."""
+        view = self._window.grid.scene_view
+        view.scene.camera.parallel = not view.scene.camera.parallel
+        view.redraw()
+
+    def show_shortcuts(self) -> None:
+        """Show what keys and mouse do."""
+        ShortcutsSheet(self._window).open()
+
+    def show_about(self) -> None:
+        """Say what this program is."""
+        from gp_labeler.session.specimen_file import application
+
+        self.prompts.tell(
+            "About gp-labeler",
+            f"{application()}\n\nLabels guinea-pig heads in micro-CT, and estimates the pose of the cochlea from a "
+            "few touched points.\n\nCoordinates are LPS, mm. Nothing is sent anywhere.",
+        )
+
+    def _near_bone(self, points: FloatArray) -> NDArray[np.bool_]:
+        volume, threshold = self._desk.volume, self._desk.threshold
+        if volume is None or threshold is None:
+            return np.ones(len(points), dtype=bool)
+        reach = _NEAR_BONE_VOXELS * min(volume.spacing)
+        around = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 3), axis=-1).reshape(-1, 3)
+        values = volume.values_at((points[:, None] + around).reshape(-1, 3)).reshape(len(points), -1)
+        near: NDArray[np.bool_] = np.nanmax(np.where(np.isnan(values), -np.inf, values), axis=1) >= threshold
+        return near
+
+    @property
+    def _folder(self) -> str:
+        return self._window.memory.get("folder", str, str(Path.home()))  # type: ignore[no-any-return]
+
+    def _remember_folder(self, path: Path) -> None:
+        self._window.memory.set(folder=str(Path(path).absolute().parent))
+
+    def _open_unsaved(self, path: Path, error: UnsavedEditsError) -> None:
+        answer = self.prompts.choose(
+            "Unsaved work was found", error.recovery.text, ["Recover these edits", "Open as saved"]
+        )
+        if answer:
+            self._desk.open_specimen(path, unsaved="recover" if answer.startswith("Recover") else "leave")
