@@ -24,7 +24,7 @@ _FARTHEST = 3.0
 """Standard deviations: a coordinate drawn beyond is brought back, so that no head is a monster."""
 
 _MIDLINE_NORMAL = (0.20, 0.98, 0.0)
-"""Normal of the mid-sagittal plane, outward, in the left CO frame; measured on skulls touched on both sides."""
+"""Normal of the mid-sagittal plane, outward, in the left CO frame: of skulls touched on both sides."""
 
 _PITCH = np.radians(16.0)
 """How far a head with level cheek teeth is turned nose down from the CO frame's own z."""
@@ -35,8 +35,8 @@ def draw_animal(
 ) -> Specimen:
     """Draw an animal from the Gaussian shape of an atlas and hold its head as in a scanner.
 
-    The mid-sagittal plane is x = 0, the origin lies midway between the ears, the cheek teeth are level. The two
-    sides are alike but not the same; they share IN exactly, and CO is computed from the drawn points.
+    The mid-sagittal plane is x = 0, the origin lies midway between the ears, the cheek teeth are level. The
+    two sides are alike but not the same; they share IN exactly, and CO is computed from the drawn points.
 
     Parameters
     ----------

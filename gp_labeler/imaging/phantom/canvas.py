@@ -61,7 +61,9 @@ class Canvas:
 
     def _paint_block(self, block: tuple[slice, slice, slice], solid: Solid, grey: float) -> None:
         z, y, x = block
-        around = slice(max(z.start - 1, 0), min(z.stop + 1, len(self.axes[2])))  # for slopes at the layer's ends
+        around = slice(
+            max(z.start - 1, 0), min(z.stop + 1, len(self.axes[2]))
+        )  # for slopes at the layer's ends
         distance = solid.distance(self._grid(around, y, x))
         distance = distance[z.start - around.start : z.stop - around.start]
         share = np.clip(np.float32(0.5) - distance / np.float32(_EDGE * self.spacing), 0, 1)

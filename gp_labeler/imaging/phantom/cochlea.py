@@ -17,10 +17,13 @@ from gp_labeler.imaging.phantom.solids import (
     Solid,
     Values,
     blend,
+    component,
     cone,
     ellipsoid,
     implicit,
+    moved,
     sheet,
+    squared_length,
     tip_centre,
     tube,
     union,
@@ -64,15 +67,15 @@ class Cochlea:
     @cached_property
     def across(self) -> FloatArray:
         """(2, 3) unit vectors perpendicular to the axis: to the round window, and on along the basal turn."""
-        window = (self.ear["RWA"] + self.ear["RWP"]) / 2 - self.ear["CO"]
+        window = (self.ear["RWA"] + self.ear["RWP"]) / 2 - self.ear["CB"]
         first = unit(window - (window @ self.axis) * self.axis)
         return np.stack([first, -self.ear.sign * np.cross(self.axis, first)])
 
     def _polar(self, code: str) -> tuple[float, float, FloatArray]:
-        """Return height above CB, distance from the axis (mm) and the direction outward (3,) of a landmark."""
-        offset = self.ear[code] - self.ear["CB"]
-        height = float(offset @ self.axis)
-        radial = offset - height * self.axis
+        """Return height above CB and distance from the axis (mm) of a landmark, and its direction outward."""
+        from_base = self.ear[code] - self.ear["CB"]
+        height = float(from_base @ self.axis)
+        radial = from_base - height * self.axis
         return height, float(np.linalg.norm(radial)), unit(radial)
 
     @cached_property
@@ -127,23 +130,21 @@ class Cochlea:
         misfit = float(self._beyond(_as_grid(cc), steps, radii, turns, bulge)[0, 0, 0])
 
         def value(grid: Grid) -> Values:
-            to_cc = sum((a - np.float32(c)) ** 2 for a, c in zip(grid, cc, strict=True))
-            fit = np.float32(misfit) * np.exp(to_cc / np.float32(-2 * _DENT_MM**2))
-            return self._beyond(grid, steps, radii, turns, bulge) - fit
+            near_cc = np.exp(squared_length(moved(grid, cc)) / np.float32(-2 * _DENT_MM**2))
+            fitted: Values = self._beyond(grid, steps, radii, turns, bulge) - np.float32(misfit) * near_cc
+            return fitted
 
         ends = np.stack([self.ear["CB"] - 1.5 * self.axis, self.ear["CA"] + _CAP * self.axis])
         return implicit(value, ends.min(axis=0) - 2.4, ends.max(axis=0) + 2.4)
 
     def _beyond(self, grid: Grid, steps: FloatArray, *tables: Values) -> Values:
         """Return squared distance from the axis less the capsule's squared radius there, mm^2."""
-        x, y, z = (a - np.float32(c) for a, c in zip(grid, self.ear["CB"], strict=True))
-        s, u, v = (
-            np.float32(d[0]) * x + np.float32(d[1]) * y + np.float32(d[2]) * z for d in (self.axis, *self.across)
-        )
+        here = moved(grid, self.ear["CB"])
+        s, u, v = (component(here, direction) for direction in (self.axis, *self.across))
         radius, turn, bulge = (np.interp(s, steps, table).astype(np.float32) for table in tables)
-        wave = np.cos(np.float32(2 * np.pi) * turn - np.arctan2(v, u))
-        radius = radius + bulge * wave
-        return u * u + v * v - radius * np.abs(radius)
+        radius = radius + bulge * np.cos(np.float32(2 * np.pi) * turn - np.arctan2(v, u))
+        beyond: Values = u * u + v * v - radius * np.abs(radius)
+        return beyond
 
     def duct_line(self, per_turn: int = 32) -> tuple[FloatArray, FloatArray]:
         """Return the middle (n, 3) of the coiled duct from base to apex, and its radius (n,)."""
@@ -208,7 +209,7 @@ class Cochlea:
         return inner - 0.3 * self.axis, inner
 
     def _open_round_window(self, canvas: Canvas) -> None:
-        """Open the round window, fluid within and air without, and make its lip whole again beside the oval one."""
+        """Open the round window, fluid within and air without, and make its lip whole again."""
         rim = self.round_window
         canvas.paint(rim.plug(-0.9, 0.0), grey.FLUID)
         canvas.paint(rim.plug(0.0, 1.2, flare=0.4), grey.AIR)

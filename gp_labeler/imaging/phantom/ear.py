@@ -29,6 +29,7 @@ _LIP = 0.42
 _CANAL_DEPTH = (0.7, 1.9)
 _UMBO = (8.2, 1.1, -1.1)
 _RECESS = 0.85
+_LIMB = 0.24
 
 
 def paint_ear(canvas: Canvas, ear: Ear) -> None:
@@ -49,6 +50,9 @@ def paint_ear(canvas: Canvas, ear: Ear) -> None:
     cochlea.paint_inside(canvas)
     canvas.paint(union([tube(line, 0.2) for line in canals]), grey.FLUID)
     _paint_drum(canvas, ear, canal, depth)
+    end = _limb_end(ear)
+    joint = min(_LIMB + 0.2, float(np.linalg.norm(end - ear["RWA"])) - 0.05)
+    canvas.paint(cone(end, end, joint), grey.AIR)  # keeps the limb apart from the lip of the window
     canvas.paint(_ossicles(ear), grey.BONE)
     cochlea.paint_stapes(canvas)
 
@@ -70,7 +74,7 @@ def _cavity(ear: Ear) -> Solid:
 
 def _recess(ear: Ear, cochlea: Cochlea) -> Solid:
     """Return the air in front of CC: there the bulla wall rises from the cochlea at an open angle."""
-    offset = ear["CC"] - ear["CO"]
+    offset = ear["CC"] - ear["CB"]
     radial = unit(offset - (offset @ cochlea.axis) * cochlea.axis)
     ahead = unit(0.87 * cochlea.axis + 0.5 * radial)
     aside = unit(np.cross(ahead, radial))
@@ -140,19 +144,23 @@ def _spur(ear: Ear) -> Solid:
     return tube([root, bend, tip], (0.6, 0.4, 0.24), steps=3)
 
 
+def _limb_end(ear: Ear) -> FloatArray:
+    """Return the middle of the round end of the long limb; LLI is where it is nearest to the window."""
+    window = (ear["RWA"] + ear["RWP"]) / 2
+    return tip_centre(ear["LLI"], unit(window - ear["LLI"]), _LIMB)
+
+
 def _ossicles(ear: Ear) -> Solid:
     """Return malleus and incus, fused: head DTM, handle with MH at its upper end, long limb ending in LLI."""
     body, back = ear.at((8.75, 2.0, 1.0), (8.35, 1.15, 1.35))
     short = ear.at((8.5, 0.2, 1.6), (8.6, -0.7, 1.8))
-    window = (ear["RWA"] + ear["RWP"]) / 2
-    limb_end = tip_centre(ear["LLI"], unit(window - ear["LLI"]), 0.28)
     neck, top, middle, umbo = ear.at((8.7, 1.8, 0.65), (8.55, 1.4, 0.25), (8.4, 1.25, -0.4), _UMBO)
     process = unit(ear["MH"] - top)
     return union(
         [
             cone(body, tip_centre(ear["DTM"], ear.towards(0, 0, 1), 0.42), 0.55, 0.42),
             tube([body, back, *short], (0.6, 0.5, 0.32, 0.2), steps=3),
-            tube([back, ear.at((7.95, 0.5, 0.95)), limb_end], (0.38, 0.27, 0.28)),
+            tube([back, ear.at((7.95, 0.5, 0.95)), _limb_end(ear)], (0.38, 0.26, _LIMB)),
             tube([body, neck, top, middle, umbo], (0.5, 0.3, 0.28, 0.22, 0.26), steps=3),
             cone(top, tip_centre(ear["MH"], process, 0.24), 0.28, 0.24),
         ]

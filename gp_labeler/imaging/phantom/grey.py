@@ -1,4 +1,4 @@
-"""Grey values of a phantom, 16 bit: far enough apart that a histogram shows air, soft tissue, bone and enamel."""
+"""Grey values of a phantom, 16 bit: air, soft tissue and bone stand apart in the histogram."""
 
 AIR = 2_000.0
 SOFT = 11_000.0

@@ -19,8 +19,8 @@ def paint_jaw(canvas: Canvas, head: HeadLayout) -> None:
     for ear in head.ears:
         canvas.paint(_half_jaw(ear), grey.BONE)
         for a in (14.8, 18.2, 21.6, 25.0):
-            tooth = ear.at((6.0 + 0.1 * (20 - a), a, -14.0), (5.4 + 0.1 * (20 - a), a, -8.7))
-            canvas.paint(tube(tooth, 1.4 * head.scale), grey.ENAMEL)
+            tooth = ear.at((5.6 + 0.1 * (20 - a), a, -13.0), (5.4 + 0.1 * (20 - a), a, -8.7))
+            canvas.paint(tube(tooth, 1.35 * head.scale), grey.ENAMEL)
             canvas.paint(tube(tooth - (0, 0, 0.2), 0.9 * head.scale), grey.BONE)
         canvas.paint(_incisor(ear, 0.0), grey.ENAMEL)
         canvas.paint(_incisor(ear, 0.35), grey.DENTINE)
@@ -44,7 +44,7 @@ def _half_jaw(ear: Ear) -> Solid:
     return union(
         [
             sheet(upper, lower, (0.9, 1.2, 1.1, 1.0, 0.7, 0.55), steps=4),
-            sheet(back, angle, (0.55, 0.45, 0.45, 0.6), steps=4),
+            sheet(back, angle, (0.55, 0.45, 0.45, 0.6), steps=8),
             sheet(spur, blade, (0.6, 0.6, 0.5, 0.4), steps=4),
             tube(lower, (0.9, 1.2, 1.4, 1.3, 1.0, 0.7), steps=4),
             tube(spur, (0.7, 0.75, 0.65, 0.4), steps=4),

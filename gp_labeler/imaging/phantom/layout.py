@@ -30,8 +30,8 @@ def unit(vector: ArrayLike) -> FloatArray:
 class HeadLayout:
     """Carries places from the mean head to one animal's.
 
-    Places in the mean head are (left, anterior, up) in mm from the middle between the two cochlea origins, cheek
-    teeth level: the numbers in which the anatomy of the phantom is written down.
+    Places in the mean head are (left, anterior, up) in mm from the middle between the two cochlea origins,
+    cheek teeth level: the numbers in which the anatomy of the phantom is written down.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ class HeadLayout:
         return self.scale * points @ self.rotation.T + self.shift
 
     def at(self, places: ArrayLike) -> FloatArray:
-        """Carry (..., 3) places (left, anterior, up) over so that landmarks come to the animal's landmarks."""
+        """Carry (..., 3) places (left, anterior, up) over; the mean landmarks come to the animal's own."""
         points = np.asarray(places, dtype=np.float64) * (1.0, -1.0, 1.0)
         flat = points.reshape(-1, 3)
         moved = self.roughly(flat) + _kernel(flat, self._anchors) @ self._weights

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.draw import draw_animal
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.markups import write_markups
 from gp_core.landmarks.sets import Specimen
 from gp_labeler.imaging.phantom import grey
@@ -19,12 +21,12 @@ from gp_labeler.imaging.phantom.canvas import Canvas
 from gp_labeler.imaging.phantom.ear import paint_ear, pinna
 from gp_labeler.imaging.phantom.jaw import paint_jaw
 from gp_labeler.imaging.phantom.layout import HeadLayout
+from gp_labeler.imaging.phantom.loft import skin
 from gp_labeler.imaging.phantom.skull import (
     paint_arches,
     paint_skin,
     paint_skull,
     paint_upper_teeth,
-    skin,
 )
 from gp_labeler.imaging.volume import Volume
 
@@ -90,15 +92,14 @@ def make_phantom(
         raise GpError(f"spacing must be {_SPACINGS_MM[0]} to {_SPACINGS_MM[1]} mm, got {spacing!r}")
     rng = np.random.default_rng(seed)
     atlas = Atlas.published()
-    name = f"phantom-{seed}"
-    animal = specimen or draw_animal(atlas, rng=rng, tilt_deg=_TILT_DEG, name=name)
+    animal = specimen or draw_animal(atlas, rng=rng, tilt_deg=_TILT_DEG, name=f"phantom-{seed}")
     head = HeadLayout(animal, atlas)
     low, high = _head_box(head) if box is None else box
     canvas = Canvas(low, high, spacing, grey.AIR)
     _paint(canvas, head)
     voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=noise)
     notes = (f"synthetic head, seed {seed}: no animal was scanned",)
-    volume = Volume.from_parts(voxels, [spacing] * 3, canvas.origin, name=name, notes=notes)
+    volume = Volume.from_parts(voxels, [spacing] * 3, canvas.origin, name=animal.name, notes=notes)
     return Phantom(volume, animal)
 
 
@@ -133,18 +134,12 @@ def write_phantom(phantom: Phantom, directory: str | PathLike[str]) -> tuple[Pat
     GpError
         The folder cannot be written to.
     """
-    import SimpleITK as sitk
-
     folder = Path(directory)
     name = phantom.specimen.name
     path = folder / f"{name}.nrrd"
-    image = sitk.GetImageFromArray(phantom.volume.array)
-    image.SetSpacing(phantom.volume.spacing)
-    image.SetOrigin(phantom.volume.origin.tolist())
-    image.SetDirection(phantom.volume.direction.ravel().tolist())
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        sitk.WriteImage(image, str(path), useCompression=True)
+        _write_volume(phantom.volume, path)
     except (OSError, RuntimeError) as error:
         raise GpError(f"the phantom cannot be written ({error})", file=path) from None
     about = {
@@ -153,8 +148,17 @@ def write_phantom(phantom: Phantom, directory: str | PathLike[str]) -> tuple[Pat
         "spacing": list(phantom.volume.spacing),
         "checksum": phantom.volume.checksum,
     }
-    files = []
-    for side, landmarks in phantom.specimen.sides.items():
-        files.append(folder / f"{name}_{side.value}.mrk.json")
-        write_markups(files[-1], landmarks, specimen=name, volume=about)
-    return path, files[0], files[1]
+    left, right = (folder / f"{name}_{side.value}.mrk.json" for side in Side)
+    for side, file in ((Side.LEFT, left), (Side.RIGHT, right)):
+        write_markups(file, phantom.specimen.side(side), specimen=name, volume=about)
+    return path, left, right
+
+
+def _write_volume(volume: Volume, path: Path) -> None:
+    import SimpleITK
+
+    image: Any = SimpleITK.GetImageFromArray(volume.array)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin.tolist())
+    image.SetDirection(volume.direction.ravel().tolist())
+    SimpleITK.WriteImage(image, str(path), useCompression=True)

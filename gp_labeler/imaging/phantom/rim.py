@@ -9,7 +9,7 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.phantom.layout import unit
-from gp_labeler.imaging.phantom.solids import Grid, Solid, Values, tube
+from gp_labeler.imaging.phantom.solids import Grid, Solid, Values, component, moved, tube
 
 __all__ = ["Rim"]
 
@@ -53,7 +53,8 @@ class Rim:
     @property
     def normal(self) -> FloatArray:
         """(3,) unit vector out of the opening."""
-        return self.axes[2]
+        normal: FloatArray = self.axes[2]
+        return normal
 
     def shape(self, angles: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return radius and height at angles (n,): smooth steps from each point to the next."""
@@ -100,17 +101,14 @@ class Rim:
         middle, half = np.float32((inner + outer) / 2), np.float32((outer - inner) / 2)
 
         def distance(grid: Grid) -> Values:
-            u, v, w = self._local(grid)
-            step = ((np.arctan2(v, u) + np.float32(np.pi)) * np.float32((_STEPS - 1) / (2 * np.pi))).astype(np.int16)
+            here = moved(grid, self.centre)
+            u, v, w = (component(here, axis) for axis in self.axes)
+            turned = (np.arctan2(v, u) + np.float32(np.pi)) * np.float32((_STEPS - 1) / (2 * np.pi))
+            step = turned.astype(np.int16)
             radius, height = table[:, step]
             w = w - height
             side = np.sqrt(u * u + v * v) - radius - np.float32(grow) - np.float32(flare) * w
-            return np.maximum(side, np.abs(w - middle) - half)
+            gone: Values = np.maximum(side, np.abs(w - middle) - half)
+            return gone
 
         return Solid(distance, corners.min(axis=0) - reach, corners.max(axis=0) + reach)
-
-    def _local(self, grid: Grid) -> list[Values]:
-        shifted = [axis - np.float32(c) for axis, c in zip(grid, self.centre, strict=True)]
-        return [
-            sum(np.float32(d) * s for d, s in zip(row, shifted, strict=True)) for row in self.axes
-        ]

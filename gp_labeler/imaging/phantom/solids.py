@@ -1,7 +1,7 @@
 """Solids as signed distances: what the bones of a phantom are built of.
 
-A solid knows a box it lies in and the distance (mm, negative inside) to its surface at any place; the distance
-is exact, or true to first order near the surface, which is all that anti-aliasing needs.
+A solid knows a box it lies in and the distance (mm, negative inside) to its surface at any place. The
+distance is exact, or true to first order near the surface, which is all that smooth edges of voxels need.
 """
 
 from __future__ import annotations
@@ -20,13 +20,16 @@ __all__ = [
     "Solid",
     "Values",
     "blend",
+    "component",
     "cone",
     "cut",
     "cut_smoothly",
     "ellipsoid",
     "implicit",
     "inset",
+    "moved",
     "sheet",
+    "squared_length",
     "tip_centre",
     "tube",
     "union",
@@ -71,18 +74,40 @@ class Solid:
             np.minimum(part, self.distance(here), out=part)
 
 
+def moved(grid: Grid, origin: FloatArray) -> Grid:
+    """Return the coordinates of a block from another origin (3,)."""
+    x, y, z = (axis - np.float32(o) for axis, o in zip(grid, origin, strict=True))
+    return x, y, z
+
+
+def component(grid: Grid, direction: FloatArray) -> Values:
+    """Return the coordinate of a block's voxels along a direction (3,)."""
+    x, y, z = (np.float32(d) * axis for axis, d in zip(grid, direction, strict=True))
+    total: Values = x + y + z
+    return total
+
+
+def squared_length(grid: Grid) -> Values:
+    """Return the squared distance of a block's voxels from the origin."""
+    x, y, z = grid
+    squared: Values = x * x + y * y + z * z
+    return squared
+
+
 def cone(start: ArrayLike, end: ArrayLike, radius: float, end_radius: float | None = None) -> Solid:
     """Return a rod from `start` to `end` (3,) with round ends and a radius that changes evenly."""
     a, b = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
     last = radius if end_radius is None else end_radius
-    along = (b - a) / max(float((b - a) @ (b - a)), 1e-12)
+    step = (b - a) / max(float((b - a) @ (b - a)), 1e-12)
     thick = max(radius, last)
 
     def distance(grid: Grid) -> Values:
-        x, y, z = (axis - np.float32(origin) for axis, origin in zip(grid, a, strict=True))
-        t = np.clip(_dot((x, y, z), along), 0, 1)
-        dx, dy, dz = (axis - np.float32(d) * t for axis, d in zip((x, y, z), b - a, strict=True))
-        return np.sqrt(dx * dx + dy * dy + dz * dz) - (np.float32(radius) + np.float32(last - radius) * t)
+        x, y, z = moved(grid, a)
+        t = np.clip(component((x, y, z), step), 0, 1)
+        dx, dy, dz = (np.float32(d) * t for d in b - a)
+        radii = np.float32(radius) + np.float32(last - radius) * t
+        gone: Values = np.sqrt(squared_length((x - dx, y - dy, z - dz))) - radii
+        return gone
 
     return Solid(distance, np.minimum(a, b) - thick, np.maximum(a, b) + thick)
 
@@ -106,7 +131,7 @@ def tube(points: ArrayLike, radii: ArrayLike, *, steps: int = 1) -> Solid:
 
 
 def sheet(first: ArrayLike, second: ArrayLike, radii: ArrayLike, *, steps: int = 1) -> Solid:
-    """Return the sheet between two lines of (n, 3) points, with one half thickness or one a point; see `tube`."""
+    """Return the sheet between two lines of (n, 3) points; half its thickness is given as in `tube`."""
     a, half = _smooth(first, radii, steps)
     b, _ = _smooth(second, radii, steps)
     faces = []
@@ -142,27 +167,30 @@ def _triangle(a: FloatArray, b: FloatArray, c: FloatArray, half: float) -> Solid
     inward = [np.cross(normal, edge) for edge in edges]
 
     def distance(grid: Grid) -> Values:
-        over: Values = np.ones((1, 1, 1), bool)
-        for corner, direction in zip((a, b, c), inward, strict=True):
-            over = over & (_dot(grid, direction) >= np.float32(corner @ direction))
-        plane = np.abs(_dot(grid, normal) - np.float32(a @ normal)) - np.float32(half)
-        return np.where(over, plane, rods.distance(grid))
+        beside = [
+            component(grid, direction) - np.float32(corner @ direction)
+            for corner, direction in zip((a, b, c), inward, strict=True)
+        ]
+        plane = np.abs(component(grid, normal) - np.float32(a @ normal)) - np.float32(half)
+        return np.where(reduce(np.minimum, beside) >= 0, plane, rods.distance(grid))
 
     return Solid(distance, rods.low, rods.high)
 
 
 def ellipsoid(centre: ArrayLike, semi_axes: ArrayLike) -> Solid:
-    """Return the ellipsoid around `centre` (3,) with three orthogonal semi-axes, the rows of (3, 3), in mm."""
+    """Return the ellipsoid around `centre` (3,); its orthogonal semi-axes (mm) are the rows of (3, 3)."""
     middle, axes = np.asarray(centre, dtype=np.float64), np.asarray(semi_axes, dtype=np.float64)
     scaled = axes / np.sum(axes**2, axis=1, keepdims=True)
     reach = np.sqrt(np.sum(axes**2, axis=0))
 
     def distance(grid: Grid) -> Values:
-        x, y, z = (axis - np.float32(origin) for axis, origin in zip(grid, middle, strict=True))
-        unit = [_dot((x, y, z), row) for row in scaled]
-        k = np.sqrt(unit[0] ** 2 + unit[1] ** 2 + unit[2] ** 2)
-        slope = np.sqrt(sum(np.float32(row @ row) * u * u for row, u in zip(scaled, unit, strict=True)))
-        return k * (k - 1) / np.maximum(slope, np.float32(1e-6))
+        here = moved(grid, middle)
+        x, y, z = (component(here, row) for row in scaled)
+        k = np.sqrt(squared_length((x, y, z)))
+        p, q, r = (np.float32(row @ row) for row in scaled)
+        slope = np.sqrt(p * x * x + q * y * y + r * z * z)
+        gone: Values = k * (k - 1) / np.maximum(slope, np.float32(1e-6))
+        return gone
 
     return Solid(distance, middle - reach, middle + reach)
 
@@ -173,11 +201,13 @@ def implicit(value: Callable[[Grid], Values], low: ArrayLike, high: ArrayLike) -
     def distance(grid: Grid) -> Values:
         f = value(grid)
         steps = [float(axis.ravel()[1] - axis.ravel()[0]) if axis.size > 1 else 1.0 for axis in grid]
-        square = np.zeros_like(f)
+        square: Values = np.zeros_like(f)
         for axis, step in zip((2, 1, 0), steps, strict=True):
             if f.shape[axis] > 1:
-                square += np.gradient(f, step, axis=axis) ** 2
-        return f / np.sqrt(np.maximum(square, np.float32(1e-6)))
+                slope: Values = np.gradient(f, step, axis=axis)
+                square += slope * slope
+        gone: Values = f / np.sqrt(np.maximum(square, np.float32(1e-6)))
+        return gone
 
     return Solid(distance, np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64))
 
@@ -205,7 +235,8 @@ def blend(solids: Sequence[Solid], width: float) -> Solid:
 
     def smooth(a: Values, b: Values) -> Values:
         h = np.maximum(np.float32(width) - np.abs(a - b), 0) / np.float32(width)
-        return np.minimum(a, b) - h * h * np.float32(width / 4)
+        joined: Values = np.minimum(a, b) - h * h * np.float32(width / 4)
+        return joined
 
     return Solid(lambda grid: reduce(smooth, (part.distance(grid) for part in solids)), low, high)
 
@@ -225,20 +256,12 @@ def cut_smoothly(solid: Solid, other: Solid, width: float) -> Solid:
     def distance(grid: Grid) -> Values:
         a, b = solid.distance(grid), -other.distance(grid)
         h = np.maximum(np.float32(width) - np.abs(a - b), 0) / np.float32(width)
-        return np.maximum(a, b) + h * h * np.float32(width / 4)
+        rounded: Values = np.maximum(a, b) + h * h * np.float32(width / 4)
+        return rounded
 
     return Solid(distance, solid.low, solid.high)
 
 
 def inset(solid: Solid, depth: float) -> Solid:
     """Return a solid shrunk by `depth` mm on all sides; grown where it is negative."""
-    return Solid(
-        lambda grid: solid.distance(grid) + np.float32(depth), solid.low + depth, solid.high - depth
-    )
-
-
-def _dot(grid: Sequence[Values], direction: FloatArray) -> Values:
-    x, y, z = grid
-    d = direction.astype(np.float32)
-    total: Values = d[0] * x + d[1] * y + d[2] * z
-    return total
+    return Solid(lambda grid: solid.distance(grid) + np.float32(depth), solid.low + depth, solid.high - depth)

@@ -68,7 +68,7 @@ def test_the_two_ears_of_an_animal_are_alike_but_not_the_same(atlas, drawn_sides
     assert np.corrcoef(left, right)[0, 1] == pytest.approx(0.6, abs=0.03)
 
 
-def test_both_sides_share_IN_exactly_in_the_mid_sagittal_plane(animals):
+def test_both_sides_share_the_incisors_exactly_in_the_mid_sagittal_plane(animals):
     for animal in animals:
         left, right = animal.side("L")["IN"], animal.side("R")["IN"]
         np.testing.assert_array_equal(left, right)
@@ -82,7 +82,7 @@ def test_all_twenty_features_are_placed_in_the_scan_frame(animals):
             assert animal.side(side).frame == "scan"
 
 
-def test_CO_obeys_its_law(animals):
+def test_the_cochlea_origin_obeys_its_law(animals):
     for animal in animals:
         for landmarks in animal.sides.values():
             ca, cb, rwa, rwp, co = landmarks.array(("CA", "CB", "RWA", "RWP", "CO"))
@@ -94,7 +94,9 @@ def test_distances_between_features_are_those_that_were_published(animals):
     mean, sd = published_distances()
     found = np.array([distances(landmarks.points) for a in animals for landmarks in a.sides.values()])
     upper = np.triu_indices(len(CODES), 1)
-    assert np.abs(found.mean(axis=0) - mean)[upper].max() < 0.5  # IN; the published atlas itself is 0.4 off there
+    assert (
+        np.abs(found.mean(axis=0) - mean)[upper].max() < 0.5
+    )  # IN; the published atlas itself is 0.4 off there
     assert np.median(np.abs(found.mean(axis=0) - mean)[upper]) < 0.05
     ratio = found.std(axis=0)[upper] / np.maximum(sd[upper], 0.05)
     assert 0.8 < np.median(ratio) < 1.25
@@ -116,7 +118,7 @@ def test_the_mean_animal_is_symmetric_and_has_the_atlas_shape(atlas):
 
 def test_the_head_is_held_as_in_a_scanner(atlas):
     left = mean_animal(atlas).side("L")
-    x, y, z = left.points.T
+    x = left.points[:, 0]
     assert (np.delete(x, CODES.index("IN")) > 4).all()  # the animal's left is +x
     assert left["IN"][1] < -40  # the snout points forward, -y
     assert left["OS"][2] > left["OI"][2]
@@ -130,12 +132,12 @@ def test_the_head_is_held_as_in_a_scanner(atlas):
     assert x.argmax() == CODES.index("ZL")
 
 
-def test_the_mid_sagittal_plane_lies_in_the_CO_frame_where_it_was_measured(animals):
+def test_the_mid_sagittal_plane_lies_in_the_cochlea_frame_where_it_was_measured(animals):
     measured = np.array([0.20, 0.98, 0.0]) / np.linalg.norm([0.20, 0.98, 0.0])
     for animal in animals:
         T_scan_cochlea = cochlea_frame(animal.side("L"))
         normal = T_scan_cochlea.inverse().apply_vector([1.0, 0.0, 0.0])
-        assert np.degrees(np.arccos(normal @ measured)) < 20
+        assert np.degrees(np.arccos(normal @ measured)) < 15
         assert T_scan_cochlea.apply_vector([1.0, 0, 0])[1] < -0.85  # x points forward
         assert T_scan_cochlea.apply_vector([0, 0, 1.0])[2] > 0.8  # z points up
 

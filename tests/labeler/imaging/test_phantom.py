@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-import SimpleITK as sitk
+import SimpleITK
 from scipy.spatial import cKDTree
 from skimage.measure import label, marching_cubes
 
@@ -128,17 +128,17 @@ def test_tips_are_extremes_of_their_bone(whole, code, direction, reach, side):
 
 
 @pytest.mark.parametrize("side", list("LR"))
-def test_IN_is_the_lowest_point_of_the_bone_between_the_incisors(whole, side):
+def test_the_incisor_point_is_the_lowest_point_of_the_bone_between_the_incisors(whole, side):
     tip = whole.specimen.side(side)["IN"]
     bone = surface_points(whole.volume, tip, 1.0) - tip
     between = bone[(np.abs(bone[:, 0]) < 0.3) & (bone[:, 1] > -0.3)]
     assert abs(between[:, 2].min()) < whole.volume.spacing[0]
     for sign in (-1, 1):
-        tooth = tip + [sign * 1.15, -0.9, -1.5]
+        tooth = tip + np.array([sign * 1.15, -0.9, -1.5])
         assert whole.volume.values_at(tooth[None])[0] > BONE
 
 
-@pytest.mark.parametrize(("side", "seed"), [("L", 1), ("R", 2)])
+@pytest.mark.parametrize(("side", "seed"), [("L", 1), ("L", 4), ("R", 7)])
 def test_the_long_limb_of_the_incus_ends_where_it_is_nearest_to_the_round_window(side, seed):
     landmarks = animal(seed).side(side)
     volume = make_phantom(seed, spacing=0.1, box=around(landmarks["LLI"][None], 1.2)).volume
@@ -163,14 +163,18 @@ def test_the_rim_of_the_round_window_surrounds_an_opening(ear):
     for point in (rwa, rwp, rwl, rwm):
         beyond = values_along(volume, centre, centre + 1.6 * (point - centre))
         first = np.flatnonzero(beyond > BONE)[0] / len(beyond) * 1.6
-        assert first * np.linalg.norm(point - centre) == pytest.approx(np.linalg.norm(point - centre), abs=0.2)
+        assert first * np.linalg.norm(point - centre) == pytest.approx(
+            np.linalg.norm(point - centre), abs=0.2
+        )
 
 
 def test_the_oval_window_opens_between_its_rims(ear):
     volume, landmarks, _ = ear
     front, back = landmarks["FPA"], landmarks["FPP"]
     line = (back - front) / np.linalg.norm(back - front)
-    rims = [values_along(volume, point, point + out * 0.3 * line).max() for point, out in ((front, -1), (back, 1))]
+    rims = [
+        values_along(volume, point, point + out * 0.3 * line).max() for point, out in ((front, -1), (back, 1))
+    ]
     assert min(rims) > BONE
     assert values_along(volume, front, front + 0.25 * line).min() < BONE  # the gap beside the footplate
     assert values_along(volume, back, back - 0.25 * line).min() < BONE
@@ -202,10 +206,16 @@ def test_the_cochlea_is_coiled_around_a_bony_axis(ear):
     away -= (away @ axis) / (axis @ axis) * axis
     away /= np.linalg.norm(away)
     cut = np.array(
-        [values_along(volume, cb + h * axis, cb + h * axis + 2.0 * away).min() for h in np.linspace(0.05, 0.95, 90)]
+        [
+            values_along(volume, cb + h * axis, cb + h * axis + 2.0 * away).min()
+            for h in np.linspace(0.05, 0.95, 90)
+        ]
     )
     wall = np.array(
-        [values_along(volume, p, p + 0.05 * axis).mean() for p in np.linspace(cb + 1.2 * away, ca + 0.4 * away, 90)]
+        [
+            values_along(volume, p, p + 0.05 * axis).mean()
+            for p in np.linspace(cb + 1.2 * away, ca + 0.4 * away, 90)
+        ]
     )
     turns = np.count_nonzero(np.diff((wall < BONE).astype(int)) == 1)
     assert turns >= 3, (turns, cut)
@@ -231,7 +241,7 @@ def test_the_two_sides_of_a_symmetric_animal_mirror_each_other():
 
 def test_noise_is_as_strong_as_asked():
     mean = mean_animal(Atlas.published())
-    box = np.array([[18.0, 0, 0], [20.0, 2, 2]]) + [40, 0, 0]  # air beside the head
+    box = np.array([[58.0, 0, 0], [60.0, 2, 2]])  # air beside the head
     still, noisy = (make_phantom(spacing=0.1, box=box, specimen=mean, noise=n).volume.array for n in (0, 500))
     assert np.ptp(still) == 0
     assert noisy.std() == pytest.approx(500, rel=0.05)
@@ -241,8 +251,8 @@ def test_written_files_give_the_phantom_back(tmp_path):
     box = around(animal(4).side("L").array(["RWA", "LLI"]), 1.0)
     phantom = make_phantom(4, spacing=0.2, box=box)
     volume, left, right = write_phantom(phantom, tmp_path / "new")
-    image = sitk.ReadImage(str(volume))
-    np.testing.assert_array_equal(sitk.GetArrayFromImage(image), phantom.volume.array)
+    image = SimpleITK.ReadImage(str(volume))
+    np.testing.assert_array_equal(SimpleITK.GetArrayFromImage(image), phantom.volume.array)
     np.testing.assert_allclose(image.GetOrigin(), phantom.volume.origin, atol=1e-9)
     np.testing.assert_allclose(image.GetSpacing(), phantom.volume.spacing, atol=1e-9)
     for path, side in ((left, Side.LEFT), (right, Side.RIGHT)):
