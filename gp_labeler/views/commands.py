@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
 
 from gp_labeler.actions import ACTIONS, MENUS, Action, Ui, run
 from gp_labeler.views.bind import follow
+from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.workbench import Workbench
 
 __all__ = ["Commands"]
@@ -85,13 +86,9 @@ class Commands(QObject):
         made.setObjectName(row.id)
         made.setShortcuts([QKeySequence(keys) for keys in row.shortcuts])
         made.setCheckable(row.checked is not None)
-        keys = (
-            QKeySequence(row.shortcuts[0]).toString(QKeySequence.SequenceFormat.NativeText)
-            if row.shortcuts
-            else ""
-        )
+        keys = keys_text(row.shortcuts[0]) if row.shortcuts else ""
         made.setToolTip((row.hint or row.title.rstrip("…")) + (f"  ({keys})" if keys else ""))
-        made.triggered.connect(partial(self._run, row.id))
+        made.triggered.connect(partial(self.run, row.id))
         if _VIEW_KEYS & set(row.shortcuts):
             made.setShortcutContext(Qt.ShortcutContext.WidgetWithChildrenShortcut)
             views.addAction(made)
@@ -99,7 +96,8 @@ class Commands(QObject):
             window.addAction(made)
         return made
 
-    def _run(self, id: str, *_: object) -> None:
+    def run(self, id: str, *_: object) -> None:
+        """Do an action."""
         run(id, self._desk, self._ui)
         self.refresh()
 

@@ -3,10 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import partial
+from pathlib import Path
+from typing import TypeVar
 
-from PySide6.QtCore import QByteArray, QEvent
+from PySide6.QtCore import QByteArray
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
-from PySide6.QtWidgets import QHBoxLayout, QMainWindow, QStackedWidget, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QHBoxLayout,
+    QMainWindow,
+    QSizePolicy,
+    QStackedWidget,
+    QVBoxLayout,
+    QWidget,
+)
 
 from gp_labeler.session.view import View as SessionView
 from gp_labeler.session.view import ViewState
@@ -14,6 +25,8 @@ from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.rail import Rail
+from gp_labeler.views.panels.scan_panel import ScanPanel
+from gp_labeler.views.panels.welcome import Welcome
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
@@ -64,6 +77,7 @@ class MainWindow(QMainWindow):
         self.commands = Commands(workbench, self.ui, self, self.grid)
         self.commands.fill(self.menuBar())
         self.rail, self.panels = Rail(workbench), QStackedWidget()
+        self.pages, self.welcome = QStackedWidget(), Welcome(workbench)
         self.status = StatusLine(workbench)
         self._dock()
         self._listen()
@@ -79,37 +93,61 @@ class MainWindow(QMainWindow):
     def set_step(self, step: str) -> None:
         """Show the panel of a step: ``scan`` or ``label``."""
         self.rail.set_step(step)
-        self.panels.setCurrentWidget(self._steps[step])
+        self.panels.setCurrentWidget(self.steps[step])
 
     def _dock(self) -> None:
-        self._steps: dict[str, QWidget] = {"label": LabelPanel(self.workbench)}
-        for panel in self._steps.values():
+        self.steps = {"scan": ScanPanel(self.workbench), "label": LabelPanel(self.workbench)}
+        for panel in self.steps.values():
             self.panels.addWidget(panel)
-        middle = QHBoxLayout()
-        middle.setContentsMargins(0, 0, 0, 0)
-        middle.setSpacing(6)
-        middle.addWidget(self.rail)
+        self.panels.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
+        desk = QWidget()
+        middle = _tight(QHBoxLayout(desk), spacing=6)
         middle.addWidget(self.grid, 1)
         middle.addWidget(self.panels)
-        whole = QVBoxLayout()
-        whole.setContentsMargins(0, 0, 0, 0)
-        whole.setSpacing(0)
-        whole.addWidget(TopBar(self.workbench, self.commands.actions))
-        whole.addLayout(middle, 1)
-        whole.addWidget(self.status)
+        self.pages.addWidget(self.welcome)
+        self.pages.addWidget(desk)
+        sides = _tight(QHBoxLayout(), spacing=6)
+        sides.addWidget(self.rail)
+        sides.addWidget(self.pages, 1)
         centre = QWidget()
-        centre.setLayout(whole)
+        whole = _tight(QVBoxLayout(centre))
+        whole.addWidget(TopBar(self.workbench, self.commands.actions))
+        whole.addLayout(sides, 1)
+        whole.addWidget(self.status)
         self.setCentralWidget(centre)
+        self._show_page()
 
     def _listen(self) -> None:
         desk = self.workbench
         self.grid.hovered.connect(self.status.show_position)
         self.rail.step_chosen.connect(self.set_step)
         self.rail.keys_asked.connect(self.ui.show_shortcuts)
+        self.welcome.open_scan_asked.connect(self.ui.ask_open_file)
+        self.welcome.open_specimen_asked.connect(self.ui.ask_open_file)
+        self.welcome.demo_asked.connect(self.ui.open_demo)
+        self.welcome.path_chosen.connect(self._on_path_chosen)
+        card = self.steps["label"].card
+        card.open_asked.connect(self.ui.ask_open_file)
+        card.export_asked.connect(partial(self.commands.run, "file.export"))
+        self.steps["scan"].mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
+        follow(self, desk.volume_opened, self._show_page)
+        follow(self, desk.session_replaced, self._show_page)
         follow(self, desk.import_asked, self._on_import_asked)
         follow(self, desk.scan_differs, self._on_scan_differs)
         for signal in (desk.session_replaced, desk.details_changed, desk.dirty_changed):
             follow(self, signal, self._show_title)
+
+    def _show_page(self, *_: object) -> None:
+        """Show the first page until a scan, or a specimen that lies on one, is open."""
+        is_open = self.workbench.session.state.volume is not None
+        if is_open and self.pages.currentIndex() == 0 and self.workbench.volume is not None:
+            self.set_step("label")
+        self.pages.setCurrentIndex(int(is_open))
+        if not is_open:
+            self.welcome.refresh()
+
+    def _on_path_chosen(self, path: str) -> None:
+        self.ui.open_path(Path(path))
 
     def _on_import_asked(self, plan: object) -> None:
         self.ui.take_plan(plan)  # type: ignore[arg-type]
@@ -161,9 +199,10 @@ class MainWindow(QMainWindow):
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802
         for url in event.mimeData().urls()[:1]:
-            from pathlib import Path
-
             self.ui.open_path(Path(url.toLocalFile()))
 
-    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
-        super().changeEvent(event)
+
+def _tight(layout: Layout, *, spacing: int = 0) -> Layout:
+    layout.setContentsMargins(0, 0, 0, 0)
+    layout.setSpacing(spacing)
+    return layout

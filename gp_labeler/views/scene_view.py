@@ -1,4 +1,4 @@
-"""The 3D view as a widget: the scene drawn in memory and painted, so that it needs no OpenGL of the display.
+"""The 3D view as a widget: the scene is drawn in memory and painted, so it needs no OpenGL of the display.
 
 What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over the
 last frame: the bone need not be drawn again for it.

@@ -167,8 +167,9 @@ class SlicePainter:
             painter.setPen(QPen(colour, 1.8 * ratio))
             painter.drawPolygon(ring)
             text = _outlined(ghost.label, _font(13, ratio, bold=True))
-            box = ring.boundingRect()
-            text.translate(box.right() + 4 * ratio, box.top())
+            box, letters = ring.boundingRect(), text.boundingRect()
+            right = min(box.right() + 4 * ratio, shown.size[0] - letters.width() - 6 * ratio)
+            text.translate(right, max(box.top(), letters.height() + 6 * ratio))
             _draw_text(painter, text, colour.name(), ratio)
 
     def _paint_marks(

@@ -8,7 +8,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QToolButton, QVBox
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import Plane, position_text
-from gp_labeler.views.bind import follow
+from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.slice_view import SliceView
@@ -154,9 +154,8 @@ class ViewGrid(QWidget):
         for name in (left, right):
             row.addWidget(self.frames[name])
         row.setSizes([1000, 1000])
-        for splitter in (row,):
-            splitter.setChildrenCollapsible(False)
-            splitter.setHandleWidth(6)
+        row.setChildrenCollapsible(False)
+        row.setHandleWidth(6)
         return row
 
     def _listen(self) -> None:
@@ -195,7 +194,9 @@ class ViewGrid(QWidget):
         self.frames[plane.value].header.where.setText(position_text(plane, position))
 
     def _say_threshold(self, threshold: float | None) -> None:
-        self.frames["3d"].header.where.setText("" if threshold is None else f"bone from {threshold:.4g}")
+        self.frames["3d"].header.where.setText(
+            "" if threshold is None else f"bone from {value_text(threshold)}"
+        )
 
     def fly_to(self, position: FloatArray) -> None:
         """Bring a (3,) scan position into sight in every view."""
