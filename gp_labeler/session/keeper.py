@@ -11,7 +11,7 @@ from gp_core.errors import GpError
 from gp_labeler.session.document import document_of
 from gp_labeler.session.journal import Journal, read_journal
 from gp_labeler.session.lock import FileLock, InUseError
-from gp_labeler.session.places import UNSAVED, journal_path, lock_path, volume_lock_path
+from gp_labeler.session.places import UNSAVED, absolute_path, journal_path, lock_path, volume_lock_path
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.specimen_file import SUFFIX, digest, write_specimen
 from gp_labeler.session.state import SpecimenState
@@ -34,7 +34,7 @@ class Keeper:
 
     def __init__(self, directory: Path | None = None, specimen_file: Path | None = None) -> None:
         self.directory = directory
-        self.specimen_file = None if specimen_file is None else Path(specimen_file).resolve()
+        self.specimen_file = None if specimen_file is None else absolute_path(specimen_file)
         self._saved = None if specimen_file is None else digest(specimen_file)
         self._journal: Journal | None = None
         self._lock: FileLock | None = None
@@ -157,7 +157,7 @@ class Keeper:
     def _target(self, path: str | PathLike[str] | None) -> Path:
         if path is None and self.specimen_file is None:
             raise GpError("the specimen was never saved", remedy=f"Give a file name, <specimen>{SUFFIX}.")
-        target = Path(path or self.specimen_file or "").resolve()
+        target = absolute_path(path or self.specimen_file or "")
         return target if target.name.endswith(SUFFIX) else target.with_name(target.name + SUFFIX)
 
     def _check_ours(self, target: Path, overwrite: bool, moves: bool) -> None:

@@ -11,6 +11,7 @@ from gp_core.checks import check_option
 from gp_core.errors import GpError
 from gp_labeler.session.document import state_of
 from gp_labeler.session.keeper import Keeper
+from gp_labeler.session.places import absolute_path
 from gp_labeler.session.recovery import Recovery, find_recovery, replayed
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_file import read_specimen
@@ -92,7 +93,7 @@ def open_session(
         It cannot be read.
     """
     check_option(unsaved, "unsaved", ("ask", "recover", "leave"))
-    file = Path(path)
+    file = absolute_path(path)
     recovery = find_recovery(directory, file) if directory and not as_copy and unsaved != "leave" else None
     if recovery is not None and directory is not None:
         if unsaved == "ask":

@@ -10,7 +10,17 @@ from uuid import uuid4
 
 from platformdirs import user_state_path
 
-__all__ = ["UNSAVED", "default_directory", "journal_folder", "journal_path", "lock_path", "volume_lock_path"]
+from gp_core.errors import GpError
+
+__all__ = [
+    "UNSAVED",
+    "absolute_path",
+    "default_directory",
+    "journal_folder",
+    "journal_path",
+    "lock_path",
+    "volume_lock_path",
+]
 
 UNSAVED = "unsaved-"
 """Journals whose name begins so belong to one session only, which was never saved."""
@@ -19,6 +29,14 @@ UNSAVED = "unsaved-"
 def default_directory() -> Path:
     """Return the user's state directory; tests and scripts give their own."""
     return user_state_path("gp-labeler", appauthor=False)
+
+
+def absolute_path(path: str | PathLike[str]) -> Path:
+    """Return a path from the root, links followed; raises `GpError` for one that no system can hold."""
+    try:
+        return Path(path).resolve()
+    except (OSError, ValueError, RuntimeError) as error:
+        raise GpError(f"is no path that can be ({error})", file=path, remedy="Give another.") from None
 
 
 def journal_folder(directory: Path) -> Path:

@@ -7,6 +7,7 @@ from os import PathLike
 from pathlib import Path
 
 from gp_core.errors import GpError
+from gp_labeler.session.places import absolute_path
 from gp_labeler.session.specimen_file import write_durably
 
 __all__ = ["RecentFiles"]
@@ -43,12 +44,12 @@ class RecentFiles:
 
     def add(self, path: str | PathLike[str]) -> None:
         """Put a file at the top."""
-        newest = Path(path).resolve()
+        newest = absolute_path(path)
         self._write([newest, *(p for p in self.all() if p != newest)])
 
     def remove(self, path: str | PathLike[str]) -> None:
         """Forget a file."""
-        gone = Path(path).resolve()
+        gone = absolute_path(path)
         self._write([p for p in self.all() if p != gone])
 
     def clear(self) -> None:

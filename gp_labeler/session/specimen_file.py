@@ -49,7 +49,7 @@ def write_specimen(path: str | PathLike[str], state: SpecimenState) -> None:
     target = Path(path)
     document = {"format": FORMAT, "version": VERSION, "application": application(), **document_of(state)}
     document = _with_relative_path(document, target.absolute().parent)
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
     write_durably(target, text)
 
 

@@ -18,6 +18,7 @@ from gp_core.landmarks.files import disk
 from gp_labeler.session.document import document_of, state_of
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.frozen_json import freeze
+from gp_labeler.session.opening import open_session
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import SetNotes
 from gp_labeler.session.specimen_file import read_specimen, write_specimen
@@ -173,6 +174,18 @@ def test_another_scan_is_noticed():
         assert session.volume == FakeVolume(path=Path("moved"))
     session.attach_volume(FakeVolume(checksum="other"), accept_changes=True)
     assert session.state.volume.checksum == "other"
+
+
+def test_paths_and_notes_of_any_kind_are_kept(tmp_path):
+    state = SpecimenState(notes="é \udc80 🐹").on_volume(
+        VolumeReference("x", (1, 1, 1), (1, 1, 1), path="/\udcff"), {}
+    )
+    write_specimen(tmp_path / "a", state)
+    assert read_specimen(tmp_path / "a") == state
+    session = Session(state)
+    for do in (session.save, open_session):
+        with pytest.raises(GpError, match="is no path that can be"):
+            do("a\0b")
 
 
 def test_undo_leaves_the_scan_alone():
