@@ -7,7 +7,6 @@ loading it and what can be chosen. `read_volume` loads what was looked into, or 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -15,10 +14,11 @@ from typing import Any
 import numpy as np
 
 from gp_labeler.imaging.progress import Progress, Report
+from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
 from gp_labeler.imaging.readers.options import ImportOptions
-from gp_labeler.imaging.readers.plan import Choice, ImportPlan
-from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error
+from gp_labeler.imaging.readers.plan import ImportPlan
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, quiet
 from gp_labeler.imaging.readers.source import assemble
 from gp_labeler.imaging.volume import GreyArray, Volume
 
@@ -120,21 +120,18 @@ def read_preview(
     plan: ImportPlan, *, cancel: Callable[[], bool] | None = None, reverse: bool | None = None
 ) -> Volume:
     """Load a coarse picture of a plan, whatever stands against it; a missing voxel size counts as 1 mm."""
-    stride = plan.preview_stride
-    options = replace(
-        plan.options, stride=stride, reverse=plan.options.reverse if reverse is None else reverse
-    )
-    return _load(plan.with_options(options), Report(None, cancel))
+    backward = plan.options.reverse if reverse is None else reverse
+    return _load(plan.with_options(stride=plan.preview_stride, reverse=backward), Report(None, cancel))
 
 
 def _planned(path: PathOrPlan, options: dict[str, Any], report: Report) -> ImportPlan:
     """Return a plan under the options; it is looked into again only where they change what is read."""
     if not isinstance(path, ImportPlan):
         return _inspect(path, ImportOptions.make(**options), report)
-    wanted = ImportOptions.make(**path.options.as_json() | options)
-    if (wanted.series, wanted.channel) == (path.options.series, path.options.channel):
-        return path.with_options(wanted)
-    return _inspect(path.path, wanted, report)
+    changed = path.with_options(**options)
+    if (changed.options.series, changed.options.channel) == (path.options.series, path.options.channel):
+        return changed
+    return _inspect(path.path, changed.options, report)
 
 
 def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) -> ImportPlan:
@@ -145,7 +142,7 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 
 
 def _load(plan: ImportPlan, report: Report) -> Volume:
-    with failing_as_volume_error(plan.path):
+    with quiet(), failing_as_volume_error(plan.path):
         array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
     array, filled = _finite(array)
     volume = Volume(

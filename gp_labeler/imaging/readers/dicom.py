@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.choosing import Choice, choose
 from gp_labeler.imaging.readers.dicom_tags import Frame, Pixels, scan_dicom
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
-from gp_labeler.imaging.readers.plan import Choice, Geometry, ImportPlan
+from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 from gp_labeler.imaging.readers.simpleitk import ItkSource, read_itk_planes
 from gp_labeler.imaging.readers.source import FileSource, Plane, RawSource, SliceSource
 
 __all__ = ["inspect_dicom"]
 
-_FEW = 0.1
 _SAME = 0.25
 """Positions nearer than this part of the slice distance are the same one; all tolerances are relative, for a
 whole slice of a micro-CT may measure less than the absolute 0.01 mm that suffices for people."""
@@ -71,10 +71,15 @@ def inspect_dicom(
             file=folder,
             remedy="Give the folder of a CT series.",
         )
-    candidates, scouts = _candidates(series)
-    ids = [_id(one, candidates) for one in candidates]
-    choices = tuple(Choice(id_, _text(one)) for id_, one in zip(ids, candidates, strict=True))
-    index, found = _choose(choices, candidates, options, chosen, folder)
+    series, scouts = _without_scouts(series)
+    ids = [_id(one, series) for one in series]
+    choices = tuple(Choice(id_, _text(one), _depth(one)) for id_, one in zip(ids, series, strict=True))
+    paths = [{frame.path for frame in one} for one in series]
+    picked = next((n for n, members in enumerate(paths) if chosen in members), None)
+    index, problems = choose(choices, options, picked, folder)
+    if picked is not None and len(series) > 1:
+        options = replace(options, series=ids[picked])
+    found = list(problems)
     if damaged:
         text = f"files are DICOM, but damaged: {names(damaged)}"
         remedy = "Copy them again, or accept that they are left out (--accept damaged)."
@@ -85,8 +90,8 @@ def inspect_dicom(
         found.append(
             warning("scout", f"scout images are left out: {names([f.path for s in scouts for f in s])}")
         )
-    plan = _multi_frame if candidates[index][0].n_frames > 1 else _single_frames
-    return plan(folder, candidates[index], options, tuple(found), choices, ids[index])
+    plan = _multi_frame if series[index][0].n_frames > 1 else _single_frames
+    return plan(folder, series[index], options, tuple(found), choices, ids[index])
 
 
 def _series(frames: Sequence[Frame]) -> list[list[Frame]]:
@@ -103,12 +108,11 @@ def _depth(group: Sequence[Frame]) -> int:
     return sum(frame.n_frames for frame in group)
 
 
-def _candidates(series: list[list[Frame]]) -> tuple[list[list[Frame]], list[list[Frame]]]:
-    """Part what may be a volume from scouts: those that say so, and those of very few slices."""
-    least = max(2, _FEW * _depth(series[0]))
-    scouts = [group for group in series if _depth(group) < least or all(frame.localizer for frame in group)]
-    candidates = [group for group in series if group not in scouts]
-    return (candidates, scouts) if candidates else (series[:1], series[1:])
+def _without_scouts(series: list[list[Frame]]) -> tuple[list[list[Frame]], list[list[Frame]]]:
+    """Part what may be a volume from scouts: those that say so, and single slices."""
+    scouts = [one for one in series if _depth(one) < 2 or all(frame.localizer for frame in one)]
+    volumes = [one for one in series if one not in scouts]
+    return (volumes, scouts) if volumes else (series[:1], series[1:])
 
 
 def _id(group: Sequence[Frame], among: Sequence[Sequence[Frame]]) -> str:
@@ -122,38 +126,6 @@ def _text(group: Sequence[Frame]) -> str:
     first = group[0]
     size = "" if first.pixel is None else f" of {first.pixel[0]:.4g} mm"
     return f"{first.description}: {_depth(group)} slices, {_times(first.shape)} pixels{size}"
-
-
-def _choose(
-    choices: Sequence[Choice],
-    candidates: Sequence[Sequence[Frame]],
-    options: ImportOptions,
-    chosen: Path | None,
-    folder: Path,
-) -> tuple[int, list[Problem]]:
-    if options.series is not None:
-        wanted = options.series.lower()
-        exact = [n for n, choice in enumerate(choices) if choice.id.lower() == wanted]
-        fitting = exact or [n for n, c in enumerate(choices) if wanted in f"{c.id} {c.text}".lower()]
-        if len(fitting) == 1:
-            return fitting[0], []
-        raise VolumeError(
-            f"series {options.series!r} fits {len(fitting)} of its series",
-            file=folder,
-            remedy=f"Give one of: {names([f'{choice.id} ({choice.text})' for choice in choices], 12)}.",
-        )
-    for n, group in enumerate(candidates):
-        if chosen is not None and chosen in [frame.path for frame in group]:
-            return n, []
-    if len(candidates) == 1:
-        return 0, []
-    problem = Problem(
-        "several-series",
-        f"it holds {len(candidates)} series: {names([choice.text for choice in choices], 12)}",
-        remedy="Choose one (--series, with its UID or a part of its name).",
-        resolved_by=("series",),
-    )
-    return 0, [problem]
 
 
 def _single_frames(

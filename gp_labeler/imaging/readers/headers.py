@@ -105,8 +105,7 @@ def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
     if not head.startswith(b"NRRD"):
         raise _not_a("NRRD", path)
     end = re.search(rb"\r?\n\r?\n", head)
-    text = head[: end.start() if end else len(head)].decode("latin-1")
-    fields = _fields(text, ":")
+    fields = _fields(_text(head[: end.start() if end else len(head)]), ":")
     data_file = fields.get("data file") or fields.get("datafile")
     source = _nrrd_source(path, fields, data_file, end.end() if end else len(head), channel)
     unit, notes = _stated_unit(fields.get("space units") or fields.get("units") or "")
@@ -156,7 +155,7 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
     with path.open("rb") as file:
         head = file.read(_HEADER_BYTES)
     end = re.search(rb"^[ \t]*ElementDataFile[^\n]*\n?", head, re.MULTILINE)
-    fields = _fields(head[: end.end() if end else len(head)].decode("latin-1"), "=")
+    fields = _fields(_text(head[: end.end() if end else len(head)]), "=")
     if end is None or not {"ndims", "dimsize", "elementtype"} <= fields.keys():
         raise _not_a("MetaImage", path)
     source = _meta_source(path, fields, end.end(), channel)
@@ -247,6 +246,13 @@ def _read(stream: object, n: int) -> bytes:
 def _is_gzip(path: Path) -> bool:
     with path.open("rb") as file:
         return file.read(2) == b"\x1f\x8b"
+
+
+def _text(raw: bytes) -> str:
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
 
 
 def _fields(text: str, separator: str) -> dict[str, str]:

@@ -11,33 +11,18 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.grey import loaded_dtype, narrowing
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.problems import Problem, warning
 from gp_labeler.imaging.readers.source import SliceSource, window
 from gp_labeler.imaging.readers.spacing import shown, spacing_problems
 
-__all__ = ["Choice", "Geometry", "ImportPlan"]
+__all__ = ["Geometry", "ImportPlan"]
 
 _LARGE_BYTES = 2 << 30
 _PREVIEW_VOXELS = 160
 _ORTHOGONAL = 1e-4
-
-
-@dataclass(frozen=True)
-class Choice:
-    """One of several scans in a folder.
-
-    Parameters
-    ----------
-    id : str
-        What the option `series` takes.
-    text : str
-        What a person chooses by.
-    """
-
-    id: str
-    text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,9 +178,9 @@ class ImportPlan:
         """Problems to show."""
         return tuple(problem for problem in self.problems if problem.severity == "warning")
 
-    def with_options(self, options: ImportOptions) -> ImportPlan:
-        """Return the plan under other options; another `series` or `channel` needs `inspect_volume`."""
-        return replace(self, options=options)
+    def with_options(self, **options: Any) -> ImportPlan:
+        """Return the plan with some options changed; another `series` or `channel` needs `inspect_volume`."""
+        return replace(self, options=ImportOptions.make(**self.options.as_json() | options))
 
     def T_scan_voxel(self) -> FloatArray:  # noqa: N802 - a transform keeps its name
         """Return the (4, 4) affine of the part that will be loaded; a missing voxel size counts as 1 mm."""

@@ -22,7 +22,7 @@ from gp_labeler.imaging.readers.formats import (
 from gp_labeler.imaging.readers.itk_image import inspect_itk_image
 from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.plan import ImportPlan
-from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error, names
+from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error, names, quiet
 from gp_labeler.imaging.readers.scanco import inspect_scanco
 from gp_labeler.imaging.readers.stack import inspect_stack
 from gp_labeler.imaging.readers.tiff import inspect_tiff, is_multi_page
@@ -45,7 +45,7 @@ def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Repo
     where = Path(path)
     if not where.exists():
         raise VolumeError("there is no such file or folder", file=where, remedy="Check the path.")
-    with failing_as_volume_error(where):
+    with quiet(), failing_as_volume_error(where):
         if where.is_dir():
             return _inspect_folder(where, options, report)
         if where.stat().st_size == 0:

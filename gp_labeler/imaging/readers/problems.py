@@ -14,7 +14,7 @@ from typing import Literal
 from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Cancelled
 
-__all__ = ["Problem", "VolumeError", "failing_as_volume_error", "names", "warning"]
+__all__ = ["Problem", "VolumeError", "failing_as_volume_error", "names", "quiet", "warning"]
 
 Resolution = Literal["spacing", "series", "accept"]
 
@@ -83,15 +83,9 @@ def names(files: Iterable[Path | str], most: int = 4) -> str:
 
 @contextmanager
 def failing_as_volume_error(path: Path) -> Iterator[None]:
-    """Turn whatever a library raises on a broken file into `VolumeError`, and keep it quiet meanwhile."""
-    handler = logging.NullHandler()
-    loggers = [logging.getLogger(name) for name in ("tifffile", "pydicom", "PIL")]
-    for logger in loggers:
-        logger.addHandler(handler)  # else their words reach stderr where nobody set logging up
+    """Turn whatever a library raises on a broken file into `VolumeError`."""
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
+        yield
     except Cancelled:
         raise
     except GpError as problem:
@@ -100,17 +94,32 @@ def failing_as_volume_error(path: Path) -> Iterator[None]:
         raise VolumeError(problem.problem, file=path, remedy=problem.remedy) from None
     except MemoryError:
         raise VolumeError(
-            "there is not enough memory to load it", file=path, remedy="Load every second voxel, or a region."
+            "there is not enough memory to load it",
+            file=path,
+            remedy="Load every second voxel, or a region.",
         ) from None
     except (
         Exception
-    ) as problem:  # parsers of broken files raise anything: struct.error, SyntaxError, KeyError ...
+    ) as problem:  # parsers of broken files raise anything: struct.error, SyntaxError, KeyError
         text = str(problem).strip().splitlines()
         raise VolumeError(
             f"it cannot be read: {text[-1] if text else type(problem).__name__}",
             file=path,
             remedy="It may be damaged: copy it again, or open it in the program that wrote it.",
         ) from problem
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Keep the reading libraries from writing to stderr: what matters comes out as a problem or a note."""
+    handler = logging.NullHandler()
+    loggers = [logging.getLogger(name) for name in ("tifffile", "pydicom", "PIL")]
+    for logger in loggers:
+        logger.addHandler(handler)  # else their words reach stderr where nobody set logging up
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            yield
     finally:
         for logger in loggers:
             logger.removeHandler(handler)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from PIL import Image
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.choosing import FEW, Choice, choose
 from gp_labeler.imaging.readers.formats import TIFF_SUFFIXES
 from gp_labeler.imaging.readers.grey import palette_as_grey, to_grey
 from gp_labeler.imaging.readers.naming import Numbering, SliceGroup, group_slices, number_slices
@@ -25,7 +26,7 @@ from gp_labeler.imaging.readers.pixel_size import (
     stack_geometry,
     tiff_pixel_size,
 )
-from gp_labeler.imaging.readers.plan import Choice, Geometry, ImportPlan
+from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 from gp_labeler.imaging.readers.skyscan import SkyScanLog, find_log
 from gp_labeler.imaging.readers.source import FileSource, Plane
@@ -35,7 +36,6 @@ from gp_labeler.imaging.readers.tiff import finishing, page_array
 __all__ = ["inspect_stack"]
 
 _PALETTE = 3
-_FEW = 0.1  # a group with less than this part of the largest one's files is not another scan
 
 
 @dataclass(frozen=True)
@@ -73,64 +73,35 @@ def inspect_stack(
     """
     slices = [file for file in files if not file.stem.lower().endswith("_spr")]
     groups = group_slices(slices)
-    candidates = [group for group in groups if len(group.files) >= max(2, _FEW * len(groups[0].files))]
-    if not candidates:
+    stacks = [group for group in groups if len(group.files) > 1]
+    if not stacks:
         raise VolumeError(
             f"it holds no stack of slices, but {names(files)}",
             file=folder,
             remedy="A stack needs one image file for each slice, with names that differ in a number.",
         )
-    group, found = _choose(candidates, options, chosen, folder)
-    found += _left_out(files, slices, groups, candidates)
-    headers = _read_headers(group.files, report)
-    return _plan(folder, group, headers, found, [_choice(one) for one in candidates], options)
+    choices = tuple(_choice(group) for group in stacks)
+    picked = next((n for n, group in enumerate(stacks) if chosen in group.files), None)
+    index, found = choose(choices, options, picked, folder)
+    if picked is not None and len(stacks) > 1:
+        options = replace(options, series=choices[picked].id)
+    headers = _read_headers(stacks[index].files, report)
+    left_out = _left_out(files, slices, groups)
+    return _plan(folder, stacks[index], headers, [*found, *left_out], choices, options)
 
 
 def _choice(group: SliceGroup) -> Choice:
-    return Choice(group.pattern, f"{group.pattern}: {len(group.files)} slices")
+    return Choice(group.pattern, f"{group.pattern} ({len(group.files)} slices)", len(group.files))
 
 
-def _choose(
-    candidates: Sequence[SliceGroup], options: ImportOptions, chosen: Path | None, folder: Path
-) -> tuple[SliceGroup, list[Problem]]:
-    if options.series is not None:
-        wanted = options.series.lower()
-        exact = [group for group in candidates if group.pattern.lower() == wanted]
-        fitting = exact or [group for group in candidates if wanted in group.pattern.lower()]
-        if len(fitting) == 1:
-            return fitting[0], []
-        raise VolumeError(
-            f"series {options.series!r} fits {len(fitting)} of its stacks",
-            file=folder,
-            remedy=f"Give one of: {names([group.pattern for group in candidates], 12)}.",
-        )
-    for group in candidates:
-        if chosen is not None and chosen in group.files:
-            return group, []
-    if len(candidates) == 1:
-        return candidates[0], []
-    listed = names([f"{group.pattern} ({len(group.files)})" for group in candidates], 12)
-    problem = Problem(
-        "several-series",
-        f"it holds {len(candidates)} stacks: {listed}",
-        remedy="Choose one (--series, with a part of its name).",
-        resolved_by=("series",),
-    )
-    return candidates[0], [problem]
-
-
-def _left_out(
-    files: Sequence[Path],
-    slices: Sequence[Path],
-    groups: Sequence[SliceGroup],
-    candidates: Sequence[SliceGroup],
-) -> list[Problem]:
+def _left_out(files: Sequence[Path], slices: Sequence[Path], groups: Sequence[SliceGroup]) -> list[Problem]:
     found = []
     scouts = sorted(set(files) - set(slices))
     if scouts:
         found.append(warning("scout", f"scout images are left out: {names(scouts)}"))
-    stray = [file for group in groups if group not in candidates for file in group.files]
-    if stray:
+    few = [group for group in groups if len(group.files) < max(2, FEW * len(groups[0].files))]
+    if few:
+        stray = [file for group in few for file in group.files]
         found.append(warning("stray", f"images that are no part of a stack are left out: {names(stray)}"))
     return found
 
@@ -181,7 +152,7 @@ def _plan(
     group: SliceGroup,
     headers: dict[Path, _Slice],
     found: list[Problem],
-    choices: list[Choice],
+    choices: tuple[Choice, ...],
     options: ImportOptions,
 ) -> ImportPlan:
     shape = Counter(header.shape for header in headers.values()).most_common(1)[0][0]
@@ -209,7 +180,7 @@ def _plan(
         source=FileSource(files, _decoder(options.channel)),
         geometry=geometry,
         found=(*found, *log_problems),
-        choices=tuple(choices),
+        choices=choices,
         choice=group.pattern,
         options=options,
         name=log.prefix.rstrip("_") if log and log.prefix else folder.name,

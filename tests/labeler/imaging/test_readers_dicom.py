@@ -168,13 +168,15 @@ def test_several_series_are_to_be_chosen_from(tmp_path: Path) -> None:
     assert [problem.code for problem in plan.errors] == ["several-series"]
     assert [choice.id for choice in plan.choices] == ["1.2.9", "1.2.10"]
     assert plan.choices[0].text == "series 3 bone kernel: 25 slices, 60 x 24 pixels of 0.1411 mm"
-    with pytest.raises(VolumeError, match=r"2 series: series 3 bone kernel: 25 slices.*--series"):
+    with pytest.raises(VolumeError, match=r"2 scans: series 3 bone kernel: 25 slices.*--series"):
         read_volume(tmp_path)
     assert_same_scan(tmp_path, scan, series="1.2.9")
     np.testing.assert_array_equal(read_volume(plan, series="SOFT").array, other.array)
-    assert inspect_volume(tmp_path / "soft003.dcm").choice == "1.2.10"
+    picked = read_volume(tmp_path / "soft003.dcm")
+    assert picked.choices == {"series": "1.2.10"}
+    np.testing.assert_array_equal(read_volume(picked.path, **picked.choices).array, other.array)
     with pytest.raises(
-        VolumeError, match=r"series 'kernel' fits 2 of its series.*1\.2\.9 \(series 3 bone kernel"
+        VolumeError, match=r"series 'kernel' fits 2 of its scans.*1\.2\.9 \(series 3 bone kernel"
     ):
         read_volume(plan, series="kernel")
 

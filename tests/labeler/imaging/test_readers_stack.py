@@ -201,17 +201,30 @@ def test_other_numbers_in_the_name_make_other_stacks(tmp_path: Path) -> None:
     assert codes(plan)[0] == ["several-series", "spacing-missing"]
     assert [choice.id for choice in plan.choices] == ["ear2_z#_c0.tif", "ear2_z#_c1.tif"]
     with pytest.raises(
-        VolumeError, match=r"2 stacks: ear2_z#_c0.tif \(61\), ear2_z#_c1.tif \(61\).*--series"
+        VolumeError, match=r"2 scans: ear2_z#_c0.tif \(61 slices\), ear2_z#_c1.tif \(61 .*--series"
     ):
         read_volume(plan, spacing=SPACING)
     assert_same_values(tmp_path, scan, series="_c0")
     np.testing.assert_array_equal(read_volume(plan, series="C1", spacing=SPACING).array, 255 - scan.array)
-    np.testing.assert_array_equal(inspect_volume(tmp_path / "ear2_z010_c1.tif").choice, "ear2_z#_c1.tif")
+    picked = read_volume(tmp_path / "ear2_z010_c1.tif", spacing=SPACING)
+    assert picked.choices["series"] == "ear2_z#_c1.tif"
+    np.testing.assert_array_equal(read_volume(picked.path, **picked.choices).array, 255 - scan.array)
     for vague in ("ear2", "c9"):
         with pytest.raises(
-            VolumeError, match=f"series '{vague}' fits . of its stacks.*Give one of: ear2_z#_c0.tif"
+            VolumeError, match=f"series '{vague}' fits . of its scans.*Give one of: .ear2_z#_c0.tif"
         ):
             read_volume(tmp_path, series=vague)
+
+
+def test_a_much_smaller_stack_is_no_rival_but_can_be_asked_for(tmp_path: Path) -> None:
+    scan = cropped()
+    write_image_stack(scan, tmp_path, "bone{:03d}.png")
+    write_image_stack(Scan(scan.array[:5], scan.affine, scan.landmarks), tmp_path, "calibration{:03d}.png")
+    plan = inspect_volume(tmp_path)
+    assert codes(plan) == (["spacing-missing"], ["stray"])
+    assert len(plan.choices) == 2
+    assert_same_values(tmp_path, scan)
+    assert inspect_volume(plan, series="calib").size == (72, 66, 5)
 
 
 def test_a_slice_stands_for_its_stack(tmp_path: Path) -> None:

@@ -104,6 +104,7 @@ def test_the_checksum_notices_mirrors_types_shapes_and_places() -> None:
         Volume.from_parts(array, (1, 1, 1)),
         Volume.from_parts(array[::-1], (1, 1, 1)),
         Volume.from_parts(array[:, :, ::-1], (1, 1, 1)),
+        Volume.from_parts(np.roll(array, 8, axis=2), (1, 1, 1)),
         Volume.from_parts(array.astype(np.uint16), (1, 1, 1)),
         Volume.from_parts(array.reshape(40, 64, 48), (1, 1, 1)),
         Volume.from_parts(array, (1, 1, 1.001)),
