@@ -1,4 +1,4 @@
-"""Between models and widgets: signals that let go in time, errors that are told, numbers as people read them."""
+"""Between models and widgets: signals that let go in time, errors that are told, numbers for people."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from PySide6.QtWidgets import QWidget
 from gp_core.errors import GpError
 
 __all__ = [
+    "NONE",
+    "TIMES",
     "attempt",
     "blocked",
     "degrees_text",
@@ -27,6 +29,9 @@ __all__ = [
     "voxel_text",
 ]
 
+NONE = "\N{EN DASH}"
+TIMES = " \N{MULTIPLICATION SIGN} "
+_MINUS = "\N{MINUS SIGN}"
 _AXES = (("L", "R"), ("P", "A"), ("S", "I"))
 
 
@@ -95,14 +100,14 @@ def set_role(widget: QWidget, role: str) -> None:
 def mm_text(length: float) -> str:
     """Return a length such as ``2.6 mm``; finer below a tenth of a millimetre."""
     if not math.isfinite(length):
-        return "–"
+        return NONE
     digits = 1 if abs(length) >= 0.995 else 2 if abs(length) >= 0.0995 else 3
-    return f"{length:.{digits}f} mm".replace("-", "−")
+    return f"{length:.{digits}f} mm".replace("-", _MINUS)
 
 
 def degrees_text(angle_rad: float) -> str:
     """Return an angle in radians such as ``4.3°``."""
-    return f"{math.degrees(angle_rad):.1f}°".replace("-", "−") if math.isfinite(angle_rad) else "–"
+    return f"{math.degrees(angle_rad):.1f}°".replace("-", _MINUS) if math.isfinite(angle_rad) else NONE
 
 
 def position_text(position: Iterable[float]) -> str:
@@ -110,7 +115,7 @@ def position_text(position: Iterable[float]) -> str:
     parts = []
     for value, (plus, minus) in zip(position, _AXES, strict=True):
         if not math.isfinite(value):
-            return "–"
+            return NONE
         shown = round(float(value), 1)
         parts.append(f"{plus if shown >= 0 else minus} {abs(shown):.1f}")
     return "  ".join(parts) + " mm"
@@ -123,15 +128,15 @@ def voxel_text(index: Iterable[float]) -> str:
 
 def value_text(value: float | None) -> str:
     """Return a grey value with as many digits as it has a meaning for."""
-    return "–" if value is None or not math.isfinite(value) else f"{value:.5g}".replace("-", "−")
+    return NONE if value is None or not math.isfinite(value) else f"{value:.5g}".replace("-", _MINUS)
 
 
 def size_text(size: Sequence[int]) -> str:
-    """Return voxels along x, y, z such as ``512 × 512 × 600``."""
-    return " × ".join(str(n) for n in size)
+    """Return voxels along x, y, z such as ``512 x 512 x 600``, with true multiplication signs."""
+    return TIMES.join(str(n) for n in size)
 
 
 def spacing_text(spacing: Sequence[float]) -> str:
     """Return a voxel size such as ``0.035 mm``, or all three numbers where they differ."""
     texts = [f"{length:.4g}" for length in spacing]
-    return f"{texts[0] if len(set(texts)) == 1 else ' × '.join(texts)} mm"
+    return f"{texts[0] if len(set(texts)) == 1 else TIMES.join(texts)} mm"

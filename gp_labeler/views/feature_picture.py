@@ -63,7 +63,9 @@ def feature_picture(code: str, side: Side | str, size: QSize, theme: Theme, *, r
     pixmap.fill(Qt.GlobalColor.transparent)
     painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _Picture(painter, schematic_of(code, Side.parse(side)), QRectF(0, 0, size.width(), size.height()), theme).draw()
+    _Picture(
+        painter, schematic_of(code, Side.parse(side)), QRectF(0, 0, size.width(), size.height()), theme
+    ).draw()
     painter.end()
     return pixmap
 
@@ -87,7 +89,9 @@ class FeaturePicture(QWidget):
 
     def paintEvent(self, event: object) -> None:  # noqa: D102, N802 - Qt's name
         if self._shown is not None:
-            picture = feature_picture(*self._shown, self.size(), theme_of(self), ratio=self.devicePixelRatioF())
+            picture = feature_picture(
+                *self._shown, self.size(), theme_of(self), ratio=self.devicePixelRatioF()
+            )
             painter = QPainter(self)
             painter.drawPixmap(0, 0, picture)
             painter.end()
@@ -137,7 +141,9 @@ class _Picture:
         dark, bone = self._theme.is_dark, QColor(self._theme.scene.bone)
         edge = QPen(bone if dark else bone.darker(170), 1.3)
         for n, outline in enumerate(self._it.head):
-            fill = self._tint(self._theme.scene.halo, 0.35) if n == _ORBIT else bone.darker(210 if dark else 100)
+            fill = (
+                self._tint(self._theme.scene.halo, 0.35) if n == _ORBIT else bone.darker(210 if dark else 100)
+            )
             self._painter.setPen(edge)
             self._painter.setBrush(fill)
             self._painter.drawPath(_smooth([self._at(p) for p in outline]))
@@ -165,7 +171,9 @@ class _Picture:
             edge.setCapStyle(Qt.PenCapStyle.FlatCap)  # so it does not stain the part before
             self._painter.setPen(edge)
             self._painter.drawLine(line[i], line[i + 1])
-            self._painter.setPen(_round_pen(QColor(bone).darker(round(150 - 40 * i / n)), self._tube_width(i / n)))
+            self._painter.setPen(
+                _round_pen(QColor(bone).darker(round(150 - 40 * i / n)), self._tube_width(i / n))
+            )
             self._painter.drawPolyline(QPolygonF(line[i - 1 : i + 2]))
 
     def _tube_width(self, t: float) -> float:
@@ -204,7 +212,8 @@ class _Picture:
             unit, side = ahead / length, QPointF(-ahead.y(), ahead.x()) / length
             self._painter.setPen(Qt.PenStyle.NoPen)
             self._painter.setBrush(colour)
-            self._painter.drawPolygon(QPolygonF([end + 3 * unit, end - 5 * unit + 3 * side, end - 5 * unit - 3 * side]))
+            heel = end - unit * 5.0
+            self._painter.drawPolygon(QPolygonF([end + unit * 3.0, heel + side * 3.0, heel - side * 3.0]))
 
     def _points(self) -> None:
         order = sorted(CODES, key=lambda code: self._it.depths[code])
@@ -253,7 +262,7 @@ class _Picture:
         self._painter.setFont(self._font(10, bold=True))
         self._painter.setPen(QColor(self._theme.muted))
         inner, flag = self._frame.adjusted(5, 3, -5, -3), Qt.AlignmentFlag
-        left, right, below, above = self._it.letters
+        left, right, below, above = tuple(self._it.letters)
         for letter, where in (
             (left, flag.AlignLeft | flag.AlignVCenter),
             (right, flag.AlignRight | flag.AlignVCenter),

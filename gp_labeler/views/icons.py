@@ -40,9 +40,7 @@ def draw_icon(painter: QPainter, name: str, box: QRectF, colour: QColor) -> None
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.translate(box.topLeft())
     painter.scale(box.width() / _UNIT, box.height() / _UNIT)
-    painter.setPen(
-        QPen(colour, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
-    )
+    painter.setPen(QPen(colour, 2, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin))
     painter.setBrush(Qt.BrushStyle.NoBrush)
     ICONS[name](painter)
     painter.restore()
@@ -186,12 +184,17 @@ ICONS: Mapping[str, Callable[[QPainter], None]] = MappingProxyType(
         "check": _check,
         "clock": _clock,
         "close": _lines([(6, 6), (18, 18)], [(18, 6), (6, 18)]),
+        "down": _lines([(5, 9), (12, 16), (19, 9)]),
         "error": _error,
-        "export": _lines([(4, 14), (4, 20), (20, 20), (20, 14)], [(12, 15), (12, 3)], [(7, 8), (12, 3), (17, 8)]),
+        "export": _lines(
+            [(4, 14), (4, 20), (20, 20), (20, 14)], [(12, 15), (12, 3)], [(7, 8), (12, 3), (17, 8)]
+        ),
         "eye": _eye,
         "file": _file,
         "folder": _lines([(2.5, 19.5), (2.5, 5), (9, 5), (11, 8), (21.5, 8), (21.5, 19.5), (2.5, 19.5)]),
-        "import": _lines([(4, 14), (4, 20), (20, 20), (20, 14)], [(12, 3), (12, 15)], [(7, 10), (12, 15), (17, 10)]),
+        "import": _lines(
+            [(4, 14), (4, 20), (20, 20), (20, 14)], [(12, 3), (12, 15)], [(7, 10), (12, 15), (17, 10)]
+        ),
         "info": _info,
         "label": _label,
         "layout": _layers,
@@ -201,13 +204,15 @@ ICONS: Mapping[str, Callable[[QPainter], None]] = MappingProxyType(
         "pose": _pose,
         "redo": _redo,
         "save": _lines(
-            [(4, 4), (16, 4), (20, 8), (20, 20), (4, 20), (4, 4)], [(8, 4), (8, 9), (15, 9), (15, 4)],
+            [(4, 4), (16, 4), (20, 8), (20, 20), (4, 20), (4, 4)],
+            [(8, 4), (8, 9), (15, 9), (15, 4)],
             [(7, 20), (7, 14), (17, 14), (17, 20)],
         ),
         "scan": _scan,
         "skip": _lines([(4, 12), (19, 12)], [(13, 6), (19, 12), (13, 18)]),
         "sun": _sun,
         "swap": _swap,
+        "tick": _lines([(4, 12.5), (10, 18.5), (20, 6)]),
         "undo": _undo,
         "unseen": _unseen,
         "warning": _warning,

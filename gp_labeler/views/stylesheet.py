@@ -5,6 +5,8 @@ from __future__ import annotations
 from string import Template
 from typing import TYPE_CHECKING
 
+from gp_core.resources import resource_path
+
 if TYPE_CHECKING:
     from gp_labeler.views.theme import Theme
 
@@ -21,6 +23,7 @@ QToolTip { background: $raised; color: $text; border: 1px solid $border_strong; 
 *[role="card"] { background: $card; border: 1px solid $border; border-radius: 8px; }
 *[role="rail"] { background: $window; border-right: 1px solid $border; }
 QLabel[role="title"] { font-size: 17px; font-weight: 600; }
+QLabel[role="hero"] { font-size: 24px; font-weight: 600; }
 QLabel[role="heading"] { font-size: 13px; font-weight: 600; }
 QLabel[role="eyebrow"] { color: $muted; }
 QLabel[role="hint"] { color: $muted; }
@@ -34,7 +37,7 @@ QLabel[role="mono"], QPlainTextEdit[role="mono"] { font-family: "DejaVu Sans Mon
 QPushButton, QToolButton {
     background: $raised; border: 1px solid $border_strong; border-radius: 6px; padding: 5px 12px;
 }
-QToolButton { padding: 4px 8px; }
+QToolButton { padding: 4px 6px; }
 QPushButton:hover, QToolButton:hover { background: $hover; }
 QPushButton:pressed, QToolButton:pressed, QToolButton:checked { background: $selected; }
 QToolButton:checked { border-color: $accent_text; }
@@ -63,14 +66,28 @@ QLineEdit, QPlainTextEdit, QTextEdit, QSpinBox, QDoubleSpinBox, QComboBox {
 }
 QLineEdit:focus, QPlainTextEdit:focus, QTextEdit:focus, QDoubleSpinBox:focus, QSpinBox:focus,
 QComboBox:focus { border-color: $accent_text; }
+QAbstractSpinBox QLineEdit, QComboBox QLineEdit { border: none; padding: 0 4px; background: transparent; }
 QLineEdit[wrong="true"] { border-color: $danger; }
-QComboBox::drop-down { border: none; width: 20px; }
+QComboBox::drop-down { border: none; width: 22px; }
+QComboBox::down-arrow { image: url("$icons/down.png"); width: 12px; height: 12px; }
 QComboBox QAbstractItemView {
     background: $card; border: 1px solid $border_strong; selection-background-color: $selected;
     selection-color: $text; outline: none;
 }
 QCheckBox, QRadioButton { spacing: 6px; background: transparent; padding: 2px; }
 QCheckBox:focus, QRadioButton:focus { color: $accent_text; }
+QCheckBox::indicator {
+    width: 14px; height: 14px; background: $field; border: 1px solid $border_strong; border-radius: 4px;
+}
+QCheckBox::indicator:hover { border-color: $accent_text; }
+QCheckBox::indicator:checked { background: $accent; border-color: $accent; image: url("$icons/tick.png"); }
+QCheckBox::indicator:disabled { border-color: $border; }
+QRadioButton::indicator {
+    width: 14px; height: 14px; background: $field; border: 1px solid $border_strong; border-radius: 8px;
+}
+QRadioButton::indicator:checked {
+    width: 6px; height: 6px; background: $on_accent; border: 5px solid $accent; border-radius: 8px;
+}
 
 QTableView, QListView, QTreeView {
     background: $card; border: 1px solid $border; border-radius: 8px; outline: none; gridline-color: $border;
@@ -109,17 +126,22 @@ QScrollBar::add-line, QScrollBar::sub-line, QScrollBar::add-page, QScrollBar::su
 QSplitter::handle { background: $window; }
 QSplitter::handle:hover { background: $border_strong; }
 
-QProgressBar { background: $field; border: 1px solid $border; border-radius: 4px; text-align: center; height: 8px; }
+QProgressBar {
+    background: $field; border: 1px solid $border; border-radius: 4px; text-align: center; height: 8px;
+}
 QProgressBar::chunk { background: $accent_hover; border-radius: 3px; }
-QSlider::groove:horizontal { background: $border_strong; height: 4px; border-radius: 2px; }
+QSlider { background: transparent; border: none; min-height: 20px; }
+QSlider::groove:horizontal { background: $border_strong; border: none; height: 4px; border-radius: 2px; }
 QSlider::sub-page:horizontal { background: $accent_hover; border-radius: 2px; }
 QSlider::handle:horizontal {
-    background: $text; width: 14px; height: 14px; margin: -5px 0; border-radius: 7px;
+    border: none; background: $text; width: 14px; height: 14px; margin: -5px 0; border-radius: 7px;
 }
 QSlider::handle:horizontal:focus { background: $accent_text; }
-QSlider:disabled::sub-page:horizontal { background: $border_strong; }
+QSlider::sub-page:horizontal:disabled { background: $border_strong; }
 QSlider::handle:horizontal:disabled { background: $faint; }
-QTabBar::tab { background: transparent; color: $muted; padding: 6px 12px; border-bottom: 2px solid transparent; }
+QTabBar::tab {
+    background: transparent; color: $muted; padding: 6px 12px; border-bottom: 2px solid transparent;
+}
 QTabBar::tab:selected { color: $text; border-bottom-color: $accent_text; }
 QTabWidget::pane { border: none; }
 QGroupBox { border: none; margin-top: 20px; font-weight: 600; }
@@ -130,4 +152,5 @@ QGroupBox::title { subcontrol-origin: margin; left: 0; }
 def stylesheet(theme: Theme) -> str:
     """Return the style sheet for a window in this theme."""
     colours = {name: value for name, value in vars(theme).items() if isinstance(value, str)}
-    return _TEMPLATE.substitute(colours, ghost=theme.states["ghost"])
+    icons = resource_path("icons/tick.png").parent.as_posix()
+    return _TEMPLATE.substitute(colours, ghost=theme.states["ghost"], icons=icons)

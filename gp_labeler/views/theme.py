@@ -6,8 +6,9 @@ itself, and hears of a change as Qt's own style change event.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import MappingProxyType
 
 from PySide6.QtCore import QObject
@@ -29,6 +30,7 @@ __all__ = [
     "TITLE_PX",
     "Theme",
     "apply_theme",
+    "base_font",
     "contrast",
     "theme_of",
 ]
@@ -98,7 +100,7 @@ class Theme:
     danger: str
     good: str
     states: Mapping[str, str]
-    views: Mapping[str, str] = field(default_factory=lambda: _VIEWS_DARK)
+    views: Mapping[str, str] = dataclasses.field(default_factory=lambda: _VIEWS_DARK)
     scene: SceneColours = DARK_SCENE
 
     @property

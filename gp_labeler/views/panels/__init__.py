@@ -1,1 +1,1 @@
-"""The panels beside the views and the dialogs: each shows one thing of a `Workbench`, and passes on clicks."""
+"""Panels beside the views, and dialogs: each shows one thing of a `Workbench`, and passes on clicks."""

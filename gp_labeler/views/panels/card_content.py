@@ -12,7 +12,12 @@ from gp_labeler.views.bind import mm_text
 
 __all__ = ["CardContent", "content_of"]
 
-_VIEWS = {"3D": "the 3D view", "axial": "axial slices", "coronal": "coronal slices", "sagittal": "sagittal slices"}
+_VIEWS = {
+    "3D": "the 3D view",
+    "axial": "axial slices",
+    "coronal": "coronal slices",
+    "sagittal": "sagittal slices",
+}
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["FeatureCard"]
 
-_TALL = 420
+_TALL = 350
 """From this height on, logical pixels, the picture stands above the words; below, beside them."""
 
 
@@ -209,6 +209,8 @@ class FeatureCard(QWidget):
         way = QBoxLayout.Direction.TopToBottom if tall else QBoxLayout.Direction.LeftToRight
         if self._body.direction() is not way:
             self._body.setDirection(way)
+            self._body.setStretch(0, 1 if tall else 2)
+            self._body.setStretch(1, 0 if tall else 3)
         super().resizeEvent(event)
 
 

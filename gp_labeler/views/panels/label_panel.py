@@ -36,5 +36,5 @@ class LabelPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4, 8, 8, 8)
         layout.setSpacing(6)
-        layout.addWidget(self.card, 2)
-        layout.addWidget(self.table, 3)
+        layout.addWidget(self.card, 1)
+        layout.addWidget(self.table)

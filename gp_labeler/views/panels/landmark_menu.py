@@ -62,9 +62,7 @@ def _add_edits(add: Callable[..., None], workbench: Workbench, side: Side, code:
     )
 
 
-def _add_swaps(
-    add: Callable[..., None], menu: QMenu, workbench: Workbench, side: Side, code: str
-) -> None:
+def _add_swaps(add: Callable[..., None], menu: QMenu, workbench: Workbench, side: Side, code: str) -> None:
     """Offer to swap with each settled feature of the same side that is not locked."""
     session = workbench.session
     others = menu.addMenu("Swap with")

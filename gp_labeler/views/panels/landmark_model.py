@@ -109,7 +109,7 @@ class LandmarkModel(QAbstractTableModel):
             return "place"
         if state is PointState.DOUBTFUL:
             return mm_text(self._workbench.session.doubts(side)[code].distance)
-        return state.value
+        return str(state.value)
 
     def _sentence(self, code: str, side: Side, state: PointState) -> str:
         text = f"{code} {side.word}: {state.value}"
@@ -117,5 +117,7 @@ class LandmarkModel(QAbstractTableModel):
             distance = mm_text(self._workbench.session.doubts(side)[code].distance)
             text += f", {distance} from where the atlas expects it"
         if state is PointState.GHOST:
-            text += f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"
+            text += (
+                f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"
+            )
         return text

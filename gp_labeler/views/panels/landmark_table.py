@@ -145,7 +145,7 @@ class _TableView(QTableView):
             self.setColumnWidth(column, max(_PAD + _CHIP + 4 + width, words.horizontalAdvance(_WIDEST) + 14))
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        return QSize(340, 30 + 22 * len(CODES))
+        return QSize(340, 32 + 24 * len(CODES))
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         return QSize(340, 32 + _LOWEST * len(CODES))
@@ -179,7 +179,7 @@ class _ChipDelegate(QStyledItemDelegate):
     ) -> None:
         view = self.parent()
         assert isinstance(view, QTableView)
-        theme, box = theme_of(view), QRectF(option.rect)  # type: ignore[attr-defined]
+        theme, box = theme_of(view), QRectF(option.rect)
         painter.save()
         self._ground(painter, option, index, theme, view)
         painter.setClipRect(box)
@@ -199,9 +199,9 @@ class _ChipDelegate(QStyledItemDelegate):
         theme: Theme,
         view: QTableView,
     ) -> None:
-        box = QRectF(option.rect)  # type: ignore[attr-defined]
+        box = QRectF(option.rect)
         is_row = view.currentIndex().row() == index.row()
-        is_over = bool(option.state & QStyle.StateFlag.State_MouseOver)  # type: ignore[attr-defined]
+        is_over = bool(option.state & QStyle.StateFlag.State_MouseOver)
         if bool(index.data(ACTIVE_ROLE)) or (is_row and index.column() == 0):
             painter.fillRect(box, QColor(theme.selected))
         elif is_over:

@@ -1,0 +1,88 @@
+"""Where bone begins: the threshold over the histogram, tried out on the slices before it is taken."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QAbstractSpinBox, QDoubleSpinBox, QHBoxLayout, QPushButton, QWidget
+
+from gp_labeler.imaging.histogram import histogram_of
+from gp_labeler.views.bind import attempt, blocked, follow
+from gp_labeler.views.panels.histogram_slider import HistogramSlider
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.work import ProposeThreshold
+from gp_labeler.workbench import Workbench
+
+__all__ = ["BoneCard"]
+
+
+class BoneCard(Card):
+    """The bone threshold.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose threshold it sets.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Bone begins at", parent)
+        self._workbench = workbench
+        self.slider = HistogramSlider()
+        self.slider.previewed.connect(self._on_previewed)
+        self.slider.chosen.connect(self._choose)
+        self.box = QDoubleSpinBox()
+        self.box.setRange(-1e9, 1e9)
+        self.box.setKeyboardTracking(False)
+        self.box.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
+        self.box.setAccessibleName("Bone threshold, grey value")
+        self.box.valueChanged.connect(self._choose)
+        self.propose = QPushButton("Propose")
+        self.propose.setToolTip("Find the threshold from the histogram")
+        self.propose.clicked.connect(self._propose)
+        self.add(self.slider)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(self.box, 1)
+        row.addWidget(self.propose)
+        self.add(row)
+        self.add(
+            text_label(
+                "Thin bone should be just closed. The slices show it while you drag.", "hint", wrap=True
+            )
+        )
+        follow(self, workbench.volume_opened, self._on_volume)
+        follow(self, workbench.session_replaced, self._on_volume)
+        follow(self, workbench.threshold_changed, self.refresh)
+        self._on_volume()
+
+    def refresh(self, *_: object) -> None:
+        """Show the threshold in effect."""
+        threshold = self._workbench.threshold
+        for widget in (self.box, self.propose):
+            widget.setEnabled(self._workbench.volume is not None)
+        self.slider.set_value(threshold)
+        with blocked(self.box):
+            self.box.setValue(0.0 if threshold is None else threshold)
+
+    def _on_volume(self, *_: object) -> None:
+        volume = self._workbench.volume
+        histogram = None if volume is None else histogram_of(volume)
+        self.slider.set_histogram(histogram)
+        if histogram is not None:
+            fine = histogram.high - histogram.low < 50
+            self.box.setDecimals(3 if fine else 1)
+            self.box.setSingleStep(0.01 if fine else max(1.0, round((histogram.high - histogram.low) / 200)))
+        self.refresh()
+
+    def _on_previewed(self, value: float) -> None:
+        with blocked(self.box):
+            self.box.setValue(value)
+        self._workbench.preview_threshold(value)
+
+    def _choose(self, value: float) -> None:
+        if self._workbench.volume is not None:
+            attempt(self._workbench, lambda: self._workbench.set_threshold(value))
+
+    def _propose(self) -> None:
+        volume = self._workbench.volume
+        if volume is not None:
+            self._workbench.jobs.submit(ProposeThreshold(volume), self._choose, key="propose threshold")

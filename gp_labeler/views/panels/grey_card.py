@@ -1,0 +1,99 @@
+"""How grey values become black and white: presets, level and width."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QAbstractSpinBox, QDoubleSpinBox, QGridLayout, QHBoxLayout, QToolButton, QWidget
+
+from gp_labeler.imaging.histogram import window_presets
+from gp_labeler.views.bind import attempt, blocked, follow
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["GreyCard"]
+
+_HINTS = {
+    "Auto": "The window that suits the whole scan",
+    "Full": "From the darkest to the brightest value",
+    "Bone": "Shades within bone",
+    "Soft": "Shades below bone",
+    "Edge": "Steep around the threshold: where bone begins",
+}
+
+
+class GreyCard(Card):
+    """Grey window of the slices.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose view it sets.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Greys of the slices", parent)
+        self._workbench = workbench
+        row = QHBoxLayout()
+        row.setSpacing(4)
+        self.presets = {name: self._button(name, row) for name in _HINTS}
+        self.add(row)
+        self.level, self.width_box = self._box("Level"), self._box("Width")
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(8)
+        for column, (name, box) in enumerate((("Level", self.level), ("Width", self.width_box))):
+            grid.addWidget(text_label(name, "hint"), 0, 2 * column)
+            grid.addWidget(box, 0, 2 * column + 1)
+            grid.setColumnStretch(2 * column + 1, 1)
+            box.valueChanged.connect(self._on_typed)
+        self.add(grid)
+        for signal in (workbench.view_changed, workbench.volume_opened, workbench.session_replaced):
+            follow(self, signal, self.refresh)
+        follow(self, workbench.threshold_changed, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show the window in effect."""
+        volume, view = self._workbench.volume, self._workbench.session.view.state
+        presets = {} if volume is None else window_presets(volume, self._workbench.threshold)
+        auto = view.level is None or view.width is None
+        shown = presets.get("Full", (0.0, 1.0)) if auto else (view.level or 0.0, view.width or 1.0)
+        for name, button in self.presets.items():
+            button.setEnabled(volume is not None and (name == "Auto" or name in presets))
+            button.setChecked(auto if name == "Auto" else not auto and presets.get(name) == shown)
+        with blocked(self.level, self.width_box):
+            for box, value in zip((self.level, self.width_box), shown, strict=True):
+                box.setEnabled(volume is not None)
+                box.setSingleStep(max(10.0 ** (len(f"{abs(shown[1]):.0f}") - 2), 0.01))
+                box.setValue(value)
+
+    def _button(self, name: str, row: QHBoxLayout) -> QToolButton:
+        button = QToolButton()
+        button.setText(name)
+        button.setCheckable(True)
+        button.setToolTip(_HINTS[name])
+        button.clicked.connect(lambda: self._choose(name))
+        row.addWidget(button, 1)
+        return button
+
+    def _box(self, name: str) -> QDoubleSpinBox:
+        box = QDoubleSpinBox()
+        box.setRange(-1e9 if name == "Level" else 1e-6, 1e9)
+        box.setDecimals(1)
+        box.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
+        box.setKeyboardTracking(False)
+        box.setAccessibleName(f"{name} of the grey window")
+        return box
+
+    def _choose(self, name: str) -> None:
+        volume, view = self._workbench.volume, self._workbench.session.view
+        if volume is None:
+            return
+        level, width = None, None
+        if name != "Auto":
+            level, width = window_presets(volume, self._workbench.threshold)[name]
+        view.update(level=level, width=width)
+        self.refresh()
+
+    def _on_typed(self, _: float) -> None:
+        view = self._workbench.session.view
+        level, width = self.level.value(), self.width_box.value()
+        attempt(self._workbench, lambda: view.update(level=level, width=width))

@@ -1,0 +1,335 @@
+"""The import dialog: what a scan's files say, what they do not say, and the answers to that."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QCloseEvent
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_labeler.imaging.preview import PreviewPlane, preview_planes
+from gp_labeler.imaging.readers import ImportPlan, Problem, read_preview
+from gp_labeler.imaging.readers.options import Spacing
+from gp_labeler.session.jobs import Progress, Task
+from gp_labeler.views.bind import TIMES, blocked, follow, size_text, spacing_text
+from gp_labeler.views.panels.parts import Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.preview_picture import PreviewPicture
+from gp_labeler.views.panels.spacing_fields import SpacingFields
+from gp_labeler.work import InspectScan
+from gp_labeler.workbench import Workbench
+
+__all__ = ["ImportDialog", "PreviewScan"]
+
+_STRIDES = {1: "Every voxel", 2: "Every second voxel", 4: "Every fourth voxel"}
+_MB = 2**20
+
+
+@dataclass(frozen=True)
+class PreviewScan:
+    """Read a coarse picture of a scan, as a job."""
+
+    plan: ImportPlan
+    title: str = "Reading a preview"
+
+    def run(self, progress: Progress) -> tuple[PreviewPlane, PreviewPlane]:
+        """Return its middle slices."""
+        progress(0.0)
+        return preview_planes(read_preview(self.plan, cancel=progress.cancelled))
+
+
+class ImportDialog(QDialog):
+    """Asks what the files of a scan do not say; `Load` reads it as a new specimen.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Reads the scan.
+    plan : ImportPlan
+        What was found.
+    """
+
+    def __init__(
+        self, workbench: Workbench, plan: ImportPlan, actions: object = None, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self._plan = plan
+        self._accepts: dict[str, QCheckBox] = {}
+        self.setWindowTitle("Open scan")
+        self.setModal(True)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setMinimumSize(560, 420)
+        self._make_widgets()
+        self._lay_out()
+        self._show_plan(plan)
+        self._start_preview()
+        follow(self, workbench.jobs.failed, self._on_failed)
+        self.resize(720, 480 if plan.sides_known else 700)
+
+    @property
+    def plan(self) -> ImportPlan:
+        """The plan under the answers given so far."""
+        return self._plan
+
+    def _make_widgets(self) -> None:
+        self.facts = Facts()
+        self.series = QComboBox()
+        self.series.setPlaceholderText("Choose one of the scans")
+        self.series.setAccessibleName("Which scan of the folder")
+        self.series.activated.connect(self._on_series)
+        self.spacing = SpacingFields()
+        self.spacing.changed.connect(self._update)
+        self.stride = QComboBox()
+        self.stride.setAccessibleName("How many voxels to load")
+        self.stride.currentIndexChanged.connect(self._update)
+        self.reverse = QCheckBox("Reverse the order of the slices: exchanges left and right")
+        self.reverse.toggled.connect(self._on_reverse)
+        self.pictures = (PreviewPicture(), PreviewPicture())
+        self.why = text_label("", "danger", wrap=True)
+        self.cancel = QPushButton("Cancel")
+        self.cancel.clicked.connect(self.reject)
+        self.load = QPushButton("Load")
+        self.load.setProperty("role", "primary")
+        self.load.setDefault(True)
+        self.load.clicked.connect(self.accept)
+        self._findings = QVBoxLayout()
+        self._findings.setSpacing(8)
+
+    def _lay_out(self) -> None:
+        content = QWidget()
+        content.setProperty("role", "panel")
+        column = QVBoxLayout(content)
+        column.setContentsMargins(20, 16, 20, 12)
+        column.setSpacing(10)
+        self._title = text_label("", "title")
+        column.addWidget(self._title)
+        column.addWidget(self.facts)
+        column.addLayout(self._findings)
+        column.addLayout(self._form())
+        column.addWidget(self._sides_box())
+        column.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.setSpacing(0)
+        layout.addWidget(scrolled(content), 1)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(20, 10, 20, 14)
+        foot.setSpacing(8)
+        foot.addWidget(self.why, 1)
+        foot.addWidget(self.cancel)
+        foot.addWidget(self.load)
+        layout.addLayout(foot)
+
+    def _form(self) -> QGridLayout:
+        form = QGridLayout()
+        form.setHorizontalSpacing(8)
+        form.setVerticalSpacing(8)
+        form.setColumnStretch(1, 1)
+        self._captions = {}
+        rows = (("Which scan", self.series), ("Voxel size", self.spacing), ("Load", self.stride))
+        for row, (name, widget) in enumerate(rows):
+            caption = self._captions[name] = text_label(name, "hint")
+            caption.setFixedWidth(80)
+            form.addWidget(caption, row, 0, Qt.AlignmentFlag.AlignTop)
+            form.addWidget(widget, row, 1)
+        return form
+
+    def _sides_box(self) -> QWidget:
+        """Return pictures with R and L, and the choice to reverse."""
+        self.sides = QWidget()
+        column = QVBoxLayout(self.sides)
+        column.setContentsMargins(0, 4, 0, 0)
+        column.setSpacing(6)
+        column.addWidget(text_label("Which side is left?", "heading"))
+        words = (
+            "A stack of slices does not say it. Look for something that you know to be on one side, "
+            "and reverse the slices if it is on the wrong one. The choice is kept with the specimen."
+        )
+        column.addWidget(text_label(words, "hint", wrap=True))
+        pictures = QHBoxLayout()
+        pictures.setSpacing(8)
+        for picture in self.pictures:
+            pictures.addWidget(picture, 1)
+        column.addLayout(pictures)
+        column.addWidget(self.reverse)
+        return self.sides
+
+    def _show_plan(self, plan: ImportPlan) -> None:
+        """Fill everything in from a plan that was just made."""
+        self._plan = plan
+        self._title.setText(plan.name)
+        self._captions["Which scan"].setVisible(len(plan.choices) > 1)
+        self.series.setVisible(len(plan.choices) > 1)
+        with blocked(self.series, self.stride, self.reverse):
+            self.series.clear()
+            for choice in plan.choices:
+                self.series.addItem(choice.text, choice.id)
+            self.series.setCurrentIndex(self.series.findData(plan.choice))
+            self.stride.clear()
+            for stride, words in _STRIDES.items():
+                bytes_ = plan.with_options(stride=stride).n_bytes
+                self.stride.addItem(f"{words}  ({bytes_ / _MB:,.0f} MB of memory)", stride)
+            self.stride.setCurrentIndex(max(0, self.stride.findData(plan.options.stride)))
+            self.reverse.setChecked(plan.options.reverse)
+        self._accepts = {}
+        doubted = any("spacing" in p.resolved_by for p in _bare(plan).errors)
+        self.spacing.offer(
+            plan.suggested_spacing if not doubted else plan.geometry.suggested, from_file=not doubted
+        )
+        self.sides.setVisible(not plan.sides_known)
+        self._update()
+
+    def _update(self) -> None:
+        """Take the answers into the plan, and say what still stands against it."""
+        wrong = self.spacing.error()
+        self._plan = self._plan.with_options(
+            spacing=None if wrong else self.spacing.spacing(),
+            stride=self.stride.currentData() or 1,
+            reverse=self.reverse.isChecked(),
+            accept=[code for code, box in self._accepts.items() if box.isChecked()],
+        )
+        self.facts.show_facts(_facts_of(self._plan))
+        self._show_findings()
+        self.spacing.show_wrong(bool(wrong))
+        self.load.setEnabled(not wrong and not self._plan.errors)
+        self.why.setText(_sentence(wrong) if wrong else _why_not(self._plan.errors))
+
+    def _show_findings(self) -> None:
+        accepted = {code for code, box in self._accepts.items() if box.isChecked()}
+        emptied(self._findings)
+        self._accepts = {}
+        original = {p.code: p for p in _bare(self._plan).problems}
+        for problem in self._plan.problems:
+            if problem.code == "sides-unknown":
+                continue  # it has a place of its own
+            remedy = _remedy(original.get(problem.code, problem))
+            self._findings.addWidget(Notice(problem.severity, _sentence(problem.text), remedy))
+            if "accept" in problem.resolved_by:
+                self._findings.addWidget(self._accept_box(problem, problem.code in accepted))
+
+    def _accept_box(self, problem: Problem, checked: bool) -> QCheckBox:
+        box = QCheckBox("It is right all the same: go on")
+        box.setChecked(checked)
+        box.toggled.connect(self._update_later)
+        self._accepts[problem.code] = box
+        return box
+
+    def _update_later(self) -> None:
+        self._update()
+        for box in self._accepts.values():
+            box.setFocus()
+
+    def _on_series(self, _: int) -> None:
+        """Look into another scan of the folder."""
+        chosen = self.series.currentData()
+        if chosen == self._plan.choice:
+            return
+        self.load.setEnabled(False)
+        self.why.setText("Looking into it…")
+        options: dict[str, Any] = self._plan.options.as_json() | {"series": chosen}
+        options.pop("spacing", None)
+        options.pop("accept", None)
+        self._workbench.jobs.submit(InspectScan(self._plan.path, options), self._take_plan, key="import look")
+
+    def _take_plan(self, plan: ImportPlan) -> None:
+        self._show_plan(plan)
+        self._start_preview()
+
+    def _on_reverse(self, _: bool) -> None:
+        self._update()
+        self._start_preview()
+
+    def _start_preview(self) -> None:
+        if self._plan.sides_known:
+            return
+        for picture in self.pictures:
+            picture.show_plane(None)
+        self._workbench.jobs.submit(PreviewScan(self._plan), self._show_preview, key="import preview")
+
+    def _show_preview(self, planes: tuple[PreviewPlane, PreviewPlane]) -> None:
+        for picture, plane in zip(self.pictures, planes, strict=True):
+            picture.show_plane(plane)
+
+    def _on_failed(self, task: Task[Any]) -> None:
+        if task.key == "import preview":
+            for picture in self.pictures:
+                picture.show_plane(None, "No preview: it cannot be read")
+        elif task.key == "import look":
+            self.why.setText(task.message)
+
+    def accept(self) -> None:
+        """Read the scan as answered."""
+        if self.load.isEnabled():
+            self._stop()
+            self._workbench.read_scan(self._plan)
+            super().accept()
+
+    def reject(self) -> None:
+        """Read nothing."""
+        self._stop()
+        super().reject()
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802 - Qt's name
+        self._stop()
+        super().closeEvent(event)
+
+    def _stop(self) -> None:
+        for task in self._workbench.jobs.running:
+            if task.key in ("import preview", "import look"):
+                task.cancel()
+
+
+def _bare(plan: ImportPlan) -> ImportPlan:
+    """Return the plan without answers to what it found."""
+    return plan.with_options(spacing=None, accept=())
+
+
+def _facts_of(plan: ImportPlan) -> dict[str, str]:
+    spacing: Spacing | None = plan.spacing
+    size = (
+        TIMES.join(f"{n * s:.1f}" for n, s in zip(plan.size, spacing, strict=True)) + " mm" if spacing else ""
+    )
+    files = f", {len(plan.files)} files" if len(plan.files) > 1 else ""
+    return {
+        "Format": f"{plan.format}{files}",
+        "Voxels": f"{size_text(plan.size)}, {plan.stored_dtype}"
+        + (f", {spacing_text(spacing)} each" if spacing else ", of unknown size"),
+        "Size": size or "not known before the voxel size is",
+        "Memory": f"{plan.n_bytes / _MB:,.0f} MB",
+        "Where": str(plan.path),
+    }
+
+
+def _remedy(problem: Problem) -> str:
+    """Return what to do in this window; the remedies of `Problem` are for the command as well."""
+    if "spacing" in problem.resolved_by:
+        return "Type the true voxel size below. It stands in the scanner's log, or ask who made the scan."
+    return problem.remedy
+
+
+def _why_not(errors: tuple[Problem, ...]) -> str:
+    """Return why it cannot be loaded yet, in a few words."""
+    if any(problem.code == "extent" for problem in errors):
+        return "Correct the voxel size, or accept it."
+    if any("spacing" in problem.resolved_by for problem in errors):
+        return "The voxel size is needed first."
+    if any("series" in problem.resolved_by for problem in errors):
+        return "Choose a scan first."
+    if any("accept" in problem.resolved_by for problem in errors):
+        return "Look at what was found, and accept it to go on."
+    return "It cannot be loaded." if errors else ""
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:].rstrip(".") + "."

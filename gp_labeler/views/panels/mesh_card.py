@@ -1,0 +1,150 @@
+"""The bone mesh: how it is shown, how fine it is, and saving it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QSlider, QWidget
+
+from gp_labeler.session.jobs import Task
+from gp_labeler.views.bind import blocked, follow, mm_text
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["MeshCard"]
+
+_SHOWN = {
+    "outline_visible": ("Outline on slices", "The edge of bone, drawn on the slices"),
+    "hidden_visible": ("Points behind bone", "Show points faintly where bone hides them"),
+}
+
+
+class MeshCard(Card):
+    """The bone mesh.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose mesh it is about.
+    """
+
+    save_asked = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Bone surface", parent)
+        self._workbench = workbench
+        self.state = text_label("", "hint", wrap=True)
+        self.add(self.state)
+        self.opacity = QSlider(Qt.Orientation.Horizontal)
+        self.opacity.setRange(5, 100)
+        self.opacity.setAccessibleName("Opacity of the bone surface")
+        self.opacity.valueChanged.connect(lambda value: self._update(mesh_opacity=value / 100))
+        self._percent = text_label("100 %")
+        self._percent.setFixedWidth(44)
+        self._percent.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        row = QHBoxLayout()
+        row.addWidget(text_label("Opacity", "hint"))
+        row.addWidget(self.opacity, 1)
+        row.addWidget(self._percent)
+        self.add(row)
+        checks = QHBoxLayout()
+        self.checks = {name: self._check(name, checks) for name in _SHOWN}
+        self.add(checks)
+        self._add_buttons()
+        self._listen()
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show the mesh as it stands."""
+        view, surfaces = self._workbench.session.view.state, self._workbench.surfaces
+        with blocked(self.opacity, *self.checks.values()):
+            self.opacity.setValue(round(100 * view.mesh_opacity))
+            for name, check in self.checks.items():
+                check.setChecked(bool(getattr(view, name)))
+        self._percent.setText(f"{round(100 * view.mesh_opacity)} %")
+        self.state.setText(self._words())
+        self.ears.setEnabled(any(s.stride > 1 for s in surfaces))
+        self.save.setEnabled(bool(surfaces))
+
+    def _words(self) -> str:
+        surfaces = self._workbench.surfaces
+        if not surfaces:
+            return "There is no surface yet." if self._workbench.volume is None else "It is being made…"
+        n = sum(surface.n_triangles for surface in surfaces)
+        finest, coarsest = (f(s.voxel_mm for s in surfaces) for f in (min, max))
+        voxels = mm_text(coarsest) if finest == coarsest else f"{mm_text(coarsest)}, ears {mm_text(finest)}"
+        count = f"{n / 1e6:.1f} million" if n >= 1e6 else f"{n / 1e3:.0f} thousand"
+        return f"{count} triangles; voxels of {voxels}. Parts below 1 mm across are left out."
+
+    def _check(self, name: str, row: QHBoxLayout) -> QCheckBox:
+        text, hint = _SHOWN[name]
+        check = QCheckBox(text)
+        check.setToolTip(hint)
+        check.toggled.connect(lambda on: self._update(**{name: on}))
+        row.addWidget(check)
+        return check
+
+    def _add_buttons(self) -> None:
+        self.ears = QPushButton("Ears at full resolution")
+        self.ears.setToolTip("Mesh around each ear with every voxel; needs a placed feature or a ghost there")
+        self.ears.clicked.connect(self._mesh_ears)
+        self.save = QPushButton("Save mesh…")
+        self.save.setToolTip("As PLY, STL or VTP, in LPS mm")
+        self.save.clicked.connect(self.save_asked)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(6)
+        buttons.addWidget(self.ears, 2)
+        buttons.addWidget(self.save, 1)
+        self.add(buttons)
+        self.progress = QProgressBar()
+        self.progress.setRange(0, 100)
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(8)
+        self.stop = QPushButton("Stop")
+        self._work = QWidget()
+        line = QHBoxLayout(self._work)
+        line.setContentsMargins(0, 0, 0, 0)
+        self._doing = text_label("", "hint")
+        line.addWidget(self._doing)
+        line.addWidget(self.progress, 1)
+        line.addWidget(self.stop)
+        self.stop.clicked.connect(self._stop)
+        self._work.hide()
+        self.add(self._work)
+
+    def _listen(self) -> None:
+        desk = self._workbench
+        for signal in (desk.surfaces_changed, desk.view_changed, desk.volume_opened, desk.session_replaced):
+            follow(self, signal, self.refresh)
+        for signal in (desk.jobs.started, desk.jobs.progressed):
+            follow(self, signal, self._on_progress)
+        for signal in (desk.jobs.done, desk.jobs.failed, desk.jobs.cancelled):
+            follow(self, signal, self._on_end)
+
+    def _update(self, **changes: Any) -> None:
+        self._workbench.session.view.update(**changes)
+
+    def _mesh_ears(self) -> None:
+        session = self._workbench.session
+        self._workbench.mesh_ears()
+        if not any(task.key == "mesh ears" for task in self._workbench.jobs.running):
+            where = session.active.side.word
+            self._workbench.say(
+                f"Place a feature first (such as CA {where}): it tells where the ear is.", "warning"
+            )
+
+    def _on_progress(self, task: Task[Any]) -> None:
+        if task.key.startswith("mesh"):
+            self._work.show()
+            self._doing.setText(task.job.title)
+            self.progress.setValue(round(100 * task.fraction))
+
+    def _on_end(self, _: Task[Any]) -> None:
+        self._work.setVisible(any(task.key.startswith("mesh") for task in self._workbench.jobs.running))
+        self.refresh()
+
+    def _stop(self) -> None:
+        for task in self._workbench.jobs.running:
+            if task.key.startswith("mesh"):
+                task.cancel()

@@ -1,0 +1,107 @@
+"""The panel of the step Scan: what was opened, how its greys are shown, where bone begins, and its mesh."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QVBoxLayout, QWidget
+
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
+from gp_labeler.views.panels.bone_card import BoneCard
+from gp_labeler.views.panels.grey_card import GreyCard
+from gp_labeler.views.panels.label_panel import PANEL_WIDTH
+from gp_labeler.views.panels.mesh_card import MeshCard
+from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["ScanPanel", "facts_of"]
+
+_N_NOTES = 6
+
+
+class ScanPanel(QWidget):
+    """Shows the scan.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose scan it shows.
+    actions : object, optional
+        Not needed here; all panels are made alike.
+    """
+
+    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("role", "panel")
+        self.setFixedWidth(PANEL_WIDTH)
+        self.facts = Facts()
+        self._notes = QVBoxLayout()
+        self._notes.setSpacing(6)
+        self._empty = text_label(
+            "Open a scan: a file, a folder of slices or a DICOM folder.", "hint", wrap=True
+        )
+        about = Card("Scan")
+        about.add(self._empty)
+        about.add(self.facts)
+        about.add(self._notes)
+        self.grey, self.bone, self.mesh = GreyCard(workbench), BoneCard(workbench), MeshCard(workbench)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        column = QVBoxLayout(content)
+        column.setContentsMargins(4, 8, 8, 8)
+        column.setSpacing(6)
+        for card in (about, self.bone, self.grey, self.mesh):
+            column.addWidget(card)
+        column.addStretch(1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolled(content))
+        follow(self, workbench.volume_opened, self._refresh)
+        follow(self, workbench.session_replaced, self._refresh)
+        self._refresh()
+
+    def _refresh(self, *_: object) -> None:
+        volume = self._workbench.volume
+        self._empty.setVisible(volume is None)
+        self.facts.setVisible(volume is not None)
+        self.facts.show_facts({} if volume is None else facts_of(volume))
+        emptied(self._notes)
+        notes = () if volume is None else volume.notes
+        for note in notes[:_N_NOTES]:
+            self._notes.addWidget(Notice("info", _sentence(note)))
+        if len(notes) > _N_NOTES:
+            more = "\n".join(notes[_N_NOTES:])
+            rest = text_label(f"and {len(notes) - _N_NOTES} more notes", "hint")
+            rest.setToolTip(more)
+            self._notes.addWidget(rest)
+
+
+def facts_of(volume: Volume) -> dict[str, str]:
+    """Return what there is to know about a scan, as names and words."""
+    lengths = TIMES.join(f"{n * s:.1f}" for n, s in zip(volume.size, volume.spacing, strict=True))
+    facts = {
+        "Name": volume.name,
+        "Voxels": f"{size_text(volume.size)} of {spacing_text(volume.spacing)}",
+        "Size": f"{lengths} mm",
+        "Values": f"{volume.array.dtype}, {volume.array.nbytes / 2**20:.0f} MB in memory",
+        "Axes": _axes(volume),
+    }
+    if volume.path is not None:
+        facts["File"] = str(volume.path.name)
+    return facts
+
+
+def _axes(volume: Volume) -> str:
+    """Say where the axes of the grid point, such as ``x to L, y to P, z to S``."""
+    words, oblique = [], False
+    for name, column in zip("xyz", volume.direction.T, strict=True):
+        row = int(abs(column).argmax())
+        words.append(f"{name} to {'LPS'[row] if column[row] > 0 else 'RAI'[row]}")
+        oblique = oblique or abs(column[row]) < 0.999
+    return ", ".join(words) + (" (oblique)" if oblique else "")
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:].rstrip(".") + "."
