@@ -1,4 +1,4 @@
-"""A flat schematic of the ear, made from the atlas: what the small pictures of the features are drawn from."""
+"""A flat schematic of ear and head, made from the atlas: what the pictures of features are drawn from."""
 
 from __future__ import annotations
 
@@ -31,17 +31,20 @@ _PLANES: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], str]] = {
 }
 """Of the left side: what points right and up on the picture, and the letters left, right, below, above."""
 
-_HEAD: tuple[tuple[tuple[float, float], ...], ...] = (
-    ((-14, -3), (-15.5, 5), (-11, 12), (-2, 15), (10, 15), (21, 12.6), (33, 8.6), (42, 5), (48.5, 1.5))
-    + ((48.5, -2), (46.2, -4.6), (47.4, -10.5), (46.8, -12.6), (45.4, -11), (44.2, -6.5), (36, -5))
-    + ((28, -6), (20, -5.5), (12, -4.5), (6, -3), (3, -5.5), (-3, -6), (-8, -5)),
-    ((45.6, -10.5), (45.4, -12.6), (42, -14.2), (35, -12.6), (30, -16.2), (20, -18), (9, -18.6), (-2, -17))
-    + ((1, -13), (4, -10), (6.4, -1), (9, -4), (13, -7.5), (24, -8.2), (33, -8.6), (40, -11.6)),
-    ((19, 3.5), (22, 8), (27.5, 8.2), (30.5, 4), (28.5, -0.5), (22.5, -1.2)),
-    ((5.5, 2.2), (13, 0.8), (20, -1), (27, -2.2), (27, -4), (19, -3.2), (12, -1), (5.5, 0.6)),
-)
-"""A guinea pig's skull, mandible, orbit and zygoma from the left: mm forwards and upwards of the ear; drawn, not
-measured."""
+_HEAD = tuple(
+    np.array(outline, dtype=np.float64).reshape(-1, 2)
+    for outline in (
+        [-14, -3, -15.5, 5, -11, 12, -2, 15, 10, 15, 21, 12.6, 33, 8.6, 42, 5, 48.5, 1.5, 48.5, -2,
+         46.2, -4.6, 47.4, -10.5, 46.8, -12.6, 45.4, -11, 44.2, -6.5, 36, -5, 28, -6, 20, -5.5,
+         12, -4.5, 6, -3, 3, -5.5, -3, -6, -8, -5],
+        [45.6, -10.5, 45.4, -12.6, 42, -14.2, 35, -12.6, 30, -16.2, 20, -18, 9, -18.6, -2, -17,
+         1, -13, 4, -10, 6.4, -1, 9, -4, 13, -7.5, 24, -8.2, 33, -8.6, 40, -11.6],
+        [19, 3.5, 22, 8, 27.5, 8.2, 30.5, 4, 28.5, -0.5, 22.5, -1.2],
+        [5.5, 2.2, 13, 0.8, 20, -1, 27, -2.2, 27, -4, 19, -3.2, 12, -1, 5.5, 0.6],
+    )
+)  # fmt: skip
+"""A guinea pig's skull, mandible, orbit and zygoma from the left: mm forwards and upwards of the ear, in
+turns; drawn by hand, not measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +96,7 @@ def schematic_of(code: str, side: Side) -> Schematic:
     shown = {c: axes @ atlas[c] for c in CODES}
     points = {c: xyz[:2] for c, xyz in shown.items()}
     forwards = np.array([1.0 if side is Side.RIGHT else -1.0, 1.0])
-    head = tuple(np.array(outline) * forwards for outline in _HEAD) if far else ()
+    head = tuple(outline * forwards for outline in _HEAD) if far else ()
     spiral = (_spiral() @ axes.T)[:, :2]
     inside = [points[c] for c in CODES if far or c == row.code or c not in (*FAR, "MN")]
     corners = np.vstack([np.array(inside), spiral, *head])
