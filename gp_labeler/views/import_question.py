@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from PySide6.QtWidgets import QWidget
 
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
@@ -28,13 +26,13 @@ def ask_about(plan: ImportPlan, parent: QWidget, prompts: Prompts) -> ImportPlan
             )
             if given is None:
                 return None
-            plan = plan.with_options(replace(plan.options, spacing=(given, given, given)))
+            plan = plan.with_options(spacing=given)
         elif "accept" in problem.resolved_by:
             if not prompts.choose(
                 "Look at this first", problem.text, ["Go on"], detail=problem.remedy, kind="warning"
             ):
                 return None
-            plan = plan.with_options(replace(plan.options, accept=plan.options.accept | {problem.code}))
+            plan = plan.with_options(accept=plan.options.accept | {problem.code})
     if plan.errors:
         prompts.tell("It cannot be read", " ".join(problem.text for problem in plan.errors))
         return None
@@ -47,5 +45,5 @@ def ask_about(plan: ImportPlan, parent: QWidget, prompts: Prompts) -> ImportPlan
         )
         if not answer:
             return None
-        plan = plan.with_options(replace(plan.options, reverse=answer == "Reverse it"))
+        plan = plan.with_options(reverse=answer == "Reverse it")
     return plan
