@@ -28,8 +28,10 @@ from gp_core.landmarks.files import (
 )
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
+from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
+from gp_core.study.physical import PhysicalReport, physical_test
 from gp_core.study.simulation import SimulationReport, simulate
 from gp_core.study.subset_search import SearchReport, search_features
 
@@ -43,6 +45,7 @@ __all__ = [
     "TRAINING",
     "Atlas",
     "CochleaPose",
+    "ComparisonReport",
     "DistanceTable",
     "Feature",
     "Finding",
@@ -51,6 +54,7 @@ __all__ = [
     "JrmpcSettings",
     "LandmarkSet",
     "LeaveOneOutReport",
+    "PhysicalReport",
     "RigidTransform",
     "SearchReport",
     "Side",
@@ -59,6 +63,7 @@ __all__ = [
     "Status",
     "__version__",
     "check_specimen",
+    "compare",
     "distances",
     "estimate_pose",
     "fit_atlas",
@@ -66,6 +71,7 @@ __all__ = [
     "jrmpc",
     "leave_one_out",
     "load_specimens",
+    "physical_test",
     "predict",
     "read_landmarks",
     "read_touches",

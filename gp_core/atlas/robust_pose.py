@@ -24,7 +24,7 @@ from gp_core.landmarks.anatomy import axis_frame, cochlea_origin
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["estimate_robust"]
+__all__ = ["estimate_robust", "locate_robust"]
 
 _SUSPECT_WEIGHT = 0.2
 _SUSPECT_SQUARED = 20.0
@@ -73,6 +73,19 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
         probe_noise=fit.noise,
         T_touches_atlas=_atlas_in_touches(fit, touches),
     )
+
+
+def locate_robust(touches: LandmarkSet, atlas: Atlas) -> RigidTransform:
+    """Return ``T_touches_cochlea`` of `estimate_robust` alone, for studies of thousands of touches.
+
+    Raises
+    ------
+    FeatureError, GeometryError
+        As `estimate_robust` does.
+    """
+    model = touch_model(touches, atlas, None)
+    fit = fit_named_points(model, _leftwards(touches.array(model.codes), touches.side))
+    return _cochlea_in_touches(_defining_points(atlas, model, fit), fit, touches)
 
 
 def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -> TouchModel:

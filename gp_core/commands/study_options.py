@@ -10,7 +10,10 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from gp_core.atlas.pose import METHODS
+from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, EXTERNAL, PROBE, TRAINING, check_codes
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings
 from gp_core.study.elimination import Progress
@@ -21,11 +24,13 @@ __all__ = [
     "add_features",
     "add_figure",
     "add_method",
+    "add_seed",
     "add_settings",
     "add_workers",
     "codes_of",
     "executor_of",
     "features_of",
+    "rng_of",
     "save_figure_of",
     "settings_of",
 ]
@@ -95,9 +100,24 @@ def settings_of(args: argparse.Namespace, default: JrmpcSettings) -> JrmpcSettin
     return replace(named, **{name: value for name, value in numbers.items() if value is not None})
 
 
-def add_workers(parser: argparse.ArgumentParser) -> None:
+def add_seed(parser: argparse.ArgumentParser) -> None:
+    """Add ``--seed``."""
+    parser.add_argument("--seed", type=int, default=0, help="start of the random numbers; default: 0")
+
+
+def rng_of(args: argparse.Namespace) -> np.random.Generator:
+    """Return the source of chance that was asked for."""
+    if args.seed < 0:
+        raise GpError(f"the seed must be 0 or more, got {args.seed}")
+    return np.random.default_rng(args.seed)
+
+
+def add_workers(parser: argparse.ArgumentParser, *, default: int | None = None) -> None:
     """Add ``--workers`` and ``--scheduler``."""
-    parser.add_argument("--workers", type=int, metavar="N", help="processes to use; default: one a core")
+    shown = "one a core" if default is None else f"{default}"
+    parser.add_argument(
+        "--workers", type=int, default=default, metavar="N", help=f"processes to use; default: {shown}"
+    )
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="run on a Dask cluster instead, such as tcp://host:8786"
     )

@@ -16,11 +16,20 @@ from matplotlib.ticker import MaxNLocator
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, PROBE
+from gp_core.study.compare import PROBES, ComparisonReport, ComparisonRow
 from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
+from gp_core.study.simulation import SimulationReport
 from gp_core.study.subset_search import SearchReport
 
-__all__ = ["distance_matrix", "error_histograms", "save_figure", "search_curves"]
+__all__ = [
+    "comparison",
+    "distance_matrix",
+    "error_boxes",
+    "error_histograms",
+    "save_figure",
+    "search_curves",
+]
 
 LEFT, RIGHT = "#2f6f9f", "#e0a458"
 """Colours of the two sides; told apart in grey print and by colour-blind readers."""
@@ -30,7 +39,7 @@ AXIS_ERROR, ORIGIN_ERROR = "Modiolar-axis error (degrees)", "Cochlea-origin erro
 ACCENT = "#b5403a"
 """Colour of what stands out."""
 
-_INK = "#222222"
+_INK, _FAINT = "#222222", "#d9d9d9"
 _SUFFIXES = (".png", ".pdf", ".svg")
 _DPI = 200
 
@@ -176,3 +185,85 @@ def _curve(ax: Axes, points: Sequence[tuple[int, float]], dropped: Sequence[str]
         ax.text(position, 0.02, code or "dropped", fontsize=7, fontstyle=style, color=_INK, **place)
     ax.invert_xaxis()
     ax.set_xticks(range(max(n), min(n) - 1, -2 if len(n) > 12 else -1))
+
+
+def error_boxes(report: SimulationReport, physical: Sequence[tuple[float, float]] = ()) -> Figure:
+    """Draw box plots of both errors on simulated sides, with physical results as circles (Figure 6 C and D).
+
+    Parameters
+    ----------
+    report : SimulationReport
+    physical : sequence of (float, float)
+        E_CO (mm) and E_MA (degrees) of touched skulls.
+    """
+    figure, (first, second) = new_figure(1, 2, (7.0, 3.2))
+    groups = report.groups
+    names = [{"L": "left", "R": "right"}.get(name, name) for name in groups]
+    touched = [[skull[1] for skull in physical], [skull[0] for skull in physical]]
+    for ax, error, circles in ((first, "e_ma_deg", touched[0]), (second, "e_co_mm", touched[1])):
+        values = [getattr(errors, error) for errors in groups.values()]
+        drawn = ax.boxplot(
+            values,
+            showfliers=False,
+            showmeans=True,
+            widths=0.5,
+            patch_artist=True,
+            medianprops={"color": _INK},
+            meanprops={"marker": "D", "mfc": "white", "mec": _INK, "ms": 4},
+        )
+        for box, colour in zip(drawn["boxes"], (LEFT, RIGHT, "#b8b8b8")[-len(names) :], strict=True):
+            box.set(facecolor=colour, alpha=0.75, linewidth=0.8)
+        ax.plot([len(names)] * len(circles), circles, "o", mfc="none", mec=ACCENT, ms=6, mew=1.3)
+        ax.set_xticks(range(1, len(names) + 1), names)
+        ax.set_ylim(bottom=0)
+    label(first, "C", "", AXIS_ERROR)
+    label(second, "D", "", ORIGIN_ERROR)
+    n = len(groups["pooled"].e_co_mm)
+    note = f"method {report.method}, {n} simulated sides"
+    second.set_title(note + (f", noise {report.noise:g} mm" if report.noise else ""), loc="right", fontsize=8)
+    return figure
+
+
+def comparison(report: ComparisonReport) -> Figure:
+    """Draw mean, 95th percentile and maximum of both methods as touch errors rise."""
+    figure, axes = new_figure(2, len(PROBES), (9.2, 5.6))
+    titles = {"six": "six (the paper's)", "ten": "all ten", "five at random": "five at random"}
+    for column, probe in enumerate(PROBES):
+        rows = [row for row in report.rows if row.probe == probe]
+        for ax, error in ((axes[column], "e_co_mm"), (axes[column + len(PROBES)], "e_ma_deg")):
+            _compared(ax, rows, error)
+        axes[column].set_title(f"Touched: {titles[probe]}", fontsize=9, color=_INK)
+    for name, panels in ((ORIGIN_ERROR, axes[: len(PROBES)]), (AXIS_ERROR, axes[len(PROBES) :])):
+        lowest, highest = (pick(ax.get_ylim()[i] for ax in panels) for i, pick in ((0, min), (1, max)))
+        for ax in panels:
+            ax.set_ylim(lowest, highest)
+        panels[0].set_ylabel(name, fontsize=9, color=_INK)
+    figure.suptitle(f"{report.animals}, touched {report.repeats} times", fontsize=9, color=_INK)
+    axes[0].legend(fontsize=8, frameon=False, loc="upper left")
+    figure.supxlabel(
+        "Touch errors (mm): Gaussian noise a coordinate; or noise 0.1 and one touch off its place.   "
+        "Dot mean, bar to 95 %, cross maximum",
+        fontsize=8,
+        color=_INK,
+    )
+    return figure
+
+
+def _compared(ax: Axes, rows: Sequence[ComparisonRow], error: str) -> None:
+    conditions = list(dict.fromkeys(row.condition for row in rows))
+    for method, name, colour, shift in (("jrmpc", "JRMPC", ACCENT, -0.15), ("robust", "robust", LEFT, 0.15)):
+        found = [row.as_dict()[error] for row in rows if row.method == method]
+        x = np.arange(len(conditions)) + shift
+        mean, p95, highest = ([summary[key] for summary in found] for key in ("mean", "p95", "max"))
+        ax.vlines(x, mean, p95, color=colour, lw=1.6)
+        ax.plot(x, mean, "o", color=colour, ms=4.5, label=name)
+        ax.plot(x, highest, "x", color=colour, ms=4, mew=0.9)
+    ax.set_yscale("log")
+    ax.set_xticks(range(len(conditions)), [_tick(c.noise_mm, c.mistouch_mm) for c in conditions], fontsize=7)
+    ax.yaxis.set_major_formatter("{x:g}")
+    ax.grid(axis="y", which="major", color=_FAINT, lw=0.6)
+    ax.set_axisbelow(True)
+
+
+def _tick(noise: float, mistouch: float) -> str:
+    return f"one off\n{mistouch:g}" if mistouch else f"noise\n{noise:g}"

@@ -15,7 +15,7 @@ from gp_core.atlas.pose import METHODS
 from gp_core.checks import FloatArray, check_option
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import round_window_frame, with_cochlea_origin
-from gp_core.landmarks.features import PROBE, TRAINING
+from gp_core.landmarks.features import PROBE, TRAINING, index_of
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
 from gp_core.study.scoring import PoseErrors, jrmpc_errors, robust_errors, touched
@@ -187,7 +187,8 @@ class Folds:
         """Register each animal with all others and return the errors; see `jrmpc_errors`."""
         animals = np.arange(len(self.cochlea))
         others = np.array([np.delete(animals, held_out) for held_out in animals])
-        return jrmpc_errors(self.cochlea[others], self.window, self.window, features, probe, settings)
+        touches = self.window[:, [index_of(code) for code in probe]]
+        return jrmpc_errors(self.cochlea[others], touches, self.window, features, settings)
 
 
 def folds_of(specimens: Sequence[Specimen]) -> list[Folds]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.robust_pose import estimate_robust
+from gp_core.atlas.robust_pose import locate_robust
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import index_of
 from gp_core.landmarks.sets import LandmarkSet
@@ -64,7 +64,6 @@ def jrmpc_errors(
     touches: FloatArray,
     truth: FloatArray,
     features: Sequence[str],
-    probe: Sequence[str],
     settings: JrmpcSettings,
 ) -> PoseErrors:
     """Register touches with training sides by JRMPC and measure the errors in the joint frame.
@@ -76,20 +75,20 @@ def jrmpc_errors(
     ----------
     training : (B, M, 20, 3) array, mm
         All points of the M training sides, each in its own CO frame, CO at the origin.
-    touches : (B, 20, 3) array, mm
-        What the probe reports, in the RW frame built on it.
+    touches : (B, p, 3) array, mm
+        The p points that the probe reports, in the RW frame built on them.
     truth : (B, 20, 3) array, mm
         The points of the same sides as they are, in the same frame.
-    features, probe : sequence of str
-        Which of the training points and of the touches take part.
+    features : sequence of str
+        Which of the training points take part.
     settings : JrmpcSettings
         See there.
     """
-    rows, touched_rows = ([index_of(code) for code in codes] for codes in (features, probe))
+    rows = [index_of(code) for code in features]
     n_problems, n_sets = training.shape[:2]
     known = training[:, :, rows].reshape(n_problems, -1, 3)
-    problems = np.concatenate([known, touches[:, touched_rows]], axis=1)
-    result = jrmpc_batch(problems, [len(rows)] * n_sets + [len(touched_rows)], settings)
+    problems = np.concatenate([known, touches], axis=1)
+    result = jrmpc_batch(problems, [len(rows)] * n_sets + [touches.shape[1]], settings)
     ends = np.concatenate([training[:, :, [_CO, _CA]], truth[:, None, [_CO, _CA]]], axis=1)
     moved = np.einsum("bmij,bmkj->bmki", result.rotations, ends) + result.translations[:, :, None]
     origin, apex = moved[:, :-1].mean(axis=1).swapaxes(0, 1)
@@ -116,9 +115,9 @@ def robust_errors(
     """
     origins, axes = [], []
     for atlas, touch, truth in zip(atlases, touches, truths, strict=True):
-        pose = estimate_robust(touch, atlas)
-        origins.append(pose.origin - truth["CO"])
-        axes.append((pose.axis, truth["CA"] - truth["CO"]))
+        T_touches_cochlea = locate_robust(touch, atlas)
+        origins.append(T_touches_cochlea.translation - truth["CO"])
+        axes.append((T_touches_cochlea.rotation[:, 0], truth["CA"] - truth["CO"]))
     estimated, true = np.array(axes).swapaxes(0, 1)
     return PoseErrors(np.linalg.norm(origins, axis=1), angle_between_deg(estimated, true))
 

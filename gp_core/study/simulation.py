@@ -155,7 +155,7 @@ def simulate(
             estimate = partial(_robust, atlas)
         else:
             labelled = np.array([t.landmarks.points for t in training_sides(specimens, side)])
-            estimate = partial(_jrmpc, labelled, features, touches, settings)
+            estimate = partial(_jrmpc, labelled, features, settings)
         errors[side.value] = PoseErrors.joined(run_map(estimate, chunks, executor))
     used = settings if method == "jrmpc" else None
     return SimulationReport(method, features, touches, used, noise, errors)
@@ -198,13 +198,12 @@ def simulate_sides(
 def _jrmpc(
     labelled: FloatArray,
     features: Sequence[str],
-    probe: Sequence[str],
     settings: JrmpcSettings,
     trials: Sequence[Trial],
 ) -> PoseErrors:
     touches, truths = window_arrays(trials)
     training = np.broadcast_to(labelled, (len(trials), *labelled.shape))
-    return jrmpc_errors(training, touches, truths, features, probe, settings)
+    return jrmpc_errors(training, touches, truths, features, settings)
 
 
 def _robust(atlas: Atlas, trials: Sequence[Trial]) -> PoseErrors:

@@ -71,11 +71,11 @@ def make_trial(
 
 
 def window_arrays(trials: Sequence[Trial]) -> tuple[FloatArray, FloatArray]:
-    """Return touches and truth (B, 20, 3), each trial in the RW frame built on its own touches, mm."""
+    """Return touches (B, p, 3) and truth (B, 20, 3), each trial in the RW frame of its own touches, mm."""
     touches, truths = [], []
     for trial in trials:
         T_window_frame = round_window_frame(trial.window).inverse()
-        touches.append(T_window_frame.apply(trial.window.points))
+        touches.append(T_window_frame.apply(trial.touches.array(trial.touches.placed)))
         truths.append(T_window_frame.apply(trial.truth.points))
     return np.array(touches), np.array(truths)
 

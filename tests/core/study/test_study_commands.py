@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from study_cases import herd
 
 from gp_core.cli import main
 from gp_core.landmarks.files import landmark_file_name, write_markups
+from gp_core.landmarks.sets import LandmarkSet
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +75,56 @@ def test_search(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert Path(figure).read_bytes().startswith(b"\x89PNG")
     assert main(["search", folder, "--workers", "1", *features, "--checkpoint", checkpoint]) == 0
     assert capsys.readouterr().out.splitlines()[1:] == first.splitlines()[1:]
+
+
+def test_simulate_with_physical_results(
+    folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    skull = tmp_path / "skull.json"
+    row = {"registration": "icp", "method": "jrmpc", "e_co_mm": 0.65, "e_ma_deg": 9.3}
+    skull.write_text(json.dumps({"rows": [row]}))
+    report, figure = tmp_path / "sim.json", tmp_path / "sim.pdf"
+    options = ["--n", "20", "--seed", "3", "--noise", "0.1", "--physical", str(skull)]
+    assert main(["simulate", folder, *options, "--json", str(report), "--figure", str(figure)]) == 0
+    content = json.loads(report.read_text())
+    assert content["seed"] == 3
+    assert content["settings"]["noise_mm"] == 0.1
+    assert f"{content['groups']['pooled']['e_co_mm']['mean']:.3f}" in capsys.readouterr().out
+    assert figure.read_bytes().startswith(b"%PDF")
+    skull.write_text("[]")
+    assert main(["simulate", folder, *options]) == 2
+    assert "is no result of a physical test" in capsys.readouterr().err
+
+
+def test_compare(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    files = [str(tmp_path / name) for name in ("c.json", "c.csv", "c.png")]
+    options = ["--repeats", "1", "--workers", "1"]
+    outputs = ["--json", files[0], "--csv", files[1], "--figure", files[2]]
+    assert main(["compare", folder, *options, *outputs]) == 0
+    assert len(json.loads(Path(files[0]).read_text())["rows"]) == 36
+    assert len(Path(files[1]).read_text().splitlines()) == 37
+    assert Path(files[2]).read_bytes().startswith(b"\x89PNG")
+    assert "4 labelled animals, touched 1 times" in capsys.readouterr().out
+
+
+def test_physical(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    animal = herd(1, seed=9)[0].side("R")
+    skull = {f"S{i}": 12.0 * np.array([np.cos(i), np.sin(2 * i), np.cos(5 * i)]) for i in range(1, 9)}
+    ct = LandmarkSet(animal.points, animal.side, "scan", extra=skull)
+    write_markups(tmp_path / "ct_R.mrk.json", ct, specimen="ct")
+    rows = [animal[code] for code in ("CL", "MN", "OS", "RWA", "RWP", "LLI")] + list(skull.values())
+    touches = tmp_path / "touches.dat"
+    touches.write_text("\n".join("\t".join(repr(float(x)) for x in row) for row in rows) + "\n")
+    report = tmp_path / "physical.json"
+    files = ["--touches", str(touches), "--ct-landmarks", str(tmp_path / "ct_R.mrk.json")]
+    assert main(["physical", *files, "--side", "R", "--atlas", folder, "--json", str(report)]) == 0
+    content = json.loads(report.read_text())
+    assert [r["way"] for r in content["registrations"]] == ["names", "icp"]
+    assert content["registrations"][0]["fre_mm"] < 1e-6
+    assert len(content["rows"]) == 4
+    assert "icp" in capsys.readouterr().out
+    assert main(["physical", *files, "--side", "L"]) == 2
+    assert "ct_R.mrk.json" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,150 @@
+"""A touched skull against its own CT: the paper's physical test."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.pose import METHODS, CochleaPose, estimate_pose
+from gp_core.errors import FeatureError, GpError
+from gp_core.landmarks.anatomy import modiolar_axis, with_cochlea_origin
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.registration.targets import Surface
+from gp_core.study.scoring import angle_between_deg
+from gp_core.study.skull_registration import (
+    SkullRegistration,
+    register_by_icp,
+    register_by_names,
+    register_to_surface,
+)
+
+__all__ = ["PhysicalReport", "PhysicalRow", "physical_test"]
+
+
+@dataclass(frozen=True)
+class PhysicalRow:
+    """Errors of one estimate, held against the CT by one registration."""
+
+    registration: str
+    method: str
+    e_co_mm: float
+    e_ma_deg: float
+
+
+@dataclass(frozen=True)
+class PhysicalReport:
+    """A physical test of one side.
+
+    Attributes
+    ----------
+    side : str
+    registrations : tuple of SkullRegistration
+    rows : tuple of PhysicalRow
+        Every method by every registration.
+    warnings : tuple of str
+    """
+
+    side: str
+    registrations: tuple[SkullRegistration, ...]
+    rows: tuple[PhysicalRow, ...]
+    warnings: tuple[str, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report as the JSON file holds it."""
+        return {
+            "side": self.side,
+            "registrations": [registration.as_dict() for registration in self.registrations],
+            "rows": [asdict(row) for row in self.rows],
+            "warnings": list(self.warnings),
+        }
+
+
+def physical_test(
+    touches: LandmarkSet,
+    ct: LandmarkSet,
+    *,
+    atlas: Atlas | None = None,
+    specimens: Sequence[Specimen] | None = None,
+    bone: Surface | None = None,
+) -> PhysicalReport:
+    """Estimate a cochlea from touches of a skull, and hold it against the CT of the same skull.
+
+    Parameters
+    ----------
+    touches : LandmarkSet
+        Probe features, and in `extra` the skull features, tracker frame, mm.
+    ct : LandmarkSet
+        CA, CB, RWA and RWP, and in `extra` the skull features by the same names, scan frame, mm.
+    atlas : Atlas, optional
+        Of the robust method; by default fitted to `specimens`, or else the published one.
+    specimens : sequence of Specimen, optional
+        Labelled animals, other than this one; without them there is no JRMPC estimate.
+    bone : Surface, optional
+        The bone in the CT, scan frame, mm. Touched points in `extra` that the CT does not name are then
+        registered to it, starting from the registration by names.
+
+    Raises
+    ------
+    GpError
+        Fewer than three skull features in common, or on one line; a side or a feature that does not fit.
+
+    References
+    ----------
+    Usevitch et al., "Estimating the pose of a guinea-pig cochlea without medical imaging", 2021, Figure 6.
+    """
+    if touches.side is not ct.side:
+        raise GpError(f"the touches are of the {touches.side.word} side, the CT of the {ct.side.word}")
+    for code in ("CA", "CB", "RWA", "RWP"):
+        if code not in ct:
+            raise FeatureError(
+                f"the CT landmarks have no {code}, which defines the true cochlea", landmark=code
+            )
+    poses = _estimates(touches, atlas, specimens)
+    by_names = register_by_names(touches, ct)
+    registrations = [by_names, register_by_icp(touches, ct)]
+    if bone is not None:
+        unnamed = [point for name, point in touches.extra.items() if name not in ct.extra]
+        registrations.append(register_to_surface(unnamed, bone, by_names.T_scan_tracker))
+    true = with_cochlea_origin(ct)
+    rows = [_row(registration, pose, true) for registration in registrations for pose in poses]
+    return PhysicalReport(
+        touches.side.value, tuple(registrations), tuple(rows), tuple(_warnings(registrations, poses))
+    )
+
+
+def _estimates(
+    touches: LandmarkSet, atlas: Atlas | None, specimens: Sequence[Specimen] | None
+) -> list[CochleaPose]:
+    methods = METHODS if specimens else METHODS[:1]
+    probe = LandmarkSet(touches.points, touches.side, touches.frame)
+    return [
+        estimate_pose(probe, touches.side, atlas, method=method, specimens=specimens) for method in methods
+    ]
+
+
+def _row(registration: SkullRegistration, pose: CochleaPose, true: LandmarkSet) -> PhysicalRow:
+    T_scan_tracker = registration.T_scan_tracker
+    origin = T_scan_tracker.apply(pose.origin[None])[0]
+    axis = T_scan_tracker.apply_vector(pose.axis)
+    return PhysicalRow(
+        registration.way,
+        pose.method,
+        float(np.linalg.norm(origin - true["CO"])),
+        float(angle_between_deg(axis, modiolar_axis(true["CA"], true["CB"]))),
+    )
+
+
+def _warnings(registrations: Sequence[SkullRegistration], poses: Sequence[CochleaPose]) -> list[str]:
+    by_names, by_icp = registrations[:2]
+    found = [
+        f"skull feature {name} does not fit the others: left out of the registration by names"
+        for name in by_names.suspects
+    ]
+    if by_icp.fre_mm > 2 * by_names.fre_mm and not by_names.suspects:
+        found.append("ICP pairs features otherwise than their names do")
+    found += [f"{pose.method}: {warning}" for pose in poses for warning in pose.warnings]
+    return found

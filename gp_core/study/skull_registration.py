@@ -1,0 +1,167 @@
+"""Register a touched skull to its CT: by names, by ICP as in the paper, or to the surface of the bone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.checks import FloatArray, as_points
+from gp_core.errors import GeometryError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.registration.icp import icp
+from gp_core.registration.procrustes import fit_rigid
+from gp_core.registration.targets import Cloud, Surface
+
+__all__ = ["SkullRegistration", "register_by_icp", "register_by_names", "register_to_surface"]
+
+_FEWEST = 3
+_FEWEST_TO_DOUBT = 6
+_TELLING = 0.5
+"""A point is wrong if the others fit twice as well without it; of eight good ones, 0.3 % are called so."""
+
+_EXACT_MM = 1e-6
+
+
+@dataclass(frozen=True)
+class SkullRegistration:
+    """A touched skull registered to its CT.
+
+    Attributes
+    ----------
+    way : str
+        ``names``, ``icp`` or ``surface``.
+    T_scan_tracker : RigidTransform
+    fre_mm : float
+        Fiducial registration error: root mean square distance between the touched features and those of the
+        same names in the CT, of all but the suspects; of ``surface``, from the touches to the bone.
+    residuals_mm : dict of str to float
+        The distance of each feature.
+    suspects : tuple of str
+        Features that the others contradict; left out by ``names``, kept by ``icp``, as in the paper.
+    """
+
+    way: str
+    T_scan_tracker: RigidTransform
+    fre_mm: float
+    residuals_mm: dict[str, float]
+    suspects: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the registration as the JSON file holds it."""
+        return {
+            "way": self.way,
+            "T_scan_tracker": self.T_scan_tracker.matrix.tolist(),
+            "fre_mm": self.fre_mm,
+            "residuals_mm": self.residuals_mm,
+            "suspect": list(self.suspects),
+        }
+
+
+def register_by_names(touches: LandmarkSet, ct: LandmarkSet) -> SkullRegistration:
+    """Register the skull features by their names; a feature that the others contradict is left out.
+
+    Raises
+    ------
+    GpError
+        Fewer than three features in common, or on one line.
+    """
+    names, touched, labelled = _common(touches, ct)
+    kept = list(range(len(names)))
+    suspects: list[int] = []
+    rms = _fit(touched, labelled, names, kept)[1]
+    while len(kept) >= _FEWEST_TO_DOUBT and rms > _EXACT_MM:
+        without = [(_rms_without(touched, labelled, names, kept, i), i) for i in kept]
+        best, worst = min(without)
+        if best > _TELLING * rms:
+            break
+        kept.remove(worst)
+        suspects.append(worst)
+        rms = best
+    transform, rms = _fit(touched, labelled, names, kept)
+    residuals = _residuals(transform, names, touched, labelled)
+    return SkullRegistration("names", transform, rms, residuals, tuple(names[i] for i in suspects))
+
+
+def register_by_icp(touches: LandmarkSet, ct: LandmarkSet) -> SkullRegistration:
+    """Register the skull features by iterative closest point, without their names, as the paper does.
+
+    Raises
+    ------
+    GpError
+        Fewer than three features in common, or on one line.
+    """
+    names, touched, labelled = _common(touches, ct)
+    found = icp(touched, Cloud(labelled), dst="scan", src="tracker")
+    residuals = _residuals(found.transform, names, touched, labelled)
+    rms = float(np.sqrt(np.mean(np.square(list(residuals.values())))))
+    return SkullRegistration("icp", found.transform, rms, residuals)
+
+
+def register_to_surface(points: ArrayLike, bone: Surface, start: RigidTransform) -> SkullRegistration:
+    """Register points touched anywhere on the bone to its surface.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like, mm, tracker frame
+        Spread over the skull; names are not needed.
+    bone : Surface
+        From the CT, mm, scan frame.
+    start : RigidTransform
+        ``T_scan_tracker`` within some millimetres and ten degrees, such as `register_by_names` of a few
+        features gives.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than three points, or on one line.
+    """
+    touched = as_points(np.reshape(points, (-1, 3)), "points on the bone")
+    if len(touched) < _FEWEST:
+        raise GeometryError(
+            f"a registration to bone needs at least {_FEWEST} touched points that the CT does not name, "
+            f"got {len(touched)}",
+            remedy="Touch more, spread over the skull.",
+        )
+    found = icp(touched, bone, start=start, dst=start.dst, src=start.src)
+    residuals = {f"point {i + 1}": distance for i, distance in enumerate(found.distances.tolist())}
+    return SkullRegistration("surface", found.transform, found.rms, residuals)
+
+
+def _common(touches: LandmarkSet, ct: LandmarkSet) -> tuple[list[str], FloatArray, FloatArray]:
+    names = [name for name in touches.extra if name in ct.extra]
+    if len(names) < _FEWEST:
+        raise GeometryError(
+            f"touches and CT must have at least {_FEWEST} skull features by the same names, got {len(names)}"
+            f" (touched: {' '.join(touches.extra) or 'none'}; CT: {' '.join(ct.extra) or 'none'})",
+            remedy="Name them alike in both files, such as S1 to S8.",
+        )
+    touched, labelled = (np.array([s.extra[name] for name in names]) for s in (touches, ct))
+    return names, touched, labelled
+
+
+def _fit(
+    touched: FloatArray, labelled: FloatArray, names: Sequence[str], kept: Sequence[int]
+) -> tuple[RigidTransform, float]:
+    fit = fit_rigid(touched[kept], labelled[kept], names=[names[i] for i in kept], dst="scan", src="tracker")
+    return fit.transform, fit.rms
+
+
+def _rms_without(
+    touched: FloatArray, labelled: FloatArray, names: Sequence[str], kept: Sequence[int], i: int
+) -> float:
+    try:
+        return _fit(touched, labelled, names, [k for k in kept if k != i])[1]
+    except GeometryError:
+        return np.inf
+
+
+def _residuals(
+    transform: RigidTransform, names: Sequence[str], touched: FloatArray, labelled: FloatArray
+) -> dict[str, float]:
+    lengths = np.linalg.norm(transform.apply(touched) - labelled, axis=1)
+    return dict(zip(names, lengths.tolist(), strict=True))
