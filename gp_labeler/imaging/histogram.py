@@ -48,8 +48,12 @@ class Histogram:
     def value(self, fraction: float) -> float:
         """Return the value at a fraction of the way from the lowest to the highest, in sensible steps."""
         value = self.low + min(max(fraction, 0.0), 1.0) * (self.high - self.low)
-        step = 10.0 ** np.floor(np.log10((self.high - self.low) / 500))
-        return float(np.round(np.round(value / step) * step, 10))
+        return float(np.round(np.round(value / self.step) * self.step, 10))
+
+    @property
+    def step(self) -> float:
+        """A sensible step between values: a power of ten, some thousandth of the whole."""
+        return float(10.0 ** np.floor(np.log10((self.high - self.low) / 500)))
 
 
 def histogram_of(volume: Volume, *, bins: int = _BINS) -> Histogram:

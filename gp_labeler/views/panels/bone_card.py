@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QAbstractSpinBox, QDoubleSpinBox, QHBoxLayout, QPushButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gp_labeler.imaging.histogram import histogram_of
-from gp_labeler.views.bind import attempt, blocked, follow
+from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.histogram_slider import HistogramSlider
+from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.work import ProposeThreshold
 from gp_labeler.workbench import Workbench
@@ -29,12 +30,8 @@ class BoneCard(Card):
         self.slider = HistogramSlider()
         self.slider.previewed.connect(self._on_previewed)
         self.slider.chosen.connect(self._choose)
-        self.box = QDoubleSpinBox()
-        self.box.setRange(-1e9, 1e9)
-        self.box.setKeyboardTracking(False)
-        self.box.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
-        self.box.setAccessibleName("Bone threshold, grey value")
-        self.box.valueChanged.connect(self._choose)
+        self.box = NumberField("Bone threshold, grey value")
+        self.box.value_chosen.connect(self._choose)
         self.propose = QPushButton("Propose")
         self.propose.setToolTip("Find the threshold from the histogram")
         self.propose.clicked.connect(self._propose)
@@ -60,22 +57,18 @@ class BoneCard(Card):
         for widget in (self.box, self.propose):
             widget.setEnabled(self._workbench.volume is not None)
         self.slider.set_value(threshold)
-        with blocked(self.box):
-            self.box.setValue(0.0 if threshold is None else threshold)
+        self.box.set_value(threshold)
 
     def _on_volume(self, *_: object) -> None:
         volume = self._workbench.volume
         histogram = None if volume is None else histogram_of(volume)
         self.slider.set_histogram(histogram)
         if histogram is not None:
-            fine = histogram.high - histogram.low < 50
-            self.box.setDecimals(3 if fine else 1)
-            self.box.setSingleStep(0.01 if fine else max(1.0, round((histogram.high - histogram.low) / 200)))
+            self.box.step = histogram.step
         self.refresh()
 
     def _on_previewed(self, value: float) -> None:
-        with blocked(self.box):
-            self.box.setValue(value)
+        self.box.set_value(value)
         self._workbench.preview_threshold(value)
 
     def _choose(self, value: float) -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QAbstractSpinBox, QDoubleSpinBox, QGridLayout, QHBoxLayout, QToolButton, QWidget
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.imaging.histogram import window_presets
-from gp_labeler.views.bind import attempt, blocked, follow
+from gp_labeler.views.bind import attempt, follow
+from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.workbench import Workbench
 
@@ -36,14 +37,16 @@ class GreyCard(Card):
         row.setSpacing(4)
         self.presets = {name: self._button(name, row) for name in _HINTS}
         self.add(row)
-        self.level, self.width_box = self._box("Level"), self._box("Width")
+        self.level, self.width_box = (
+            NumberField(f"{name} of the grey window") for name in ("Level", "Width")
+        )
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
         for column, (name, box) in enumerate((("Level", self.level), ("Width", self.width_box))):
             grid.addWidget(text_label(name, "hint"), 0, 2 * column)
             grid.addWidget(box, 0, 2 * column + 1)
             grid.setColumnStretch(2 * column + 1, 1)
-            box.valueChanged.connect(self._on_typed)
+            box.value_chosen.connect(self._on_typed)
         self.add(grid)
         for signal in (workbench.view_changed, workbench.volume_opened, workbench.session_replaced):
             follow(self, signal, self.refresh)
@@ -59,29 +62,20 @@ class GreyCard(Card):
         for name, button in self.presets.items():
             button.setEnabled(volume is not None and (name == "Auto" or name in presets))
             button.setChecked(auto if name == "Auto" else not auto and presets.get(name) == shown)
-        with blocked(self.level, self.width_box):
-            for box, value in zip((self.level, self.width_box), shown, strict=True):
-                box.setEnabled(volume is not None)
-                box.setSingleStep(max(10.0 ** (len(f"{abs(shown[1]):.0f}") - 2), 0.01))
-                box.setValue(value)
+        for box, value in zip((self.level, self.width_box), shown, strict=True):
+            box.setEnabled(volume is not None)
+            box.step = presets["Full"][1] / 100 if presets else 1.0
+            box.set_value(value if presets else None)
 
     def _button(self, name: str, row: QHBoxLayout) -> QToolButton:
         button = QToolButton()
         button.setText(name)
         button.setCheckable(True)
+        button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         button.setToolTip(_HINTS[name])
         button.clicked.connect(lambda: self._choose(name))
         row.addWidget(button, 1)
         return button
-
-    def _box(self, name: str) -> QDoubleSpinBox:
-        box = QDoubleSpinBox()
-        box.setRange(-1e9 if name == "Level" else 1e-6, 1e9)
-        box.setDecimals(1)
-        box.setButtonSymbols(QAbstractSpinBox.ButtonSymbols.NoButtons)
-        box.setKeyboardTracking(False)
-        box.setAccessibleName(f"{name} of the grey window")
-        return box
 
     def _choose(self, name: str) -> None:
         volume, view = self._workbench.volume, self._workbench.session.view
@@ -95,5 +89,6 @@ class GreyCard(Card):
 
     def _on_typed(self, _: float) -> None:
         view = self._workbench.session.view
-        level, width = self.level.value(), self.width_box.value()
+        level, width = self.level.value, self.width_box.value
         attempt(self._workbench, lambda: view.update(level=level, width=width))
+        self.refresh()
