@@ -41,13 +41,15 @@ def make_application() -> QApplication:
     return app
 
 
-def make_window(directory: Path | None = None) -> MainWindow:
+def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWindow:
     """Return a window with nothing open.
 
     Parameters
     ----------
     directory : Path, optional
         State directory; None keeps nothing on disk.
+    atlas : bool
+        Whether to load the published atlas, for ghosts.
     """
     make_application()
     dispatcher = QtDispatcher()
@@ -55,7 +57,8 @@ def make_window(directory: Path | None = None) -> MainWindow:
     memory = WindowState(None if directory is None else directory / "window.json")
     window = MainWindow(workbench, memory)
     dispatcher.setParent(window)
-    workbench.load_atlas()
+    if atlas:
+        workbench.load_atlas()
     return window
 
 

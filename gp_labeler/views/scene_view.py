@@ -125,12 +125,16 @@ class SceneView(QWidget):
         follow(self, desk.session_replaced, self._on_session_replaced)
         for signal in (desk.landmarks_changed, desk.active_changed, desk.ghosts_changed, desk.doubts_changed):
             follow(self, signal, self._show_points)
-        follow(self, desk.crosshair_changed, self._repaint)
+        follow(self, desk.crosshair_changed, self._on_crosshair)
         follow(self, desk.point_shown, self.go_to)
         follow(self, desk.dragged, self._on_dragged)
         follow(self, desk.view_changed, self._on_view_changed)
 
-    def _repaint(self, *_: object) -> None:
+    def _on_crosshair(self, position: FloatArray) -> None:
+        x, y = self.scene.display_of(position[None])[0]
+        width, height = self.scene.target.size
+        if self._fitted and not (0 < x < width and 0 < y < height):
+            self.go_to(position)
         self.update()
 
     def _on_session_replaced(self, _: object) -> None:

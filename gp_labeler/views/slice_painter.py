@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QLineF, QPointF, QRectF, Qt
+from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPolygonF
 
 from gp_core.checks import FloatArray
@@ -18,6 +18,7 @@ from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks
+from gp_labeler.views.qt_paths import segments_path
 from gp_labeler.views.theme import Theme, base_font, theme_of
 from gp_labeler.workbench import Workbench
 
@@ -52,7 +53,7 @@ class SlicePainter:
         self._preview: float | None = None
         self._slice: SliceImage | None = None
         self._picture: tuple[object, QImage] | None = None
-        self._outline: tuple[object, list[QLineF]] | None = None
+        self._outline: tuple[object, QPainterPath] | None = None
         follow(view, workbench.threshold_previewed, self._on_preview)
 
     def forget(self) -> None:
@@ -102,16 +103,16 @@ class SlicePainter:
         if threshold is None or self._slice is None or not self._desk.session.view.state.outline_visible:
             return
         if self._outline is None or self._outline[0] != threshold:
-            segments = self._slice.outline(threshold).reshape(-1, 4).tolist()
-            self._outline = (threshold, [QLineF(*segment) for segment in segments])
-        pen = QPen(QColor(246, 190, 110, 190), 1.1 * ratio)
+            self._outline = (threshold, segments_path(self._slice.outline(threshold)))
+        pen = QPen(QColor(246, 190, 110, 190), max(1.0, ratio))
         pen.setCosmetic(True)
         painter.save()
         corner = shown.flat_to_pixel(np.zeros(2)) + 0.5
         painter.translate(*corner.tolist())
         painter.scale(1 / shown.mm_per_pixel, 1 / shown.mm_per_pixel)
         painter.setPen(pen)
-        painter.drawLines(self._outline[1])
+        painter.setBrush(Qt.BrushStyle.NoBrush)
+        painter.drawPath(self._outline[1])
         painter.restore()
 
     def _paint_crosshair(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:

@@ -144,7 +144,7 @@ class SliceView(QWidget):
 
     def _on_crosshair(self, position: FloatArray) -> None:
         if self.shown is not None:
-            self.shown = self.shown.at(float(position[self.plane.axis]))
+            self.shown = self.shown.showing(position, 0.02)
             self.moved.emit(self.shown.position)
             self.update()
 
@@ -283,7 +283,9 @@ class SliceView(QWidget):
         return np.array([steps[axis] for axis in range(3)])
 
     def _drag_to(self, here: FloatArray) -> None:
-        to = here + self._grip
+        drag, to = self._desk.drag, here + self._grip
+        if drag is not None:
+            to[self.plane.axis] = drag.position[self.plane.axis]  # the slice follows it: depth stays its own
         if self._desk.volume is not None and bool(self._desk.volume.contains(to[None])[0]):
             self._desk.drag_to(to, How.SLICE)
 

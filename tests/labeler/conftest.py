@@ -1,0 +1,58 @@
+"""A window without a display, a scan whose surface is known exactly, and a check that nothing is left behind."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+from window_cases import Answers, ball_volume, close, settle
+
+from gp_labeler.imaging.volume import Volume
+
+
+@pytest.fixture
+def ball() -> Volume:
+    return ball_volume()
+
+
+@pytest.fixture
+def make_window(qtbot, tmp_path) -> Iterator[Callable[..., object]]:
+    """Make windows on one state directory; whatever is left of them afterwards is a leak."""
+    from PySide6.QtWidgets import QApplication
+
+    from gp_labeler.views.application import make_window as make
+
+    windows = []
+
+    def made(directory: Path | None = None, *, atlas: bool = False):
+        window = make(directory or tmp_path / "state", atlas=atlas)
+        window.ui.prompts = Answers()
+        window.resize(1100, 760)
+        window.show()
+        qtbot.waitExposed(window)
+        window.activateWindow()
+        windows.append(window)
+        return window
+
+    yield made
+    for window in windows:
+        close(window)
+    windows.clear()
+    gc.collect()
+    left = [w for w in QApplication.topLevelWidgets() if w.isVisible()]
+    assert left == []
+
+
+@pytest.fixture
+def window(qtbot, make_window, ball):
+    """A window with the ball open and meshed."""
+    window = make_window()
+    window.workbench.open_volume(ball)
+    settle(qtbot, window)
+    return window

@@ -1,0 +1,332 @@
+"""Labelling by real mouse and key events, on a ball whose surface is known exactly."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QPoint, Qt
+from PySide6.QtTest import QTest
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
+
+from gp_core.landmarks.features import Side
+from gp_labeler.scene.planes import Plane
+from gp_labeler.session import labelling
+from gp_labeler.session.state import How
+from gp_labeler.session.workflow import Active
+
+LEFT_BUTTON = Qt.MouseButton.LeftButton
+
+
+def pixel(view, position) -> QPoint:
+    x, y = view.pixel_at(position)
+    return QPoint(int(x), int(y))
+
+
+def drag(view, start: QPoint, end: QPoint, button=LEFT_BUTTON, modifiers=Qt.KeyboardModifier.NoModifier):
+    QTest.mousePress(view, button, modifiers, start)
+    for part in (0.2, 0.6, 1.0):
+        QTest.mouseMove(view, start + (end - start) * part)
+    QTest.mouseRelease(view, button, modifiers, end)
+
+
+def on_ball(*direction: float) -> np.ndarray:
+    towards = np.array(direction, dtype=float)
+    return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
+
+
+@pytest.fixture
+def scene(window):
+    view = window.grid.scene_view
+    view.view_from("A")
+    return view
+
+
+def placed(window, code="CA", side=Side.LEFT):
+    landmarks = window.workbench.session.landmarks(side)
+    return landmarks[code] if code in landmarks else None
+
+
+def test_a_click_where_a_landmark_is_seen_places_it_there(window, scene) -> None:
+    for code, direction in (("CA", (0, -1, 0)), ("RWP", (0.5, -1, 0.3)), ("OS", (-0.4, -1, -0.5))):
+        assert window.workbench.session.active.code == code
+        known = on_ball(*direction)
+        QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, known))
+        assert np.linalg.norm(placed(window, code) - known) < VOXEL_MM
+    assert window.workbench.session.state.landmark(Side.LEFT, "CA").provenance.how is How.MESH
+
+
+@pytest.mark.parametrize("plane", list(Plane))
+def test_a_click_on_a_slice_places_on_it(window, plane) -> None:
+    view = window.grid.slice_views[plane]
+    known = MIDDLE + np.array([2.1, -1.7, 1.3])
+    window.workbench.session.set_crosshair(known)
+    QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, known))
+    assert np.abs(placed(window) - known).max() < VOXEL_MM
+    assert window.workbench.session.state.landmark(Side.LEFT, "CA").provenance.how is How.SLICE
+
+
+def test_left_is_on_the_right_of_the_screen(window) -> None:
+    for plane in (Plane.AXIAL, Plane.CORONAL):
+        view = window.grid.slice_views[plane]
+        assert view.pixel_at(MIDDLE + [3, 0, 0])[0] > view.pixel_at(MIDDLE)[0]
+    sagittal = window.grid.slice_views[Plane.SAGITTAL]
+    assert sagittal.pixel_at(MIDDLE - [0, 3, 0])[0] < sagittal.pixel_at(MIDDLE)[0]  # the nose to the left
+
+
+def test_a_drag_rotates_and_places_nothing(window, scene) -> None:
+    before = scene.scene.camera.direction
+    middle = pixel(scene, MIDDLE)
+    drag(scene, middle, middle + QPoint(60, 20))
+    assert placed(window) is None
+    assert np.degrees(np.arccos(before @ scene.scene.camera.direction)) > 5
+
+
+def test_a_trembling_hand_clicks(window, scene) -> None:
+    before = scene.scene.camera.direction
+    middle = pixel(scene, MIDDLE)
+    drag(scene, middle, middle + QPoint(2, 1))
+    assert placed(window) is not None
+    np.testing.assert_allclose(scene.scene.camera.direction, before)
+
+
+def test_a_miss_places_nothing(window, scene) -> None:
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=QPoint(4, 4))
+    axial = window.grid.slice_views[Plane.AXIAL]
+    QTest.mouseClick(axial, LEFT_BUTTON, pos=QPoint(2, 2))  # beside the scan
+    assert placed(window) is None
+    assert window.workbench.session.undo_text is None
+
+
+def test_shift_drag_pans_and_right_drag_zooms(window, scene) -> None:
+    before = np.array(scene.pixel_at(MIDDLE))
+    start = pixel(scene, MIDDLE)
+    drag(scene, start, start + QPoint(30, 10), modifiers=Qt.KeyboardModifier.ShiftModifier)
+    np.testing.assert_allclose(np.array(scene.pixel_at(MIDDLE)) - before, [30, 10], atol=1.5)
+    wide = scene.pixel_at(MIDDLE + [3, 0, 0])[0] - scene.pixel_at(MIDDLE)[0]
+    drag(scene, start, start - QPoint(0, 60), button=Qt.MouseButton.RightButton)
+    assert scene.pixel_at(MIDDLE + [3, 0, 0])[0] - scene.pixel_at(MIDDLE)[0] > 1.2 * wide
+    assert placed(window) is None
+
+
+def test_undo_and_redo_by_keys(qtbot, window, scene) -> None:
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, on_ball(0, -1, 0)))
+    where = placed(window)
+    scene.setFocus()
+    QTest.keyClick(scene, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
+    assert placed(window) is None
+    assert window.workbench.session.active == Active(Side.LEFT, "CA")
+    QTest.keyClick(scene, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
+    np.testing.assert_array_equal(placed(window), where)
+
+
+def test_a_dragged_point_stays_on_the_bone_and_is_one_edit(window, scene) -> None:
+    start, end = on_ball(0, -1, 0), on_ball(0.6, -1, 0.3)
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, start))
+    before = scene.scene.camera.direction
+    drag(scene, pixel(scene, start), pixel(scene, end))
+    assert np.linalg.norm(placed(window) - end) < VOXEL_MM
+    assert abs(np.linalg.norm(placed(window) - MIDDLE) - BALL_MM) < VOXEL_MM / 4
+    np.testing.assert_array_equal(scene.scene.camera.direction, before)
+    window.workbench.session.undo()
+    assert np.linalg.norm(placed(window) - start) < VOXEL_MM
+
+
+def test_a_point_dragged_past_the_edge_stops_there(window, scene) -> None:
+    start = on_ball(0, -1, 0)
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, start))
+    drag(scene, pixel(scene, start), QPoint(3, 3))
+    assert abs(np.linalg.norm(placed(window) - MIDDLE) - BALL_MM) < VOXEL_MM / 4
+
+
+def test_escape_lets_a_dragged_point_go_back(window, scene) -> None:
+    start = on_ball(0, -1, 0)
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, start))
+    before = placed(window)
+    where = pixel(scene, start)
+    QTest.mousePress(scene, LEFT_BUTTON, pos=where)
+    QTest.mouseMove(scene, where + QPoint(30, 0))
+    assert window.workbench.drag is not None
+    QTest.keyClick(scene, Qt.Key.Key_Escape)
+    QTest.mouseRelease(scene, LEFT_BUTTON, pos=where + QPoint(30, 0))
+    np.testing.assert_array_equal(placed(window), before)
+
+
+def test_a_point_dragged_on_a_slice_keeps_its_depth(window) -> None:
+    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
+    start = MIDDLE + np.array([1.0, 1.0, 0.1])
+    labelling.place(session, start, How.SLICE, side=Side.LEFT, code="CA")
+    session.set_crosshair(MIDDLE)
+    to = MIDDLE + np.array([3.0, -1.0, 0.1])
+    drag(view, pixel(view, start), pixel(view, to))
+    assert np.abs(placed(window) - to).max() < VOXEL_MM
+    assert placed(window)[2] == pytest.approx(start[2])
+
+
+def test_locked_points_cannot_be_dragged(window, scene) -> None:
+    start = on_ball(0, -1, 0)
+    labelling.place(window.workbench.session, start, side=Side.LEFT, code="CA")
+    labelling.lock(window.workbench.session, side=Side.LEFT, code="CA")
+    drag(scene, pixel(scene, start), pixel(scene, on_ball(0.6, -1, 0.3)))
+    np.testing.assert_array_equal(placed(window), start)
+
+
+def test_arrow_keys_nudge_a_voxel_at_a_time(window) -> None:
+    view, session = window.grid.slice_views[Plane.CORONAL], window.workbench.session
+    labelling.place(session, MIDDLE, How.SLICE, side=Side.LEFT, code="CA")
+    view.setFocus()
+    for key in (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Up):
+        QTest.keyClick(view, key)
+    np.testing.assert_allclose(placed(window) - MIDDLE, [2 * VOXEL_MM, 0, VOXEL_MM], atol=1e-9)
+    session.undo()
+    np.testing.assert_allclose(placed(window), MIDDLE)  # nudges in a row are one edit
+
+
+def test_arrow_keys_move_the_crosshair_where_nothing_is_placed(window) -> None:
+    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
+    session.set_crosshair(MIDDLE)
+    view.setFocus()
+    QTest.keyClick(view, Qt.Key.Key_Left)
+    np.testing.assert_allclose(session.crosshair - MIDDLE, [-VOXEL_MM, 0, 0], atol=1e-9)
+
+
+def test_a_double_click_maximises_and_takes_its_point_back(window, scene) -> None:
+    where = pixel(scene, on_ball(0, -1, 0))
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=where)
+    QTest.mouseDClick(scene, LEFT_BUTTON, pos=where)
+    assert window.workbench.session.view.state.layout == "3d"
+    assert placed(window) is None
+    assert not window.grid.frames["axial"].isVisible()
+    QTest.mouseDClick(window.grid.frames["3d"].header, LEFT_BUTTON)
+    assert window.workbench.session.view.state.layout == "four-up"
+    assert window.grid.frames["axial"].isVisible()
+
+
+def test_a_click_on_a_point_chooses_it_once_nothing_waits_to_be_placed_there(window, scene) -> None:
+    session = window.workbench.session
+    labelling.place(session, on_ball(0, -1, 0), side=Side.LEFT, code="CA")
+    labelling.place(session, on_ball(0.7, -1, 0), side=Side.LEFT, code="CB")
+    window.workbench.go_to(Side.LEFT, "CB")
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, on_ball(0, -1, 0)))
+    assert session.active == Active(Side.LEFT, "CA")
+
+
+def test_letters_do_what_the_sheet_says(window, scene) -> None:
+    session, mesh = window.workbench.session, window.workbench.surfaces
+    scene.setFocus()
+    for key in (Qt.Key.Key_W, Qt.Key.Key_J, Qt.Key.Key_E):  # VTK's own letters change nothing in 3D
+        QTest.keyClick(scene, key)
+    assert window.workbench.tool == "grey"
+    assert window.workbench.surfaces is mesh
+    QTest.keyClick(scene, Qt.Key.Key_P)
+    assert window.workbench.tool == "place"
+    QTest.keyClick(scene, Qt.Key.Key_X)
+    assert "CA" in session.landmarks(Side.LEFT).unseen
+    before = session.active
+    QTest.keyClick(scene, Qt.Key.Key_N)
+    assert session.active != before
+    QTest.keyClick(scene, Qt.Key.Key_Z)
+    assert session.view.state.layout == "axial"
+    QTest.keyClick(window.grid.slice_views[Plane.AXIAL], Qt.Key.Key_V)
+    assert session.view.state.layout == "four-up"
+
+
+def test_enter_accepts_the_ghost(qtbot, make_window, ball) -> None:
+    window = make_window(atlas=True)
+    window.workbench.open_volume(ball)
+    settle(qtbot, window)
+    session, scene = window.workbench.session, window.grid.scene_view
+    from gp_core.atlas.atlas import Atlas
+
+    atlas = Atlas.published()
+    for code in ("CA", "RWP", "OS"):
+        where = atlas.mean[atlas.codes.index(code)] + MIDDLE
+        labelling.place(session, where, side=Side.LEFT, code=code)
+    code = session.active.code
+    ghost = session.ghosts(Side.LEFT)[code].position
+    np.testing.assert_allclose(session.crosshair, ghost)  # the views went there
+    scene.setFocus()
+    QTest.keyClick(scene, Qt.Key.Key_Return)
+    np.testing.assert_allclose(placed(window, code), ghost)
+
+
+def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
+    from PySide6.QtCore import QPointF
+    from PySide6.QtGui import QWheelEvent
+    from PySide6.QtWidgets import QApplication
+
+    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
+    session.set_crosshair(MIDDLE)
+    before = session.crosshair
+    event = QWheelEvent(
+        QPointF(50, 50),
+        QPointF(50, 50),
+        QPoint(),
+        QPoint(0, 120),
+        Qt.MouseButton.NoButton,
+        Qt.KeyboardModifier.NoModifier,
+        Qt.ScrollPhase.NoScrollPhase,
+        False,
+    )
+    QApplication.sendEvent(view, event)
+    assert session.crosshair[2] - before[2] == pytest.approx(VOXEL_MM, abs=0.6 * VOXEL_MM)
+    coronal = window.grid.slice_views[Plane.CORONAL]
+    assert coronal.pixel_at(session.crosshair)[1] < coronal.pixel_at(before)[1]
+
+
+def test_contrast_tool_changes_greys_and_places_nothing(window) -> None:
+    view = window.grid.slice_views[Plane.AXIAL]
+    window.workbench.set_tool("grey")
+    before = view.window_level()
+    middle = pixel(view, MIDDLE)
+    drag(view, middle, middle + QPoint(40, 30))
+    after = view.window_level()
+    assert after.width > before.width
+    assert after.level < before.level
+    assert placed(window) is None
+
+
+def test_crosshair_tool_and_shift_move_the_crosshair(window, scene) -> None:
+    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
+    session.set_crosshair(MIDDLE)
+    window.workbench.set_tool("look")
+    there = MIDDLE + np.array([2.0, 1.0, 0.0])
+    QTest.mousePress(view, LEFT_BUTTON, pos=pixel(view, there))
+    QTest.mouseRelease(view, LEFT_BUTTON, pos=pixel(view, there))
+    assert np.abs(session.crosshair - there).max() < VOXEL_MM
+    assert placed(window) is None
+    QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, on_ball(0.2, -1, 0)))
+    assert np.linalg.norm(session.crosshair - on_ball(0.2, -1, 0)) < VOXEL_MM
+    assert placed(window) is None
+
+
+def test_hovering_tells_position_voxel_and_value(window) -> None:
+    view = window.grid.slice_views[Plane.AXIAL]
+    there = MIDDLE + np.array([4.0, 1.0, 0.0])
+    window.workbench.session.set_crosshair(there)
+    QTest.mouseMove(view, pixel(view, there))
+    assert "voxel" in window.status.where.text()
+    assert window.status.where.text().endswith("1400")
+    QTest.mouseMove(view, QPoint(1, 1))
+    assert window.status.where.text().endswith("outside")
+
+
+def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
+    session = window.workbench.session
+    where = on_ball(1, 0.2, 0.4)
+    labelling.place(session, where, side=Side.RIGHT, code="FPA")
+    session.set_crosshair(MIDDLE)
+    view = window.grid.slice_views[Plane.CORONAL]
+    view.shown = view.shown.zoomed(6)
+    table = window.steps["label"].table
+    row = [
+        table.model.index(r, 2) for r in range(20) if table.target_of(table.model.index(r, 2))[1] == "FPA"
+    ][0]
+    QTest.mouseClick(table.view.viewport(), LEFT_BUTTON, pos=table.view.visualRect(row).center())
+    assert session.active == Active(Side.RIGHT, "FPA")
+    np.testing.assert_allclose(session.crosshair, where)
+    x, y = view.pixel_at(where)
+    assert 0 < x < view.width()
+    assert 0 < y < view.height()
+    x, y = scene.pixel_at(where)
+    assert 0 < x < scene.width()
+    assert 0 < y < scene.height()

@@ -1,0 +1,75 @@
+"""Shared by the tests of the window: a ball of bone, answers to its questions, closing and waiting."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from gp_labeler.imaging.volume import Volume
+
+BALL_MM, VOXEL_MM = 6.0, 0.25
+MIDDLE = np.array([10.0, -20.0, 30.0])
+
+
+def ball_volume() -> Volume:
+    """A ball of bone, hollow in the middle, away from the origin; its outer radius is `BALL_MM`."""
+    n = 64
+    start = MIDDLE - VOXEL_MM * (n - 1) / 2
+    axis = [start[a] + VOXEL_MM * np.arange(n) - MIDDLE[a] for a in range(3)]
+    z, y, x = np.meshgrid(axis[2], axis[1], axis[0], indexing="ij")
+    away = np.sqrt(x**2 + y**2 + z**2)
+    value = 1000 + 400 * np.clip((BALL_MM - away) / VOXEL_MM, -1, 1)
+    value[away < 3.0] = 700
+    return Volume.from_parts(value.astype(np.float32), [VOXEL_MM] * 3, start, name="ball")
+
+
+class Answers:
+    """Answers questions in the user's place, and remembers them."""
+
+    def __init__(self) -> None:
+        self.asked: list[str] = []
+        self.answers: list[str] = []
+        self.files: list[Path] = []
+
+    def choose(self, title: str, text: str, answers: list[str], **_: object) -> str:
+        self.asked.append(title)
+        given = self.answers.pop(0) if self.answers else "Do not save"
+        return given if given in answers else ""
+
+    def tell(self, title: str, text: str) -> None:
+        self.asked.append(title)
+
+    def open_files(self, *_: object, **__: object) -> list[Path]:
+        return self.files
+
+    def folder(self, *_: object) -> Path | None:
+        return self.files[0] if self.files else None
+
+    def save_file(self, *_: object) -> Path | None:
+        return self.files[0] if self.files else None
+
+    def item(self, title: str, text: str, items: list[str]) -> str:
+        given = self.answers.pop(0)
+        return next(item for item in items if item.startswith(given))
+
+    def number(self, title: str, text: str, value: float) -> float | None:
+        self.asked.append(text)
+        return value
+
+
+def close(window) -> None:
+    """Close a window and let Qt delete it."""
+    from PySide6.QtCore import QCoreApplication, QEvent
+
+    window.ui.prompts.answers = ["Do not save"]
+    window.close()
+    window.deleteLater()
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def settle(qtbot, window, seconds: float = 20.0) -> None:
+    """Wait until all work is done, and all is drawn."""
+    desk = window.workbench
+    qtbot.waitUntil(lambda: not desk.jobs.running, timeout=int(1000 * seconds))
+    qtbot.wait(10)
