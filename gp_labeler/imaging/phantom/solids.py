@@ -201,13 +201,13 @@ def implicit(value: Callable[[Grid], Values], low: ArrayLike, high: ArrayLike) -
     def distance(grid: Grid) -> Values:
         f = value(grid)
         steps = [float(axis.ravel()[1] - axis.ravel()[0]) if axis.size > 1 else 1.0 for axis in grid]
-        square: Values = np.zeros_like(f)
+        square: Values = np.zeros(f.shape, np.float32)
         for axis, step in zip((2, 1, 0), steps, strict=True):
             if f.shape[axis] > 1:
-                slope: Values = np.gradient(f, step, axis=axis)
-                square += slope * slope
-        gone: Values = f / np.sqrt(np.maximum(square, np.float32(1e-6)))
-        return gone
+                slope = np.gradient(f, step, axis=axis)
+                np.add(square, slope * slope, out=square)
+        steepness: Values = np.sqrt(np.maximum(square, np.float32(1e-6)))
+        return f / steepness
 
     return Solid(distance, np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64))
 
@@ -254,7 +254,10 @@ def cut_smoothly(solid: Solid, other: Solid, width: float) -> Solid:
     """Return a solid without the other, with edges rounded over about `width` mm."""
 
     def distance(grid: Grid) -> Values:
-        a, b = solid.distance(grid), -other.distance(grid)
+        a = solid.distance(grid)
+        b = np.full(a.shape, _FAR)
+        other.lower(b, grid, 2 * width)
+        b = -b
         h = np.maximum(np.float32(width) - np.abs(a - b), 0) / np.float32(width)
         rounded: Values = np.maximum(a, b) + h * h * np.float32(width / 4)
         return rounded
