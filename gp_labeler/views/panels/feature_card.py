@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from gp_core.landmarks.features import Side
+from gp_labeler.actions import ACTIONS
 from gp_labeler.session import labelling
 from gp_labeler.session.edits import CheckPoint
 from gp_labeler.session.state import How
@@ -25,6 +26,7 @@ from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.panels.card_content import CardContent, content_of
+from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
@@ -93,10 +95,12 @@ class FeatureCard(QWidget):
         self.primary = QPushButton()
         self.primary.setProperty("role", "primary")
         self.primary.clicked.connect(self._on_primary)
-        self.skip = QPushButton("Skip")
+        self.skip = QPushButton(_with_key("Skip", "point.skip"))
         self.skip.setToolTip("Leave it for later and go on to the next feature")
+        self.skip.setAccessibleName("Skip")
         self.skip.clicked.connect(lambda: self._do(lambda: labelling.skip(self._workbench.session)))
-        self.unseen = QPushButton("Unseen")
+        self.unseen = QPushButton(_with_key("Unseen", "point.unseen"))
+        self.unseen.setAccessibleName("Unseen")
         self.unseen.setToolTip("It was looked for and cannot be seen in this scan")
         self.unseen.clicked.connect(lambda: self._do(lambda: labelling.mark_unseen(self._workbench.session)))
         self.sides = {side: self._side_button(side) for side in Side}
@@ -161,7 +165,7 @@ class FeatureCard(QWidget):
             follow(self, signal, self.refresh)
 
     def _refresh_buttons(self, now: CardContent) -> None:
-        self.primary.setText(now.action_text)
+        self.primary.setText(_with_key(now.action_text, _COMMANDS.get(now.action, "")))
         self.primary.setAccessibleName(now.action_text)
         self.skip.setVisible(now.can_skip)
         self.unseen.setVisible(now.can_skip)
@@ -192,7 +196,7 @@ class FeatureCard(QWidget):
     def _go_to_side(self, side: Side) -> None:
         code = self._workbench.session.active.code
         if code is not None:
-            self._do(lambda: labelling.go_to(self._workbench.session, side, code))
+            self._do(lambda: self._workbench.go_to(side, code))
 
     def _do(self, edit: Callable[[], object]) -> None:
         attempt(self._workbench, edit)
@@ -232,6 +236,25 @@ _EDITS: Mapping[str, Callable[[Workbench], object]] = {
     "unlock": lambda desk: labelling.lock(desk.session, False),
     "next": lambda desk: labelling.skip(desk.session),
 }
+
+
+_COMMANDS: Mapping[str, str] = {
+    "ghost": "point.accept_ghost",
+    "crosshair": "point.place",
+    "check": "point.check",
+    "unlock": "point.lock",
+    "next": "point.skip",
+}
+"""The commands that do the same as the one next action."""
+
+
+def _with_key(text: str, command: str) -> str:
+    """Return the words of a button with the first key of its command."""
+    keys = ACTIONS[command].shortcuts if command in ACTIONS else ()
+    return f"{text}   {_SYMBOLS.get(keys[0], keys_text(keys[0]))}" if keys else text
+
+
+_SYMBOLS = {"Return": "\N{RETURN SYMBOL}", "Space": "\N{OPEN BOX}"}
 
 
 def _label(role: str, *, wrap: bool = False) -> QLabel:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.views.panels.feature_card import FeatureCard
@@ -37,4 +37,7 @@ class LabelPanel(QWidget):
         layout.setContentsMargins(4, 8, 8, 8)
         layout.setSpacing(6)
         layout.addWidget(self.card, 1)
-        layout.addWidget(self.table)
+        layout.addWidget(self.table, 2)
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(PANEL_WIDTH, super().sizeHint().height())

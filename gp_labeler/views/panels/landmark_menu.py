@@ -27,7 +27,7 @@ def landmark_menu(workbench: Workbench, side: Side, code: str, parent: QWidget) 
         action.setEnabled(enabled)
         action.triggered.connect(lambda: attempt(workbench, edit))
 
-    add(f"Go to {point_text(side, code)}", lambda: labelling.go_to(session, side, code))
+    add(f"Go to {point_text(side, code)}", lambda: workbench.go_to(side, code))
     position = session.landmarks(side).as_mapping().get(code)
     copied = "" if position is None else " ".join(f"{x:.4f}" for x in position)
     if not feature(code).computed:

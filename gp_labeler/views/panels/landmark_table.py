@@ -16,7 +16,6 @@ from PySide6.QtWidgets import (
 )
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
-from gp_labeler.session import labelling
 from gp_labeler.session.edits import ClearPoint
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
@@ -34,7 +33,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkTable"]
 
-_LOWEST, _HIGHEST = 18, 30
+_LOWEST, _HIGHEST = 18, 24
 _WIDEST = "Right 20/20"
 _CHIP, _CODE_WIDTH, _PAD = 12, 35, 8
 
@@ -58,6 +57,7 @@ class LandmarkTable(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.view)
+        self.setMaximumHeight(34 + _HIGHEST * len(CODES))
         self.view.selectionModel().currentChanged.connect(self._on_current)
         self.view.clicked.connect(self._on_clicked)
         self.view.customContextMenuRequested.connect(self._open_menu)
@@ -79,7 +79,7 @@ class LandmarkTable(QWidget):
 
     def _go_to(self, index: QModelIndex) -> None:
         side, code = self.target_of(index)
-        attempt(self._workbench, lambda: labelling.go_to(self._workbench.session, side, code))
+        attempt(self._workbench, lambda: self._workbench.go_to(side, code))
 
     def _show_active(self, *_: object) -> None:
         """Bring the cursor of the table to the active point."""
@@ -142,10 +142,10 @@ class _TableView(QTableView):
         words = QFontMetrics(font)
         width = max(words.horizontalAdvance(text) for text in ("computed", "checked", "0.99 mm"))
         for column in (1, 2):
-            self.setColumnWidth(column, max(_PAD + _CHIP + 4 + width, words.horizontalAdvance(_WIDEST) + 14))
+            self.setColumnWidth(column, max(_PAD + _CHIP + 8 + width, words.horizontalAdvance(_WIDEST) + 14))
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        return QSize(340, 32 + 24 * len(CODES))
+        return self.minimumSizeHint()
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         return QSize(340, 32 + _LOWEST * len(CODES))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QSize, Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
@@ -61,6 +61,9 @@ class ScanPanel(QWidget):
         follow(self, workbench.volume_opened, self._refresh)
         follow(self, workbench.session_replaced, self._refresh)
         self._refresh()
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(PANEL_WIDTH, super().sizeHint().height())
 
     def _refresh(self, *_: object) -> None:
         volume = self._workbench.volume

@@ -1,0 +1,73 @@
+"""Shared by the tests of the panels: a workbench with a small scan, points of the atlas laid into it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+from PySide6.QtGui import QFontMetrics
+from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWidget
+
+from gp_core import Atlas, predict
+from gp_core.landmarks.features import Side
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session import labelling
+from gp_labeler.session.jobs import QueueDispatcher
+from gp_labeler.workbench import Workbench
+
+ATLAS = Atlas.published()
+
+
+def grey_volume(seed: int = 0) -> Volume:
+    """Noise around two greys, as air and bone have; 60 mm wide."""
+    rng = np.random.default_rng(seed)
+    array = rng.normal(40, 12, (40, 40, 40))
+    array[12:28, 12:28, 12:28] = rng.normal(180, 15, (16, 16, 16))
+    return Volume.from_parts(array.clip(0, 255).astype(np.uint8), (1.5,) * 3, (-20, -40, -30), name="GP-014")
+
+
+def desk_with_scan(**options) -> Workbench:
+    """Make a workbench on that scan, with the atlas, whose jobs wait to be delivered."""
+    desk = Workbench(None, QueueDispatcher(), predict=partial(predict, ATLAS), author="tester", **options)
+    volume = grey_volume()
+    desk.session.attach_volume(volume)
+    desk.volume_opened.emit(volume)
+    return desk
+
+
+def deliver(desk: Workbench) -> None:
+    """Let the jobs of a workbench come to their end."""
+    dispatcher = desk.jobs._dispatch
+    assert isinstance(dispatcher, QueueDispatcher)
+    dispatcher.deliver_until_idle(desk.jobs, timeout=30)
+
+
+def in_scan(code: str, side: Side = Side.LEFT) -> np.ndarray:
+    """Lay a mean feature of the atlas into the scan: its axes are anterior, outwards and superior."""
+    ahead, out, up = ATLAS[code]
+    return np.array([(out + 5.0) * (1 if side is Side.LEFT else -1), -ahead - 10.0, up])
+
+
+def place(desk: Workbench, *codes: str, side: Side = Side.LEFT) -> None:
+    """Place features where the atlas has them."""
+    for code in codes:
+        labelling.place(desk.session, in_scan(code, side), side=side, code=code)
+
+
+def cut_words(root: QWidget) -> Iterator[str]:
+    """Yield what cannot be read in full: words of visible labels and buttons that do not fit."""
+    for _ in range(3):  # layouts inside layouts take a turn each
+        QApplication.processEvents()
+    for label in root.findChildren(QLabel):
+        if label.isVisible() and label.text() and label.pixmap().isNull():
+            need = label.heightForWidth(label.width()) if label.wordWrap() else label.sizeHint().height()
+            longest = max(label.text().split(), key=len) if label.wordWrap() else label.text()
+            wide = QFontMetrics(label.font()).horizontalAdvance(longest)
+            if label.height() < need or label.contentsRect().width() < wide:
+                yield f"{label.text()!r}: {label.size()} needs {wide} x {need}"
+    for button in root.findChildren(QAbstractButton):
+        if button.isVisible() and button.text() and button.objectName() != "recent":
+            inside = 20 if isinstance(button, QCheckBox) else 6
+            if button.width() < QFontMetrics(button.font()).horizontalAdvance(button.text()) + inside:
+                yield f"button {button.text()!r} is {button.width()} wide"

@@ -1,0 +1,354 @@
+"""The rail, the feature card and the table of landmarks, by real clicks and keys."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
+from PySide6.QtCore import QModelIndex, QPoint, QSize, Qt
+from PySide6.QtGui import QFontMetrics, QGuiApplication
+from PySide6.QtWidgets import QMenu
+
+from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import CheckPoint
+from gp_labeler.session.workflow import Active
+from gp_labeler.views.chips import SHAPES, chip_pixmap
+from gp_labeler.views.feature_picture import feature_picture
+from gp_labeler.views.panels.feature_card import FeatureCard
+from gp_labeler.views.panels.label_panel import PANEL_WIDTH, LabelPanel
+from gp_labeler.views.panels.landmark_menu import landmark_menu
+from gp_labeler.views.panels.landmark_table import LandmarkTable
+from gp_labeler.views.panels.rail import Rail
+from gp_labeler.views.theme import DARK, LIGHT, apply_theme, contrast
+from gp_labeler.workbench import Workbench
+
+LEFT, RIGHT = Side.LEFT, Side.RIGHT
+CLICK = Qt.MouseButton.LeftButton
+LOWEST_PANEL = QSize(PANEL_WIDTH, 698)
+"""What a window of 1280 x 800 leaves."""
+
+
+@pytest.fixture
+def desk() -> Iterator[Workbench]:
+    desk = desk_with_scan()
+    yield desk
+    desk.close(discard=True)
+
+
+@pytest.fixture
+def panel(desk: Workbench, qtbot) -> LabelPanel:
+    panel = LabelPanel(desk)
+    apply_theme(panel, DARK)
+    qtbot.addWidget(panel)
+    panel.resize(LOWEST_PANEL)
+    panel.show()
+    qtbot.waitExposed(panel)
+    return panel
+
+
+def click_cell(qtbot, table: LandmarkTable, code: str, column: int) -> None:
+    where = table.view.visualRect(table.model.index(index_of(code), column)).center()
+    qtbot.mouseClick(table.view.viewport(), CLICK, pos=where)
+
+
+def word(table: LandmarkTable, code: str, side: Side) -> str:
+    return table.model.index(index_of(code), 1 + [LEFT, RIGHT].index(side)).data()
+
+
+# Table
+
+
+def test_a_click_on_a_cell_makes_that_point_active_and_goes_there(desk, panel, qtbot):
+    place(desk, "OS", side=RIGHT)
+    click_cell(qtbot, panel.table, "OS", 2)
+    assert desk.session.active == Active(RIGHT, "OS")
+    np.testing.assert_allclose(desk.session.crosshair, in_scan("OS", RIGHT))
+    click_cell(qtbot, panel.table, "MN", 1)
+    assert desk.session.active == Active(LEFT, "MN")
+
+
+def test_a_click_on_a_name_stays_on_the_side_being_worked_on(desk, panel, qtbot):
+    desk.session.set_active(Active(RIGHT, "CA"))
+    click_cell(qtbot, panel.table, "FPP", 0)
+    assert desk.session.active == Active(RIGHT, "FPP")
+
+
+def test_a_click_on_the_computed_origin_shows_it_and_keeps_the_active_point(desk, panel, qtbot):
+    place(desk, "CA", "CB", "RWA", "RWP")
+    before = desk.session.active
+    click_cell(qtbot, panel.table, "CO", 1)
+    assert desk.session.active == before
+    np.testing.assert_allclose(desk.session.crosshair, desk.session.landmarks(LEFT)["CO"])
+
+
+def test_arrow_keys_walk_through_the_points(desk, panel, qtbot):
+    click_cell(qtbot, panel.table, "CA", 1)
+    qtbot.keyClick(panel.table.view, Qt.Key.Key_Down)
+    assert desk.session.active == Active(LEFT, "CB")
+    qtbot.keyClick(panel.table.view, Qt.Key.Key_Right)
+    assert desk.session.active == Active(RIGHT, "CB")
+
+
+def test_delete_clears_the_point_of_the_cell(desk, panel, qtbot):
+    place(desk, "CA")
+    click_cell(qtbot, panel.table, "CA", 1)
+    qtbot.keyClick(panel.table.view, Qt.Key.Key_Delete)
+    assert "CA" not in desk.session.landmarks(LEFT)
+
+
+def test_the_table_follows_the_active_point_without_changing_it(desk, panel):
+    asked = []
+    desk.active_changed.connect(asked.append)
+    desk.session.set_active(Active(RIGHT, "ZL"))
+    current = panel.table.view.currentIndex()
+    assert (current.row(), current.column()) == (index_of("ZL"), 2)
+    assert asked == [Active(RIGHT, "ZL")]
+
+
+def test_every_state_has_its_word(desk, panel):
+    place(desk, "CA", "CB", "RWA", "RWP", "OS", "LLI", "MH")
+    labelling.place(desk.session, in_scan("OI") + [0, 0, 3.0], side=LEFT, code="OI")
+    labelling.mark_unseen(desk.session, side=LEFT, code="RWM")
+    desk.session.do(CheckPoint(LEFT, "CA"))
+    deliver(desk)
+    table = panel.table
+    assert word(table, "CA", LEFT) == "checked"
+    assert word(table, "CB", LEFT) == "placed"
+    assert word(table, "CO", LEFT) == "computed"
+    assert word(table, "RWM", LEFT) == "unseen"
+    assert word(table, "FPA", LEFT) == "ghost"
+    assert word(table, "FPA", RIGHT) == "to do"
+    distance = desk.session.doubts(LEFT)["OI"].distance
+    assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
+
+
+def test_the_header_counts_each_side(desk, panel):
+    place(desk, "CA", "CB", "RWA", "RWP")
+    header = [panel.table.model.headerData(n, Qt.Orientation.Horizontal) for n in range(3)]
+    assert header == ["Feature", "Left 5/20", "Right 0/20"]
+
+
+def test_all_rows_and_words_fit_at_the_smallest_window(desk, panel, qtbot):
+    view = panel.table.view
+    assert view.verticalScrollBar().maximum() == 0
+    metrics = QFontMetrics(view.font())
+    room = view.columnWidth(0) - 8 - 35 - 1
+    assert [row.name for row in FEATURES if metrics.horizontalAdvance(row.name) > room] == []
+    states = view.columnWidth(1) - 8 - 12 - 4
+    words = [*SHAPES, "0.99 mm", "12.4 mm"]
+    assert [w for w in words if w != "doubtful" and metrics.horizontalAdvance(w) > states] == []
+
+
+# Menu
+
+
+def menu_actions(menu: QMenu) -> dict:
+    return {a.text(): a for a in menu.actions() if a.text()}
+
+
+def test_the_menu_locks_swaps_checks_and_clears(desk, panel):
+    place(desk, "RWA", "RWP", "CA")
+    before = {code: desk.session.landmarks(LEFT)[code].copy() for code in ("RWA", "RWP")}
+    menu = landmark_menu(desk, LEFT, "RWA", panel)
+    swaps = next(m for m in menu.findChildren(QMenu) if m.title() == "Swap with")
+    next(a for a in swaps.actions() if a.text().startswith("RWP")).trigger()
+    np.testing.assert_allclose(desk.session.landmarks(LEFT)["RWP"], before["RWA"])
+    desk.session.undo()
+    menu_actions(menu)["Mark as checked"].trigger()
+    assert desk.session.state.landmark(LEFT, "RWA").checked
+    menu_actions(menu)["Lock"].trigger()
+    assert desk.session.state.landmark(LEFT, "RWA").locked
+    locked = menu_actions(landmark_menu(desk, LEFT, "RWA", panel))
+    assert not locked["Clear"].isEnabled()
+    locked["Unlock"].trigger()
+    menu_actions(landmark_menu(desk, LEFT, "RWA", panel))["Clear"].trigger()
+    assert "RWA" not in desk.session.landmarks(LEFT)
+
+
+def test_the_menu_copies_a_position_in_mm(desk, panel):
+    place(desk, "CA")
+    menu_actions(landmark_menu(desk, LEFT, "CA", panel))["Copy position (LPS, mm)"].trigger()
+    copied = [float(x) for x in QGuiApplication.clipboard().text().split()]
+    np.testing.assert_allclose(copied, in_scan("CA"), atol=1e-4)
+
+
+def test_a_computed_point_offers_nothing_to_edit(desk, panel):
+    assert set(menu_actions(landmark_menu(desk, LEFT, "CO", panel))) == {
+        "Go to CO left",
+        "Copy position (LPS, mm)",
+    }
+
+
+def test_a_right_click_opens_the_menu(desk, panel, qtbot):
+    where = panel.table.view.visualRect(panel.table.model.index(0, 1)).center()
+    panel.table.view.customContextMenuRequested.emit(QPoint(where))
+    menus = [m for m in panel.table.findChildren(QMenu) if m.title() == ""]
+    assert len(menus) == 1
+    assert menus[0].isVisible()
+    menus[0].close()
+
+
+# Card
+
+
+def test_the_primary_button_accepts_the_ghost_and_goes_on(desk, panel, qtbot):
+    place(desk, "CA", "RWP", "OS")
+    active = desk.session.active
+    ghost = desk.session.ghosts(active.side)[active.code].position.copy()
+    assert panel.card.content.action == "ghost"
+    qtbot.mouseClick(panel.card.primary, CLICK)
+    np.testing.assert_allclose(desk.session.landmarks(active.side)[active.code], ghost)
+    assert desk.session.active != active
+
+
+def test_without_a_ghost_it_places_at_the_crosshair(desk, panel, qtbot):
+    desk.session.set_crosshair([1.0, 2.0, 3.0])
+    qtbot.mouseClick(panel.card.primary, CLICK)
+    np.testing.assert_allclose(desk.session.landmarks(LEFT)["CA"], [1, 2, 3])
+
+
+def test_a_placed_point_can_be_checked_and_a_locked_one_unlocked(desk, panel, qtbot):
+    place(desk, "CA")
+    desk.go_to(LEFT, "CA")
+    qtbot.mouseClick(panel.card.primary, CLICK)
+    assert desk.session.state.landmark(LEFT, "CA").checked
+    labelling.lock(desk.session, side=LEFT, code="CA")
+    assert panel.card.content.action == "unlock"
+    qtbot.mouseClick(panel.card.primary, CLICK)
+    assert not desk.session.state.landmark(LEFT, "CA").locked
+
+
+def test_skip_unseen_and_side_buttons(desk, panel, qtbot):
+    qtbot.mouseClick(panel.card.skip, CLICK)
+    assert desk.session.active == Active(LEFT, "RWP")
+    qtbot.mouseClick(panel.card.unseen, CLICK)
+    assert desk.session.state.landmark(LEFT, "RWP").unseen
+    code = desk.session.active.code
+    qtbot.mouseClick(panel.card.sides[RIGHT], CLICK)
+    assert desk.session.active == Active(RIGHT, code)
+
+
+def test_an_error_is_told_and_nothing_else_happens(desk, panel, qtbot):
+    told = []
+    desk.message.connect(lambda text, level: told.append((text, level)))
+    place(desk, "CA")
+    labelling.lock(desk.session, side=LEFT, code="CA")
+    desk.go_to(LEFT, "CA")
+    panel.card._do(lambda: labelling.clear(desk.session))
+    assert [level for _, level in told] == ["error"]
+    assert "CA left is locked" in told[0][0]
+    assert "CA" in desk.session.landmarks(LEFT)
+
+
+def test_everything_done_offers_the_export(desk, panel, qtbot):
+    for side in Side:
+        for row in FEATURES:
+            if not row.computed:
+                labelling.mark_unseen(desk.session, side=side, code=row.code)
+    assert panel.card.content.name == "Everything is labelled"
+    with qtbot.waitSignal(panel.card.export_asked, timeout=1000):
+        qtbot.mouseClick(panel.card.primary, CLICK)
+
+
+def test_without_a_scan_the_card_offers_to_open_one(qtbot):
+    desk = Workbench(None)
+    card = FeatureCard(desk)
+    qtbot.addWidget(card)
+    card.show()
+    with qtbot.waitSignal(card.open_asked, timeout=1000):
+        qtbot.mouseClick(card.primary, CLICK)
+    desk.close(discard=True)
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
+def test_no_word_of_any_feature_is_cut_off_at_1280_by_800(desk, panel, qtbot, theme):
+    place(desk, "CA", "RWP", "OS")
+    apply_theme(panel, theme)
+    cut = []
+    for row in FEATURES:
+        if not row.computed:
+            desk.go_to(LEFT, row.code)
+            cut += [f"{row.code}: {words}" for words in cut_words(panel.card)]
+    assert cut == []
+
+
+def test_all_of_the_card_can_be_reached_by_keyboard(desk, panel, qtbot):
+    panel.card.primary.setFocus()
+    reached = set()
+    for _ in range(12):
+        focused = panel.focusWidget()
+        reached.add(focused)
+        qtbot.keyClick(focused, Qt.Key.Key_Tab)
+    assert {panel.card.primary, panel.card.skip, panel.card.unseen, panel.table.view} <= reached
+
+
+# Rail
+
+
+def test_the_rail_tells_of_steps_that_are_built_and_only_those(desk, qtbot):
+    rail = Rail(desk)
+    qtbot.addWidget(rail)
+    rail.show()
+    told = []
+    rail.step_chosen.connect(told.append)
+    for step in ("label", "atlas", "pose", "scan"):
+        qtbot.mouseClick(rail.buttons[step], CLICK)
+    assert told == ["label", "scan"]
+    assert rail.step == "scan"
+    assert "gp-core" in rail.buttons["pose"].toolTip()
+    rail.buttons["label"].setFocus()
+    qtbot.keyClick(rail.buttons["label"], Qt.Key.Key_Return)
+    assert rail.step == "label"
+
+
+# Looks
+
+
+def test_a_panel_that_is_gone_hears_nothing_more(desk, qtbot):
+    panel = LabelPanel(desk)
+    panel.show()
+    panel.close()
+    panel.deleteLater()
+    qtbot.wait(20)
+    place(desk, "CA")  # would raise in a slot of a deleted widget
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
+def test_words_stand_out_from_every_ground(theme):
+    grounds = [theme.window, theme.panel, theme.card, theme.raised, theme.field, theme.selected]
+    words = [theme.text, theme.muted, theme.accent_text, theme.warning, theme.danger, theme.good]
+    assert min(contrast(w, g) for w in words for g in grounds) >= 4.5
+    assert min(contrast(theme.faint, g) for g in (theme.window, theme.panel, theme.card, theme.field)) >= 4.5
+    assert min(contrast(c, g) for c in theme.states.values() for g in (theme.card, theme.selected)) >= 4.5
+    assert contrast(theme.on_accent, theme.accent) >= 4.5
+
+
+def test_no_two_states_have_the_same_shape():
+    drawn = {state: chip_pixmap(state, 24, DARK).toImage().createAlphaMask() for state in SHAPES}
+    pairs = [(a, b) for a in drawn for b in drawn if a < b]
+    assert [pair for pair in pairs if drawn[pair[0]] == drawn[pair[1]]] == []
+
+
+@pytest.mark.parametrize("side", list(Side))
+def test_every_feature_has_a_picture_of_its_own(side):
+    size = QSize(200, 120)
+    pictures = {code: feature_picture(code, side, size, DARK, ratio=1).toImage() for code in CODES}
+    assert all(not picture.isNull() for picture in pictures.values())
+    codes = list(CODES)
+    assert all(pictures[a] != pictures[b] for n, a in enumerate(codes) for b in codes[n + 1 :])
+
+
+def test_left_and_right_pictures_are_of_different_ears():
+    size = QSize(200, 120)
+    for code in CODES:
+        left, right = (feature_picture(code, side, size, DARK, ratio=1).toImage() for side in Side)
+        assert left != right, code
+
+
+def test_an_index_outside_the_table_has_no_data(desk, qtbot):
+    table = LandmarkTable(desk)
+    qtbot.addWidget(table)
+    assert table.model.data(QModelIndex()) is None
