@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import importlib
+import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -39,6 +41,15 @@ FIRST_LOOK_VOXELS = 96**3
 
 QUICK_TRIANGLES = 60_000
 
+_LOADING = threading.Lock()
+
+
+def _load(*modules: str) -> None:
+    """Import what takes long, one thread at a time: two that import SciPy at once may find it half made."""
+    with _LOADING:
+        for module in modules:
+            importlib.import_module(module)
+
 
 @dataclass(frozen=True)
 class InspectScan:
@@ -54,6 +65,7 @@ class InspectScan:
 
     def run(self, progress: Progress) -> ImportPlan:
         """Read headers and names."""
+        _load("gp_labeler.imaging.readers.probe")
         return inspect_volume(self.path, progress=progress, cancel=progress.cancelled, **self.options)
 
 
@@ -89,6 +101,7 @@ class ProposeThreshold:
     def run(self, progress: Progress) -> float:
         """Look at the histogram."""
         progress(0.0)
+        _load("skimage.filters")
         return propose_threshold(self.volume)
 
 
@@ -176,6 +189,7 @@ class LoadAtlas:
 
     def run(self, progress: Progress) -> Predict:
         """Build it from the published table."""
+        _load("gp_core.atlas.shape", "gp_core.atlas.published")
         from gp_core.atlas.atlas import Atlas  # here: SciPy takes a moment that the window need not wait for
         from gp_core.atlas.shape import predict
 
@@ -205,6 +219,7 @@ class MakeDemo:
 
     def run(self, progress: Progress) -> Demo:
         """Draw the animal and scan it."""
+        _load("scipy.ndimage", "scipy.interpolate", "gp_labeler.imaging.phantom")
         from gp_labeler.imaging.phantom import make_phantom
 
         progress(0.05)
@@ -243,5 +258,6 @@ def _mesh(
     **how: Any,
 ) -> Surface:
     """Mesh as one part, from `start` to `end`, of a job."""
+    _load("gp_labeler.imaging.islands")
     told: Told = lambda fraction: progress(start + (end - start) * fraction)  # noqa: E731
     return extract_isosurface(volume, threshold, progress=told, cancel=progress.cancelled, **how)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import os
 import sys
@@ -52,6 +53,7 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
         Whether to load the published atlas, for ghosts.
     """
     make_application()
+    importlib.import_module("scipy.ndimage")  # the scene needs it; no job may be importing SciPy meanwhile
     dispatcher = QtDispatcher()
     workbench = Workbench(directory, dispatcher)
     memory = WindowState(None if directory is None else directory / "window.json")

@@ -144,6 +144,7 @@ class MainWindow(QMainWindow):
             self.set_step("label")
         self.pages.setCurrentIndex(int(is_open))
         if not is_open:
+            self.set_step("scan")
             self.welcome.refresh()
 
     def _on_path_chosen(self, path: str) -> None:

@@ -19,6 +19,7 @@ from gp_labeler.actions import ACTIONS, MENUS, gestures
 
 __all__ = ["ShortcutsSheet", "keys_text"]
 
+_KEYS_WIDTH = 128
 _COLUMNS = (("In the 3D view", "On a slice"), ("View",), ("Landmarks", "File", "Edit", "Help"))
 
 
@@ -81,6 +82,7 @@ def _add_block(column: QVBoxLayout, name: str, rows: list[tuple[str, str]]) -> N
     grid.setHorizontalSpacing(14)
     grid.setVerticalSpacing(3)
     grid.setColumnStretch(1, 1)
+    grid.setColumnMinimumWidth(0, _KEYS_WIDTH)
     for n, (keys, text) in enumerate(rows):
         key = QLabel(keys)
         key.setProperty("role", "ghost")

@@ -44,6 +44,7 @@ class TopBar(QWidget):
         self.name.setProperty("role", "heading")
         self.about.setProperty("role", "hint")
         self._icons: list[tuple[QToolButton, str]] = []
+        self._working: list[QToolButton] = []  # mean nothing before a scan is open
         self._lay_out()
         for signal in (
             workbench.session_replaced,
@@ -69,6 +70,8 @@ class TopBar(QWidget):
         known = session.path is not None
         self.saved.setText("● not saved" if session.dirty else "● saved" if known else "")
         self.saved.setToolTip("Every edit is kept in a journal at once; Ctrl+S writes the specimen file")
+        for button in self._working:
+            button.setVisible(session.state.volume is not None)
         undo = session.undo_text or ""
         short = undo if len(undo) <= _LONGEST_UNDO else undo[: _LONGEST_UNDO - 1] + "…"
         self._undo.setText(f"Undo {short}" if undo else "Undo")
@@ -121,6 +124,8 @@ class TopBar(QWidget):
         button.clicked.connect(follow_action)  # a click toggles it, whatever the action says
         follow_action()
         self._icons.append((button, picture))
+        if id != "view.theme":
+            self._working.append(button)
         return button
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802

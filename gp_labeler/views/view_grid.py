@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, Qt, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QToolButton, QVBoxLayout, QWidget
 
@@ -41,7 +41,9 @@ class ViewHeader(QWidget):
         self.where.setProperty("role", "hint")
         self._button = QToolButton()
         self._button.setProperty("role", "quiet")
-        self._button.setFixedSize(22, 20)
+        self._button.setFixedSize(24, 20)
+        self._button.setStyleSheet("padding: 0")
+        self._button.setIconSize(QSize(14, 14))
         self._button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._button.setToolTip("Maximise or restore this view (double click)")
         self._button.setAccessibleName(f"Maximise the {name} view")

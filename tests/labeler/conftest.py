@@ -1,8 +1,7 @@
-"""A window without a display, a scan whose surface is known exactly, and a check that nothing is left behind."""
+"""A window without a display, a scan whose surface is known, and a check that nothing is left behind."""
 
 from __future__ import annotations
 
-import gc
 import os
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -44,7 +43,6 @@ def make_window(qtbot, tmp_path) -> Iterator[Callable[..., object]]:
     for window in windows:
         close(window)
     windows.clear()
-    gc.collect()
     left = [w for w in QApplication.topLevelWidgets() if w.isVisible()]
     assert left == []
 

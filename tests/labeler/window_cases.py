@@ -61,7 +61,10 @@ class Answers:
 def close(window) -> None:
     """Close a window and let Qt delete it."""
     from PySide6.QtCore import QCoreApplication, QEvent
+    from shiboken6 import isValid
 
+    if not isValid(window):
+        return
     window.ui.prompts.answers = ["Do not save"]
     window.close()
     window.deleteLater()

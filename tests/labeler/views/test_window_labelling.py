@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, Answers, close, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How
 from gp_labeler.session.workflow import Active
+from gp_labeler.views.application import make_window
 
+THREE_LEFT = np.array([3, 0, 0])
 LEFT_BUTTON = Qt.MouseButton.LeftButton
 
 
@@ -34,6 +36,27 @@ def on_ball(*direction: float) -> np.ndarray:
     return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
 
 
+@pytest.fixture(scope="module")
+def one_window(qapp):
+    """One window for all tests of this file: to open a scan anew is quicker than to make a window."""
+    made = make_window(None, atlas=False)
+    made.ui.prompts = Answers()
+    made.resize(1100, 760)
+    made.show()
+    yield made
+    close(made)
+
+
+@pytest.fixture
+def window(qtbot, one_window, ball):
+    one_window.workbench.set_tool("place")
+    one_window.workbench.session.view.update(layout="four-up")
+    one_window.workbench.open_volume(ball)
+    one_window.activateWindow()
+    settle(qtbot, one_window)
+    return one_window
+
+
 @pytest.fixture
 def scene(window):
     view = window.grid.scene_view
@@ -43,7 +66,7 @@ def scene(window):
 
 def placed(window, code="CA", side=Side.LEFT):
     landmarks = window.workbench.session.landmarks(side)
-    return landmarks[code] if code in landmarks else None
+    return landmarks.as_mapping().get(code)
 
 
 def test_a_click_where_a_landmark_is_seen_places_it_there(window, scene) -> None:
@@ -68,9 +91,11 @@ def test_a_click_on_a_slice_places_on_it(window, plane) -> None:
 def test_left_is_on_the_right_of_the_screen(window) -> None:
     for plane in (Plane.AXIAL, Plane.CORONAL):
         view = window.grid.slice_views[plane]
-        assert view.pixel_at(MIDDLE + [3, 0, 0])[0] > view.pixel_at(MIDDLE)[0]
+        assert view.pixel_at(MIDDLE + THREE_LEFT)[0] > view.pixel_at(MIDDLE)[0]
     sagittal = window.grid.slice_views[Plane.SAGITTAL]
-    assert sagittal.pixel_at(MIDDLE - [0, 3, 0])[0] < sagittal.pixel_at(MIDDLE)[0]  # the nose to the left
+    assert (
+        sagittal.pixel_at(MIDDLE - np.array([0, 3, 0]))[0] < sagittal.pixel_at(MIDDLE)[0]
+    )  # the nose to the left
 
 
 def test_a_drag_rotates_and_places_nothing(window, scene) -> None:
@@ -102,9 +127,9 @@ def test_shift_drag_pans_and_right_drag_zooms(window, scene) -> None:
     start = pixel(scene, MIDDLE)
     drag(scene, start, start + QPoint(30, 10), modifiers=Qt.KeyboardModifier.ShiftModifier)
     np.testing.assert_allclose(np.array(scene.pixel_at(MIDDLE)) - before, [30, 10], atol=1.5)
-    wide = scene.pixel_at(MIDDLE + [3, 0, 0])[0] - scene.pixel_at(MIDDLE)[0]
+    wide = scene.pixel_at(MIDDLE + THREE_LEFT)[0] - scene.pixel_at(MIDDLE)[0]
     drag(scene, start, start - QPoint(0, 60), button=Qt.MouseButton.RightButton)
-    assert scene.pixel_at(MIDDLE + [3, 0, 0])[0] - scene.pixel_at(MIDDLE)[0] > 1.2 * wide
+    assert scene.pixel_at(MIDDLE + THREE_LEFT)[0] - scene.pixel_at(MIDDLE)[0] > 1.2 * wide
     assert placed(window) is None
 
 
@@ -230,9 +255,8 @@ def test_letters_do_what_the_sheet_says(window, scene) -> None:
     assert session.view.state.layout == "four-up"
 
 
-def test_enter_accepts_the_ghost(qtbot, make_window, ball) -> None:
-    window = make_window(atlas=True)
-    window.workbench.open_volume(ball)
+def test_enter_accepts_the_ghost(qtbot, window) -> None:
+    window.workbench.load_atlas()
     settle(qtbot, window)
     session, scene = window.workbench.session, window.grid.scene_view
     from gp_core.atlas.atlas import Atlas
@@ -318,9 +342,8 @@ def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
     view = window.grid.slice_views[Plane.CORONAL]
     view.shown = view.shown.zoomed(6)
     table = window.steps["label"].table
-    row = [
-        table.model.index(r, 2) for r in range(20) if table.target_of(table.model.index(r, 2))[1] == "FPA"
-    ][0]
+    rows = (table.model.index(row, 2) for row in range(20))
+    row = next(index for index in rows if table.target_of(index)[1] == "FPA")
     QTest.mouseClick(table.view.viewport(), LEFT_BUTTON, pos=table.view.visualRect(row).center())
     assert session.active == Active(Side.RIGHT, "FPA")
     np.testing.assert_allclose(session.crosshair, where)

@@ -1,0 +1,279 @@
+"""The window as a whole: pages, files, what is asked, what is remembered, and that it always answers."""
+
+from __future__ import annotations
+
+import gc
+import time
+import weakref
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt, QTimer
+from PySide6.QtTest import QTest
+from window_cases import MIDDLE, ball_volume, close, settle
+
+from gp_core.landmarks.features import Side
+from gp_labeler.actions import ACTIONS
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session import labelling
+from gp_labeler.session.recovery import find_recoveries
+from gp_labeler.views.application import make_window as make_plain
+from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+
+
+def test_the_first_page_gives_way_to_the_scan(qtbot, make_window, ball) -> None:
+    window = make_window()
+    assert window.pages.currentIndex() == 0
+    assert "Open" in window.status.next_click.text()
+    window.workbench.open_volume(ball)
+    settle(qtbot, window)
+    assert window.pages.currentIndex() == 1
+    assert window.windowTitle().startswith("ball")
+    assert window.rail.step == "label"
+    assert window.status.next_click.text() == "Click on bone or a slice to place CA left"
+    assert "bone from" in window.grid.frames["3d"].header.where.text()
+    assert window.grid.frames["axial"].header.where.text().startswith("S 30")
+
+
+def test_views_show_what_is_there(window) -> None:
+    scene, axial = window.grid.scene_view, window.grid.slice_views
+    picture = window.grab().toImage()
+    assert (picture.width(), picture.height()) == (1100, 760)
+    for view in (scene, *axial.values()):
+        colours = {view.grab().toImage().pixel(x, y) for x in range(0, 200, 10) for y in range(0, 200, 10)}
+        assert len(colours) > 3
+    x, y = scene.pixel_at(MIDDLE)
+    bone, background = (scene.grab().toImage().pixelColor(*at) for at in ((int(x) + 20, int(y) + 20), (3, 3)))
+    assert bone.lightness() > background.lightness() + 60
+
+
+def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
+    import SimpleITK as sitk  # noqa: N813
+
+    volume = ball_volume()
+    image = sitk.GetImageFromArray(volume.array)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin.tolist())
+    sitk.WriteImage(image, str(tmp_path / "ball.nrrd"))
+    window = make_window()
+    window.ui.open_path(tmp_path / "ball.nrrd")
+    settle(qtbot, window)
+    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    assert window.isWindowModified()
+    window.ui.prompts.files = [tmp_path / "one"]
+    window.commands.run("file.save")
+    saved = tmp_path / "one.gpspecimen.json"
+    assert saved.exists()
+    assert not window.isWindowModified()
+    close(window)
+    again = make_window()
+    assert saved.resolve() in again.workbench.recent.all()
+    again.ui.open_path(saved)
+    settle(qtbot, again)
+    np.testing.assert_array_equal(again.workbench.session.landmarks("L")["CA"], MIDDLE)
+    assert again.workbench.volume.size == volume.size
+    assert again.workbench.surfaces
+
+
+def test_a_file_that_is_no_scan_is_said_in_words(qtbot, make_window, tmp_path) -> None:
+    (tmp_path / "notes.nrrd").write_text("milk, bread")
+    window = make_window()
+    window.ui.open_path(tmp_path / "notes.nrrd")
+    settle(qtbot, window)
+    assert "notes.nrrd" in window.status.next_click.text()
+    assert window.pages.currentIndex() == 0
+
+
+def test_a_scan_without_a_voxel_size_is_asked_about(qtbot, make_window, tmp_path) -> None:
+    import tifffile
+
+    tifffile.imwrite(tmp_path / "ball.tif", ball_volume().array.astype(np.uint16))
+    window = make_window()
+    window.ui.prompts.answers = ["Keep the order of the slices", "Go on"]
+    window.ui.open_path(tmp_path / "ball.tif")
+    settle(qtbot, window)
+    assert window.ui.prompts.asked
+    if window.workbench.volume is not None:
+        assert window.workbench.session.state.import_choices
+
+
+@pytest.mark.parametrize("answer", ["", "Save", "Do not save"])
+def test_closing_with_unsaved_edits_asks(window, tmp_path, answer) -> None:
+    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    window.ui.prompts.answers = [answer]
+    window.ui.prompts.files = [tmp_path / "saved"]
+    assert window.close() is (answer != "")
+    assert window.ui.prompts.asked == ["Not saved"]
+    assert (tmp_path / "saved.gpspecimen.json").exists() is (answer == "Save")
+    if answer == "Do not save":
+        assert find_recoveries(tmp_path / "state") == ()
+
+
+def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_path) -> None:
+    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    window.workbench.close()  # as if killed: nothing asked, nothing saved
+    again = make_window()
+    again.ui.prompts.answers = ["Recover"]
+    again.ui.take_recoveries(find_recoveries(tmp_path / "state"))
+    assert "CA" in again.workbench.session.landmarks("L")
+    assert again.workbench.session.undo_text == "place CA left"
+
+
+def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tmp_path) -> None:
+    saved = window.workbench.session.save(tmp_path / "one")
+    other = make_window()
+    other.ui.prompts.answers = [""]
+    other.ui.open_path(saved)
+    assert other.ui.prompts.asked == ["Open elsewhere"]
+    other.ui.prompts.answers = ["Open a copy"]
+    other.ui.open_path(saved)
+    assert other.workbench.session.path is None
+    assert other.workbench.session.state.specimen == "ball"
+
+
+def test_landmarks_are_exported_and_imported(window, make_window, tmp_path) -> None:
+    session = window.workbench.session
+    labelling.place(session, MIDDLE, side=Side.LEFT, code="CA")
+    folder = tmp_path / "out"
+    folder.mkdir()
+    window.ui.prompts.files = [folder]
+    window.commands.run("file.export")
+    assert [f.name for f in folder.iterdir()] == ["ball_L.mrk.json"]
+    assert "right side is not labelled" in window.status.next_click.text()
+    labelling.clear(session, side=Side.LEFT, code="CA")
+    window.ui.prompts.files = [folder / "ball_L.mrk.json"]
+    window.ui.prompts.answers = ["Import nevertheless"]
+    window.commands.run("file.import")
+    np.testing.assert_allclose(session.landmarks("L")["CA"], MIDDLE)
+
+
+def test_the_look_is_remembered(window, make_window) -> None:
+    window.commands.run("view.theme")
+    window.commands.run("view.labels_visible")
+    assert window.theme_name == "light"
+    close(window)
+    again = make_window()
+    assert again.theme_name == "light"
+    assert not again.workbench.session.view.state.labels_visible
+
+
+def test_damaged_memory_does_no_harm(make_window, tmp_path) -> None:
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / "window.json").write_text(
+        '{"geometry": 3, "theme": "pink", "view": {"outline_visible": 7}}'
+    )
+    window = make_window()
+    assert window.workbench.session.view.state.outline_visible is True
+    assert window.isVisible()
+
+
+def test_the_sheet_lists_every_key(window) -> None:
+    from PySide6.QtWidgets import QLabel
+
+    QTest.keyClick(window.grid.scene_view, "?")
+    sheet = next(child for child in window.findChildren(ShortcutsSheet))
+    words = " ".join(label.text() for label in sheet.findChildren(QLabel))
+    for row in ACTIONS.values():
+        assert not row.shortcuts or row.title.rstrip("…") in words
+    sheet.close()
+
+
+def test_no_key_means_two_things() -> None:
+    keys = [key for row in ACTIONS.values() for key in row.shortcuts]
+    assert sorted(keys) == sorted(set(keys))
+
+
+def test_every_action_can_be_run_at_any_time(window, make_window) -> None:
+    risky = {"file.close", "file.demo", "help.shortcuts", "help.about"}
+    for target in (window, make_window()):
+        target.ui.prompts.answers = ["CB"] * 40
+        for id in ACTIONS:
+            if id not in risky and not id.startswith("file."):
+                target.commands.run(id)
+        assert target.isVisible()
+
+
+@dataclass(frozen=True)
+class Slow:
+    """Work as VTK and SimpleITK do it: long, and letting other threads run."""
+
+    title: str = "Slow work"
+
+    def run(self, progress) -> float:
+        values = np.random.default_rng(0).normal(size=1_000_000)
+        for n in range(40):
+            values = np.sin(values)
+            time.sleep(0.01)
+            progress(n / 40)
+        return float(values[0])
+
+
+def test_the_window_answers_while_work_goes_on(qtbot, window) -> None:
+    gaps, last = [], [time.perf_counter()]
+
+    def tick() -> None:
+        now = time.perf_counter()
+        gaps.append(now - last[0])
+        last[0] = now
+
+    timer = QTimer(interval=5, timerType=Qt.TimerType.PreciseTimer)
+    timer.timeout.connect(tick)
+    qtbot.wait(50)
+    last[0] = time.perf_counter()
+    timer.start()
+    window.workbench.jobs.submit(Slow())
+    shown = []
+    qtbot.waitUntil(
+        lambda: shown.append(window.status.work.bar.isVisible()) or not window.workbench.jobs.running,
+        timeout=20000,
+    )
+    timer.stop()
+    assert any(shown)
+    assert len(gaps) > 20
+    assert sorted(gaps)[-2] < 0.05  # one may be another process of this machine
+
+
+def test_work_can_be_stopped(qtbot, window) -> None:
+    window.workbench.jobs.submit(Slow())
+    qtbot.waitUntil(lambda: window.status.work.bar.isVisible())
+    QTest.mouseClick(window.status.work.stop, Qt.MouseButton.LeftButton)
+    qtbot.waitUntil(lambda: not window.workbench.jobs.running)
+    assert not window.status.work.bar.isVisible()
+
+
+@pytest.mark.slow
+def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
+    from PySide6.QtWidgets import QApplication
+    from window_cases import Answers
+
+    remains = []
+    for _ in range(20):
+        window = make_plain(None, atlas=False)
+        window.ui.prompts = Answers()
+        window.show()
+        window.workbench.open_volume(ball_volume())
+        settle(qtbot, window)
+        remains += [weakref.ref(window.grid.scene_view.scene), weakref.ref(window.workbench)]
+        close(window)
+        del window
+    gc.collect()
+    assert [ref() for ref in remains if ref() is not None] == []
+    assert [w for w in QApplication.topLevelWidgets() if w.isVisible()] == []
+
+
+def test_high_dpi_pictures_have_as_many_pixels(window) -> None:
+    """The scene is drawn in device pixels, whatever they are; here they are logical ones."""
+    view = window.grid.scene_view
+    assert view.scene.target.size == (round(view.width() * view.devicePixelRatioF()), view.height())
+
+
+def test_another_volume_replaces_the_first(qtbot, window) -> None:
+    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    other = Volume.from_parts(ball_volume().array, [0.5] * 3, [0, 0, 0], name="other")
+    window.workbench.open_volume(other)
+    settle(qtbot, window)
+    assert window.workbench.session.state.specimen == "other"
+    assert not window.grid.scene_view.scene.marks.marks
+    for view in window.grid.slice_views.values():
+        assert view.source.volume is other
