@@ -31,6 +31,7 @@ from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
+from gp_core.study.nested import NestedReport, nested_search
 from gp_core.study.physical import PhysicalReport, physical_test
 from gp_core.study.simulation import SimulationReport, simulate
 from gp_core.study.subset_search import SearchReport, search_features
@@ -54,6 +55,7 @@ __all__ = [
     "JrmpcSettings",
     "LandmarkSet",
     "LeaveOneOutReport",
+    "NestedReport",
     "PhysicalReport",
     "RigidTransform",
     "SearchReport",
@@ -71,6 +73,7 @@ __all__ = [
     "jrmpc",
     "leave_one_out",
     "load_specimens",
+    "nested_search",
     "physical_test",
     "predict",
     "read_landmarks",

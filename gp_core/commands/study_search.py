@@ -20,6 +20,8 @@ from gp_core.commands.study_options import (
 from gp_core.landmarks.features import CODES, PROBE
 from gp_core.landmarks.files import load_specimens
 from gp_core.registration.jrmpc import DEFAULTS
+from gp_core.study.leave_one_out import summarise
+from gp_core.study.nested import NestedReport, nested_search
 from gp_core.study.subset_search import SearchReport, search_features
 
 __all__ = ["add"]
@@ -46,6 +48,11 @@ def add(commands: Subparsers) -> None:
         help="where to stop dropping training features; default: 3, with robust none are dropped",
     )
     parser.add_argument(
+        "--nested",
+        action="store_true",
+        help="hold each animal out before anything is chosen, and report its errors: the honest ones",
+    )
+    parser.add_argument(
         "--checkpoint", metavar="FILE", help="keep results here as they come in; if it exists, go on from it"
     )
     add_settings(parser, "defaults")
@@ -58,8 +65,10 @@ def run(args: argparse.Namespace) -> int:
     """Search, print, and write what was asked for."""
     specimens = load_specimens(args.specimens)
     training = codes_of(args.training, "--training", CODES, CODES)
+    search = nested_search if args.nested else search_features
+    report: SearchReport | NestedReport
     with executor_of(args) as executor, ProgressLine() as line:
-        report = search_features(
+        report = search(
             specimens,
             method=args.method,
             training=training,
@@ -70,8 +79,9 @@ def run(args: argparse.Namespace) -> int:
             progress=line,
         )
     save_json(args.json, report.as_dict())
-    save_figure_of(args.figure, "search_curves", report)
-    for text in _lines(report):
+    nested = isinstance(report, NestedReport)
+    save_figure_of(args.figure, "nested_errors" if nested else "search_curves", report)
+    for text in _nested_lines(report) if isinstance(report, NestedReport) else _lines(report):
         say(text)
     return 0
 
@@ -89,3 +99,22 @@ def _lines(report: SearchReport) -> Iterator[str]:
     for probe in best.probe_curve:
         mark = "  (the paper's)" if set(probe.features) == set(PROBE) else ""
         yield f"  {probe.n:7}  {probe.e_t:9.2f}  {' '.join(probe.features)}{mark}"
+
+
+def _nested_lines(report: NestedReport) -> Iterator[str]:
+    yield f"Nested search by {report.method}: {report.fits} estimates in {report.seconds:.0f} s"
+    yield ""
+    yield "  held out   training  dropped, and touched"
+    for fold in report.folds:
+        dropped = " ".join(code for code in CODES if code not in fold.features) or "none"
+        yield f"  {fold.held_out:<9}  {len(fold.features):8}  -{dropped}; {' '.join(fold.probe)}"
+    yield ""
+    yield "  errors                  E_CO mm: mean  median  max     E_MA deg: mean  median  max      E_T"
+    both = (("chosen without the animal", report.errors), ("chosen on all animals", report.optimistic.errors))
+    for label, errors in both:
+        summary = summarise(errors)
+        co, ma = summary["e_co_mm"], summary["e_ma_deg"]
+        yield (
+            f"  {label:<27}  {co['mean']:6.3f}  {co['median']:6.3f}  {co['max']:5.3f}"
+            f"            {ma['mean']:5.2f}  {ma['median']:6.2f}  {ma['max']:5.2f}   {summary['e_t']:6.2f}"
+        )

@@ -25,6 +25,7 @@ __all__ = [
     "TrainingStep",
     "external",
     "probe_curve",
+    "run_all",
 ]
 
 Codes = tuple[str, ...]
@@ -117,14 +118,18 @@ class Ticker:
         self._tell = tell
         self._start = time.monotonic()
         self._done = self._fresh = 0.0
+        self._counted: set[str] = set()
 
     @property
     def seconds(self) -> float:
         """Time since the start of this run."""
         return time.monotonic() - self._start
 
-    def count(self, fits: int, work: float, *, fresh: bool) -> None:
-        """Add what a candidate took; `fresh` is False where it came from a checkpoint."""
+    def count(self, task: str, fits: int, work: float, *, fresh: bool) -> None:
+        """Add what a candidate took, once; `fresh` is False where it came from a checkpoint."""
+        if task in self._counted:
+            return
+        self._counted.add(task)
         self.fits += fits
         self._done += work
         self._fresh += work if fresh else 0.0
@@ -188,22 +193,53 @@ class Elimination:
 
         def take(index: int, curve: tuple[ProbeStep, ...]) -> None:
             nonlocal ahead
-            candidate = missing[index]
-            self.memory.put(self._task(candidate), [[s.n, s.features, s.e_t] for s in curve])
-            self._count(candidate, fresh=True)
-            ahead -= work_of(candidate)
-            self.ticker.report(ahead, f"{self.name}: {len(candidate)} training features")
+            ahead -= work_of(missing[index])
+            self.keep(missing[index], curve, ahead)
 
         found = run_map(partial(probe_curve, self.problem), missing, self.executor, done=take)
         curves.update(zip(missing, found, strict=True))
         return [curves[c] for c in candidates]
 
+    def knows(self, candidate: Codes) -> bool:
+        """Return whether the probe curve of a candidate is in memory."""
+        return self.memory.get(self._task(candidate)) is not None
+
+    def keep(self, candidate: Codes, curve: tuple[ProbeStep, ...], ahead: float) -> None:
+        """Put a new probe curve into memory and tell, with this much work ahead."""
+        self.memory.put(self._task(candidate), [[s.n, s.features, s.e_t] for s in curve])
+        self._count(candidate, fresh=True)
+        self.ticker.report(ahead, f"{self.name}: {len(candidate)} training features")
+
     def _count(self, candidate: Codes, *, fresh: bool) -> None:
         fits = _n_probe_subsets(len(external(candidate))) * self.problem.n_sides
-        self.ticker.count(fits, work_of(candidate), fresh=fresh)
+        self.ticker.count(self._task(candidate), fits, work_of(candidate), fresh=fresh)
 
     def _task(self, candidate: Codes) -> str:
         return f"{self.name}: {' '.join(candidate)}"
+
+
+def run_all(searches: Sequence[Elimination], start: Codes, fewest: int) -> list[tuple[TrainingStep, ...]]:
+    """Run several searches on one ticker: the first step of all side by side, then one after the other."""
+    ticker, executor = searches[0].ticker, searches[0].executor
+    whole, first = work_of(start) + work_below(start, fewest), work_of(start)
+    missing = [search for search in searches if not search.knows(start)]
+    ahead = whole * len(searches)
+
+    def take(index: int, curve: tuple[ProbeStep, ...]) -> None:
+        nonlocal ahead
+        ahead -= first
+        missing[index].keep(start, curve, ahead)
+
+    run_map(_curve_of, [(search.problem, start) for search in missing], executor, done=take)
+    found: list[tuple[TrainingStep, ...]] = []
+    for following in range(len(searches) - 1, -1, -1):
+        ticker.later = following * (whole - first)
+        found.append(searches[len(found)].run(start, fewest))
+    return found
+
+
+def _curve_of(task: tuple[Problem, Codes]) -> tuple[ProbeStep, ...]:
+    return probe_curve(*task)
 
 
 def external(training: Codes) -> Codes:

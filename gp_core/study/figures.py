@@ -19,6 +19,7 @@ from gp_core.landmarks.features import CODES, PROBE
 from gp_core.study.compare import PROBES, ComparisonReport, ComparisonRow
 from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
+from gp_core.study.nested import NestedReport
 from gp_core.study.simulation import SimulationReport
 from gp_core.study.subset_search import SearchReport
 
@@ -27,6 +28,7 @@ __all__ = [
     "distance_matrix",
     "error_boxes",
     "error_histograms",
+    "nested_errors",
     "save_figure",
     "search_curves",
 ]
@@ -162,6 +164,27 @@ def search_curves(report: SearchReport) -> Figure:
             )
     label(first, "A", "Training features", "Total error $E_T$")
     label(second, "B", f"Touched features, with {report.best.n} training features", "Total error $E_T$")
+    return figure
+
+
+def nested_errors(report: NestedReport) -> Figure:
+    """Draw the errors of each side, chosen for without its animal, over the optimistic ones."""
+    figure, (first, second) = new_figure(1, 2, (7.0, 3.3))
+    optimistic = {(row.specimen, row.side): row for row in report.optimistic.rows}
+    for ax, error, name, letter in (
+        (first, "e_ma_deg", AXIS_ERROR, "A"),
+        (second, "e_co_mm", ORIGIN_ERROR, "B"),
+    ):
+        for side, colour, text in (("L", LEFT, "left"), ("R", RIGHT, "right")):
+            rows = [row for row in report.rows if row.side == side]
+            x = [getattr(optimistic[row.specimen, side], error) for row in rows]
+            ax.plot(x, [getattr(row, error) for row in rows], "o", color=colour, ms=5, label=text)
+        top = 1.08 * max(getattr(row, error) for row in (*report.rows, *report.optimistic.rows))
+        ax.plot([0, top], [0, top], color=_INK, lw=0.8)
+        ax.set(xlim=(0, top), ylim=(0, top), aspect="equal")
+        label(ax, letter, f"{name},\nchosen on all animals", "chosen without the animal")
+    first.legend(fontsize=8, frameon=False, loc="upper left")
+    second.set_title(f"method {report.method}", loc="right", fontsize=8, color=_INK)
     return figure
 
 

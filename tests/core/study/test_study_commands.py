@@ -77,6 +77,19 @@ def test_search(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert capsys.readouterr().out.splitlines()[1:] == first.splitlines()[1:]
 
 
+def test_nested_search(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    report, figure = tmp_path / "n.json", tmp_path / "n.png"
+    features = ["--training", "CA,CB,CL,LLI,MN,OS", "--fewest-training", "6", "--max-iterations", "10"]
+    files = ["--json", str(report), "--figure", str(figure)]
+    assert main(["search", folder, "--nested", "--workers", "1", *features, *files]) == 0
+    content = json.loads(report.read_text())
+    assert [fold["held_out"] for fold in content["folds"]] == ["D01", "D02", "D03", "D04"]
+    out = capsys.readouterr().out
+    assert "chosen without the animal" in out
+    assert f"{content['summary']['e_t']:.2f}" in out
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
 def test_simulate_with_physical_results(
     folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
