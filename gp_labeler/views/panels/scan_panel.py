@@ -11,6 +11,7 @@ from gp_labeler.views.panels.bone_card import BoneCard
 from gp_labeler.views.panels.grey_card import GreyCard
 from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.mesh_card import MeshCard
+from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.workbench import Workbench
 
@@ -52,7 +53,8 @@ class ScanPanel(QWidget):
         column = QVBoxLayout(content)
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
-        for card in (about, self.bone, self.grey, self.mesh):
+        self.notes = NotesPanel(workbench)
+        for card in (about, self.bone, self.grey, self.mesh, self.notes):
             column.addWidget(card)
         column.addStretch(1)
         layout = QVBoxLayout(self)

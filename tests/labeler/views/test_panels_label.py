@@ -110,7 +110,7 @@ def test_the_table_follows_the_active_point_without_changing_it(desk, panel):
 
 def test_every_state_has_its_word(desk, panel):
     place(desk, "CA", "CB", "RWA", "RWP", "OS", "LLI", "MH")
-    labelling.place(desk.session, in_scan("OI") + [0, 0, 3.0], side=LEFT, code="OI")
+    labelling.place(desk.session, np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
     labelling.mark_unseen(desk.session, side=LEFT, code="RWM")
     desk.session.do(CheckPoint(LEFT, "CA"))
     deliver(desk)

@@ -1,0 +1,207 @@
+"""The export dialog: which files are written where, and what is missing from them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QFileDialog,
+    QHBoxLayout,
+    QLineEdit,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import Status
+from gp_labeler.session.landmark_export import FORMATS, export_landmarks
+from gp_labeler.session.workflow import PointState
+from gp_labeler.views.bind import follow
+from gp_labeler.views.panels.parts import Notice, emptied, scrolled, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["ExportDialog"]
+
+_WORDS: Mapping[str, str] = MappingProxyType(
+    {
+        ".mrk.json": "Markups JSON: 3D Slicer, SlicerMorph and gp-core; says everything",
+        ".fcsv": "FCSV: older 3D Slicer",
+        ".csv": "CSV: spreadsheets and R",
+    }
+)
+
+
+class ExportDialog(QDialog):
+    """Writes the landmarks of both sides.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose specimen is written.
+    folder : path
+        Where to propose.
+    """
+
+    exported = Signal(str)
+    """The folder that was written into."""
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        folder: str | Path,
+        actions: object = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._workbench = workbench
+        self.setWindowTitle("Export landmarks")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setModal(True)
+        self.setMinimumSize(520, 420)
+        self.resize(540, 500)
+        self._make_widgets(str(folder))
+        self._lay_out()
+        follow(self, workbench.doubts_changed, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Say what would be written, and what would be missing."""
+        emptied(self._findings)
+        for level, words in self._missing():
+            self._findings.addWidget(Notice(level, words))
+        names, there = self._names(), self._there()
+        self.files.setText("   ".join(names) if names else "Nothing is placed yet, or no format is chosen.")
+        self.replace.setVisible(bool(there))
+        self.replace.setText(f"Replace {len(there)} file{'s' if len(there) > 1 else ''} of that name")
+        self.export.setEnabled(bool(names) and (not there or self.replace.isChecked()))
+
+    def _make_widgets(self, folder: str) -> None:
+        self.folder = QLineEdit(folder)
+        self.folder.setAccessibleName("Folder to write into")
+        self.folder.textChanged.connect(self.refresh)
+        self.browse = QPushButton("Browse…")
+        self.browse.clicked.connect(self._browse)
+        self.formats = {suffix: self._format_box(suffix) for suffix in FORMATS}
+        self.files = text_label("", "mono", wrap=True)
+        self.replace = QCheckBox()
+        self.replace.toggled.connect(self.refresh)
+        self._findings = QVBoxLayout()
+        self._findings.setSpacing(8)
+        self._result = text_label("", "danger", wrap=True)
+        self.cancel = QPushButton("Cancel")
+        self.cancel.clicked.connect(self.reject)
+        self.export = QPushButton("Export")
+        self.export.setProperty("role", "primary")
+        self.export.setDefault(True)
+        self.export.clicked.connect(self._export)
+
+    def _format_box(self, suffix: str) -> QCheckBox:
+        box = QCheckBox(_WORDS[suffix])
+        box.setChecked(suffix == FORMATS[0])
+        box.toggled.connect(self.refresh)
+        return box
+
+    def _lay_out(self) -> None:
+        content = QWidget()
+        content.setProperty("role", "panel")
+        self._form = QVBoxLayout(content)
+        self._form.setContentsMargins(20, 16, 20, 12)
+        self._form.setSpacing(8)
+        self._form.addWidget(text_label(f"Landmarks of {self._workbench.session.state.specimen}", "title"))
+        self._form.addLayout(self._findings)
+        self._form.addSpacing(4)
+        self._form.addWidget(text_label("Folder", "heading"))
+        row = QHBoxLayout()
+        row.addWidget(self.folder, 1)
+        row.addWidget(self.browse)
+        self._form.addLayout(row)
+        self._form.addWidget(text_label("Formats", "heading"))
+        for box in self.formats.values():
+            self._form.addWidget(box)
+        self._form.addWidget(text_label("Files", "heading"))
+        self._form.addWidget(self.files)
+        self._form.addWidget(self.replace)
+        self._form.addStretch(1)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(20, 10, 20, 14)
+        foot.addWidget(self._result, 1)
+        foot.addWidget(self.cancel)
+        foot.addWidget(self.export)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolled(content), 1)
+        layout.addLayout(foot)
+
+    def _missing(self) -> list[tuple[str, str]]:
+        """Return a finding for each side, with its level."""
+        session, found = self._workbench.session, []
+        for side in Side:
+            landmarks = session.landmarks(side)
+            if not landmarks.placed:
+                found.append(("warning", f"The {side.word} side is not labelled and will not be written."))
+                continue
+            statuses = {code: landmarks.status(code) for code in session.point_states(side, wait=False)}
+            to_do = [code for code, status in statuses.items() if status is Status.TO_DO]
+            unseen = [code for code, status in statuses.items() if status is Status.UNSEEN]
+            parts = [
+                f"{word} {' '.join(codes)}"
+                for word, codes in (("to do:", to_do), ("not seen:", unseen))
+                if codes
+            ]
+            words = f"The {side.word} side has {session.progress(side).text}" + "".join(
+                f"; {p}" for p in parts
+            )
+            found.append(("warning" if to_do else "info" if unseen else "good", f"{words}."))
+            found += self._doubts(side)
+        return found
+
+    def _doubts(self, side: Side) -> list[tuple[str, str]]:
+        states = self._workbench.session.point_states(side, wait=False)
+        doubtful = [code for code, state in states.items() if state is PointState.DOUBTFUL]
+        if not doubtful:
+            return []
+        many = len(doubtful) > 1
+        far = f"lie far from where the atlas expects {'them' if many else 'it'}"
+        words = (
+            f"On the {side.word} side {' '.join(doubtful)} {far if many else far.replace('lie', 'lies', 1)}"
+        )
+        return [("warning", f"{words}: look again, or mark as checked.")]
+
+    def _suffixes(self) -> list[str]:
+        return [suffix for suffix, box in self.formats.items() if box.isChecked()]
+
+    def _names(self) -> list[str]:
+        session = self._workbench.session
+        sides = [side for side in Side if session.landmarks(side).placed]
+        return [f"{session.state.specimen}_{s.value}{suffix}" for s in sides for suffix in self._suffixes()]
+
+    def _there(self) -> list[Path]:
+        folder = Path(self.folder.text())
+        return [folder / name for name in self._names() if (folder / name).exists()]
+
+    def _browse(self) -> None:
+        chosen = QFileDialog.getExistingDirectory(self, "Export into this folder", self.folder.text())
+        if chosen:
+            self.folder.setText(chosen)
+
+    def _export(self) -> None:
+        """Write the files; on failure say why and stay."""
+        state, folder = self._workbench.session.state, self.folder.text()
+        try:
+            report = export_landmarks(
+                state, folder, formats=self._suffixes(), overwrite=self.replace.isChecked()
+            )
+        except GpError as error:
+            self._result.setText(str(error))
+            return
+        level = "info" if report.is_complete else "warning"
+        self._workbench.say(report.text.replace("\n", "  "), level)
+        self.exported.emit(folder)
+        self.accept()

@@ -1,0 +1,178 @@
+"""Taking over landmarks from files: what they hold, whether that can belong here, and what came of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QComboBox,
+    QDialog,
+    QHBoxLayout,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.files import landmarks_of, read_points
+from gp_labeler.session.landmark_import import MisfitError, Predicate, import_landmarks
+from gp_labeler.views.panels.parts import Notice, emptied, scrolled, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["LandmarkImportDialog"]
+
+
+class LandmarkImportDialog(QDialog):
+    """Shows what landmark files hold, imports them, and reports.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose session takes the points.
+    files : sequence of path
+        The files.
+    near_bone : callable, optional
+        Tells which points are near bone; see `import_landmarks`.
+    """
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        files: Sequence[str | Path],
+        near_bone: Predicate | None = None,
+        actions: object = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._workbench, self._near_bone = workbench, near_bone
+        self._files = [Path(file) for file in files]
+        self._misfit = ""
+        self.setWindowTitle("Import landmarks")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setModal(True)
+        self.setMinimumSize(520, 360)
+        self._make_widgets()
+        self._lay_out()
+        self._look()
+
+    def _make_widgets(self) -> None:
+        self.side = QComboBox()
+        self.side.setAccessibleName("Side of the head")
+        self.side.addItem("as the files say", None)
+        for side in Side:
+            self.side.addItem(side.word, side)
+        self.side.currentIndexChanged.connect(self._look)
+        self.keep = QCheckBox("Keep points that are placed already; fill only what is to do")
+        self.anyway = QCheckBox("Import nevertheless")
+        self.anyway.toggled.connect(self._refresh)
+        self.cancel = QPushButton("Cancel")
+        self.cancel.clicked.connect(self.reject)
+        self.take = QPushButton("Import")
+        self.take.setProperty("role", "primary")
+        self.take.setDefault(True)
+        self.take.clicked.connect(self._import)
+        self._findings = QVBoxLayout()
+        self._findings.setSpacing(8)
+        self._title = text_label("", "title")
+
+    def _lay_out(self) -> None:
+        content = QWidget()
+        content.setProperty("role", "panel")
+        column = QVBoxLayout(content)
+        column.setContentsMargins(20, 16, 20, 12)
+        column.setSpacing(10)
+        column.addWidget(self._title)
+        column.addLayout(self._findings)
+        column.addWidget(self.anyway)
+        self._choices = QWidget()
+        choices = QVBoxLayout(self._choices)
+        choices.setContentsMargins(0, 4, 0, 0)
+        row = QHBoxLayout()
+        row.addWidget(text_label("Side", "hint"))
+        row.addWidget(self.side)
+        row.addStretch(1)
+        choices.addLayout(row)
+        choices.addWidget(self.keep)
+        column.addWidget(self._choices)
+        column.addStretch(1)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(20, 10, 20, 14)
+        foot.addStretch(1)
+        foot.addWidget(self.cancel)
+        foot.addWidget(self.take)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolled(content), 1)
+        layout.addLayout(foot)
+
+    def _look(self, *_: object) -> None:
+        """Read the files, and say what is in them."""
+        self._misfit = ""
+        self.anyway.setChecked(False)
+        findings = [self._read(file) for file in self._files]
+        self._n_wrong = sum(level == "error" for level, _ in findings)
+        n = len(self._files)
+        self._title.setText(self._files[0].name if n == 1 else f"{n} landmark files")
+        self._show(findings)
+
+    def _read(self, file: Path) -> tuple[str, str]:
+        try:
+            landmarks = landmarks_of(read_points(file), side=self.side.currentData())
+        except GpError as error:
+            return "error", str(error)
+        unseen = f", {len(landmarks.unseen)} not seen" if landmarks.unseen else ""
+        return (
+            "info",
+            f"{file.name}: {len(landmarks.placed)} points of the {landmarks.side.word} side{unseen}",
+        )
+
+    def _show(self, findings: Sequence[tuple[str, str]]) -> None:
+        emptied(self._findings)
+        for level, words in findings:
+            self._findings.addWidget(Notice(level, words))
+        self._refresh()
+
+    def _refresh(self, *_: object) -> None:
+        self.anyway.setVisible(bool(self._misfit))
+        self.take.setEnabled(not self._n_wrong and (not self._misfit or self.anyway.isChecked()))
+
+    def _import(self) -> None:
+        session = self._workbench.session
+        try:
+            notes = import_landmarks(
+                session,
+                self._files,
+                side=self.side.currentData(),
+                near_bone=self._near_bone,
+                accept_misfit=self.anyway.isChecked(),
+                replace_placed=not self.keep.isChecked(),
+            )
+        except MisfitError as error:
+            self._misfit = error.problem
+            self._show([("warning", _sentence(error.problem) + " " + (error.remedy or ""))])
+        except GpError as error:
+            self._show([("error", str(error))])
+        else:
+            self._report(notes)
+
+    def _report(self, notes: Sequence[str]) -> None:
+        """Close where all is well; else say what should be known first."""
+        done = " and ".join(f"{side.word} {self._workbench.session.progress(side).text}" for side in Side)
+        if not notes:
+            self._workbench.say(f"Imported landmarks: {done}")
+            self.accept()
+            return
+        self._misfit = ""
+        self._title.setText("Imported, but look at this")
+        self._choices.hide()
+        self._show([("good", f"Now placed: {done}"), *(("warning", _sentence(note)) for note in notes)])
+        self.take.hide()
+        self.cancel.setText("Close")
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:].rstrip(".") + "."

@@ -1,0 +1,70 @@
+"""Notes on the specimen: free text, kept with it while it is being typed."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QEvent, QObject, QTimer
+from PySide6.QtWidgets import QPlainTextEdit, QWidget
+
+from gp_labeler.session.specimen_edits import SetNotes
+from gp_labeler.views.bind import attempt, blocked, follow
+from gp_labeler.views.panels.parts import Card
+from gp_labeler.workbench import Workbench
+
+__all__ = ["NotesPanel"]
+
+_PAUSE_MS = 600
+
+
+class NotesPanel(Card):
+    """A text field; all that is typed before the field is left is one undo.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose specimen the notes are on.
+    """
+
+    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+        super().__init__("Notes", parent)
+        self._workbench = workbench
+        self._continues = False
+        self.text = QPlainTextEdit()
+        self.text.setAccessibleName("Notes on the specimen")
+        self.text.setPlaceholderText("Animal, weight, scanner, what is damaged…")
+        self.text.setTabChangesFocus(True)
+        self.text.setFixedHeight(84)
+        self.text.textChanged.connect(self._on_typed)
+        self.text.installEventFilter(self)
+        self.add(self.text)
+        self._timer = QTimer(self)
+        self._timer.setSingleShot(True)
+        self._timer.setInterval(_PAUSE_MS)
+        self._timer.timeout.connect(self.keep)
+        follow(self, workbench.details_changed, self.refresh)
+        follow(self, workbench.session_replaced, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show the notes as they are kept."""
+        notes = self._workbench.session.state.notes
+        if notes != self.text.toPlainText() and not self._timer.isActive():
+            with blocked(self.text):
+                self.text.setPlainText(notes)
+
+    def keep(self) -> None:
+        """Make what was typed an edit of the specimen."""
+        self._timer.stop()
+        notes = self.text.toPlainText()
+        if notes == self._workbench.session.state.notes:
+            return
+        merge, self._continues = self._continues, True
+        attempt(self._workbench, lambda: self._workbench.session.do(SetNotes(notes), merge=merge))
+
+    def _on_typed(self) -> None:
+        self._timer.start()
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102, N802 - Qt's name
+        if watched is self.text and event.type() is QEvent.Type.FocusOut:
+            self.keep()
+            self._continues = False
+        return super().eventFilter(watched, event)

@@ -1,0 +1,119 @@
+"""What programs that were killed left unsaved: take it up, leave it, or delete it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import (
+    QDialog,
+    QHBoxLayout,
+    QListWidget,
+    QListWidgetItem,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_labeler.session.recovery import Recovery
+from gp_labeler.views.panels.parts import IconLabel, text_label
+
+__all__ = ["RecoverDialog"]
+
+
+class RecoverDialog(QDialog):
+    """Lists what can be recovered.
+
+    Parameters
+    ----------
+    recoveries : sequence of Recovery
+        What was found, the latest first.
+    """
+
+    recover_asked = Signal(object)
+    """The `Recovery` to go on with."""
+
+    def __init__(self, recoveries: Sequence[Recovery], parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWindowTitle("Unsaved work was found")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setModal(True)
+        self.setMinimumSize(520, 300)
+        self.list = QListWidget()
+        self.list.setAccessibleName("Unsaved work")
+        self.list.setWordWrap(True)
+        self.list.setSpacing(2)
+        for recovery in recoveries:
+            item = QListWidgetItem(_words(recovery), self.list)
+            item.setData(Qt.ItemDataRole.UserRole, recovery)
+        self.list.setCurrentRow(0)
+        self.list.currentRowChanged.connect(self._refresh)
+        self.list.itemActivated.connect(self._recover)
+        self._confirming = False
+        self._lay_out()
+        self._refresh()
+
+    def _lay_out(self) -> None:
+        self.recover, self.later = QPushButton("Recover"), QPushButton("Later")
+        self.delete = QPushButton("Delete…")
+        self.recover.setProperty("role", "primary")
+        self.recover.setDefault(True)
+        self.later.setToolTip("Leave it; it is offered again at the next start")
+        self.recover.clicked.connect(self._recover)
+        self.later.clicked.connect(self.reject)
+        self.delete.clicked.connect(self._delete)
+        top = QHBoxLayout()
+        top.setSpacing(12)
+        top.addWidget(IconLabel("clock", "accent_text", 24), 0, Qt.AlignmentFlag.AlignTop)
+        words = QVBoxLayout()
+        words.setSpacing(2)
+        words.addWidget(text_label("Nothing is lost", "title"))
+        hint = "The program ended before this was saved. Every edit was kept: take it up where you were."
+        words.addWidget(text_label(hint, "hint", wrap=True))
+        top.addLayout(words, 1)
+        foot = QHBoxLayout()
+        foot.addWidget(self.delete)
+        foot.addStretch(1)
+        foot.addWidget(self.later)
+        foot.addWidget(self.recover)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(20, 16, 20, 14)
+        layout.setSpacing(12)
+        layout.addLayout(top)
+        layout.addWidget(self.list, 1)
+        layout.addLayout(foot)
+
+    def _refresh(self, *_: object) -> None:
+        chosen = self.list.currentItem() is not None
+        self._confirming = False
+        self.delete.setText("Delete…")
+        self.recover.setEnabled(chosen)
+        self.delete.setEnabled(chosen)
+
+    def _recover(self, *_: object) -> None:
+        item = self.list.currentItem()
+        if item is not None:
+            self.recover_asked.emit(item.data(Qt.ItemDataRole.UserRole))
+            self.accept()
+
+    def _delete(self) -> None:
+        """Delete the chosen one at the second click."""
+        item = self.list.currentItem()
+        if item is None:
+            return
+        if not self._confirming:
+            self._confirming = True
+            self.delete.setText("Delete it for good?")
+            return
+        recovery: Recovery = item.data(Qt.ItemDataRole.UserRole)
+        recovery.discard()
+        self.list.takeItem(self.list.row(item))
+        self._refresh()
+        if self.list.count() == 0:
+            self.accept()
+
+
+def _words(recovery: Recovery) -> str:
+    file = recovery.specimen_file
+    where = f"Saved in {file.name}" if file is not None else "Never saved"
+    return f"{recovery.text}\n{where}"
