@@ -1,0 +1,91 @@
+"""The command line of the window."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from window_cases import BALL_MM, MIDDLE, ball_volume
+
+from gp_labeler.__main__ import main
+
+
+@pytest.fixture
+def ball_file(tmp_path) -> Path:
+    import SimpleITK as sitk  # noqa: N813
+
+    volume = ball_volume()
+    image = sitk.GetImageFromArray(volume.array)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin.tolist())
+    sitk.WriteImage(image, str(tmp_path / "ball.nrrd"))
+    return tmp_path / "ball.nrrd"
+
+
+def test_mesh_writes_the_surface_in_lps(ball_file, tmp_path, capsys) -> None:
+    assert main(["mesh", str(ball_file), "-o", str(tmp_path / "ball.ply"), "--threshold", "1000"]) == 0
+    assert "triangles" in capsys.readouterr().out
+    from vtkmodules.vtkIOPLY import vtkPLYReader
+
+    reader = vtkPLYReader()
+    reader.SetFileName(str(tmp_path / "ball.ply"))
+    reader.Update()
+    bounds = np.array(reader.GetOutput().GetBounds()).reshape(3, 2)
+    np.testing.assert_allclose(bounds.mean(axis=1), MIDDLE, atol=0.05)
+    np.testing.assert_allclose(np.ptp(bounds, axis=1), 2 * BALL_MM, atol=0.1)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["nowhere.nrrd"], "nowhere.nrrd: does not exist"),
+        (["mesh", "nowhere.nrrd", "-o", "x.ply"], "nowhere.nrrd"),
+        (["mesh", "{ball}", "-o", "x.obj", "--threshold", "1000"], ".ply"),
+        (["mesh", "{ball}", "-o", "x.ply", "--threshold", "1e9"], "no surface"),
+        (["mesh", "{ball}", "-o", "x.ply", "--spacing", "1", "2"], "one number or three"),
+        (["mesh", "{ball}", "-o", "x.ply", "--spacing", "-1"], "spacing must be positive"),
+    ],
+)
+def test_wrong_input_is_one_line_and_status_2(ball_file, arguments, words, capsys) -> None:
+    assert main([argument.format(ball=ball_file) for argument in arguments]) == 2
+    error = capsys.readouterr().err
+    assert words in error
+    assert error.count("\n") == 1
+
+
+def test_help_needs_neither_qt_nor_vtk() -> None:
+    code = (
+        "import sys; from gp_labeler.__main__ import make_parser; make_parser().format_help();"
+        "print([m for m in sys.modules if m.split('.')[0] in ('PySide6', 'vtkmodules', 'SimpleITK')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.slow
+def test_the_window_opens_from_the_command_line_and_says_what_is_wrong(ball_file, tmp_path) -> None:
+    code = (
+        "import sys; from PySide6.QtCore import QTimer; from gp_labeler.views import application as a;"
+        "old = a.MainWindow.show;\n"
+        "def show(self):\n"
+        "    old(self); QTimer.singleShot(4000, self.close)\n"
+        "a.MainWindow.show = show\n"
+        "import pathlib; path, state = map(pathlib.Path, sys.argv[1:]);"
+        "sys.exit(a.run_window(path, directory=state))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", code, str(ball_file), str(tmp_path / "state")],
+        capture_output=True,
+        text=True,
+        timeout=90,
+        env=dict(os.environ, QT_QPA_PLATFORM="offscreen"),
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Traceback" not in done.stderr
+    assert (tmp_path / "state" / "window.json").exists()
+    assert (tmp_path / "state" / "recent.json").read_text().count("ball.nrrd") == 1

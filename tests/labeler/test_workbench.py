@@ -1,0 +1,253 @@
+"""The workbench without a window: opening, meshing, dragging, saving; what goes wrong is said."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, ball_volume
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_labeler.actions import ACTIONS, run
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session import labelling
+from gp_labeler.session.jobs import QueueDispatcher
+from gp_labeler.session.state import How
+from gp_labeler.session.workflow import Active
+from gp_labeler.workbench import Workbench
+
+
+class Desk(Workbench):
+    """A workbench whose results are delivered on demand, and that remembers what it said."""
+
+    def __init__(self, directory: Path | None = None) -> None:
+        self.calls = QueueDispatcher()
+        self.said: list[tuple[str, str]] = []
+        super().__init__(directory, self.calls, author="AB")
+        self.message.connect(lambda text, level: self.said.append((level, text)))
+
+    def wait(self) -> None:
+        self.calls.deliver_until_idle(self.jobs)
+
+
+@pytest.fixture
+def desk(tmp_path):
+    made = Desk(tmp_path / "state")
+    yield made
+    made.close(discard=True)
+
+
+@pytest.fixture
+def on_ball(desk, ball):
+    desk.open_volume(ball)
+    desk.wait()
+    return desk
+
+
+@pytest.fixture
+def ball_file(tmp_path) -> Path:
+    import SimpleITK as sitk  # noqa: N813
+
+    volume = ball_volume()
+    image = sitk.GetImageFromArray(volume.array)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin.tolist())
+    sitk.WriteImage(image, str(tmp_path / "ball.mha"))
+    return tmp_path / "ball.mha"
+
+
+def test_a_scan_becomes_bone(desk, ball_file) -> None:
+    seen = []
+    desk.surfaces_changed.connect(lambda: seen.append(len(desk.surfaces)))
+    desk.open(ball_file)
+    desk.wait()
+    assert 700 < desk.threshold < 1400
+    assert seen[-1] >= 1
+    hit = desk.surfaces[0].pick(MIDDLE - [0, 20, 0], [0, 1, 0])
+    assert abs(np.linalg.norm(hit.point - MIDDLE) - BALL_MM) < VOXEL_MM
+    assert desk.session.state.specimen == "ball"
+    assert desk.session.state.volume.checksum
+    assert not desk.session.dirty
+    np.testing.assert_allclose(desk.session.crosshair, MIDDLE)
+
+
+def test_a_threshold_is_an_edit_and_a_proposal_is_none(on_ball) -> None:
+    proposed = on_ball.threshold
+    assert on_ball.session.undo_text is None
+    previews = []
+    on_ball.threshold_previewed.connect(previews.append)
+    on_ball.preview_threshold(1100.0)
+    on_ball.set_threshold(1000.0)
+    assert previews == [1100.0, None]
+    on_ball.wait()
+    before = on_ball.surfaces[0].n_triangles
+    assert on_ball.threshold == 1000.0
+    on_ball.session.undo()
+    on_ball.wait()
+    assert on_ball.threshold == proposed
+    assert on_ball.surfaces[0].n_triangles != before
+
+
+def test_ears_are_meshed_finely_once_their_place_is_known(desk) -> None:
+    ball = ball_volume()
+    large = np.kron(ball.array, np.ones((5, 5, 5), dtype=np.uint8)).astype(np.uint16)
+    volume = Volume.from_parts(large, [VOXEL_MM / 5] * 3, ball.origin, name="large")
+    desk.open_volume(volume)
+    desk.wait()
+    assert {part.stride for part in desk.surfaces} == {2}
+    for code, offset in (("CA", (5, 0, 0)), ("RWP", (5, 2, 0)), ("OS", (5, 0, 2))):
+        labelling.place(desk.session, MIDDLE + np.array(offset), side=Side.LEFT, code=code)
+    desk.mesh_ears(half_mm=1.0)
+    desk.wait()
+    assert {part.stride for part in desk.surfaces} == {1, 2}
+
+
+def test_a_drag_shows_at_once_and_is_one_edit(on_ball) -> None:
+    session, seen = on_ball.session, []
+    labelling.place(session, MIDDLE, side=Side.LEFT, code="CA")
+    on_ball.dragged.connect(lambda drag: seen.append(None if drag is None else drag.position.copy()))
+    assert on_ball.begin_drag(Side.LEFT, "CA")
+    for x in (1.0, 2.0, 3.0):
+        on_ball.drag_to(MIDDLE + np.array([x, 0, 0]), How.SLICE)
+        np.testing.assert_array_equal(session.landmarks("L")["CA"], MIDDLE)
+    assert on_ball.end_drag()
+    assert seen[-1] is None
+    np.testing.assert_array_equal(session.landmarks("L")["CA"], MIDDLE + np.array([3, 0, 0]))
+    session.undo()
+    np.testing.assert_array_equal(session.landmarks("L")["CA"], MIDDLE)
+
+
+def test_a_drag_that_comes_home_is_no_edit(on_ball) -> None:
+    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
+    on_ball.begin_drag(Side.LEFT, "CA")
+    on_ball.drag_to(MIDDLE + np.array([1, 0, 0]), How.SLICE)
+    on_ball.drag_to(MIDDLE, How.SLICE)
+    assert not on_ball.end_drag()
+    assert not on_ball.begin_drag(Side.RIGHT, "CA")  # not placed
+    labelling.lock(on_ball.session, side=Side.LEFT, code="CA")
+    assert not on_ball.begin_drag(Side.LEFT, "CA")
+
+
+def test_listeners_follow_from_one_specimen_to_the_next(on_ball, ball) -> None:
+    seen = []
+    on_ball.landmarks_changed.connect(seen.append)
+    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
+    old = on_ball.session
+    on_ball.open_volume(ball)
+    assert on_ball.session is not old
+    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CB")
+    assert [sorted(code for _, code in changed) for changed in seen] == [["CA"], ["CB"]]
+
+
+def test_arrow_keys_have_a_point_to_move(on_ball) -> None:
+    assert on_ball.nudged_point() is None
+    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
+    assert on_ball.session.active != Active(Side.LEFT, "CA")
+    assert on_ball.nudged_point() == (Side.LEFT, "CA")  # the one placed last
+    on_ball.go_to(Side.LEFT, "CA")
+    labelling.place(on_ball.session, MIDDLE + 1, side=Side.LEFT, code="CB")
+    assert on_ball.nudged_point() == (Side.LEFT, "CA")  # the chosen one
+
+
+def test_a_specimen_finds_its_scan(desk, ball_file, tmp_path) -> None:
+    desk.open(ball_file)
+    desk.wait()
+    labelling.place(desk.session, MIDDLE, side=Side.LEFT, code="CA")
+    saved = desk.session.save(tmp_path / "one")
+    desk.open_volume(ball_volume())
+    desk.open(saved)
+    desk.wait()
+    assert desk.volume.name == "ball"
+    assert desk.surfaces
+    assert "CA" in desk.session.landmarks("L")
+
+
+def test_a_scan_that_moved_is_named_and_found_again(desk, ball_file, tmp_path) -> None:
+    desk.open(ball_file)
+    desk.wait()
+    saved = desk.session.save(tmp_path / "one")
+    desk.open_volume(ball_volume())
+    moved = ball_file.rename(tmp_path / "elsewhere.mha")
+    desk.open(saved)
+    desk.wait()
+    assert desk.volume is None
+    assert any("ball" in text and level == "warning" for level, text in desk.said)
+    desk.find_scan(moved)
+    desk.wait()
+    assert desk.volume is not None
+
+
+def test_a_scan_that_changed_is_noticed(desk, ball_file, tmp_path) -> None:
+    import SimpleITK as sitk  # noqa: N813
+
+    desk.open(ball_file)
+    desk.wait()
+    saved = desk.session.save(tmp_path / "one")
+    image = sitk.ReadImage(str(ball_file))
+    sitk.WriteImage(image + 1.0, str(ball_file))
+    differs = []
+    desk.scan_differs.connect(lambda error, volume: differs.append((error, volume)))
+    desk.open_volume(ball_volume())
+    desk.open(saved)
+    desk.wait()
+    assert desk.volume is None
+    (error, volume), *_ = differs
+    assert "voxels" in str(error)
+    desk.accept_scan(volume)
+    assert desk.volume is volume
+
+
+def test_what_cannot_be_read_is_said_and_leaves_all_as_it_was(on_ball, tmp_path) -> None:
+    (tmp_path / "x.nrrd").write_text("no scan")
+    session = on_ball.session
+    on_ball.open(tmp_path / "x.nrrd")
+    on_ball.wait()
+    assert on_ball.said[-1][0] == "error"
+    assert "x.nrrd" in on_ball.said[-1][1]
+    assert on_ball.session is session
+
+
+def test_reading_can_be_stopped(desk, ball_file) -> None:
+    desk.open(ball_file)
+    desk.jobs.cancel_all()
+    desk.wait()
+    assert desk.volume is None
+    assert desk.said == []
+
+
+def test_the_atlas_brings_ghosts(on_ball) -> None:
+    on_ball.load_atlas()
+    on_ball.wait()
+    from gp_core.atlas.atlas import Atlas
+
+    atlas = Atlas.published()
+    for code in ("CA", "RWP", "OS"):
+        where = atlas.mean[atlas.codes.index(code)] + MIDDLE
+        labelling.place(on_ball.session, where, side=Side.LEFT, code=code)
+    ghosts = on_ball.session.ghosts(Side.LEFT)
+    for code in ("CB", "RWA", "LLI"):
+        expected = atlas.mean[atlas.codes.index(code)] + MIDDLE
+        assert np.linalg.norm(ghosts[code].position - expected) < 0.1
+
+
+def test_actions_say_why_they_cannot(on_ball) -> None:
+    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
+    labelling.lock(on_ball.session, side=Side.LEFT, code="CA")
+    on_ball.go_to(Side.LEFT, "CA")
+    assert not run("point.clear", on_ball, None)  # not even offered
+    assert not ACTIONS["point.clear"].enabled(on_ball)
+    assert not run("edit.swap_sides", on_ball, None)
+    assert on_ball.said[-1][0] == "warning"
+    with pytest.raises(GpError, match="unknown action"):
+        run("edit.dance", on_ball, None)
+    with pytest.raises(GpError, match="tool must be one of"):
+        on_ball.set_tool("hammer")
+
+
+def test_the_mesh_is_written(on_ball, tmp_path) -> None:
+    on_ball.save_mesh(tmp_path / "ball.ply")
+    on_ball.wait()
+    assert (tmp_path / "ball.ply").stat().st_size > 1000
+    assert on_ball.said[-1] == ("info", "Wrote ball.ply")
