@@ -7,6 +7,7 @@ import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from gp_core import __version__
 from gp_core.errors import GpError
@@ -17,6 +18,7 @@ _EXAMPLE = """examples:
   gp-labeler                          the window
   gp-labeler head.nrrd                the window with a scan, or a specimen saved before
   gp-labeler --demo                   the window with a synthetic head
+  gp-labeler --offscreen demo --output out     the same window without a display
   gp-labeler mesh head.nrrd -o head.ply
 """
 
@@ -32,6 +34,11 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
     parser.add_argument("path", nargs="?", type=Path, metavar="VOLUME|SPECIMEN", help="what to open")
     parser.add_argument("--demo", action="store_true", help="open a synthetic head")
+    parser.add_argument("--offscreen", metavar="SCRIPT", help="run a script, or 'demo', without a display")
+    parser.add_argument("--output", type=Path, metavar="DIR", help="where --offscreen writes")
+    parser.add_argument(
+        "--specimens", nargs="+", default=[], metavar="NAME", help="run the script for each, as {specimen}"
+    )
     return parser
 
 
@@ -75,6 +82,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _window(args: argparse.Namespace) -> int:
+    if args.offscreen is not None:
+        from gp_labeler.offscreen.command import run_offscreen
+
+        return run_offscreen(args.offscreen, args.output, args.specimens)
     if args.path is not None and not args.path.exists():
         raise GpError(
             "does not exist", file=args.path, remedy="Give a scan, a folder of slices or a specimen."
@@ -89,7 +100,7 @@ def _mesh(args: argparse.Namespace) -> int:
     from gp_labeler.imaging.surface import extract_isosurface
     from gp_labeler.imaging.threshold import propose_threshold
 
-    options = {} if args.spacing is None else {"spacing": _spacing(args.spacing)}
+    options: dict[str, Any] = {} if args.spacing is None else {"spacing": _spacing(args.spacing)}
     volume = read_volume(args.volume, **options)
     threshold = propose_threshold(volume) if args.threshold is None else args.threshold
     surface = extract_isosurface(volume, threshold)

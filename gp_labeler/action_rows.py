@@ -178,7 +178,8 @@ def file_rows() -> Iterator[Action]:
               hint="A synthetic guinea-pig head to try everything on", group="open", icon="play")
     yield row("find_scan", "Find scan…", (), lambda d, ui: ui.ask_find_scan(), _lacks_scan, group="open")
     yield row("save", "Save", ("Ctrl+S",), lambda d, ui: ui.save(), _has_scan, group="save", icon="save")
-    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda d, ui: ui.save(ask=True), _has_scan, group="save")
+    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda d, ui: ui.save(ask=True), _has_scan,
+              group="save")
     yield row("import", "Import landmarks…", ("Ctrl+I",), lambda d, ui: ui.ask_import(), _has_scan,
               group="exchange", icon="import")
     yield row("export", "Export landmarks…", ("Ctrl+E",), lambda d, ui: ui.ask_export(), _has_labels,
@@ -212,9 +213,12 @@ def view_rows() -> Iterator[Action]:
         return Action(id, "View", title, keys, run, enabled, checked, hint, group, icon)
 
     for title, layout, key in _LAYOUTS:
-        yield row(f"view.{layout}", title, (key,), _set_layout(layout), checked=_has_layout(layout), group="layout")
-    yield row("view.reset", "Show everything", ("R",), lambda d, ui: ui.reset_views(), _has_scan, group="show")
-    yield row("view.go_to_point", "Go to the chosen point", ("Shift+R",), _show_active, _has_active, group="show")
+        yield row(f"view.{layout}", title, (key,), _set_layout(layout), checked=_has_layout(layout),
+                  group="layout")
+    yield row("view.reset", "Show everything", ("R",), lambda d, ui: ui.reset_views(), _has_scan,
+              group="show")
+    yield row("view.go_to_point", "Go to the chosen point", ("Shift+R",), _show_active, _has_active,
+              group="show")
     for word, letter, keys in _VIEWPOINTS:
         yield row(f"view.from_{word}", f"Look from {word}", keys, _look_from(letter), group="from")
     for title, tool, key in _TOOLS:
@@ -262,8 +266,8 @@ def landmark_rows() -> Iterator[Action]:
               lambda d: _has_scan(d) and _is_free(d), icon="label")
     yield row("point.skip", "Skip for now", ("N",), lambda d, ui: labelling.skip(d.session), _has_active,
               icon="skip")
-    yield row("point.unseen", "Cannot be seen", ("X",), lambda d, ui: labelling.mark_unseen(d.session), _is_free,
-              icon="unseen")
+    yield row("point.unseen", "Cannot be seen", ("X",), lambda d, ui: labelling.mark_unseen(d.session),
+              _is_free, icon="unseen")
     yield row("point.clear", "Clear", ("Delete", "Backspace"), lambda d, ui: labelling.clear(d.session),
               lambda d: _is_free(d) and _is_settled(d))
     yield row("point.check", "Mark as checked", ("K",), _toggle_check, _is_placed, checked=_is_checked,
@@ -271,19 +275,21 @@ def landmark_rows() -> Iterator[Action]:
     yield row("point.lock", "Lock", ("L",), _toggle_lock, _is_settled, checked=_is_locked, group="state",
               icon="lock")
     yield row("point.lock_all", "Lock all", ("Ctrl+L",),
-              lambda d, ui: labelling.lock_all(d.session, not _all_locked(d)), _has_labels, checked=_all_locked,
-              group="state")
+              lambda d, ui: labelling.lock_all(d.session, not _all_locked(d)), _has_labels,
+              checked=_all_locked, group="state")
     yield row("point.next", "Next feature", (".",), _step_point(1), group="go")
     yield row("point.previous", "Previous feature", (",",), _step_point(-1), group="go")
     yield row("point.other_side", "Same feature, other side", ("Q",), _other_side, _has_active, group="go")
     for title, field in (
-        ("Go on to the next after placing", "auto_advance"), ("Show where the next is expected", "follow_ghost"),
+        ("Go on to the next after placing", "auto_advance"),
+        ("Show where the next is expected", "follow_ghost"),
     ):
         yield row(f"view.{field}", title, (), _toggle(field), checked=_is_on(field), group="how")
 
 
 def help_rows() -> Iterator[Action]:
     """Return the commands of the menu Help."""
-    yield Action("help.shortcuts", "Help", "Keyboard and mouse", ("?", "F1"), lambda d, ui: ui.show_shortcuts())
+    yield Action("help.shortcuts", "Help", "Keyboard and mouse", ("?", "F1"),
+                 lambda d, ui: ui.show_shortcuts())
     yield Action("help.about", "Help", "About gp-labeler", (), lambda d, ui: ui.show_about())
 # fmt: on

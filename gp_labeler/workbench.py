@@ -238,7 +238,7 @@ class Workbench:
             self.point_shown.emit(self.session.crosshair)
 
     def nudged_point(self) -> tuple[Side, str] | None:
-        """Return the point that arrow keys move: the chosen one where it is placed, else the one placed last."""
+        """Return the point that arrow keys move: the chosen one if it is placed, else the one placed last."""
         active, last = self.session.active, self._last
         if active.code is not None and self.session.state.landmark(active.side, active.code).position:
             return active.side, active.code

@@ -1,4 +1,4 @@
-"""What of a session is drawn in every view: marks, ghosts and lines, before any view turns them into pixels."""
+"""What of a session is drawn in every view: marks, ghosts and lines, before a view makes pixels of them."""
 
 from __future__ import annotations
 

@@ -38,6 +38,8 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["MainWindow"]
 
+Layout = TypeVar("Layout", bound=QBoxLayout)
+
 _LIKED = (
     "outline_visible",
     "labels_visible",
@@ -96,7 +98,8 @@ class MainWindow(QMainWindow):
         self.panels.setCurrentWidget(self.steps[step])
 
     def _dock(self) -> None:
-        self.steps = {"scan": ScanPanel(self.workbench), "label": LabelPanel(self.workbench)}
+        self._scan, self._label = ScanPanel(self.workbench), LabelPanel(self.workbench)
+        self.steps: dict[str, QWidget] = {"scan": self._scan, "label": self._label}
         for panel in self.steps.values():
             self.panels.addWidget(panel)
         self.panels.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
@@ -126,10 +129,10 @@ class MainWindow(QMainWindow):
         self.welcome.open_specimen_asked.connect(self.ui.ask_open_file)
         self.welcome.demo_asked.connect(self.ui.open_demo)
         self.welcome.path_chosen.connect(self._on_path_chosen)
-        card = self.steps["label"].card
+        card = self._label.card
         card.open_asked.connect(self.ui.ask_open_file)
         card.export_asked.connect(partial(self.commands.run, "file.export"))
-        self.steps["scan"].mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
+        self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
         follow(self, desk.volume_opened, self._show_page)
         follow(self, desk.session_replaced, self._show_page)
         follow(self, desk.import_asked, self._on_import_asked)

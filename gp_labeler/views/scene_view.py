@@ -1,7 +1,7 @@
 """The 3D view as a widget: the scene is drawn in memory and painted, so it needs no OpenGL of the display.
 
-What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over the
-last frame: the bone need not be drawn again for it.
+What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over
+the last frame: the bone need not be drawn again for it.
 """
 
 from __future__ import annotations
@@ -192,7 +192,7 @@ class SceneView(QWidget):
         self._frame, self._stale = frame, False
 
     def _paint_crosshair(self, painter: QPainter) -> None:
-        """A cross with an open centre, each arm in the colour of the plane that it stands upon."""
+        """Paint a cross with an open centre, each arm in the colour of the plane that it stands upon."""
         if self._desk.volume is None:
             return
         middle = self._desk.session.crosshair

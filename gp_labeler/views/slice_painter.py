@@ -116,7 +116,7 @@ class SlicePainter:
         painter.restore()
 
     def _paint_crosshair(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
-        """The other two slices as dashed lines in their colours."""
+        """Paint the other two slices as dashed lines in their colours."""
         x, y = shown.scan_to_pixel(self._desk.session.crosshair[None])[0] + 0.5
         width, height = shown.size
         for plane in Plane:

@@ -260,7 +260,7 @@ class SliceView(QWidget):
         super().enterEvent(event)
 
     def _nudge(self, right: float, down: float) -> None:
-        """Move the point that was placed last, or is chosen, by a voxel; where there is none, the crosshair."""
+        """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""
         assert self.source is not None
         across, along = (float(np.abs(d) @ self._voxel()) for d in (self.plane.right, self.plane.down))
         offset = right * across * self.plane.right + down * along * self.plane.down

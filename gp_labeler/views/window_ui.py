@@ -1,4 +1,4 @@
-"""What actions ask of the window: files, folders, what to do about unsaved edits, and what the screen shows."""
+"""What actions ask of the window: files, folders, what becomes of unsaved edits, what the screen shows."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
 __all__ = ["WindowUi"]
 
 _SCANS = (
-    "Scans and specimens (*.nrrd *.nhdr *.mha *.mhd *.nii *.nii.gz *.tif *.tiff *.bmp *.png *.jpg *.dcm *.isq "
-    "*.ISQ *.log *.gpspecimen.json);;All files (*)"
+    "Scans and specimens (*.nrrd *.nhdr *.mha *.mhd *.nii *.nii.gz *.tif *.tiff *.bmp *.png *.jpg *.dcm "
+    "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
@@ -264,8 +264,8 @@ class WindowUi:
 
         self.prompts.tell(
             "About gp-labeler",
-            f"{application()}\n\nLabels guinea-pig heads in micro-CT, and estimates the pose of the cochlea from a "
-            "few touched points.\n\nCoordinates are LPS, mm. Nothing is sent anywhere.",
+            f"{application()}\n\nLabels guinea-pig heads in micro-CT, and estimates the pose of the cochlea from "
+            "a few touched points.\n\nCoordinates are LPS, mm. Nothing is sent anywhere.",
         )
 
     def _near_bone(self, points: FloatArray) -> NDArray[np.bool_]:
