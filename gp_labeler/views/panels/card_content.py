@@ -36,6 +36,8 @@ class CardContent:
         State for the chip beside it.
     action, action_text : str
         Id and words of the one next action.
+    skip_text : str
+        What the button says that goes on to the next feature.
     can_skip, can_unsee : bool
         Whether the two other buttons mean anything.
     """
@@ -52,6 +54,7 @@ class CardContent:
     state: str = "to do"
     action: str = ""
     action_text: str = ""
+    skip_text: str = "Skip"
     can_skip: bool = True
     can_unsee: bool = True
 
@@ -84,11 +87,13 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
         aside_hint=hint,
         definition=row.definition,
         where=f"{row.where} Best seen in {_VIEWS[row.view]}.",
-        status=f"{status} Locked." if mark.locked else status,
-        status_role=role,
+        status=f"{_settled_words(session, side, row.code)} Locked against change." if mark.locked else status,
+        status_role="hint" if mark.locked else role,
         state="locked" if mark.locked else state.value,
         action=action,
         action_text=words,
+        skip_text="Skip" if state in (PointState.TO_DO, PointState.GHOST) else "Next",
+        can_skip=action != "next",
         can_unsee=not mark.locked and state is not PointState.UNSEEN,
     )
 
@@ -125,17 +130,24 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"
     if state is PointState.PLACED:
-        return f"Placed {_how(session, side, code)}. Drag or nudge it to correct it.", "hint"
+        return f"{_settled_words(session, side, code)} Drag or nudge it to correct it.", "hint"
     if state is PointState.UNSEEN:
         return "Looked for, not seen. Click to place it after all.", "hint"
     return _first_ones(session, side), "hint"
 
 
-def _how(session: Session, side: Side, code: str) -> str:
-    provenance = session.state.landmark(side, code).provenance
-    words = {"mesh": "on bone", "slice": "on a slice", "accepted ghost": "on its ghost"}
-    how = provenance.how.value if provenance else ""
-    return words.get(how, how)
+def _settled_words(session: Session, side: Side, code: str) -> str:
+    """Return how a point came to be where it is, such as ``Placed on bone.``."""
+    mark = session.state.landmark(side, code)
+    if mark.unseen:
+        return "Looked for, not seen."
+    how = mark.provenance.how.value if mark.provenance else ""
+    words = {
+        "mesh": "Placed on bone.",
+        "slice": "Placed on a slice.",
+        "accepted ghost": "Placed on its ghost.",
+    }
+    return words.get(how, f"{how.capitalize()}." if how else "Placed.")
 
 
 def _first_ones(session: Session, side: Side) -> str:
@@ -183,7 +195,8 @@ def _between(session: Session) -> CardContent:
     doubtful = sum(
         s is PointState.DOUBTFUL for side in Side for s in session.point_states(side, wait=False).values()
     )
-    doubts = "" if not doubtful else f"{doubtful} of them should be looked at again: see the red triangles. "
+    many = "One point" if doubtful == 1 else f"{doubtful} points"
+    doubts = f"{many} should be looked at again: see the red triangles. " if doubtful else ""
     return CardContent(
         totals,
         name="Everything is labelled",

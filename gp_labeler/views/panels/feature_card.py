@@ -95,9 +95,8 @@ class FeatureCard(QWidget):
         self.primary = QPushButton()
         self.primary.setProperty("role", "primary")
         self.primary.clicked.connect(self._on_primary)
-        self.skip = QPushButton(_with_key("Skip", "point.skip"))
-        self.skip.setToolTip("Leave it for later and go on to the next feature")
-        self.skip.setAccessibleName("Skip")
+        self.skip = QPushButton()
+        self.skip.setToolTip("Go on to the next feature; one that is to do comes again after the others")
         self.skip.clicked.connect(lambda: self._do(lambda: labelling.skip(self._workbench.session)))
         self.unseen = QPushButton(_with_key("Unseen", "point.unseen"))
         self.unseen.setAccessibleName("Unseen")
@@ -167,8 +166,10 @@ class FeatureCard(QWidget):
     def _refresh_buttons(self, now: CardContent) -> None:
         self.primary.setText(_with_key(now.action_text, _COMMANDS.get(now.action, "")))
         self.primary.setAccessibleName(now.action_text)
-        self.skip.setVisible(now.can_skip)
-        self.unseen.setVisible(now.can_skip)
+        self.skip.setText(_with_key(now.skip_text, "point.skip"))
+        self.skip.setAccessibleName(now.skip_text)
+        self.skip.setVisible(bool(now.code) and now.can_skip)
+        self.unseen.setVisible(bool(now.code))
         self.unseen.setEnabled(now.can_unsee)
         active = self._workbench.session.active
         for side, button in self.sides.items():
@@ -183,15 +184,13 @@ class FeatureCard(QWidget):
 
     def _on_primary(self) -> None:
         """Do the one next thing."""
-        session, action = self._workbench.session, self._content.action
+        action = self._content.action
         if action == "open":
             self.open_asked.emit()
         elif action == "export":
             self.export_asked.emit()
         else:
             self._do(lambda: _EDITS[action](self._workbench))
-        if session.active.code is None and not self.primary.isVisible():
-            self.setFocus()
 
     def _go_to_side(self, side: Side) -> None:
         code = self._workbench.session.active.code
