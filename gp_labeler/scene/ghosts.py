@@ -79,10 +79,12 @@ class GhostActor:
     ----------
     stage : Stage
         Where to draw.
+    state : str
+        Whose colour of the theme they have.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, stage: Stage, state: str = "ghost") -> None:
+        self._stage, self._state = stage, state
         self._ghosts: tuple[Ghost, ...] = ()
         self._fills: list[vtkActor] = []
         self._rings = PixelLines(stage.overlay)
@@ -98,14 +100,14 @@ class GhostActor:
         self._ghosts = tuple(ghosts)
         for ghost in self._ghosts:
             if ghost.active:
-                fill = solid_actor(_ball(), self._stage.colours.states["ghost"], _FILL)
+                fill = solid_actor(_ball(), self._stage.colours.states[self._state], _FILL)
                 fill.SetUserMatrix(_ellipsoid(ghost))
                 self._stage.base.AddActor(fill)
                 self._fills.append(fill)
 
     def refresh(self, view: Viewpoint) -> list[Label]:
         """Bring the outlines up to date with the camera, and return the labels to draw."""
-        colour, scale = self._stage.colours.states["ghost"], self._stage.scale
+        colour, scale = self._stage.colours.states[self._state], self._stage.scale
         rings = [ellipse(*_projected(ghost, view)) for ghost in self._ghosts]
         widths = [(2.5 if ghost.active else 1.2) * scale for ghost in self._ghosts]
         self._rings.draw(rings, [colour] * len(rings), widths)

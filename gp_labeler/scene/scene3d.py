@@ -20,6 +20,7 @@ from gp_labeler.scene.ghosts import GhostActor
 from gp_labeler.scene.hover import HoverActor
 from gp_labeler.scene.labels import LabelActor
 from gp_labeler.scene.marks import MarkActor
+from gp_labeler.scene.pose import PoseActor
 from gp_labeler.scene.segments import CrosshairActor, SegmentActor
 from gp_labeler.scene.slice_planes import SlicePlaneActor
 from gp_labeler.scene.stage import Stage
@@ -45,7 +46,7 @@ class Scene3D:
 
     Attributes
     ----------
-    bone, marks, ghosts, lines, crosshair, hover, slices : adapters
+    bone, marks, ghosts, pose, lines, crosshair, hover, slices : adapters
         What is drawn; each has ``show(...)``.
     camera : SceneCamera
         Where it is seen from.
@@ -72,6 +73,7 @@ class Scene3D:
         self.lines = SegmentActor(self._stage)
         self.crosshair = CrosshairActor(self._stage)
         self.ghosts = GhostActor(self._stage)
+        self.pose = PoseActor(self._stage)
         self.marks = MarkActor(self._stage)
         self.hover = HoverActor(self._stage)
         self.labels = LabelActor(self._stage)
@@ -141,7 +143,7 @@ class Scene3D:
         self._set_clipping()
         view = self.camera.viewpoint()
         labels = self.marks.refresh(view, self.hidden(self.marks.positions))
-        self.labels.refresh(view, labels + self.ghosts.refresh(view))
+        self.labels.refresh(view, labels + self.ghosts.refresh(view) + self.pose.refresh(view))
         self.hover.refresh(view)
         self.scale_bar.refresh(view, self.camera)
         self.cube.refresh(view, self.camera)
@@ -200,6 +202,7 @@ class Scene3D:
             self.hover,
             self.marks,
             self.ghosts,
+            self.pose,
             self.crosshair,
             self.lines,
             self.slices,

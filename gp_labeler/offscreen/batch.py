@@ -1,0 +1,113 @@
+"""One script over many specimens: each in its own window and folder; one that fails does not stop the others."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from gp_core.errors import GpError
+from gp_core.landmarks.files import write_text
+from gp_labeler.offscreen.report import Report
+from gp_labeler.offscreen.runner import Tell, run_script
+from gp_labeler.offscreen.script import Script
+from gp_labeler.session.opening import tidy_name
+
+__all__ = ["SUMMARY", "run_batch", "summary_lines"]
+
+SUMMARY = "summary.csv"
+
+_COLUMNS = ("specimen", "ok", "steps", "placed", "seconds", "largest error mm", "error")
+
+
+def run_batch(
+    script: Script, specimens: Sequence[str], output: Path, *, tell: Tell | None = None
+) -> Mapping[str, Report]:
+    """Run a script once for each specimen, and write ``summary.csv``.
+
+    Parameters
+    ----------
+    script : Script
+        With ``{specimen}`` in its paths.
+    specimens : sequence of str
+        What to put there.
+    output : Path
+        Each specimen gets a folder of its name in here.
+    tell : callable, optional
+        Takes lines for the terminal.
+
+    Returns
+    -------
+    mapping of str to Report
+        By specimen, also of those that failed.
+
+    Raises
+    ------
+    GpError
+        No specimens, or one twice, or the script has no place for them.
+    """
+    _check(script, specimens)
+    reports = {}
+    for name in specimens:
+        if tell is not None:
+            tell(f"{name}:")
+        reports[name] = _run_one(script, name, output / tidy_name(name), tell)
+    write_text(output / SUMMARY, _table(reports))
+    return reports
+
+
+def summary_lines(reports: Mapping[str, Report]) -> list[str]:
+    """Return a table for the terminal."""
+    width = max(len(name) for name in reports)
+    lines = [f"{'specimen':<{max(width, 8)}}  steps  placed  seconds"]
+    for name, report in reports.items():
+        row = _row(name, report)
+        counts = f"{row['steps']:>5}  {row['placed']:>6}  {row['seconds']:>7}"
+        lines.append(f"{name:<{max(width, 8)}}  {counts}  {report.error or 'done'}")
+    failed = sum(not report.ok for report in reports.values())
+    return [*lines, f"{len(reports) - failed} of {len(reports)} done"]
+
+
+def _run_one(script: Script, name: str, output: Path, tell: Tell | None) -> Report:
+    try:
+        return run_script(script.for_specimen(name), output, tell=tell)
+    except GpError as error:
+        return Report(script.name, name, str(error))
+
+
+def _check(script: Script, specimens: Sequence[str]) -> None:
+    if not specimens:
+        raise GpError("no specimens were given")
+    twice = {name for name in specimens if [tidy_name(each) for each in specimens].count(tidy_name(name)) > 1}
+    if twice:
+        raise GpError(f"specimens share the folder name of {', '.join(sorted(twice))}")
+    if not script.has_slots:
+        raise GpError(
+            "the script does the same for every specimen",
+            file=script.file,
+            remedy="Write {specimen} where its name belongs, such as path = 'scans/{specimen}.nrrd'.",
+        )
+
+
+def _table(reports: Mapping[str, Report]) -> str:
+    text = io.StringIO()
+    writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_row(name, report) for name, report in reports.items())
+    return text.getvalue()
+
+
+def _row(name: str, report: Report) -> dict[str, Any]:
+    content = report.as_dict()
+    largest = content["largest_error_mm"]
+    return {
+        "specimen": name,
+        "ok": "yes" if report.ok else "no",
+        "steps": len(report.steps) - (not report.ok and bool(report.steps)),
+        "placed": content["n_placed"],
+        "seconds": f"{report.seconds:.1f}",
+        "largest error mm": "" if largest is None else f"{largest:.3f}",
+        "error": report.error,
+    }

@@ -1,0 +1,52 @@
+"""The demo: a phantom labelled by clicks, exported, checked, and a cochlea estimated from simulated touches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from gp_core.landmarks.features import FEATURES, Side
+from gp_labeler.offscreen.script import Script, make_script
+from gp_labeler.session.workflow import OPENING
+
+__all__ = ["demo_script"]
+
+_VOXEL_MM = 0.2
+
+
+def demo_script(seed: int = 0) -> Script:
+    """Return the demo as a script like any other.
+
+    Parameters
+    ----------
+    seed : int
+        Of the phantom.
+    """
+    return make_script(list(_tables(seed)), name="demo")
+
+
+def _tables(seed: int) -> Iterator[dict[str, Any]]:
+    yield {"do": "open", "phantom": seed}
+    for side in Side:
+        for code in _order(side):
+            yield {"do": "place", "feature": code, "side": side.value, "at": "truth", "within": _VOXEL_MM}
+    yield {"do": "expect", "placed": 2 * len(FEATURES)}
+    yield {"do": "export", "complete": True}
+    yield {"do": "check", "path": "check.json", "strict": True}
+    yield {"do": "save"}
+    yield {"do": "view", "reset": True, "go_to": "RWA L", "camera": [-0.75, 0.45, -0.48]}
+    yield {"do": "screenshot", "path": "window.png", "what": "window"}
+    yield {"do": "screenshot", "path": "mesh.png", "what": "3d", "size": [1200, 900]}
+    yield {"do": "view", "zoom": 3.0, "go_to": "CO L"}
+    yield {"do": "screenshot", "path": "slices.png", "what": "slices", "size": [1800, 600]}
+    yield {"do": "estimate", "side": "L", "noise": 0.1, "seed": seed}
+    yield {"do": "overlay"}
+    yield {"do": "view", "opacity": 0.5}
+    yield {"do": "screenshot", "path": "overlay.png", "what": "views", "size": [1400, 1000]}
+
+
+def _order(side: Side) -> Iterator[str]:
+    """The three that open the atlas's eyes, then the table's order; what both sides share once."""
+    codes = [row.code for row in FEATURES if not row.computed and not (row.shared and side is Side.RIGHT)]
+    yield from OPENING
+    yield from (code for code in codes if code not in OPENING)

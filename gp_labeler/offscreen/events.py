@@ -1,0 +1,79 @@
+"""Real events on real widgets: what a hand does with mouse and keys."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtGui import QKeySequence, QWheelEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication, QWidget
+
+from gp_core.errors import GpError
+
+__all__ = ["click", "drag", "press_keys", "turn_wheel"]
+
+_UNITS_PER_NOTCH = 120
+_LEFT = Qt.MouseButton.LeftButton
+_NO_KEYS = Qt.KeyboardModifier.NoModifier
+
+
+def click(widget: QWidget, x: float, y: float) -> None:
+    """Click with the left button at a logical pixel of a widget.
+
+    Raises
+    ------
+    GpError
+        The pixel lies outside the widget.
+    """
+    QTest.mouseClick(widget, _LEFT, _NO_KEYS, _inside(widget, x, y))
+
+
+def drag(widget: QWidget, start: tuple[float, float], end: tuple[float, float]) -> None:
+    """Drag with the left button from one logical pixel to another."""
+    first, last = _inside(widget, *start), _inside(widget, *end)
+    QTest.mousePress(widget, _LEFT, _NO_KEYS, first)
+    for part in (0.3, 0.7, 1.0):
+        QTest.mouseMove(widget, first + (last - first) * part)
+    QTest.mouseRelease(widget, _LEFT, _NO_KEYS, last)
+
+
+def turn_wheel(widget: QWidget, x: float, y: float, notches: int, *, ctrl: bool = False) -> None:
+    """Turn the wheel over a logical pixel, away from the user positive, one event a notch."""
+    here = QPointF(_inside(widget, x, y))
+    held = Qt.KeyboardModifier.ControlModifier if ctrl else _NO_KEYS
+    for _ in range(abs(notches)):
+        turned = QPoint(0, _UNITS_PER_NOTCH if notches > 0 else -_UNITS_PER_NOTCH)
+        event = QWheelEvent(
+            here,
+            widget.mapToGlobal(here),
+            QPoint(),
+            turned,
+            Qt.MouseButton.NoButton,
+            held,
+            Qt.ScrollPhase.NoScrollPhase,
+            False,
+        )
+        QApplication.sendEvent(widget, event)
+
+
+def press_keys(widget: QWidget, keys: str) -> None:
+    """Press a combination of keys such as ``Ctrl+Z``, as Qt writes it.
+
+    Raises
+    ------
+    GpError
+        There is no such key.
+    """
+    sequence = QKeySequence(keys)
+    if sequence.count() != 1 or sequence[0].key() == Qt.Key.Key_unknown:
+        raise GpError(f"unknown keys {keys!r}", remedy="Such as Ctrl+Z, Return, Space or Left.")
+    QTest.keyClick(widget, sequence[0].key(), sequence[0].keyboardModifiers())
+
+
+def _inside(widget: QWidget, x: float, y: float) -> QPoint:
+    point = QPoint(int(x // 1), int(y // 1))
+    if not widget.rect().contains(point):
+        raise GpError(
+            f"pixel {point.x()}, {point.y()} lies outside the view of {widget.width()} x {widget.height()} pixels",
+            remedy="Bring it into sight first: view, with go_to.",
+        )
+    return point

@@ -1,0 +1,89 @@
+"""Pictures of the window and its views, of any size."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QSize
+from PySide6.QtGui import QImage, QPainter
+from PySide6.QtWidgets import QApplication, QWidget
+
+from gp_labeler.scene.planes import Plane
+from gp_labeler.views.slice_view import SliceView
+
+if TYPE_CHECKING:
+    from gp_labeler.views.main_window import MainWindow
+
+__all__ = ["PICTURES", "picture"]
+
+PICTURES = ("window", "views", "slices", "3d", *(plane.value for plane in Plane))
+
+_GAP = 4
+
+
+def picture(window: MainWindow, what: str, size: tuple[int, int] | None = None) -> QImage:
+    """Draw one of `PICTURES`.
+
+    Parameters
+    ----------
+    window : MainWindow
+        What is drawn; it looks as before afterwards.
+    what : str
+        Which picture.
+    size : (width, height), optional
+        In pixels; by default as on the screen. A view shows the same middle at a zoom to match.
+    """
+    grid = window.grid
+    grid.scene_view.redraw()  # not the coarse stand-in of a moving camera
+    if what == "slices":
+        return _slices(list(grid.slice_views.values()), size)
+    if what == "3d":
+        return _grabbed(grid.scene_view, size)
+    if what in (plane.value for plane in Plane):
+        return _slice(grid.slice_views[Plane(what)], size)
+    return _resized(window, grid if what == "views" else window, size)
+
+
+def _resized(window: QWidget, part: QWidget, size: tuple[int, int] | None) -> QImage:
+    """Draw a part of the window, the window resized until the part has its size."""
+    before = window.size()
+    if size is not None:
+        window.resize(before + QSize(*size) - part.size())
+        QApplication.processEvents()
+    image = part.grab().toImage()
+    if size is not None:
+        window.resize(before)
+        QApplication.processEvents()
+    return image if size is None or image.size() == QSize(*size) else image.scaled(*size)
+
+
+def _grabbed(view: QWidget, size: tuple[int, int] | None) -> QImage:
+    before = view.size()
+    if size is not None:
+        ratio = view.devicePixelRatioF()
+        view.resize(round(size[0] / ratio), round(size[1] / ratio))
+    image = view.grab().toImage()
+    view.resize(before)
+    return image
+
+
+def _slice(view: SliceView, size: tuple[int, int] | None) -> QImage:
+    before = view.shown
+    if before is not None and size is not None:
+        factor = min(size[0] / before.size[0], size[1] / before.size[1])
+        view.shown = before.resized(*size).zoomed(factor)
+    image = _grabbed(view, size)
+    view.shown = before
+    return image
+
+
+def _slices(views: list[SliceView], size: tuple[int, int] | None) -> QImage:
+    width, height = size or (3 * 480 + 2 * _GAP, 480)
+    each = (width - 2 * _GAP) // 3
+    whole = QImage(width, height, QImage.Format.Format_RGB32)
+    whole.fill(0)
+    painter = QPainter(whole)
+    for n, view in enumerate(views):
+        painter.drawImage(n * (each + _GAP), 0, _slice(view, (each, height)))
+    painter.end()
+    return whole

@@ -1,0 +1,63 @@
+"""What stands in for the user's answers: only what a step has said; any other question stops the script."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+__all__ = ["ScriptPrompts"]
+
+
+class ScriptPrompts:
+    """Answers the window's questions; see `gp_labeler.views.prompts.Prompts` for what they are."""
+
+    def __init__(self) -> None:
+        self.files: list[Path] = []
+        self.answers: tuple[str, ...] = ()
+        self.unanswered: list[str] = []
+
+    def prepare(self, files: Sequence[Path] = (), answers: Sequence[str] = ()) -> None:
+        """Take the answers that the next step gives, and forget those of the last."""
+        self.files, self.answers = list(files), tuple(answers)
+        self.unanswered = []
+
+    def choose(
+        self, title: str, text: str, answers: Sequence[str], *, detail: str = "", kind: str = ""
+    ) -> str:
+        """Return the first answer offered that the step allows."""
+        for answer in answers:
+            if answer in self.answers:
+                return answer
+        self.unanswered.append(f"{text} {detail}".strip())
+        return ""
+
+    def tell(self, title: str, text: str) -> None:
+        """Take what must be read as a question that nobody answers."""
+        self.unanswered.append(text)
+
+    def open_files(self, title: str, folder: str, filters: str, *, many: bool = False) -> list[Path]:
+        """Return the files of the step."""
+        if not self.files:
+            self.unanswered.append(title)
+        return self.files if many else self.files[:1]
+
+    def folder(self, title: str, folder: str) -> Path | None:
+        """Return the folder of the step."""
+        return next(iter(self.open_files(title, folder, "")), None)
+
+    def save_file(self, title: str, suggestion: str, filters: str) -> Path | None:
+        """Return the file of the step."""
+        return next(iter(self.open_files(title, suggestion, filters)), None)
+
+    def item(self, title: str, text: str, items: Sequence[str]) -> str:
+        """Return the item that the step names."""
+        for item in items:
+            if item in self.answers or item.split()[0] in self.answers:
+                return item
+        self.unanswered.append(text)
+        return ""
+
+    def number(self, title: str, text: str, value: float) -> float | None:
+        """Leave it open: scripts give numbers where they are needed."""
+        self.unanswered.append(text)
+        return None

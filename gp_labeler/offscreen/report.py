@@ -1,0 +1,146 @@
+"""What a script did: each step with its time, each feature with its error, the poses."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.files import write_text
+from gp_labeler.offscreen.rig import Rig
+
+__all__ = ["Report", "StepRecord", "feature_rows", "pose_rows"]
+
+
+@dataclass(frozen=True)
+class StepRecord:
+    """A step that was done, or failed.
+
+    Parameters
+    ----------
+    number : int
+        Which, from 1.
+    title : str
+        The step in a few words.
+    text : str
+        What came of it.
+    seconds : float
+        How long it took.
+    warnings : tuple of str
+        What the window warned of meanwhile.
+    """
+
+    number: int
+    title: str
+    text: str = ""
+    seconds: float = 0.0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass
+class Report:
+    """The result of one run.
+
+    Parameters
+    ----------
+    script : str
+        Its name.
+    specimen : str
+        What was open at the end.
+    error : str
+        Why it stopped; empty where it came to its end.
+    """
+
+    script: str
+    specimen: str = ""
+    error: str = ""
+    steps: list[StepRecord] = field(default_factory=list)
+    features: list[dict[str, Any]] = field(default_factory=list)
+    poses: list[dict[str, Any]] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
+
+    @property
+    def ok(self) -> bool:
+        """Whether every step was done."""
+        return not self.error
+
+    @property
+    def seconds(self) -> float:
+        """How long all steps took."""
+        return sum(step.seconds for step in self.steps)
+
+    def take_stock(self, rig: Rig) -> None:
+        """Note what the window holds now."""
+        self.specimen = rig.desk.session.state.specimen
+        self.features, self.poses = feature_rows(rig), pose_rows(rig)
+        self.files = [_relative(file, rig.output) for file in rig.files]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the report as its file holds it; lengths in mm."""
+        errors = [row["error_mm"] for row in self.features if row.get("error_mm") is not None]
+        voxels = [row["error_voxels"] for row in self.features if row.get("error_voxels") is not None]
+        return {
+            "script": self.script,
+            "specimen": self.specimen,
+            "ok": self.ok,
+            "error": self.error,
+            "seconds": round(self.seconds, 3),
+            "n_placed": len(self.features),
+            "largest_error_mm": max(errors, default=None),
+            "largest_error_voxels": max(voxels, default=None),
+            "steps": [
+                {
+                    "number": step.number,
+                    "step": step.title,
+                    "result": step.text,
+                    "seconds": round(step.seconds, 3),
+                    "warnings": list(step.warnings),
+                }
+                for step in self.steps
+            ],
+            "features": self.features,
+            "poses": self.poses,
+            "files": self.files,
+        }
+
+    def save(self, path: Path) -> None:
+        """Write the report as JSON."""
+        write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
+
+
+def feature_rows(rig: Rig) -> list[dict[str, Any]]:
+    """Return a row for each placed or computed feature: where it is and, of a phantom, where it should be."""
+    rows = []
+    for side in Side:
+        landmarks = rig.desk.session.landmarks(side)
+        for code in (code for code in CODES if code in landmarks):
+            row: dict[str, Any] = {"side": side.value, "feature": code, "placed": landmarks[code].tolist()}
+            if rig.desk.truth is not None:
+                truth = rig.truth(side, code)
+                off = float(np.linalg.norm(landmarks[code] - truth))
+                row |= {"true": truth.tolist(), "error_mm": off, "error_voxels": off / rig.voxel}
+            rows.append(row)
+    return rows
+
+
+def pose_rows(rig: Rig) -> list[dict[str, Any]]:
+    """Return a row for each estimated cochlea."""
+    return [
+        {
+            "side": side.value,
+            "method": estimated.pose.method,
+            "radius_95_mm": estimated.pose.radius_95,
+            "cone_95_deg": float(np.degrees(estimated.pose.cone_95)),
+            "error_mm": estimated.error_mm,
+            "error_deg": estimated.error_deg,
+        }
+        for side, estimated in rig.poses.items()
+    ]
+
+
+def _relative(file: Path, folder: Path) -> str:
+    return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else str(file)

@@ -1,0 +1,217 @@
+"""The window that a script drives, and what its steps have found so far."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from PySide6.QtCore import QCoreApplication, QEvent
+from PySide6.QtTest import QTest
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature, index_of
+from gp_labeler.offscreen.events import click
+from gp_labeler.offscreen.prompts import ScriptPrompts
+from gp_labeler.scene.planes import Plane
+from gp_labeler.session.workflow import Active
+
+if TYPE_CHECKING:
+    from gp_labeler.offscreen.steps.pose import Estimated
+    from gp_labeler.views.scene_view import SceneView
+    from gp_labeler.views.slice_view import SliceView
+
+__all__ = ["VIEWS", "Rig", "use_no_display"]
+
+VIEWS = ("3d", *(plane.value for plane in Plane))
+
+_SIZE = (1440, 900)
+_PATIENCE_SECONDS = 600.0
+_IN_PASSING = ("judging",)
+"""Work whose result changes only how things look: nobody waits for it between clicks."""
+
+
+def use_no_display() -> None:
+    """Let Qt draw in memory, on every system, unless the environment asks for something else."""
+    os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+
+
+class Rig:
+    """A real window, with someone who answers its questions.
+
+    Parameters
+    ----------
+    output : Path
+        Folder for what is written.
+    folder : Path
+        What paths of files to read are relative to.
+    """
+
+    def __init__(self, output: Path, folder: Path) -> None:
+        from gp_labeler.views.application import make_application, make_window
+
+        self.app = make_application()
+        self.output, self.folder = output, folder
+        self.prompts = ScriptPrompts()
+        self.window = make_window(None)
+        self.window.ui.prompts = self.prompts  # type: ignore[assignment]
+        self.desk = self.window.workbench
+        self.messages: list[tuple[str, str]] = []
+        self.faults: list[BaseException] = []
+        self.spacing: Any = None  # of the next scan
+        self.poses: dict[Side, Estimated] = {}
+        self.files: list[Path] = []
+        self.desk.message.connect(self._hear)
+        self.window.resize(*_SIZE)
+        self.window.show()
+        QTest.qWaitForWindowExposed(self.window)
+        self.window.activateWindow()
+        self.settle()
+
+    def _hear(self, text: str, level: str) -> None:
+        self.messages.append((text, level))
+
+    # Paths
+
+    def to_read(self, path: str) -> Path:
+        """Return a path to read, relative to the script's folder."""
+        return self.folder / path
+
+    def to_write(self, path: str) -> Path:
+        """Return a path to write, relative to the output folder, which is made if need be."""
+        file = self.output / path
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise GpError(f"cannot be made: {error.strerror}", file=file.parent) from None
+        return file
+
+    def wrote(self, *files: Path) -> str:
+        """Remember files that were written, and return their names."""
+        self.files += [file for file in files if file not in self.files]
+        return ", ".join(file.name for file in files)
+
+    # Waiting
+
+    def settle(self, *, in_passing: bool = True) -> None:
+        """Wait until all background work is done and delivered, and all is drawn.
+
+        Parameters
+        ----------
+        in_passing : bool
+            Whether to wait also for what changes only how points look.
+        """
+        end = time.monotonic() + _PATIENCE_SECONDS
+        while any(in_passing or not task.key.startswith(_IN_PASSING) for task in self.desk.jobs.running):
+            QTest.qWait(5)
+            if time.monotonic() > end:
+                titles = ", ".join(task.job.title for task in self.desk.jobs.running)
+                raise GpError(f"still not finished after {_PATIENCE_SECONDS:g} s: {titles}")
+        self.app.processEvents()
+
+    # What is there
+
+    @property
+    def voxel(self) -> float:
+        """Smallest voxel edge, mm.
+
+        Raises
+        ------
+        GpError
+            No scan is open.
+        """
+        if self.desk.volume is None:
+            raise GpError("no scan is open", remedy="Let a step open one first.")
+        return min(self.desk.volume.spacing)
+
+    def truth(self, side: Side, code: str) -> FloatArray:
+        """Return where a feature of the phantom really is, (3,) mm, scan frame."""
+        if self.desk.truth is None:
+            raise GpError("the truth is known of a phantom only", landmark=code)
+        return self.desk.truth.side(side)[code]
+
+    def placed(self, side: Side, code: str) -> FloatArray | None:
+        """Return where a feature is placed or computed, (3,) mm, scan frame."""
+        landmarks = self.desk.session.landmarks(side)
+        return landmarks[code] if feature(code).code in landmarks else None
+
+    # The views
+
+    @property
+    def scene(self) -> SceneView:
+        """The 3D view."""
+        return self.window.grid.scene_view
+
+    def view(self, name: str) -> SceneView | SliceView:
+        """Return a view by its name, and see to it that it is on the screen."""
+        if name not in VIEWS:
+            raise GpError(f"view must be one of {', '.join(VIEWS)}, got {name!r}")
+        layout = self.desk.session.view.state.layout
+        if layout not in ("four-up", name):
+            self.desk.session.view.update(layout=name)
+            self.app.processEvents()
+        return self.scene if name == "3d" else self.window.grid.slice_views[Plane(name)]
+
+    def bring(self, position: FloatArray) -> None:
+        """Bring a (3,) scan position into sight in every view, as a click on a row does."""
+        self.desk.session.set_crosshair(position)
+        self.desk.point_shown.emit(np.asarray(position, dtype=np.float64))
+
+    def choose(self, side: Side, code: str) -> None:
+        """Choose a point by a click on its cell in the table.
+
+        Raises
+        ------
+        GpError
+            It cannot be chosen, as CO cannot.
+        """
+        code = feature(code).code
+        self.window.set_step("label")
+        table = self.window.steps["label"].table  # type: ignore[attr-defined]
+        cell = table.model.index(index_of(code), 1 + list(Side).index(side))
+        middle = table.view.visualRect(cell).center()
+        click(table.view.viewport(), middle.x(), middle.y())
+        if self.desk.session.active != Active(side, code):
+            raise GpError(f"{code} {side.word} cannot be chosen", landmark=code)
+
+    # Life
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Catch what goes wrong inside Qt's own calls, where nobody else would."""
+        before = sys.excepthook
+
+        def note(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+            self.faults.append(error)
+
+        sys.excepthook = note
+        try:
+            yield
+        finally:
+            sys.excepthook = before
+
+    def trouble(self, since: int) -> str:
+        """Return what went wrong while a step was done, as the window said it; empty where nothing did."""
+        errors = [text for text, level in self.messages[since:] if level == "error"]
+        asked = [f"the window asks: {text}" for text in self.prompts.unanswered]
+        faults = [f"{type(fault).__name__}: {fault}" for fault in self.faults]
+        return " ".join([*errors, *asked, *faults])
+
+    def warnings(self, since: int) -> Sequence[str]:
+        """Return what the window warned of since so many messages."""
+        return [text for text, level in self.messages[since:] if level == "warning"]
+
+    def close(self) -> None:
+        """Close the window and everything it holds; edits that no step saved are dropped."""
+        self.prompts.prepare(answers=("Do not save",))
+        self.window.close()
+        self.desk.message.disconnect(self._hear, missing_ok=True)
+        self.window.deleteLater()
+        QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)

@@ -1,0 +1,23 @@
+"""All steps that a script can take, by what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from gp_labeler.offscreen.step import Step
+from gp_labeler.offscreen.steps.expecting import Expect
+from gp_labeler.offscreen.steps.files import Export, Import, Save
+from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
+from gp_labeler.offscreen.steps.placing import Drag, Place
+from gp_labeler.offscreen.steps.pose import Check, Estimate, Fit, Overlay
+from gp_labeler.offscreen.steps.scan import Mesh, Open, Spacing, Threshold
+
+__all__ = ["STEPS"]
+
+_ALL: tuple[type[Step], ...] = (
+    *(Open, Spacing, Threshold, Mesh, Look, Place, Drag, Key, Act, Undo),
+    *(Import, Export, Fit, Estimate, Overlay, Check, Screenshot, Save, Expect),
+)
+
+STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

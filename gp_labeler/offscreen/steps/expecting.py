@@ -1,0 +1,98 @@
+"""The step that makes a script a test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature
+from gp_labeler.offscreen.rig import Rig
+from gp_labeler.offscreen.step import Step, Triple
+
+__all__ = ["Expect"]
+
+
+@dataclass(frozen=True)
+class Expect(Step):
+    """Fail unless something is so.
+
+    Parameters
+    ----------
+    feature : str, optional
+        A point, of `side`, that lies `within` mm of `near`.
+    side : L or R, optional
+        Which side; for `placed`, both where it is not given.
+    near : three numbers or str, optional
+        A scan position, mm, or ``truth``.
+    within : float, optional
+        mm; by default one voxel.
+    placed : int, optional
+        How many points are placed or computed.
+    message : str, optional
+        A part of something that the window has said.
+    pose_within : float, optional
+        The estimated cochlea of `side` (L by default) is so near to the true one, mm.
+    """
+
+    do: ClassVar[str] = "expect"
+    feature: str | None = None
+    side: Side | None = None
+    near: Triple | str | None = None
+    within: float | None = None
+    placed: int | None = None
+    message: str | None = None
+    pose_within: float | None = None
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        rig.settle()
+        found = []
+        if self.feature is not None:
+            found.append(self._point(rig, feature(self.feature).code))
+        if self.placed is not None:
+            found.append(self._count(rig, self.placed))
+        if self.message is not None:
+            found.append(self._heard(rig, self.message))
+        if self.pose_within is not None:
+            found.append(self._pose(rig, self.pose_within))
+        if not found:
+            raise GpError("expect needs feature, placed, message or pose_within")
+        return ", ".join(found)
+
+    def _point(self, rig: Rig, code: str) -> str:
+        side = self.side or Side.LEFT
+        there = rig.placed(side, code)
+        if there is None:
+            raise GpError(f"{code} {side.word} is not placed", landmark=code)
+        if self.near is None:
+            return f"{code} {side.word} is placed"
+        aim = rig.truth(side, code) if self.near == "truth" else np.array(self.near)
+        if aim.shape != (3,) or aim.dtype.kind != "f":
+            raise GpError(f"near must be a position or truth, got {self.near!r}")
+        off, allowed = float(np.linalg.norm(there - aim)), self.within or rig.voxel
+        if off > allowed:
+            raise GpError(f"{code} {side.word} lies {off:.3f} mm off, allowed are {allowed:g}", landmark=code)
+        return f"{code} {side.word} {off:.3f} mm off"
+
+    def _count(self, rig: Rig, wanted: int) -> str:
+        sides = list(Side) if self.side is None else [self.side]
+        counted = sum(rig.desk.session.progress(side).n_placed for side in sides)
+        if counted != wanted:
+            raise GpError(f"{counted} points are placed, expected were {wanted}")
+        return f"{counted} points"
+
+    def _heard(self, rig: Rig, text: str) -> str:
+        if not any(text in said for said, _ in rig.messages):
+            last = f"; the last was {rig.messages[-1][0]!r}" if rig.messages else ""
+            raise GpError(f"no message holds {text!r}{last}")
+        return f"message {text!r}"
+
+    def _pose(self, rig: Rig, allowed: float) -> str:
+        pose = rig.poses.get(self.side or Side.LEFT)
+        if pose is None or pose.error_mm is None:
+            raise GpError("no pose was estimated whose truth is known")
+        if pose.error_mm > allowed:
+            raise GpError(f"the cochlea is {pose.error_mm:.3f} mm off, allowed are {allowed:g}")
+        return f"cochlea {pose.error_mm:.3f} mm off"

@@ -1,0 +1,228 @@
+"""Steps that change or keep what is seen, press keys and run commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_labeler.actions import action
+from gp_labeler.offscreen.events import press_keys
+from gp_labeler.offscreen.pictures import PICTURES, picture
+from gp_labeler.offscreen.rig import Rig
+from gp_labeler.offscreen.step import Pair, Step, Triple
+from gp_labeler.scene.planes import Plane
+from gp_labeler.views.theme import THEMES
+
+__all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]
+
+
+@dataclass(frozen=True)
+class Look(Step):
+    """Change what the views show; the keys are done in this order.
+
+    Parameters
+    ----------
+    size : two numbers, optional
+        Width and height of the window, logical pixels.
+    theme : str, optional
+        ``dark`` or ``light``.
+    panel : str, optional
+        ``scan`` or ``label``: the panel beside the views.
+    layout : str, optional
+        ``four-up``, ``3d``, ``axial``, ``sagittal`` or ``coronal``.
+    reset : bool
+        Show everything in every view.
+    camera : str or three numbers, optional
+        Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``, or in a direction.
+    go_to : three numbers or str, optional
+        A scan position, mm, or a point such as ``CA L``, to bring into sight in every view.
+    axial, sagittal, coronal : float, optional
+        Positions of the slices, mm.
+    zoom : float, optional
+        Magnify the 3D view, and the slices about the crosshair.
+    opacity : float, optional
+        Of the bone, 0 to 1.
+    """
+
+    do: ClassVar[str] = "view"
+    size: Pair | None = None
+    theme: str | None = None
+    panel: str | None = None
+    layout: str | None = None
+    reset: bool = False
+    camera: str | Triple | None = None
+    go_to: Triple | str | None = None
+    axial: float | None = None
+    sagittal: float | None = None
+    coronal: float | None = None
+    zoom: float | None = None
+    opacity: float | None = None
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        self._set_window(rig)
+        if self.reset:
+            rig.window.grid.reset()
+        if isinstance(self.camera, str):
+            rig.scene.view_from(self.camera.upper())
+        elif self.camera is not None:
+            direction = np.array(self.camera) / np.linalg.norm(self.camera)
+            up = (0, -1, 0) if abs(direction[2]) > 0.95 else (0, 0, 1)
+            rig.scene.scene.camera.look(direction, up)
+            rig.scene.redraw()
+        self._go(rig)
+        if self.zoom is not None:
+            self._magnify(rig, self.zoom)
+        if self.opacity is not None:
+            rig.desk.session.view.update(mesh_opacity=self.opacity)
+        rig.app.processEvents()
+
+    def _set_window(self, rig: Rig) -> None:
+        if self.size is not None:
+            rig.window.resize(round(self.size[0]), round(self.size[1]))
+        if self.theme is not None:
+            _check(self.theme, "theme", tuple(THEMES))
+            rig.window.set_theme(self.theme)
+        if self.panel is not None:
+            _check(self.panel, "panel", tuple(rig.window.steps))
+            rig.window.set_step(self.panel)
+        if self.layout is not None:
+            rig.desk.session.view.update(layout=self.layout)
+        rig.app.processEvents()  # sizes are known from here on
+
+    def _go(self, rig: Rig) -> None:
+        if isinstance(self.go_to, str):
+            code, _, side = self.go_to.partition(" ")
+            rig.desk.go_to(Side.parse(side or "L"), code)
+        elif self.go_to is not None:
+            rig.bring(np.array(self.go_to))
+        crosshair = np.array(rig.desk.session.crosshair)
+        for plane in Plane:
+            position = getattr(self, plane.value)
+            if position is not None:
+                crosshair[plane.axis] = position
+        rig.desk.session.set_crosshair(crosshair)
+
+    def _magnify(self, rig: Rig, factor: float) -> None:
+        if factor <= 0:
+            raise GpError(f"zoom must be above 0, got {factor:g}")
+        rig.scene.scene.camera.zoom(factor)
+        rig.scene.redraw()
+        for view in rig.window.grid.slice_views.values():
+            if view.shown is not None:
+                about = view.shown.scan_to_pixel(rig.desk.session.crosshair[None])[0]
+                view.shown = view.shown.zoomed(factor, about)
+                view.update()
+
+
+@dataclass(frozen=True)
+class Screenshot(Step):
+    """Write a picture.
+
+    Parameters
+    ----------
+    path : str
+        The file, .png.
+    what : str
+        ``window``, ``views`` (all four), ``slices`` (three side by side), ``3d``, ``axial``, ``sagittal`` or
+        ``coronal``.
+    size : two numbers, optional
+        Width and height in pixels; by default as large as on the screen.
+    """
+
+    do: ClassVar[str] = "screenshot"
+    says: ClassVar[tuple[str, ...]] = ("path",)
+    path: str
+    what: str = "window"
+    size: Pair | None = None
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        _check(self.what, "what", PICTURES)
+        rig.settle()
+        size = None if self.size is None else (round(self.size[0]), round(self.size[1]))
+        image, file = picture(rig.window, self.what, size), rig.to_write(self.path)
+        if not image.save(str(file)):
+            raise GpError("cannot be written", file=file, remedy="Give a path that ends with .png.")
+        return f"{rig.wrote(file)}, {image.width()} x {image.height()}"
+
+
+@dataclass(frozen=True)
+class Key(Step):
+    """Press keys while the pointer is in a view.
+
+    Parameters
+    ----------
+    keys : str
+        Such as ``Ctrl+Z``, ``Return``, ``Left``.
+    view : str
+        ``3d``, ``axial``, ``sagittal`` or ``coronal``.
+    times : int
+        How often.
+    """
+
+    do: ClassVar[str] = "key"
+    says: ClassVar[tuple[str, ...]] = ("keys",)
+    keys: str
+    view: str = "axial"
+    times: int = 1
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        view = rig.view(self.view)
+        view.setFocus()
+        for _ in range(self.times):
+            press_keys(view, self.keys)
+        rig.settle(in_passing=False)
+
+
+@dataclass(frozen=True)
+class Act(Step):
+    """Run a command of the window's menus by its id, such as ``point.lock``.
+
+    Parameters
+    ----------
+    id : str
+        The command; an unknown one is answered with all there are.
+    """
+
+    do: ClassVar[str] = "action"
+    says: ClassVar[tuple[str, ...]] = ("id",)
+    id: str
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        if not action(self.id).enabled(rig.desk):
+            raise GpError(f"{self.id} cannot be done now")
+        rig.window.commands.run(self.id)
+        rig.settle()
+
+
+@dataclass(frozen=True)
+class Undo(Step):
+    """Take back the last edits.
+
+    Parameters
+    ----------
+    times : int
+        How many.
+    """
+
+    do: ClassVar[str] = "undo"
+    times: int = 1
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        undone = []
+        for _ in range(self.times):
+            text = rig.desk.session.undo_text
+            if text is None:
+                raise GpError("there is nothing to undo")
+            undone.append(text)
+            rig.window.commands.run("edit.undo")
+        rig.settle(in_passing=False)
+        return ", ".join(undone)
+
+
+def _check(value: str, name: str, allowed: tuple[str, ...]) -> None:
+    if value not in allowed:
+        raise GpError(f"{name} must be one of {', '.join(allowed)}, got {value!r}")

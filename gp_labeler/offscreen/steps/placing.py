@@ -1,0 +1,171 @@
+"""Steps that place and move points by clicks and drags on the real views."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature
+from gp_labeler.offscreen.aiming import aim_at_bone, scroll_to
+from gp_labeler.offscreen.events import click, drag, press_keys
+from gp_labeler.offscreen.rig import VIEWS, Rig
+from gp_labeler.offscreen.step import Pair, Step, Triple
+from gp_labeler.scene.planes import Plane
+
+__all__ = ["Drag", "Place"]
+
+_KEYS = {"ghost": "Return", "crosshair": "Space"}
+
+
+@dataclass(frozen=True)
+class Place(Step):
+    """Choose a feature by a click on its row, and place it by a click, or a key, in a view.
+
+    Parameters
+    ----------
+    feature : str
+        Its code.
+    side : L or R
+        Which side.
+    at : three numbers or str, optional
+        A scan position, mm, through whose picture the click goes: the view is scrolled and zoomed to it first.
+        ``truth`` is where the phantom has the feature. ``ghost`` and ``crosshair`` press the keys that place
+        the point where the atlas expects it, or where the crosshair is.
+    pixel : two numbers, optional
+        Instead of `at`: a logical pixel of the view as it is, from its top left.
+    view : str
+        ``3d``, ``axial``, ``sagittal``, ``coronal``, or ``best``: where the feature table says it is found.
+    within : float, optional
+        Fail where the point comes to lie farther than this from `at`, mm.
+    """
+
+    do: ClassVar[str] = "place"
+    says: ClassVar[tuple[str, ...]] = ("feature", "side")
+    feature: str
+    side: Side
+    at: Triple | str | None = None
+    pixel: Pair | None = None
+    view: str = "best"
+    within: float | None = None
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        code = feature(self.feature).code
+        if (self.at is None) == (self.pixel is None):
+            raise GpError("place needs at or pixel, one of them", landmark=code)
+        _ = rig.voxel
+        before, since = rig.desk.session.state, len(rig.messages)
+        rig.choose(self.side, code)
+        name = self._hit(rig, code)
+        rig.settle(in_passing=False)
+        if rig.desk.session.state is before:
+            why = " ".join(text for text, _ in rig.messages[since:]) or "nothing was hit"
+            raise GpError(f"{code} {self.side.word} was not placed: {why}", landmark=code)
+        return self._result(rig, code, name)
+
+    def _hit(self, rig: Rig, code: str) -> str:
+        """Click or press; return where."""
+        if isinstance(self.at, str) and self.at in _KEYS:
+            view = rig.view("axial" if self.view == "best" else self.view)
+            view.setFocus()
+            press_keys(view, _KEYS[self.at])
+            return self.at
+        name = self.view
+        if self.pixel is not None:
+            name = "axial" if name == "best" else name
+            click(rig.view(name), *self.pixel)
+            return name
+        aim = self._aim(rig, code)
+        name = _seen_in(rig, name, code, aim)
+        view = rig.view(name)
+        click(view, *view.pixel_at(aim))
+        return name
+
+    def _aim(self, rig: Rig, code: str) -> FloatArray:
+        if isinstance(self.at, str):
+            if self.at != "truth":
+                raise GpError(f"at must be truth, ghost, crosshair or a position, got {self.at!r}")
+            return rig.truth(self.side, code)
+        return np.array(self.at, dtype=np.float64)
+
+    def _result(self, rig: Rig, code: str, name: str) -> str:
+        there = rig.placed(self.side, code)
+        if there is None or (self.at in _KEYS) or self.at is None:
+            return name
+        off = float(np.linalg.norm(there - self._aim(rig, code)))
+        if self.within is not None and off > self.within:
+            raise GpError(
+                f"{code} {self.side.word} came to lie {off:.3f} mm off, allowed are {self.within:g}",
+                landmark=code,
+            )
+        return f"{name}, {off:.3f} mm from there"
+
+
+def _seen_in(rig: Rig, name: str, code: str, aim: FloatArray) -> str:
+    """Bring a position into sight, and return the name of the view to click in."""
+    if name == "best":
+        name = feature(code).view.lower()
+        if name == "3d" and not aim_at_bone(rig, aim, turn=True):
+            name = "axial"  # hidden behind bone from everywhere
+    elif name == "3d" and not aim_at_bone(rig, aim, turn=False):
+        raise GpError(
+            "bone hides that position from where the camera is", remedy="Look from elsewhere, or use best."
+        )
+    if name not in VIEWS:
+        raise GpError(f"view must be best or one of {', '.join(VIEWS)}, got {name!r}")
+    if name != "3d":
+        scroll_to(rig, Plane(name), aim)
+    return name
+
+
+@dataclass(frozen=True)
+class Drag(Step):
+    """Drag a placed point to another place.
+
+    Parameters
+    ----------
+    feature : str
+        Its code.
+    side : L or R
+        Which side.
+    to : three numbers, optional
+        Scan position, mm, to whose picture it is dragged.
+    by : two numbers, optional
+        Instead: logical pixels, right and down.
+    view : str
+        ``3d``, ``axial``, ``sagittal`` or ``coronal``.
+    """
+
+    do: ClassVar[str] = "drag"
+    says: ClassVar[tuple[str, ...]] = ("feature", "side")
+    feature: str
+    side: Side
+    to: Triple | None = None
+    by: Pair | None = None
+    view: str = "axial"
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        code = feature(self.feature).code
+        start = rig.placed(self.side, code)
+        if (self.to is None) == (self.by is None):
+            raise GpError("drag needs to or by, one of them", landmark=code)
+        if start is None:
+            raise GpError(f"{code} {self.side.word} is not placed yet", landmark=code)
+        view = rig.view(self.view)
+        rig.choose(self.side, code)
+        rig.bring(start)
+        rig.app.processEvents()
+        here = view.pixel_at(start)
+        there = (here[0] + self.by[0], here[1] + self.by[1]) if self.by else view.pixel_at(np.array(self.to))
+        since = len(rig.messages)
+        drag(view, here, there)
+        rig.settle(in_passing=False)
+        end = rig.placed(self.side, code)
+        if end is None or np.allclose(start, end, atol=1e-9):
+            why = " ".join(text for text, _ in rig.messages[since:]) or "it is where it was"
+            raise GpError(f"{code} {self.side.word} was not moved: {why}", landmark=code)
+        return f"by {math.dist(start, end):.3f} mm"

@@ -1,0 +1,144 @@
+"""Steps on the scan: open, spacing, threshold, mesh."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+from gp_core.errors import GpError
+from gp_labeler.imaging.readers import inspect_volume
+from gp_labeler.offscreen.rig import Rig
+from gp_labeler.offscreen.step import Step, Triple
+from gp_labeler.session.specimen_file import SUFFIX
+
+__all__ = ["Mesh", "Open", "Spacing", "Threshold"]
+
+
+@dataclass(frozen=True)
+class Open(Step):
+    """Open a scan, a folder of slices, a specimen file, or the phantom.
+
+    Parameters
+    ----------
+    path : str, optional
+        The file or folder.
+    phantom : int, optional
+        Seed of the phantom to open instead.
+    spacing : float or three, optional
+        Voxel size, mm: of the scan where its file does not say, or of the phantom.
+    series : str, optional
+        Which scan of several.
+    reverse : bool
+        Whether the slices run the other way.
+    accept : text or texts
+        Codes of problems that are knowingly accepted.
+    """
+
+    do: ClassVar[str] = "open"
+    says: ClassVar[tuple[str, ...]] = ("path", "phantom")
+    path: str | None = None
+    phantom: int | None = None
+    spacing: float | Triple | None = None
+    series: str | None = None
+    reverse: bool = False
+    accept: tuple[str, ...] = ()
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        if (self.path is None) == (self.phantom is None):
+            raise GpError("open needs a path or phantom = a seed, one of them")
+        if rig.desk.session.dirty:
+            raise GpError("what is open has edits that are not saved", remedy="Let a save step come first.")
+        if self.phantom is not None:
+            rig.desk.open_demo(self.phantom, self.spacing if isinstance(self.spacing, float) else 0.2)
+        else:
+            self._open(rig, rig.to_read(self.path or ""))
+        rig.settle()
+        volume = rig.desk.volume
+        if volume is None:
+            raise GpError(rig.trouble(0) or "no scan was opened")
+        return f"{volume.name}, {' x '.join(str(n) for n in volume.size)} voxels"
+
+    def _open(self, rig: Rig, path: Path) -> None:
+        if not path.exists():
+            raise GpError("does not exist", file=path)
+        if path.name.endswith(SUFFIX):
+            rig.desk.open_specimen(path)
+            return
+        plan = inspect_volume(path, **self._options(rig))
+        if plan.errors:
+            text = " ".join(f"{problem.text}. {problem.remedy} [{problem.code}]" for problem in plan.errors)
+            raise GpError(text, file=path)
+        for problem in plan.problems:
+            rig.desk.say(problem.text, "warning")
+        rig.desk.read_scan(plan)
+
+    def _options(self, rig: Rig) -> dict[str, Any]:
+        spacing = rig.spacing if self.spacing is None else self.spacing
+        options: dict[str, Any] = {"series": self.series, "reverse": self.reverse, "accept": self.accept}
+        return options if spacing is None else options | {"spacing": spacing}
+
+
+@dataclass(frozen=True)
+class Spacing(Step):
+    """Say the voxel size of the scans that are opened from now on.
+
+    Parameters
+    ----------
+    mm : float or three
+        Along x, y and z.
+    """
+
+    do: ClassVar[str] = "spacing"
+    says: ClassVar[tuple[str, ...]] = ("mm",)
+    mm: float | Triple
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        rig.spacing = self.mm
+
+
+@dataclass(frozen=True)
+class Threshold(Step):
+    """Set the grey value at which bone begins, and mesh anew.
+
+    Parameters
+    ----------
+    value : float
+        The grey value.
+    """
+
+    do: ClassVar[str] = "threshold"
+    says: ClassVar[tuple[str, ...]] = ("value",)
+    value: float
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        _ = rig.voxel  # a scan must be there
+        rig.desk.set_threshold(self.value)
+        rig.settle()
+
+
+@dataclass(frozen=True)
+class Mesh(Step):
+    """Mesh the ears at full resolution, and write the bone where asked.
+
+    Parameters
+    ----------
+    half_mm : float, optional
+        Half the edge of the boxes around the ears.
+    save : str, optional
+        File for the whole surface at full resolution: .ply, .stl or .vtp.
+    """
+
+    do: ClassVar[str] = "mesh"
+    half_mm: float | None = None
+    save: str | None = None
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        _ = rig.voxel
+        rig.desk.mesh_ears(self.half_mm)
+        if self.save is not None:
+            file = rig.to_write(self.save)
+            rig.desk.save_mesh(file)
+            rig.wrote(file)
+        rig.settle()
+        return f"{sum(part.n_triangles for part in rig.desk.surfaces)} triangles"
