@@ -8,6 +8,7 @@ from types import MappingProxyType
 from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
+from gp_labeler.views.strokes import round_pen
 from gp_labeler.views.theme import Theme
 
 __all__ = ["SHAPES", "chip_pixmap", "draw_chip"]
@@ -71,21 +72,21 @@ def _disc(painter: QPainter, colour: QColor, ground: QColor) -> None:
 def _ticked_disc(painter: QPainter, colour: QColor, ground: QColor) -> None:
     painter.setBrush(colour)
     painter.drawEllipse(QPointF(), 5.0, 5.0)
-    painter.setPen(_round_pen(ground, 1.7))
+    painter.setPen(round_pen(ground, 1.7))
     painter.drawPolyline(QPolygonF([QPointF(-2.4, 0.2), QPointF(-0.7, 2.0), QPointF(2.5, -1.9)]))
 
 
 def _triangle(painter: QPainter, colour: QColor, ground: QColor) -> None:
-    painter.setPen(_round_pen(colour, 1.5))
+    painter.setPen(round_pen(colour, 1.5))
     painter.setBrush(colour)
     painter.drawPolygon(QPolygonF([QPointF(0, -4.6), QPointF(4.9, 4.0), QPointF(-4.9, 4.0)]))
-    painter.setPen(_round_pen(ground, 1.4))
+    painter.setPen(round_pen(ground, 1.4))
     painter.drawLine(QPointF(0, -1.6), QPointF(0, 1.1))
     painter.drawPoint(QPointF(0, 3.1))
 
 
 def _dash(painter: QPainter, colour: QColor, ground: QColor) -> None:
-    painter.setPen(_round_pen(colour, 2.0))
+    painter.setPen(round_pen(colour, 2.0))
     painter.drawLine(QPointF(-4, 0), QPointF(4, 0))
 
 
@@ -108,10 +109,6 @@ def _padlock(painter: QPainter, colour: QColor, ground: QColor) -> None:
     painter.drawPath(shackle)
     painter.setBrush(colour)
     painter.drawRoundedRect(QRectF(-4, -0.4, 8, 5.4), 1, 1)
-
-
-def _round_pen(colour: QColor, width: float) -> QPen:
-    return QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
 
 
 SHAPES: Mapping[str, Callable[[QPainter, QColor, QColor], None]] = MappingProxyType(

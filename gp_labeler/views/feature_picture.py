@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
@@ -22,6 +20,7 @@ from PySide6.QtWidgets import QWidget
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.scene.schematic import FAR, Schematic, schematic_of
+from gp_labeler.views.strokes import beside, round_pen, smooth
 from gp_labeler.views.theme import Theme, base_font, theme_of
 
 __all__ = ["FeaturePicture", "feature_picture"]
@@ -146,7 +145,7 @@ class _Picture:
             )
             self._painter.setPen(edge)
             self._painter.setBrush(fill)
-            self._painter.drawPath(_smooth([self._at(p) for p in outline]))
+            self._painter.drawPath(smooth([self._at(p) for p in outline]))
 
     def _ear(self) -> None:
         bone = self._theme.scene.bone if self._theme.is_dark else "#B9A57E"
@@ -154,10 +153,10 @@ class _Picture:
         self._painter.setBrush(Qt.BrushStyle.NoBrush)
         self._canal(bone)
         width = max(1.5, 0.5 * self._scale)
-        self._painter.setPen(_round_pen(self._tint(bone, 0.35), width))
+        self._painter.setPen(round_pen(self._tint(bone, 0.35), width))
         for a, b in _OSSICLES:
             self._painter.drawLine(self._of(a), self._of(b))
-        self._painter.setPen(_round_pen(self._tint(bone, 0.55), max(1.2, 0.35 * self._scale)))
+        self._painter.setPen(round_pen(self._tint(bone, 0.55), max(1.2, 0.35 * self._scale)))
         self._painter.drawLine(self._of("FPA"), self._of("FPP"))
         self._window()
         self._axis()
@@ -167,12 +166,12 @@ class _Picture:
         line = [self._at(p) for p in self._it.spiral]
         n = len(line)
         for i in range(1, n - 1):
-            edge = _round_pen(QColor(bone).darker(230), self._tube_width(i / n) + 1.8)
+            edge = round_pen(QColor(bone).darker(230), self._tube_width(i / n) + 1.8)
             edge.setCapStyle(Qt.PenCapStyle.FlatCap)  # so it does not stain the part before
             self._painter.setPen(edge)
             self._painter.drawLine(line[i], line[i + 1])
             self._painter.setPen(
-                _round_pen(QColor(bone).darker(round(150 - 40 * i / n)), self._tube_width(i / n))
+                round_pen(QColor(bone).darker(round(150 - 40 * i / n)), self._tube_width(i / n))
             )
             self._painter.drawPolyline(QPolygonF(line[i - 1 : i + 2]))
 
@@ -195,7 +194,7 @@ class _Picture:
         rim = [self._of(code) for code in ("RWA", "RWL", "RWP", "RWM")]
         self._painter.setPen(QPen(QColor(self._theme.accent_text), 1.3))
         self._painter.setBrush(self._tint(self._theme.accent_text, 0.25))
-        self._painter.drawPath(_smooth(rim))
+        self._painter.drawPath(smooth(rim))
         self._painter.setBrush(Qt.BrushStyle.NoBrush)
 
     def _axis(self) -> None:
@@ -241,7 +240,7 @@ class _Picture:
     def _label(self, code: str, font: QFont, colour: QColor, gap: float, *, must: bool) -> None:
         """Write a feature's code beside it, where there is room."""
         size = QFontMetricsF(font).size(0, code)
-        boxes = list(_beside(self._of(code), size.width(), size.height(), gap))
+        boxes = list(beside(self._of(code), size.width(), size.height(), gap))
         frame = self._frame.adjusted(2, 2, -2, -2)
         free = [b for b in boxes if frame.contains(b) and not any(b.intersects(t) for t in self._taken)]
         if not free and not must:
@@ -250,7 +249,7 @@ class _Picture:
         self._taken.append(box)
         path = QPainterPath()
         path.addText(box.left(), box.top() + QFontMetricsF(font).ascent(), font, code)
-        self._painter.setPen(_round_pen(QColor(self._theme.scene.halo), 3))
+        self._painter.setPen(round_pen(QColor(self._theme.scene.halo), 3))
         self._painter.setBrush(Qt.BrushStyle.NoBrush)
         self._painter.drawPath(path)
         self._painter.setPen(Qt.PenStyle.NoPen)
@@ -282,26 +281,3 @@ class _Picture:
         font.setPixelSize(pixels)
         font.setBold(bold)
         return font
-
-
-def _beside(where: QPointF, width: float, height: float, gap: float) -> Iterator[QRectF]:
-    x, y = where.x(), where.y()
-    yield QRectF(x + gap, y - height / 2, width, height)
-    yield QRectF(x - gap - width, y - height / 2, width, height)
-    yield QRectF(x - width / 2, y - gap - height, width, height)
-    yield QRectF(x - width / 2, y + gap, width, height)
-    yield QRectF(x + 0.7 * gap, y - 0.7 * gap - height, width, height)
-    yield QRectF(x - 0.7 * gap - width, y - 0.7 * gap - height, width, height)
-
-
-def _round_pen(colour: QColor, width: float) -> QPen:
-    return QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
-
-
-def _smooth(corners: list[QPointF]) -> QPainterPath:
-    """Return a closed curve through points (Catmull and Rom's spline as cubic pieces)."""
-    n, path = len(corners), QPainterPath(corners[0])
-    for i in range(n):
-        before, a, b, after = (corners[(i + k) % n] for k in (-1, 0, 1, 2))
-        path.cubicTo(a + (b - before) / 6, b - (after - a) / 6, b)
-    return path

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 from PySide6.QtCore import Qt
@@ -18,34 +17,20 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.imaging.preview import PreviewPlane, preview_planes
-from gp_labeler.imaging.readers import ImportPlan, Problem, read_preview
-from gp_labeler.imaging.readers.options import Spacing
-from gp_labeler.session.jobs import Progress, Task
-from gp_labeler.views.bind import TIMES, blocked, follow, size_text, spacing_text
+from gp_labeler.imaging.preview import PreviewPlane
+from gp_labeler.imaging.readers import ImportPlan, Problem
+from gp_labeler.session.jobs import Task
+from gp_labeler.views.bind import blocked, follow
+from gp_labeler.views.panels.import_words import MB, PreviewScan, bare, facts_of, remedy, sentence, why_not
 from gp_labeler.views.panels.parts import Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.views.panels.preview_picture import PreviewPicture
 from gp_labeler.views.panels.spacing_fields import SpacingFields
 from gp_labeler.work import InspectScan
 from gp_labeler.workbench import Workbench
 
-__all__ = ["ImportDialog", "PreviewScan"]
+__all__ = ["ImportDialog"]
 
 _STRIDES = {1: "Every voxel", 2: "Every second voxel", 4: "Every fourth voxel"}
-_MB = 2**20
-
-
-@dataclass(frozen=True)
-class PreviewScan:
-    """Read a coarse picture of a scan, as a job."""
-
-    plan: ImportPlan
-    title: str = "Reading a preview"
-
-    def run(self, progress: Progress) -> tuple[PreviewPlane, PreviewPlane]:
-        """Return its middle slices."""
-        progress(0.0)
-        return preview_planes(read_preview(self.plan, cancel=progress.cancelled))
 
 
 class ImportDialog(QDialog):
@@ -179,11 +164,11 @@ class ImportDialog(QDialog):
             self.stride.clear()
             for stride, words in _STRIDES.items():
                 bytes_ = plan.with_options(stride=stride).n_bytes
-                self.stride.addItem(f"{words}  ({bytes_ / _MB:,.0f} MB of memory)", stride)
+                self.stride.addItem(f"{words}  ({bytes_ / MB:,.0f} MB of memory)", stride)
             self.stride.setCurrentIndex(max(0, self.stride.findData(plan.options.stride)))
             self.reverse.setChecked(plan.options.reverse)
         self._accepts = {}
-        doubted = any("spacing" in p.resolved_by for p in _bare(plan).errors)
+        doubted = any("spacing" in p.resolved_by for p in bare(plan).errors)
         self.spacing.offer(
             plan.suggested_spacing if not doubted else plan.geometry.suggested, from_file=not doubted
         )
@@ -199,22 +184,22 @@ class ImportDialog(QDialog):
             reverse=self.reverse.isChecked(),
             accept=[code for code, box in self._accepts.items() if box.isChecked()],
         )
-        self.facts.show_facts(_facts_of(self._plan))
+        self.facts.show_facts(facts_of(self._plan))
         self._show_findings()
         self.spacing.show_wrong(bool(wrong))
         self.load.setEnabled(not wrong and not self._plan.errors)
-        self.why.setText(_sentence(wrong) if wrong else _why_not(self._plan.errors))
+        self.why.setText(sentence(wrong) if wrong else why_not(self._plan.errors))
 
     def _show_findings(self) -> None:
         accepted = {code for code, box in self._accepts.items() if box.isChecked()}
         emptied(self._findings)
         self._accepts = {}
-        original = {p.code: p for p in _bare(self._plan).problems}
+        original = {p.code: p for p in bare(self._plan).problems}
         for problem in self._plan.problems:
             if problem.code == "sides-unknown":
                 continue  # it has a place of its own
-            remedy = _remedy(original.get(problem.code, problem))
-            self._findings.addWidget(Notice(problem.severity, _sentence(problem.text), remedy))
+            advice = remedy(original.get(problem.code, problem))
+            self._findings.addWidget(Notice(problem.severity, sentence(problem.text), advice))
             if "accept" in problem.resolved_by:
                 self._findings.addWidget(self._accept_box(problem, problem.code in accepted))
 
@@ -288,48 +273,3 @@ class ImportDialog(QDialog):
         for task in self._workbench.jobs.running:
             if task.key in ("import preview", "import look"):
                 task.cancel()
-
-
-def _bare(plan: ImportPlan) -> ImportPlan:
-    """Return the plan without answers to what it found."""
-    return plan.with_options(spacing=None, accept=())
-
-
-def _facts_of(plan: ImportPlan) -> dict[str, str]:
-    spacing: Spacing | None = plan.spacing
-    size = (
-        TIMES.join(f"{n * s:.1f}" for n, s in zip(plan.size, spacing, strict=True)) + " mm" if spacing else ""
-    )
-    files = f", {len(plan.files)} files" if len(plan.files) > 1 else ""
-    return {
-        "Format": f"{plan.format}{files}",
-        "Voxels": f"{size_text(plan.size)}, {plan.stored_dtype}"
-        + (f", {spacing_text(spacing)} each" if spacing else ", of unknown size"),
-        "Size": size or "not known before the voxel size is",
-        "Memory": f"{plan.n_bytes / _MB:,.0f} MB",
-        "Where": str(plan.path),
-    }
-
-
-def _remedy(problem: Problem) -> str:
-    """Return what to do in this window; the remedies of `Problem` are for the command as well."""
-    if "spacing" in problem.resolved_by:
-        return "Type the true voxel size below. It stands in the scanner's log, or ask who made the scan."
-    return problem.remedy
-
-
-def _why_not(errors: tuple[Problem, ...]) -> str:
-    """Return why it cannot be loaded yet, in a few words."""
-    if any(problem.code == "extent" for problem in errors):
-        return "Correct the voxel size, or accept it."
-    if any("spacing" in problem.resolved_by for problem in errors):
-        return "The voxel size is needed first."
-    if any("series" in problem.resolved_by for problem in errors):
-        return "Choose a scan first."
-    if any("accept" in problem.resolved_by for problem in errors):
-        return "Look at what was found, and accept it to go on."
-    return "It cannot be loaded." if errors else ""
-
-
-def _sentence(text: str) -> str:
-    return text[:1].upper() + text[1:].rstrip(".") + "."

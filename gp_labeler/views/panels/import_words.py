@@ -1,0 +1,75 @@
+"""What the import dialog says of a plan, and the job that makes its preview."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from gp_labeler.imaging.preview import PreviewPlane, preview_planes
+from gp_labeler.imaging.readers import ImportPlan, Problem, read_preview
+from gp_labeler.imaging.readers.options import Spacing
+from gp_labeler.session.jobs import Progress
+from gp_labeler.views.bind import TIMES, size_text, spacing_text
+
+__all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "sentence", "why_not"]
+
+MB = 2**20
+
+
+@dataclass(frozen=True)
+class PreviewScan:
+    """Read a coarse picture of a scan, as a job."""
+
+    plan: ImportPlan
+    title: str = "Reading a preview"
+
+    def run(self, progress: Progress) -> tuple[PreviewPlane, PreviewPlane]:
+        """Return its middle slices."""
+        progress(0.0)
+        return preview_planes(read_preview(self.plan, cancel=progress.cancelled))
+
+
+def bare(plan: ImportPlan) -> ImportPlan:
+    """Return the plan without answers to what it found."""
+    return plan.with_options(spacing=None, accept=())
+
+
+def facts_of(plan: ImportPlan) -> dict[str, str]:
+    """Return what there is to know about a scan before it is loaded, as names and words."""
+    spacing: Spacing | None = plan.spacing
+    size = (
+        TIMES.join(f"{n * s:.1f}" for n, s in zip(plan.size, spacing, strict=True)) + " mm" if spacing else ""
+    )
+    files = f", {len(plan.files)} files" if len(plan.files) > 1 else ""
+    return {
+        "Format": f"{plan.format}{files}",
+        "Voxels": f"{size_text(plan.size)}, {plan.stored_dtype}"
+        + (f", {spacing_text(spacing)} each" if spacing else ", of unknown size"),
+        "Size": size or "not known before the voxel size is",
+        "Memory": f"{plan.n_bytes / MB:,.0f} MB",
+        "Where": str(plan.path),
+    }
+
+
+def remedy(problem: Problem) -> str:
+    """Return what to do in this window; the remedies of `Problem` are for the command as well."""
+    if "spacing" in problem.resolved_by:
+        return "Type the true voxel size below. It stands in the scanner's log, or ask who made the scan."
+    return problem.remedy
+
+
+def why_not(errors: tuple[Problem, ...]) -> str:
+    """Return why it cannot be loaded yet, in a few words."""
+    if any(problem.code == "extent" for problem in errors):
+        return "Correct the voxel size, or accept it."
+    if any("spacing" in problem.resolved_by for problem in errors):
+        return "The voxel size is needed first."
+    if any("series" in problem.resolved_by for problem in errors):
+        return "Choose a scan first."
+    if any("accept" in problem.resolved_by for problem in errors):
+        return "Look at what was found, and accept it to go on."
+    return "It cannot be loaded." if errors else ""
+
+
+def sentence(text: str) -> str:
+    """Return a clause as a sentence."""
+    return text[:1].upper() + text[1:].rstrip(".") + "."
