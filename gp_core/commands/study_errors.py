@@ -167,7 +167,7 @@ def run_compare(args: argparse.Namespace) -> int:
 
 
 def _comparison_lines(report: ComparisonReport) -> Iterator[str]:
-    yield f"{report.animals}, touched {report.repeats} times: mean / p95 / max"
+    yield f"{report.animals}: mean / p95 / max"
     yield ""
     yield (
         f"  {'touched':<15} {'errors, mm':<17} {'E_CO mm   JRMPC':>21} {'robust':>21}"

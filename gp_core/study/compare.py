@@ -95,7 +95,7 @@ class ComparisonReport:
     Attributes
     ----------
     animals : str
-        What they are.
+        What they are, and how often touched.
     repeats : int
         How many times every side was touched; drawn animals are new each time.
     rows : tuple of ComparisonRow
@@ -188,9 +188,9 @@ def compare(
     keys = [(*case, method) for case in cases for method in METHODS]
     rows = [ComparisonRow(*key, PoseErrors.joined([part[i] for part in parts])) for i, key in enumerate(keys)]
     animals = (
-        f"{n_animals} animals drawn from the published atlas"
+        f"{repeats} herds of {n_animals} animals drawn from the published atlas"
         if specimens is None
-        else f"{len(specimens)} labelled animals"
+        else f"{len(specimens)} labelled animals, each touched {repeats} times"
     )
     return ComparisonReport(animals, repeats, tuple(rows))
 

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
@@ -236,14 +236,17 @@ def error_boxes(report: SimulationReport, physical: Sequence[tuple[float, float]
         )
         for box, colour in zip(drawn["boxes"], (LEFT, RIGHT, "#b8b8b8")[-len(names) :], strict=True):
             box.set(facecolor=colour, alpha=0.75, linewidth=0.8)
-        ax.plot([len(names)] * len(circles), circles, "o", mfc="none", mec=ACCENT, ms=6, mew=1.3)
-        ax.set_xticks(range(1, len(names) + 1), names)
+        ax.plot([len(names) + 1] * len(circles), circles, "o", mfc="none", mec=ACCENT, ms=6, mew=1.3)
+        shown = [*names, "skulls"] if circles else names
+        ax.set_xticks(range(1, len(shown) + 1), shown)
+        ax.set_xlim(0.5, len(shown) + 0.5)
         ax.set_ylim(bottom=0)
     label(first, "C", "", AXIS_ERROR)
     label(second, "D", "", ORIGIN_ERROR)
     n = len(groups["pooled"].e_co_mm)
     note = f"method {report.method}, {n} simulated sides"
-    second.set_title(note + (f", noise {report.noise:g} mm" if report.noise else ""), loc="right", fontsize=8)
+    note += f", noise {report.noise:g} mm" if report.noise else ""
+    figure.suptitle(note, fontsize=8, color=_INK)
     return figure
 
 
@@ -261,7 +264,7 @@ def comparison(report: ComparisonReport) -> Figure:
         for ax in panels:
             ax.set_ylim(lowest, highest)
         panels[0].set_ylabel(name, fontsize=9, color=_INK)
-    figure.suptitle(f"{report.animals}, touched {report.repeats} times", fontsize=9, color=_INK)
+    figure.suptitle(report.animals, fontsize=9, color=_INK)
     axes[0].legend(fontsize=8, frameon=False, loc="upper left")
     figure.supxlabel(
         "Touch errors (mm): Gaussian noise a coordinate; or noise 0.1 and one touch off its place.   "
@@ -282,6 +285,8 @@ def _compared(ax: Axes, rows: Sequence[ComparisonRow], error: str) -> None:
         ax.plot(x, mean, "o", color=colour, ms=4.5, label=name)
         ax.plot(x, highest, "x", color=colour, ms=4, mew=0.9)
     ax.set_yscale("log")
+    ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    ax.yaxis.set_minor_locator(NullLocator())
     ax.set_xticks(range(len(conditions)), [_tick(c.noise_mm, c.mistouch_mm) for c in conditions], fontsize=7)
     ax.yaxis.set_major_formatter("{x:g}")
     ax.grid(axis="y", which="major", color=_FAINT, lw=0.6)

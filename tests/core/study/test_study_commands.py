@@ -117,7 +117,7 @@ def test_compare(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert len(json.loads(Path(files[0]).read_text())["rows"]) == 36
     assert len(Path(files[1]).read_text().splitlines()) == 37
     assert Path(files[2]).read_bytes().startswith(b"\x89PNG")
-    assert "4 labelled animals, touched 1 times" in capsys.readouterr().out
+    assert "4 labelled animals, each touched 1 times" in capsys.readouterr().out
 
 
 def test_physical(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
