@@ -30,6 +30,7 @@ class Ui(Protocol):
     def save(self, *, ask: bool = False) -> bool: ...  # noqa: D102
     def close_window(self) -> None: ...  # noqa: D102
     def reset_views(self) -> None: ...  # noqa: D102
+    def zoom_to_point(self) -> None: ...  # noqa: D102
     def look_from(self, letter: str) -> None: ...  # noqa: D102
     def toggle_theme(self) -> None: ...  # noqa: D102
     def toggle_projection(self) -> None: ...  # noqa: D102

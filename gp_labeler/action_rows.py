@@ -154,12 +154,6 @@ def _other_side(desk: Workbench, ui: Ui) -> None:
         desk.go_to(active.side.other, active.code)
 
 
-def _show_active(desk: Workbench, ui: Ui) -> None:
-    active = desk.session.active
-    if active.code is not None:
-        desk.go_to(active.side, active.code)
-
-
 # The rows: id, menu, title, keys, what is done, when it can be
 
 
@@ -217,8 +211,8 @@ def view_rows() -> Iterator[Action]:
                   group="layout")
     yield row("view.reset", "Show everything", ("R",), lambda d, ui: ui.reset_views(), _has_scan,
               group="show")
-    yield row("view.go_to_point", "Go to the chosen point", ("Shift+R",), _show_active, _has_active,
-              group="show")
+    yield row("view.zoom_to_point", "Look closely at the point", ("E", "Shift+R"),
+              lambda d, ui: ui.zoom_to_point(), _has_scan, group="show")
     for word, letter, keys in _VIEWPOINTS:
         yield row(f"view.from_{word}", f"Look from {word}", keys, _look_from(letter), group="from")
     for title, tool, key in _TOOLS:

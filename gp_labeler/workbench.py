@@ -6,19 +6,19 @@ thread; results of long work come back through the dispatcher it was given.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from psygnal import Signal
+from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
 from gp_labeler.bone import Bone
+from gp_labeler.desk_signals import DeskSignals
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.surface import Surface
 from gp_labeler.imaging.volume import Volume
@@ -40,17 +40,7 @@ __all__ = ["TOOLS", "Drag", "Workbench"]
 TOOLS = ("place", "look", "grey")
 """What a plain left click or drag over a slice does: place, move the crosshair, set window and level."""
 
-_RELAYED = (
-    "landmarks_changed",
-    "active_changed",
-    "crosshair_changed",
-    "ghosts_changed",
-    "threshold_changed",
-    "details_changed",
-    "history_changed",
-    "dirty_changed",
-    "saved",
-)
+_NEAR_VOXELS = 3.0
 
 
 class Drag:
@@ -60,7 +50,7 @@ class Drag:
         self.side, self.code, self.position, self.how = side, code, position, how
 
 
-class Workbench:
+class Workbench(DeskSignals):
     """What one window works on; see the module.
 
     Its signals of the session's names repeat those of whatever session is open, so a listener connects once;
@@ -79,39 +69,6 @@ class Workbench:
         Who labels.
     """
 
-    session_replaced = Signal(object)
-    """Another session is open: look at everything anew."""
-    landmarks_changed = Signal(frozenset)
-    active_changed = Signal(object)
-    crosshair_changed = Signal(object)
-    ghosts_changed = Signal()
-    threshold_changed = Signal(object)
-    """The threshold in effect, set or proposed; None while there is none."""
-    details_changed = Signal()
-    history_changed = Signal()
-    dirty_changed = Signal(bool)
-    saved = Signal(object)
-    view_changed = Signal(frozenset)
-    """Names of the fields of `session.view.state` that changed."""
-
-    volume_opened = Signal(object)
-    surfaces_changed = Signal()
-    threshold_previewed = Signal(object)
-    """A threshold that is being tried out on the slices; None when that is over."""
-    doubts_changed = Signal()
-    """Doubts were found or went away: ask `session.point_states(side, wait=False)` again."""
-    dragged = Signal(object)
-    """The `Drag` that goes on; None when it is over."""
-    tool_changed = Signal(str)
-    point_shown = Signal(object)
-    """(3,) scan position that every view shall bring into sight, mm."""
-    import_asked = Signal(object)
-    """An `ImportPlan` that needs answers: change its options, then `read_scan` it."""
-    scan_differs = Signal(object, object)
-    """(VolumeChangedError, Volume): the scan is not the one labelled; `accept_scan` takes it nevertheless."""
-    message = Signal(str, str)
-    """Text, and ``info``, ``warning`` or ``error``."""
-
     def __init__(
         self,
         directory: Path | None = None,
@@ -128,10 +85,10 @@ class Workbench:
         self.tool = "place"
         self._predict, self._author = predict, author
         self._last: tuple[Side, str] | None = None
-        self._links: list[tuple[Any, Callable[..., object]]] = []
+        super().__init__()
         self.session: Session = new_session(directory, predict=predict, author=author)
         self._bone = Bone(self)
-        self._connect()
+        self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
 
@@ -259,6 +216,15 @@ class Workbench:
         """Mesh around the ears at full resolution now, wherever their place is known."""
         self._bone.mesh_ears(half_mm=half_mm, anew=True)
 
+    def near_bone(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return which of (N, 3) scan positions lie within three voxels of bone; all, where there is none."""
+        if self.volume is None or self.threshold is None:
+            return np.ones(len(points), dtype=bool)
+        reach = _NEAR_VOXELS * min(self.volume.spacing)
+        around = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 3), axis=-1).reshape(-1, 3)
+        values = self.volume.values_at((points[:, None] + around).reshape(-1, 3)).reshape(len(points), -1)
+        return np.asarray((values >= self.threshold).any(axis=1))
+
     def save_mesh(self, path: Path) -> None:
         """Write the whole bone surface at full resolution, in the background."""
         if self.volume is not None and self.threshold is not None:
@@ -300,7 +266,7 @@ class Workbench:
     def close(self, *, discard: bool = False) -> None:
         """Stop all work and let go of journal and locks; see `Session.close`."""
         self.jobs.close()
-        self._disconnect()
+        self._unfollow()
         self.session.close(discard=discard)
         self._bone.forget()
 
@@ -331,14 +297,14 @@ class Workbench:
 
     def _replace(self, session: Session) -> None:
         """Close one session and take another; the old one's unsaved edits stay in its journal."""
-        self._disconnect()
+        self._unfollow()
         old, self.session = self.session, session
         old.close(discard=not old.dirty)
         self.truth = None
         self.drag = self._last = None
         self._bone.forget()
         session.view.update(**_kept(old.view.state))
-        self._connect()
+        self._follow(self.session)
         self.session_replaced.emit(session)
         self.surfaces_changed.emit()
         self._read_own_scan()
@@ -372,26 +338,6 @@ class Workbench:
     def _remember(self, path: str | PathLike[str]) -> None:
         if self.recent is not None:
             self.recent.add(path)
-
-    def _connect(self) -> None:
-        for name in _RELAYED:
-            self._link(getattr(self.session, name), getattr(self, f"_relay_{name}", self._relay(name)))
-        self._link(self.session.view.changed, self._relay("view_changed"))
-
-    def _relay(self, name: str) -> Callable[..., None]:
-        def repeat(*values: object) -> None:
-            getattr(self, name).emit(*values)
-
-        return repeat
-
-    def _link(self, signal: Any, slot: Callable[..., object]) -> None:
-        signal.connect(slot)
-        self._links.append((signal, slot))
-
-    def _disconnect(self) -> None:
-        for signal, slot in self._links:
-            signal.disconnect(slot, missing_ok=True)
-        self._links.clear()
 
     def _relay_threshold_changed(self, _: object) -> None:
         self._bone.mesh()

@@ -84,6 +84,7 @@ class MarkActor:
         self._stage = stage
         self._marks: tuple[Mark, ...] = ()
         self.size = GlyphSize()
+        self.show_hidden = True
         self._solid = _GlyphLayer(stage.base, 1.0)
         self._faint = _GlyphLayer(stage.overlay, _FAINT)
         self._rings = PixelLines(stage.overlay)
@@ -125,13 +126,14 @@ class MarkActor:
         colours = np.array([rgb(self._colour(mark)) for mark in self._marks]).reshape(-1, 3)
         shapes = np.array([_SHAPES.get(mark.state, 0) for mark in self._marks], dtype=int)
         self._solid.set(self.positions, sizes, colours, shapes)
-        self._faint.set(self.positions[hidden], sizes[hidden], colours[hidden], shapes[hidden])
+        faint = hidden & self.show_hidden
+        self._faint.set(self.positions[faint], sizes[faint], colours[faint], shapes[faint])
         radii = 0.5 * sizes / view.pixel_sizes(self.positions)
         self._ring_active(pixels, radii)
         return [
             self._label(mark, pixel, float(radius), bool(behind))
             for mark, pixel, radius, behind in zip(self._marks, pixels, radii, hidden, strict=True)
-            if mark.label
+            if mark.label and (self.show_hidden or not behind or mark.active)
         ]
 
     def _colour(self, mark: Mark) -> str:

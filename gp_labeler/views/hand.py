@@ -14,7 +14,7 @@ from gp_labeler.session.state import How
 from gp_labeler.views.drawn import point_of
 from gp_labeler.workbench import Workbench
 
-__all__ = ["Hand"]
+__all__ = ["Hand", "nudge"]
 
 _TYPED_INTO = (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)
 
@@ -114,3 +114,18 @@ class Hand:
             edit()  # type: ignore[operator]
         except GpError as error:
             self._desk.say(str(error), "warning")
+
+
+def nudge(workbench: Workbench, offset: FloatArray) -> None:
+    """Move the chosen point, or the one placed last, by a (3,) offset, mm; without one, the crosshair."""
+    target, session = workbench.nudged_point(), workbench.session
+    if target is None:
+        session.set_crosshair(session.crosshair + offset)
+        return
+    side, code = target
+    try:
+        labelling.nudge(session, offset, side=side, code=code)
+    except GpError as error:
+        workbench.say(str(error), "warning")
+        return
+    session.set_crosshair(session.landmarks(side)[code])

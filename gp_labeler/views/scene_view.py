@@ -11,14 +11,12 @@ from typing import Any
 import numpy as np
 from PySide6.QtCore import QEvent, QPointF, Qt, QTimer, Signal
 from PySide6.QtGui import (
-    QColor,
     QEnterEvent,
     QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
     QPaintEvent,
-    QPen,
     QWheelEvent,
 )
 from PySide6.QtWidgets import QWidget
@@ -26,14 +24,14 @@ from PySide6.QtWidgets import QWidget
 from gp_core.checks import FloatArray
 from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize
-from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.target import RenderTarget
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import follow
-from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments, key_of
 from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.scene_overlay import paint_crosshair, paint_pointer
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Drag, Workbench
 
@@ -78,6 +76,7 @@ class SceneView(QWidget):
         self._frame: QImage | None = None
         self._stale, self._quick, self._fitted = True, False, False
         self._hover: FloatArray | None = None
+        self._dragging = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
         self._fine_timer.timeout.connect(self.redraw)
         self.scene.camera.look(_FIRST_LOOK, (0, 0, 1))
@@ -106,6 +105,11 @@ class SceneView(QWidget):
     def go_to(self, position: FloatArray) -> None:
         """Bring a (3,) scan position to the middle of the view."""
         self.scene.camera.focus_on(position)
+        self.redraw()
+
+    def zoom_to(self, position: FloatArray, across_mm: float) -> None:
+        """Show so many mm, from top to bottom, around a (3,) scan position."""
+        self.scene.camera.focus_on(position, across_mm=across_mm)
         self.redraw()
 
     def take_theme(self) -> None:
@@ -152,7 +156,10 @@ class SceneView(QWidget):
         view = self._desk.session.view.state
         self.scene.marks.size = GlyphSize() if view.glyph_mm is None else GlyphSize(view.glyph_mm, "mm")
         self.scene.labels.visible = view.labels_visible
-        self.scene.marks.show(drawn_marks(self._desk))
+        self.scene.marks.show_hidden = view.hidden_visible
+        drag = self._desk.drag
+        dragged = "" if drag is None else key_of(drag.side, drag.code)
+        self.scene.marks.show([mark for mark in drawn_marks(self._desk) if mark.key != dragged])
         self.scene.ghosts.show(drawn_ghosts(self._desk))
         self.scene.lines.show(drawn_segments(self._desk, theme_of(self).scene))
         self.redraw()
@@ -160,10 +167,12 @@ class SceneView(QWidget):
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if "mesh_opacity" in changed:
             self.scene.bone.opacity = self._desk.session.view.state.mesh_opacity
-        self._show_points()
+        if changed - {"level", "width", "layout", "camera"}:
+            self._show_points()
 
     def _on_dragged(self, drag: Drag | None) -> None:
-        if drag is None:
+        if (drag is None) == self._dragging:  # the point leaves the picture, and is painted over it instead
+            self._dragging = drag is not None
             self._show_points()
         self.update()
 
@@ -176,8 +185,12 @@ class SceneView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is not None:
             painter.drawImage(QPointF(0, 0), self._frame)
-        self._paint_crosshair(painter)
-        self._paint_pointer(painter)
+        if self._desk.volume is not None:
+            paint_crosshair(painter, self, self.scene, self._desk.session.crosshair)
+        drag = self._desk.drag
+        paint_pointer(
+            painter, self, self.scene, self._hover if drag is None else drag.position, drag is not None
+        )
         painter.end()
 
     def _draw_frame(self) -> None:
@@ -190,35 +203,6 @@ class SceneView(QWidget):
         frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
         frame.setDevicePixelRatio(ratio)
         self._frame, self._stale = frame, False
-
-    def _paint_crosshair(self, painter: QPainter) -> None:
-        """Paint a cross with an open centre, each arm in the colour of the plane that it stands upon."""
-        if self._desk.volume is None:
-            return
-        middle = self._desk.session.crosshair
-        ends = np.array([middle + s * r * p.normal for p in Plane for s in (-1, 1) for r in (0.8, 4.0)])
-        pixels = self.scene.display_of(ends)
-        views = theme_of(self).views
-        for n, plane in enumerate(plane for plane in Plane for _ in range(2)):
-            painter.setPen(QPen(QColor(views[plane.value]), 1.4))
-            near, far = (painted(self, *pixels[2 * n + k]) for k in range(2))
-            painter.drawLine(near, far)
-
-    def _paint_pointer(self, painter: QPainter) -> None:
-        drag = self._desk.drag
-        shown = self._hover if drag is None else drag.position
-        if shown is None:
-            return
-        colours = theme_of(self).scene
-        centre = painted(self, *self.scene.display_of(shown[None])[0])
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        for colour, width in ((colours.halo, 4.0), (colours.states["active"], 1.8)):
-            painter.setPen(QPen(QColor(colour), width))
-            painter.drawEllipse(centre, 6.0, 6.0)
-        if drag is not None:
-            painter.setPen(Qt.PenStyle.NoPen)
-            painter.setBrush(QColor(colours.states["placed"]))
-            painter.drawEllipse(centre, 4.0, 4.0)
 
     # Mouse and keys
 

@@ -17,19 +17,16 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.window_level import WindowLevel
-from gp_labeler.session import labelling
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks
-from gp_labeler.views.hand import Hand
+from gp_labeler.views.greys import drag_greys, greys_of
+from gp_labeler.views.hand import Hand, nudge
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.slice_painter import SlicePainter, reach_of
 from gp_labeler.workbench import Workbench
 
 __all__ = ["SliceView"]
-
-_DRAG_FOR_RANGE = 400.0
-"""Pixels of a drag that change window or level by as much as the whole range of greys."""
 
 _ARROWS = {
     Qt.Key.Key_Left: (-1.0, 0.0),
@@ -90,6 +87,13 @@ class SliceView(QWidget):
             self.shown = self.shown.showing(position, 0.2)
             self.update()
 
+    def zoom_to(self, position: FloatArray, across_mm: float) -> None:
+        """Show so many mm, across the shorter side, around a (3,) scan position."""
+        if self.shown is not None:
+            centred = self.shown.centred(position).at(self._position())
+            self.shown = centred.zoomed(centred.mm_per_pixel * min(centred.size) / across_mm)
+            self.update()
+
     def step(self, n: int) -> None:
         """Go so many slices on."""
         if self.source is not None:
@@ -105,10 +109,7 @@ class SliceView(QWidget):
 
     def window_level(self) -> WindowLevel:
         """Return the grey scale: what the user set, else what suits the volume."""
-        view, volume = self._desk.session.view.state, self._desk.volume
-        if view.level is not None and view.width is not None:
-            return WindowLevel(view.level - view.width / 2, view.level + view.width / 2)
-        return WindowLevel(0.0, 1.0) if volume is None else WindowLevel.of(volume)
+        return greys_of(self._desk)
 
     def _listen(self) -> None:
         desk = self._desk
@@ -262,25 +263,8 @@ class SliceView(QWidget):
     def _nudge(self, right: float, down: float) -> None:
         """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""
         assert self.source is not None
-        across, along = (float(np.abs(d) @ self._voxel()) for d in (self.plane.right, self.plane.down))
-        offset = right * across * self.plane.right + down * along * self.plane.down
-        target, session = self._desk.nudged_point(), self._desk.session
-        if target is None:
-            session.set_crosshair(session.crosshair + offset)
-            return
-        side, code = target
-        try:
-            labelling.nudge(session, offset, side=side, code=code)
-        except GpError as error:
-            self._desk.say(str(error), "warning")
-            return
-        session.set_crosshair(session.landmarks(side)[code])
-
-    def _voxel(self) -> FloatArray:
-        """Return the (3,) distance of slices along each scan axis, mm."""
-        assert self.source is not None
-        steps = {plane.axis: self.source.step(plane) for plane in Plane}
-        return np.array([steps[axis] for axis in range(3)])
+        step = np.array([self.source.step(plane) for plane in sorted(Plane, key=lambda p: p.axis)])
+        nudge(self._desk, step * (right * self.plane.right + down * self.plane.down))
 
     def _drag_to(self, here: FloatArray) -> None:
         drag, to = self._desk.drag, here + self._grip
@@ -291,15 +275,9 @@ class SliceView(QWidget):
 
     def _change_greys(self, x: float, y: float) -> None:
         assert self._greying is not None
-        per_pixel = self.window_level_range() / (_DRAG_FOR_RANGE * self.devicePixelRatioF())
-        dx, dy = x - self._greying[0], y - self._greying[1]
+        ratio = self.devicePixelRatioF()
+        drag_greys(self._desk, (x - self._greying[0]) / ratio, (y - self._greying[1]) / ratio)
         self._greying = (x, y)
-        scale = self.window_level().moved(dx * per_pixel, -dy * per_pixel, smallest=per_pixel)
-        self._desk.session.view.update(level=scale.level, width=scale.width)
-
-    def window_level_range(self) -> float:
-        """Return the range of greys that the volume has."""
-        return 1.0 if self._desk.volume is None else WindowLevel.of(self._desk.volume).width
 
     def _is_inside(self, position: FloatArray) -> bool:
         return self._desk.volume is not None and bool(self._desk.volume.contains(position[None])[0])

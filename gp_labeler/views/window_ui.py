@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.edits import SwapPoints
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.landmark_import import MisfitError, import_landmarks
 from gp_labeler.session.lock import InUseError
 from gp_labeler.session.opening import UnsavedEditsError
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.specimen_file import SUFFIX
+from gp_labeler.views.panels.export_dialog import ExportDialog
+from gp_labeler.views.panels.import_dialog import ImportDialog
+from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.recover_dialog import RecoverDialog
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.questions import ask_about, export_asking, import_asking
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.workbench import Workbench
 
@@ -35,8 +34,8 @@ _SCANS = (
     "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
+_CLOSE_MM = 12.0
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
-_NEAR_BONE_VOXELS = 3.0
 
 
 class WindowUi:
@@ -133,40 +132,20 @@ class WindowUi:
         files = self.prompts.open_files("Import landmarks", self._folder, _POINTS, many=True)
         if files:
             self._remember_folder(files[0])
-            self._import(files)
-
-    def _import(self, files: list[Path], **how: Any) -> None:
-        try:
-            notes = import_landmarks(self._desk.session, files, near_bone=self._near_bone, **how)
-        except MisfitError as error:
-            if self.prompts.choose(
-                "Do they belong here?",
-                error.problem,
-                ["Import nevertheless"],
-                detail=error.remedy or "",
-                kind="warning",
-            ):
-                self._import(files, accept_misfit=True)
-            return
-        self._desk.say(
-            ". ".join(notes) or f"Imported {', '.join(f.name for f in files)}", "warning" if notes else "info"
-        )
+            if self._has_dialogs:
+                desk = self._desk
+                LandmarkImportDialog(desk, files, desk.near_bone, parent=self._window).open()
+            else:
+                import_asking(self._desk, files, self.prompts)
 
     def ask_export(self) -> None:
         """Ask for a folder, and write the landmarks of both sides into it."""
-        folder = self.prompts.folder("Export landmarks into this folder", self._folder)
-        if folder is None:
+        if self._has_dialogs:
+            ExportDialog(self._desk, self._folder, parent=self._window).open()
             return
-        state = self._desk.session.state
-        try:
-            report = export_landmarks(state, folder)
-        except GpError as error:
-            if "exists already" not in error.problem:
-                raise
-            if not self.prompts.choose("Replace?", str(error), ["Replace"], kind="warning"):
-                return
-            report = export_landmarks(state, folder, overwrite=True)
-        self._desk.say(report.text.replace("\n", "  "), "info" if report.is_complete else "warning")
+        folder = self.prompts.folder("Export landmarks into this folder", self._folder)
+        if folder is not None:
+            export_asking(self._desk, folder, self.prompts)
 
     def ask_save_mesh(self) -> None:
         """Ask where, and write the bone surface."""
@@ -188,6 +167,11 @@ class WindowUi:
 
     def take_recoveries(self, recoveries: tuple[Recovery, ...]) -> None:
         """Offer what programs that were killed left unsaved."""
+        if recoveries and self._has_dialogs:
+            dialog = RecoverDialog(recoveries, self._window)
+            dialog.recover_asked.connect(self._desk.recover)
+            dialog.open()
+            return
         for recovery in recoveries:
             answer = self.prompts.choose(
                 "Unsaved work was found",
@@ -203,9 +187,10 @@ class WindowUi:
 
     def take_plan(self, plan: ImportPlan) -> None:
         """Ask what a scan's files do not say, then read it."""
-        from gp_labeler.views.import_question import ask_about
-
-        answered = ask_about(plan, self._window, self.prompts)
+        if self._has_dialogs:
+            ImportDialog(self._desk, plan, parent=self._window).open()
+            return
+        answered = ask_about(plan, self.prompts)
         if answered is not None:
             self._desk.read_scan(answered)
 
@@ -240,6 +225,14 @@ class WindowUi:
         """Show everything in every view."""
         self._window.grid.reset()
 
+    def zoom_to_point(self) -> None:
+        """Look closely at the chosen point, or at where it is expected."""
+        desk, active = self._desk, self._desk.session.active
+        if active.code is not None:
+            desk.go_to(active.side, active.code)
+        for view in self._window.grid.views:
+            view.zoom_to(desk.session.crosshair, _CLOSE_MM)
+
     def look_from(self, letter: str) -> None:
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
         self._window.grid.scene_view.view_from(letter)
@@ -264,19 +257,14 @@ class WindowUi:
 
         self.prompts.tell(
             "About gp-labeler",
-            f"{application()}\n\nLabels guinea-pig heads in micro-CT, and estimates the pose of the cochlea from "
-            "a few touched points.\n\nCoordinates are LPS, mm. Nothing is sent anywhere.",
+            f"{application()}\n\nLabels guinea-pig heads in micro-CT, and estimates the pose of the cochlea "
+            "from a few touched points.\n\nCoordinates are LPS, mm. Nothing is sent anywhere.",
         )
 
-    def _near_bone(self, points: FloatArray) -> NDArray[np.bool_]:
-        volume, threshold = self._desk.volume, self._desk.threshold
-        if volume is None or threshold is None:
-            return np.ones(len(points), dtype=bool)
-        reach = _NEAR_BONE_VOXELS * min(volume.spacing)
-        around = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 3), axis=-1).reshape(-1, 3)
-        values = volume.values_at((points[:, None] + around).reshape(-1, 3)).reshape(len(points), -1)
-        near: NDArray[np.bool_] = np.nanmax(np.where(np.isnan(values), -np.inf, values), axis=1) >= threshold
-        return near
+    @property
+    def _has_dialogs(self) -> bool:
+        """Whether a person answers, in dialogs that show more than a question; scripts are asked in words."""
+        return isinstance(self.prompts, Prompts)
 
     @property
     def _folder(self) -> str:

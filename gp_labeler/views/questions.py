@@ -1,16 +1,18 @@
-"""What is asked where a scan's files do not say enough."""
+"""Opening, importing and exporting by plain questions, which a script can answer as well as a person."""
 
 from __future__ import annotations
 
-from PySide6.QtWidgets import QWidget
-
+from gp_core.errors import GpError
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
+from gp_labeler.session.landmark_export import export_landmarks
+from gp_labeler.session.landmark_import import MisfitError, import_landmarks
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.workbench import Workbench
 
-__all__ = ["ask_about"]
+__all__ = ["ask_about", "export_asking", "import_asking"]
 
 
-def ask_about(plan: ImportPlan, parent: QWidget, prompts: Prompts) -> ImportPlan | None:
+def ask_about(plan: ImportPlan, prompts: Prompts) -> ImportPlan | None:
     """Return the plan with answers; None where the user thinks better of it, or nothing can be done."""
     if len(plan.choices) > 1 and plan.options.series is None:
         texts = [choice.text for choice in plan.choices]
@@ -47,3 +49,30 @@ def ask_about(plan: ImportPlan, parent: QWidget, prompts: Prompts) -> ImportPlan
             return None
         plan = plan.with_options(reverse=answer == "Reverse it")
     return plan
+
+
+def import_asking(workbench: Workbench, files: Sequence[Path], prompts: Prompts, **how: Any) -> None:
+    """Take over landmark files; asks where they cannot belong to the scan."""
+    try:
+        notes = import_landmarks(workbench.session, files, near_bone=workbench.near_bone, **how)
+    except MisfitError as error:
+        answers = ["Import nevertheless"]
+        if prompts.choose("Do they belong here?", error.problem, answers, detail=error.remedy or ""):
+            import_asking(workbench, files, prompts, accept_misfit=True)
+        return
+    words = ". ".join(notes) or f"Imported {', '.join(file.name for file in files)}"
+    workbench.say(words, "warning" if notes else "info")
+
+
+def export_asking(workbench: Workbench, folder: Path, prompts: Prompts) -> None:
+    """Write the landmarks of both sides into a folder; asks before files are replaced."""
+    state = workbench.session.state
+    try:
+        report = export_landmarks(state, folder)
+    except GpError as error:
+        if "exists already" not in error.problem:
+            raise
+        if not prompts.choose("Replace?", str(error), ["Replace"], kind="warning"):
+            return
+        report = export_landmarks(state, folder, overwrite=True)
+    workbench.say(report.text.replace("\n", "  "), "info" if report.is_complete else "warning")
