@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
 from gp_core.errors import GpError
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
 from gp_labeler.session.landmark_export import export_landmarks
