@@ -1,4 +1,4 @@
-"""Bringing a scan position before the eye, as a hand does: scroll to its slice, zoom, look from another side."""
+"""Bringing a scan position before the eye as a hand does: scroll to its slice, zoom, turn the bone."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PIXELS_PER_VOXEL = 4.0
 _ZOOM_PER_NOTCH = 1.15
 _MARGIN = 12.0
 _TRIES = 2
-"""A crosshair that lies between two slices makes the first turn of the wheel half a slice too long or short."""
+"""A crosshair between two slices makes the first turn of the wheel half a slice too long or short."""
 
 _NEAR_VOXELS = 0.6
 """A click on bone that lands nearer than this to the aim has found it."""
@@ -59,15 +59,16 @@ def aim_at_bone(rig: Rig, aim: FloatArray, *, turn: bool) -> bool:
     size = float(camera.viewpoint().pixel_sizes(aim[None])[0])
     middle = view.rect().center()
     turn_wheel(view, middle.x(), middle.y(), _notches(size, rig))
+    looks = list(_directions()) if turn else [(camera.direction, camera.up)]
     misses = []
-    for direction, up in _directions() if turn else [(camera.direction, camera.up)]:
-        camera.look(direction, up)
-        misses.append((_miss(rig, aim), tuple(direction), tuple(up)))
-    miss, direction, up = min(misses, key=lambda found: found[0])
-    if miss > _NEAR_VOXELS * rig.voxel:
+    for look in looks:
+        camera.look(*look)
+        misses.append(_miss(rig, aim))
+    best = int(np.argmin(misses))
+    if misses[best] > _NEAR_VOXELS * rig.voxel:
         camera.restore(before)
         return False
-    camera.look(direction, up)
+    camera.look(*looks[best])
     rig.scene.redraw()
     return True
 

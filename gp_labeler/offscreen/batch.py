@@ -1,4 +1,4 @@
-"""One script over many specimens: each in its own window and folder; one that fails does not stop the others."""
+"""One script over many specimens, each in its own window and folder; one that fails stops no other."""
 
 from __future__ import annotations
 

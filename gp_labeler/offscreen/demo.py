@@ -1,4 +1,4 @@
-"""The demo: a phantom labelled by clicks, exported, checked, and a cochlea estimated from simulated touches."""
+"""The demo: a phantom labelled by clicks, exported and checked, and a cochlea estimated from touches."""
 
 from __future__ import annotations
 
@@ -11,30 +11,31 @@ from gp_labeler.session.workflow import OPENING
 
 __all__ = ["demo_script"]
 
-_VOXEL_MM = 0.2
 
-
-def demo_script(seed: int = 0) -> Script:
+def demo_script(seed: int = 0, voxel_mm: float = 0.2) -> Script:
     """Return the demo as a script like any other.
 
     Parameters
     ----------
     seed : int
         Of the phantom.
+    voxel_mm : float
+        Of the phantom; every feature must come to lie so near to its true place.
     """
-    return make_script(list(_tables(seed)), name="demo")
+    return make_script(list(_tables(seed, voxel_mm)), name="demo")
 
 
-def _tables(seed: int) -> Iterator[dict[str, Any]]:
-    yield {"do": "open", "phantom": seed}
+def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
+    yield {"do": "open", "phantom": seed, "spacing": voxel_mm}
     for side in Side:
         for code in _order(side):
-            yield {"do": "place", "feature": code, "side": side.value, "at": "truth", "within": _VOXEL_MM}
+            yield {"do": "place", "feature": code, "side": side.value, "at": "truth", "within": voxel_mm}
     yield {"do": "expect", "placed": 2 * len(FEATURES)}
     yield {"do": "export", "complete": True}
     yield {"do": "check", "path": "check.json", "strict": True}
     yield {"do": "save"}
-    yield {"do": "view", "reset": True, "go_to": "RWA L", "camera": [-0.75, 0.45, -0.48]}
+    yield {"do": "view", "go_to": "RWA L", "camera": [-0.75, 0.55, -0.38]}
+    yield {"do": "view", "reset": True}
     yield {"do": "screenshot", "path": "window.png", "what": "window"}
     yield {"do": "screenshot", "path": "mesh.png", "what": "3d", "size": [1200, 900]}
     yield {"do": "view", "zoom": 3.0, "go_to": "CO L"}
@@ -46,7 +47,7 @@ def _tables(seed: int) -> Iterator[dict[str, Any]]:
 
 
 def _order(side: Side) -> Iterator[str]:
-    """The three that open the atlas's eyes, then the table's order; what both sides share once."""
+    """Yield those that open the atlas's eyes, then the others; what both sides share once."""
     codes = [row.code for row in FEATURES if not row.computed and not (row.shared and side is Side.RIGHT)]
     yield from OPENING
     yield from (code for code in codes if code not in OPENING)

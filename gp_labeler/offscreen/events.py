@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPoint, QPointF, Qt
+from PySide6.QtCore import QEvent, QPoint, QPointF, Qt
 from PySide6.QtGui import QKeySequence, QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gp_core.errors import GpError
 
-__all__ = ["click", "drag", "press_keys", "turn_wheel"]
+__all__ = ["click", "drag", "leave", "press_keys", "turn_wheel"]
 
 _UNITS_PER_NOTCH = 120
 _LEFT = Qt.MouseButton.LeftButton
@@ -55,6 +55,11 @@ def turn_wheel(widget: QWidget, x: float, y: float, notches: int, *, ctrl: bool 
         QApplication.sendEvent(widget, event)
 
 
+def leave(widget: QWidget) -> None:
+    """Take the pointer away from a widget."""
+    QApplication.sendEvent(widget, QEvent(QEvent.Type.Leave))
+
+
 def press_keys(widget: QWidget, keys: str) -> None:
     """Press a combination of keys such as ``Ctrl+Z``, as Qt writes it.
 
@@ -64,16 +69,17 @@ def press_keys(widget: QWidget, keys: str) -> None:
         There is no such key.
     """
     sequence = QKeySequence(keys)
-    if sequence.count() != 1 or sequence[0].key() == Qt.Key.Key_unknown:
+    first = sequence[0] if sequence.count() == 1 else None  # type: ignore[index]
+    if first is None or first.key() == Qt.Key.Key_unknown:
         raise GpError(f"unknown keys {keys!r}", remedy="Such as Ctrl+Z, Return, Space or Left.")
-    QTest.keyClick(widget, sequence[0].key(), sequence[0].keyboardModifiers())
+    QTest.keyClick(widget, first.key(), first.keyboardModifiers())
 
 
 def _inside(widget: QWidget, x: float, y: float) -> QPoint:
     point = QPoint(int(x // 1), int(y // 1))
     if not widget.rect().contains(point):
         raise GpError(
-            f"pixel {point.x()}, {point.y()} lies outside the view of {widget.width()} x {widget.height()} pixels",
+            f"pixel {point.x()}, {point.y()} lies outside the view, {widget.width()} x {widget.height()}",
             remedy="Bring it into sight first: view, with go_to.",
         )
     return point

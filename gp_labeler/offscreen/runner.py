@@ -1,4 +1,4 @@
-"""Running a script: a window, its steps one after the other, a report; what was done is kept where one fails."""
+"""Running a script: a window, its steps in turn, a report; what was done is kept where one fails."""
 
 from __future__ import annotations
 

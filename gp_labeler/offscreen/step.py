@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import MISSING, dataclass, fields
-from functools import cache
 from types import UnionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -87,7 +86,6 @@ def _filled(kind: type[S], given: Mapping[str, Any]) -> S:
     return kind(**{key: _converted(f"{kind.do}: {key}", hints[key], value) for key, value in given.items()})
 
 
-@cache
 def _hints(kind: type[Step]) -> dict[str, Any]:
     return get_type_hints(kind)
 

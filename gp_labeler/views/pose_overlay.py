@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from PySide6.QtCore import QEvent, QObject, QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPaintEvent, QPen, QPolygonF
-
 from PySide6.QtWidgets import QWidget
 
 from gp_core.checks import FloatArray
@@ -18,7 +17,7 @@ from gp_labeler.views.slice_view import SliceView
 __all__ = ["PoseOverlay"]
 
 _FADE_MM = 4.0
-"""A cochlea whose origin lies farther off the slice is drawn faintly, not left out: it says where to scroll."""
+"""A cochlea whose origin lies farther off the slice is drawn faintly: it says where to scroll."""
 
 _FAINT = 0.35
 
@@ -88,9 +87,8 @@ def _draw(painter: QPainter, shown: Shown, pose: DrawnPose, ratio: float) -> Non
 def _arrow_head(start: FloatArray, end: FloatArray, length: float) -> FloatArray:
     along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
     across = np.array([-along[1], along[0]])
-    head: FloatArray = end + length * np.stack(
-        [0.4 * along, -0.7 * along + 0.45 * across, -0.7 * along - 0.45 * across]
-    )
+    shape = np.array([[0.4, 0.0], [-0.7, 0.45], [-0.7, -0.45]])
+    head: FloatArray = end + length * shape @ np.stack([along, across])
     return head
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 from gp_core.errors import GpError
+from gp_labeler.imaging.near_bone import near_bone
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 from gp_labeler.session.landmark_export import export_landmarks
+from gp_labeler.session.landmark_import import import_landmarks
 from gp_labeler.session.specimen_file import SUFFIX
 
 __all__ = ["Export", "Import", "Save"]
@@ -30,21 +33,19 @@ class Import(Step):
     files: tuple[str, ...]
     accept_misfit: bool = False
 
-    def run(self, rig: Rig) -> str:  # noqa: D102
-        _ = rig.voxel
-        answers = ("Import nevertheless",) if self.accept_misfit else ()
-        rig.prompts.prepare([rig.to_read(file) for file in self.files], answers)
-        since, before = len(rig.messages), rig.desk.session.state
-        rig.window.commands.run("file.import")
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        volume, threshold = rig.desk.volume, rig.desk.threshold
+        if volume is None:
+            raise GpError("no scan is open", remedy="Let a step open one first.")
+        notes = import_landmarks(
+            rig.desk.session,
+            [rig.to_read(file) for file in self.files],
+            near_bone=None if threshold is None else partial(near_bone, volume, threshold),
+            accept_misfit=self.accept_misfit,
+        )
+        for note in notes:
+            rig.desk.say(note, "warning")
         rig.settle(in_passing=False)
-        texts = " ".join(text for text, _ in rig.messages[since:])
-        if (
-            rig.desk.session.state is before
-            and not rig.prompts.unanswered
-            and not texts.startswith("Imported")
-        ):
-            raise GpError(texts or "nothing was imported")
-        return texts
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import action
-from gp_labeler.offscreen.events import press_keys
+from gp_labeler.offscreen.events import leave, press_keys
 from gp_labeler.offscreen.pictures import PICTURES, picture
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Pair, Step, Triple
@@ -43,7 +43,7 @@ class Look(Step):
     axial, sagittal, coronal : float, optional
         Positions of the slices, mm.
     zoom : float, optional
-        Magnify the 3D view, and the slices about the crosshair.
+        Magnify the 3D view, and the slices with the crosshair in their middle.
     opacity : float, optional
         Of the bone, 0 to 1.
     """
@@ -113,8 +113,7 @@ class Look(Step):
         rig.scene.redraw()
         for view in rig.window.grid.slice_views.values():
             if view.shown is not None:
-                about = view.shown.scan_to_pixel(rig.desk.session.crosshair[None])[0]
-                view.shown = view.shown.zoomed(factor, about)
+                view.shown = view.shown.centred(rig.desk.session.crosshair).zoomed(factor)
                 view.update()
 
 
@@ -142,6 +141,8 @@ class Screenshot(Step):
     def run(self, rig: Rig) -> str:  # noqa: D102
         _check(self.what, "what", PICTURES)
         rig.settle()
+        for view in rig.window.grid.views:
+            leave(view)
         size = None if self.size is None else (round(self.size[0]), round(self.size[1]))
         image, file = picture(rig.window, self.what, size), rig.to_write(self.path)
         if not image.save(str(file)):

@@ -33,7 +33,7 @@ class Place(Step):
     side : L or R
         Which side.
     at : three numbers or str, optional
-        A scan position, mm, through whose picture the click goes: the view is scrolled and zoomed to it first.
+        A scan position, mm, through which the click goes: the view is scrolled and zoomed to it.
         ``truth`` is where the phantom has the feature. ``ghost`` and ``crosshair`` press the keys that place
         the point where the atlas expects it, or where the crosshair is.
     pixel : two numbers, optional

@@ -141,10 +141,8 @@ class Estimate(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         atlas = Atlas.published() if self.atlas == "published" else Atlas.load(rig.to_read(self.atlas))
-        if self.touches == "simulated":
-            touched, T_scan_tracker = self._simulated(rig)
-        else:
-            touched, T_scan_tracker = self._given(rig)
+        is_simulated = self.touches == "simulated"
+        touched, T_scan_tracker = self._simulated(rig) if is_simulated else self._given(rig)
         pose = estimate_pose(touched, self.side, atlas)
         estimated = Estimated(pose, T_scan_tracker, _truth(rig, self.side) if T_scan_tracker else None)
         rig.poses[self.side] = estimated
