@@ -134,7 +134,7 @@ def _mirrored(axes: FloatArray, view: str, letters: str) -> tuple[FloatArray, st
 
 def _spiral() -> FloatArray:
     """Return the (n, 3) middle line of the cochlear tube in the atlas frame of a left ear."""
-    t = np.linspace(0.0, 1.0, 160)
+    t = np.linspace(0.0, 1.0, 120)
     angle = 2 * np.pi * _TURNS * t
     radius = _BASE_RADIUS + (_TOP_RADIUS - _BASE_RADIUS) * t
     along = _FIRST + (_LAST - _FIRST) * t

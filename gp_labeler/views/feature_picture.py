@@ -75,11 +75,16 @@ class FeaturePicture(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._shown: tuple[str, Side] | None = None
+        self._drawn = QPixmap()
+        self._drawn_for: tuple[object, ...] = ()
         self.setMinimumSize(96, 72)
 
     def show_feature(self, code: str | None, side: Side) -> None:
         """Show another feature, or none."""
-        self._shown = None if code is None else (code, side)
+        shown = None if code is None else (code, side)
+        if shown == self._shown:
+            return
+        self._shown = shown
         self.setAccessibleName("" if code is None else f"Picture of {code}, {side.word} ear")
         self.update()
 
@@ -87,13 +92,15 @@ class FeaturePicture(QWidget):
         return QSize(200, 110)
 
     def paintEvent(self, event: object) -> None:  # noqa: D102, N802 - Qt's name
-        if self._shown is not None:
-            picture = feature_picture(
-                *self._shown, self.size(), theme_of(self), ratio=self.devicePixelRatioF()
-            )
-            painter = QPainter(self)
-            painter.drawPixmap(0, 0, picture)
-            painter.end()
+        if self._shown is None:
+            return
+        ratio, theme = self.devicePixelRatioF(), theme_of(self)
+        key = (self._shown, self.size(), theme.name, ratio)
+        if key != self._drawn_for:  # it is drawn anew only where it changes: that takes some 10 ms
+            self._drawn, self._drawn_for = feature_picture(*self._shown, self.size(), theme, ratio=ratio), key
+        painter = QPainter(self)
+        painter.drawPixmap(0, 0, self._drawn)
+        painter.end()
 
 
 class _Picture:

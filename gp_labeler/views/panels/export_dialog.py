@@ -24,7 +24,7 @@ from gp_core.landmarks.sets import Status
 from gp_labeler.session.landmark_export import FORMATS, export_landmarks
 from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import follow
-from gp_labeler.views.panels.parts import Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import ElidedLabel, Notice, breakable, emptied, scrolled, text_label
 from gp_labeler.workbench import Workbench
 
 __all__ = ["ExportDialog"]
@@ -77,7 +77,9 @@ class ExportDialog(QDialog):
         for level, words in self._missing():
             self._findings.addWidget(Notice(level, words))
         names, there = self._names(), self._there()
-        self.files.setText("   ".join(names) if names else "Nothing is placed yet, or no format is chosen.")
+        self.files.setText(
+            breakable("   ".join(names)) if names else "Nothing is placed yet, or no format is chosen."
+        )
         self.replace.setVisible(bool(there))
         self.replace.setText(f"Replace {len(there)} file{'s' if len(there) > 1 else ''} of that name")
         self.export.setEnabled(bool(names) and (not there or self.replace.isChecked()))
@@ -114,7 +116,7 @@ class ExportDialog(QDialog):
         self._form = QVBoxLayout(content)
         self._form.setContentsMargins(20, 16, 20, 12)
         self._form.setSpacing(8)
-        self._form.addWidget(text_label(f"Landmarks of {self._workbench.session.state.specimen}", "title"))
+        self._form.addWidget(ElidedLabel(f"Landmarks of {self._workbench.session.state.specimen}", "title"))
         self._form.addLayout(self._findings)
         self._form.addSpacing(4)
         self._form.addWidget(text_label("Folder", "heading"))
@@ -199,7 +201,7 @@ class ExportDialog(QDialog):
                 state, folder, formats=self._suffixes(), overwrite=self.replace.isChecked()
             )
         except GpError as error:
-            self._result.setText(str(error))
+            self._result.setText(breakable(str(error)))
             return
         level = "info" if report.is_complete else "warning"
         self._workbench.say(report.text.replace("\n", "  "), level)

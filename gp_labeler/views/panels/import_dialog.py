@@ -22,7 +22,7 @@ from gp_labeler.imaging.readers import ImportPlan, Problem
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.panels.import_words import MB, PreviewScan, bare, facts_of, remedy, sentence, why_not
-from gp_labeler.views.panels.parts import Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import ElidedLabel, Facts, Notice, breakable, emptied, scrolled, text_label
 from gp_labeler.views.panels.preview_picture import PreviewPicture
 from gp_labeler.views.panels.spacing_fields import SpacingFields
 from gp_labeler.work import InspectScan
@@ -97,7 +97,7 @@ class ImportDialog(QDialog):
         column = QVBoxLayout(content)
         column.setContentsMargins(20, 16, 20, 12)
         column.setSpacing(10)
-        self._title = text_label("", "title")
+        self._title = ElidedLabel("", "title")
         column.addWidget(self._title)
         column.addWidget(self.facts)
         column.addLayout(self._findings)
@@ -153,7 +153,7 @@ class ImportDialog(QDialog):
     def _show_plan(self, plan: ImportPlan) -> None:
         """Fill everything in from a plan that was just made."""
         self._plan = plan
-        self._title.setText(plan.name)
+        self._title.set_words(plan.name)
         self._captions["Which scan"].setVisible(len(plan.choices) > 1)
         self.series.setVisible(len(plan.choices) > 1)
         with blocked(self.series, self.stride, self.reverse):
@@ -251,7 +251,7 @@ class ImportDialog(QDialog):
             for picture in self.pictures:
                 picture.show_plane(None, "No preview: it cannot be read")
         elif task.key == "import look":
-            self.why.setText(task.message)
+            self.why.setText(breakable(task.message))
 
     def accept(self) -> None:
         """Read the scan as answered."""

@@ -20,7 +20,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import landmarks_of, read_points
 from gp_labeler.session.landmark_import import MisfitError, Predicate, import_landmarks
-from gp_labeler.views.panels.parts import Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, scrolled, text_label
 from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkImportDialog"]
@@ -77,7 +77,7 @@ class LandmarkImportDialog(QDialog):
         self.take.clicked.connect(self._import)
         self._findings = QVBoxLayout()
         self._findings.setSpacing(8)
-        self._title = text_label("", "title")
+        self._title = ElidedLabel("", "title")
 
     def _lay_out(self) -> None:
         content = QWidget()
@@ -116,7 +116,7 @@ class LandmarkImportDialog(QDialog):
         findings = [self._read(file) for file in self._files]
         self._n_wrong = sum(level == "error" for level, _ in findings)
         n = len(self._files)
-        self._title.setText(self._files[0].name if n == 1 else f"{n} landmark files")
+        self._title.set_words(self._files[0].name if n == 1 else f"{n} landmark files")
         self._show(findings)
 
     def _read(self, file: Path) -> tuple[str, str]:
@@ -167,7 +167,7 @@ class LandmarkImportDialog(QDialog):
             self.accept()
             return
         self._misfit = ""
-        self._title.setText("Imported, but look at this")
+        self._title.set_words("Imported, but look at this")
         self._choices.hide()
         self._show([("good", f"Now placed: {done}"), *(("warning", _sentence(note)) for note in notes)])
         self.take.hide()

@@ -35,6 +35,7 @@ class LandmarkModel(QAbstractTableModel):
         super().__init__(parent)
         self._workbench = workbench
         self._states: dict[Side, dict[str, PointState]] = {}
+        self._shown: dict[int, tuple[object, ...]] = {}
         for signal in (
             workbench.session_replaced,
             workbench.landmarks_changed,
@@ -46,12 +47,19 @@ class LandmarkModel(QAbstractTableModel):
         self.refresh()
 
     def refresh(self, *_: object) -> None:
-        """Ask the session anew."""
-        session = self._workbench.session
+        """Ask the session anew, and tell of the rows that changed."""
+        session, before = self._workbench.session, self._shown
         self._states = {side: session.point_states(side, wait=False) for side in SIDES}
-        last = self.index(len(CODES) - 1, len(SIDES))
-        self.dataChanged.emit(self.index(0, 0), last)
+        self._shown = {row: self._row(row) for row in range(len(CODES))}
+        for row in range(len(CODES)):
+            if self._shown[row] != before.get(row):
+                self.dataChanged.emit(self.index(row, 0), self.index(row, len(SIDES)))
         self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, len(SIDES))
+
+    def _row(self, row: int) -> tuple[object, ...]:
+        """Return everything that the table shows of a feature."""
+        roles = (STATE_ROLE, ACTIVE_ROLE, LOCKED_ROLE, int(Qt.ItemDataRole.DisplayRole))
+        return tuple(self._cell(CODES[row], side, role) for side in SIDES for role in roles)
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's way
         return 0 if parent.isValid() else len(CODES)

@@ -85,11 +85,15 @@ class LandmarkTable(QWidget):
         """Bring the cursor of the table to the active point."""
         active = self._workbench.session.active
         index = QModelIndex() if active.code is None else self._index(active.side, active.code)
+        before = self.view.currentIndex()
+        if before == index:
+            return
         with blocked(self.view.selectionModel()):
             self.view.setCurrentIndex(index)
         if index.isValid():
             self.view.scrollTo(index)
-        self.view.viewport().update()
+        for changed in (before, index):
+            self.view.repaint_row(changed.row())
 
     def _index(self, side: Side, code: str) -> QModelIndex:
         return self.model.index(index_of(code), 1 + SIDES.index(side))
@@ -165,6 +169,11 @@ class _TableView(QTableView):
             event.ignore()  # letters are the window's shortcuts, not a search
         else:
             super().keyPressEvent(event)
+
+    def repaint_row(self, row: int) -> None:
+        """Draw one row anew, where there is such a row."""
+        for column in range(self.model().columnCount()):
+            self.update(self.model().index(row, column))
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: N802 - Qt's name
         super().leaveEvent(event)

@@ -6,12 +6,31 @@ from types import MappingProxyType
 
 from PySide6.QtCore import QEvent, Qt
 from PySide6.QtGui import QResizeEvent
-from PySide6.QtWidgets import QFrame, QHBoxLayout, QLabel, QLayout, QScrollArea, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QFrame,
+    QHBoxLayout,
+    QLabel,
+    QLayout,
+    QScrollArea,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
 from gp_labeler.views.icons import icon_pixmap
 from gp_labeler.views.theme import theme_of
 
-__all__ = ["Card", "Facts", "IconLabel", "Notice", "emptied", "scrolled", "text_label"]
+__all__ = [
+    "Card",
+    "ElidedLabel",
+    "Facts",
+    "IconLabel",
+    "Notice",
+    "breakable",
+    "emptied",
+    "scrolled",
+    "text_label",
+]
 
 
 def text_label(words: str = "", role: str = "", *, wrap: bool = False) -> QLabel:
@@ -31,6 +50,43 @@ def emptied(layout: QLayout) -> None:
         if widget is not None:
             widget.hide()
             widget.deleteLater()
+
+
+def breakable(words: str) -> str:
+    """Return words that a line may break inside paths and long file names."""
+    return words.replace("/", "/" + _BREAK).replace("\\", "\\" + _BREAK).replace("_", "_" + _BREAK)
+
+
+_BREAK = "\N{ZERO WIDTH SPACE}"
+_LONGEST_WORD = 34
+
+
+class ElidedLabel(QLabel):
+    """One line that is shortened in its middle where there is no room; the whole is in its tool tip."""
+
+    def __init__(self, words: str = "", role: str = "", parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._words = words
+        if role:
+            self.setProperty("role", role)
+        self.setTextFormat(Qt.TextFormat.PlainText)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
+        self.set_words(words)
+
+    def set_words(self, words: str) -> None:
+        """Show other words."""
+        self._words = words
+        self.setToolTip(words)
+        self.setAccessibleName(words)
+        self._shorten()
+
+    def _shorten(self) -> None:
+        middle = Qt.TextElideMode.ElideMiddle
+        self.setText(self.fontMetrics().elidedText(self._words, middle, max(self.width() - 2, 40)))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().resizeEvent(event)
+        self._shorten()
 
 
 def scrolled(content: QWidget) -> QScrollArea:
@@ -101,7 +157,8 @@ class Facts(QWidget):
         layout.setSpacing(8)
         caption = text_label(name, "hint")
         caption.setFixedWidth(80)
-        words = text_label(value, wrap=True)
+        is_long = max(map(len, value.split()), default=0) > _LONGEST_WORD
+        words = ElidedLabel(value) if is_long else text_label(value, wrap=True)
         words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
         self.values[name] = words
         layout.addWidget(caption, 0, Qt.AlignmentFlag.AlignTop)
@@ -173,7 +230,7 @@ class Notice(QWidget):
         row.addWidget(IconLabel(name, colour, 16), 0, Qt.AlignmentFlag.AlignTop)
         column = QVBoxLayout()
         column.setSpacing(1)
-        column.addWidget(text_label(words, wrap=True))
+        column.addWidget(text_label(breakable(words), wrap=True))
         if remedy:
-            column.addWidget(text_label(remedy, "hint", wrap=True))
+            column.addWidget(text_label(breakable(remedy), "hint", wrap=True))
         row.addLayout(column, 1)

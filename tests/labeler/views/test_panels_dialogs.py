@@ -167,6 +167,19 @@ def test_no_word_of_the_import_dialog_is_cut_off(desk, stack, parent, qtbot, the
     dialog.reject()
 
 
+def test_names_of_any_length_fit(desk, tmp_path, parent, qtbot):
+    folder = tmp_path / ("a_very_long_name_without_a_single_space_" * 4)
+    folder.mkdir()
+    for k in range(3):
+        tifffile.imwrite(folder / f"s{k}.tif", np.full((30, 30), k, np.uint8))
+    dialog = opened(desk, folder, parent)
+    qtbot.wait(20)
+    content = dialog.facts.parentWidget()
+    assert content.width() <= dialog.width()
+    assert content.minimumSizeHint().width() < 560
+    dialog.reject()
+
+
 # Export
 
 
