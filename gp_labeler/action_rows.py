@@ -13,6 +13,9 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["edit_rows", "file_rows", "help_rows", "landmark_rows", "view_rows"]
 
+GLYPH_MM = 0.6
+"""Diameter of points whose size is in mm."""
+
 
 # When something can be done
 
@@ -108,6 +111,11 @@ def _change_opacity(step: float) -> Run:
         desk.session.view.update(mesh_opacity=round(opacity, 3))
 
     return change
+
+
+def _toggle_glyphs(desk: Workbench, ui: Ui) -> None:
+    is_mm = desk.session.view.state.glyph_mm is not None
+    desk.session.view.update(glyph_mm=None if is_mm else GLYPH_MM)
 
 
 def _auto_greys(desk: Workbench, ui: Ui) -> None:
@@ -221,6 +229,9 @@ def view_rows() -> Iterator[Action]:
     yield row("view.auto_greys", "Automatic contrast", ("Shift+W",), _auto_greys, _has_scan, group="tool")
     for title, field, key in _SHOWN:
         yield row(f"view.{field}", title, (key,), _toggle(field), checked=_is_on(field), group="what")
+    yield row("view.glyph_mm", "Points grow with the zoom", (), _toggle_glyphs,
+              checked=lambda d: d.session.view.state.glyph_mm is not None, group="what",
+              hint="Their size is in mm then, else the same on the screen at any zoom")
     yield row("view.fainter", "Bone more transparent", ("[",), _change_opacity(-0.1), group="bone")
     yield row("view.solider", "Bone more solid", ("]",), _change_opacity(0.1), group="bone")
     yield row("view.projection", "Perspective on or off", ("5", "Num+5"),

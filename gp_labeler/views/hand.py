@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
 from gp_core.checks import FloatArray
@@ -12,6 +12,7 @@ from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How
 from gp_labeler.views.drawn import point_of
+from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.workbench import Workbench
 
 __all__ = ["Hand", "nudge"]
@@ -87,6 +88,11 @@ class Hand:
         if self._placed:
             self._placed = False
             self._desk.session.undo()
+
+    def open_menu(self, view: QWidget, mark: str | None, where: QPoint) -> None:
+        """Offer what can be done with the point of a mark, at a position on the screen."""
+        if mark is not None:
+            landmark_menu(self._desk, *point_of(mark), view).popup(where)
 
     def cursor(self, on_target: bool, mark: str | None) -> Qt.CursorShape:
         """Return the pointer that says what a click would do."""

@@ -145,6 +145,7 @@ class MainWindow(QMainWindow):
         is_open = self.workbench.session.state.volume is not None
         if is_open and self.pages.currentIndex() == 0 and self.workbench.volume is not None:
             self.set_step("label")
+            self.grid.scene_view.setFocus()
         self.pages.setCurrentIndex(int(is_open))
         if not is_open:
             self.set_step("scan")

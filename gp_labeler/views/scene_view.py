@@ -233,6 +233,8 @@ class SceneView(QWidget):
         mark = self._hand.release()
         if event.button() == Qt.MouseButton.LeftButton and clicked:
             self._click(x, y, mark)
+        elif event.button() == Qt.MouseButton.RightButton and clicked:
+            self._hand.open_menu(self, self.scene.mark_at(x, y, 8.0), event.globalPosition().toPoint())
         self._look_at(x, y, Modifier.NONE)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802

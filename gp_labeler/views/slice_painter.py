@@ -185,7 +185,8 @@ class SlicePainter:
         in_slice = off <= 0.75 * source.step(shown.plane)
         for n in np.flatnonzero(near):
             fade = 1.0 if in_slice[n] else 1.0 - 0.65 * off[n] / reach_of(source, shown.plane)
-            _draw_mark(painter, marks[n], pixels[n], bool(in_slice[n]), float(fade), ratio)
+            radius = _radius(marks[n], self._desk.session.view.state.glyph_mm, shown, ratio)
+            _draw_mark(painter, marks[n], pixels[n], radius, bool(in_slice[n]), float(fade), ratio)
         if self._desk.session.view.state.labels_visible:
             drawn = [(marks[n], pixels[n]) for n in np.flatnonzero(near)]
             _draw_labels(painter, drawn, shown.size, ratio)
@@ -229,11 +230,23 @@ def _draw_text(painter: QPainter, text: QPainterPath, colour: str, ratio: float,
     painter.restore()
 
 
+def _radius(mark: Mark, glyph_mm: float | None, shown: Shown, ratio: float) -> float:
+    """Return how large a point is drawn, device pixels."""
+    radius = 4.0 * ratio if glyph_mm is None else 0.5 * glyph_mm / shown.mm_per_pixel
+    return radius * (1.25 if mark.active else 1.0)
+
+
 def _draw_mark(
-    painter: QPainter, mark: Mark, pixel: FloatArray, in_slice: bool, fade: float, ratio: float
+    painter: QPainter,
+    mark: Mark,
+    pixel: FloatArray,
+    radius: float,
+    in_slice: bool,
+    fade: float,
+    ratio: float,
 ) -> None:
     """Draw a point: full where the slice passes through it, its outline where it lies behind or before."""
-    radius, centre = (5.0 if mark.active else 4.0) * ratio, QPointF(*pixel)
+    centre = QPointF(*pixel)
     colour = QColor(_on_black(mark.state))
     shape = QPainterPath()
     if mark.state in _CORNERS:

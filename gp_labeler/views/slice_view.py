@@ -217,6 +217,8 @@ class SliceView(QWidget):
         self._greying = None
         dragged = self._hand.holds and not self._hand.is_click
         mark = self._hand.release()
+        if clicked and event.button() == Qt.MouseButton.RightButton:
+            self._hand.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         plain = event.button() == Qt.MouseButton.LeftButton and not modifiers_of(event)
         here = self.shown.pixel_to_scan([[x, y]])[0]
         if clicked and plain and not dragged and (self._desk.tool != "grey" or mark):
