@@ -75,12 +75,3 @@ def test_bad_choices_are_refused() -> None:
     with pytest.raises(GpError, match="no Dask scheduler answers at nowhere"):  # noqa: SIM117
         with open_executor(scheduler="nowhere://x"):
             pass
-
-
-def test_dask_cluster() -> None:
-    distributed = pytest.importorskip("distributed")
-    with (
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
-        open_executor(scheduler=cluster.scheduler_address) as executor,
-    ):
-        assert run_map(abs, [-1, 2, -3], executor) == [1, 2, 3]

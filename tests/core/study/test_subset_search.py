@@ -101,6 +101,19 @@ def test_any_number_of_workers_gives_the_same() -> None:
             assert other.fits == alone.fits
 
 
+def test_a_dask_cluster_gives_the_same() -> None:
+    distributed = pytest.importorskip("distributed")
+    animals = herd(3)
+    run: dict[str, Any] = {"training": SMALL, "fewest_training": 7, "settings": QUICK}
+    alone = search_features(animals, **run)
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        open_executor(scheduler=cluster.scheduler_address) as executor,
+    ):
+        assert executor is not None
+        assert search_features(animals, executor=executor, **run).training == alone.training
+
+
 class StopError(Exception):
     """What a caller raises to stop."""
 
