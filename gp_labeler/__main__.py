@@ -19,6 +19,7 @@ _EXAMPLE = """examples:
   gp-labeler head.nrrd                the window with a scan, or a specimen saved before
   gp-labeler --demo                   the window with a synthetic head
   gp-labeler --offscreen demo --output out     the same window without a display
+  gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply
 """
 
@@ -34,6 +35,14 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
     parser.add_argument("path", nargs="?", type=Path, metavar="VOLUME|SPECIMEN", help="what to open")
     parser.add_argument("--demo", action="store_true", help="open a synthetic head")
+    offscreen = parser.add_argument_group("without a display")
+    offscreen.add_argument(
+        "--offscreen", metavar="SCRIPT|demo", help="do what a script says, in the same window, unseen"
+    )
+    offscreen.add_argument("--output", type=Path, metavar="DIR", help="where what it makes goes")
+    offscreen.add_argument(
+        "--specimens", nargs="+", default=(), metavar="S", help="what {specimen} in the script stands for"
+    )
     parser.add_argument("--offscreen", metavar="SCRIPT", help="run a script, or 'demo', without a display")
     parser.add_argument("--output", type=Path, metavar="DIR", help="where --offscreen writes")
     parser.add_argument(
@@ -82,6 +91,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _window(args: argparse.Namespace) -> int:
+    if args.offscreen is not None:
+        from gp_labeler.offscreen.command import run_offscreen
+
+        return run_offscreen(args.offscreen, args.output, args.specimens)
     if args.offscreen is not None:
         from gp_labeler.offscreen.command import run_offscreen
 

@@ -13,6 +13,7 @@ from types import TracebackType
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
+from gp_core.errors import GpError
 from gp_labeler.session.places import default_directory
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.views.dispatch import QtDispatcher
@@ -30,9 +31,7 @@ def make_application() -> QApplication:
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
-    if sys.platform.startswith("linux") and not (
-        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-    ):
+    if not _has_display():
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     app = QApplication(["gp-labeler"])
@@ -80,7 +79,17 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
     -------
     int
         Exit status.
+
+    Raises
+    ------
+    GpError
+        There is no display.
     """
+    if not _has_display():
+        raise GpError(
+            "there is no display to open a window on",
+            remedy="Use gp-labeler --offscreen SCRIPT|demo --output DIR, or run it under xvfb-run.",
+        )
     app = make_application()
     directory = directory or default_directory()
     window = make_window(directory)
@@ -96,6 +105,12 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
 
     QTimer.singleShot(0, begin)
     return int(app.exec())
+
+
+def _has_display() -> bool:
+    """Whether a window can be seen, or somebody said which platform Qt shall draw on."""
+    named = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
+    return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in named)
 
 
 def _report(

@@ -10,6 +10,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QT
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import LETTERS
+from gp_labeler.session.edits import point_text
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import follow
 from gp_labeler.views.icons import icon
@@ -61,6 +62,7 @@ class StatusLine(QWidget):
             workbench.session_replaced,
             workbench.tool_changed,
             workbench.volume_opened,
+            workbench.dragged,
         ):
             follow(self, signal, self._on_changed)
         follow(self, workbench.message, self.say)
@@ -91,7 +93,10 @@ class StatusLine(QWidget):
 
     def _say_next(self) -> None:
         desk = self._desk
-        if desk.volume is None:
+        if desk.drag is not None:
+            point = point_text(desk.drag.side, desk.drag.code)
+            self._show(f"Let go to leave {point} here, or press Esc to take it back", "next")
+        elif desk.volume is None:
             self._show("Open a scan, or try the demo", "hint")
         elif desk.tool == "look":
             self._show("Drag over a slice to move the crosshair", "hint")

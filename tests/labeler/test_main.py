@@ -57,6 +57,15 @@ def test_wrong_input_is_one_line_and_status_2(ball_file, arguments, words, capsy
     assert error.count("\n") == 1
 
 
+def test_without_a_display_it_says_what_to_do_instead() -> None:
+    bare = {k: v for k, v in os.environ.items() if "DISPLAY" not in k and k != "QT_QPA_PLATFORM"}
+    command = [sys.executable, "-m", "gp_labeler"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=bare)
+    assert done.returncode == 2
+    assert "--offscreen" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
 def test_help_needs_neither_qt_nor_vtk() -> None:
     code = (
         "import sys; from gp_labeler.__main__ import make_parser; make_parser().format_help();"
