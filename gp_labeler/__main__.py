@@ -43,11 +43,6 @@ def make_parser() -> argparse.ArgumentParser:
     offscreen.add_argument(
         "--specimens", nargs="+", default=(), metavar="S", help="what {specimen} in the script stands for"
     )
-    parser.add_argument("--offscreen", metavar="SCRIPT", help="run a script, or 'demo', without a display")
-    parser.add_argument("--output", type=Path, metavar="DIR", help="where --offscreen writes")
-    parser.add_argument(
-        "--specimens", nargs="+", default=[], metavar="NAME", help="run the script for each, as {specimen}"
-    )
     return parser
 
 
@@ -91,10 +86,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _window(args: argparse.Namespace) -> int:
-    if args.offscreen is not None:
-        from gp_labeler.offscreen.command import run_offscreen
-
-        return run_offscreen(args.offscreen, args.output, args.specimens)
     if args.offscreen is not None:
         from gp_labeler.offscreen.command import run_offscreen
 
