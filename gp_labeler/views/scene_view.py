@@ -41,6 +41,7 @@ _FINE_AFTER_MS = 180
 _FIRST_LOOK = (-0.45, 0.75, -0.48)
 """Direction of the first look: from the front, the left and above."""
 
+_MIDDLE = 0.6
 _ARROWS = {
     Qt.Key.Key_Left: (-24.0, 0.0),
     Qt.Key.Key_Right: (24.0, 0.0),
@@ -103,9 +104,10 @@ class SceneView(QWidget):
         self.redraw()
 
     def go_to(self, position: FloatArray) -> None:
-        """Bring a (3,) scan position to the middle of the view."""
-        self.scene.camera.focus_on(position)
-        self.redraw()
+        """Bring a (3,) scan position to the middle of the view, unless it is about there."""
+        if not self._shows(position, _MIDDLE):
+            self.scene.camera.focus_on(position)
+            self.redraw()
 
     def zoom_to(self, position: FloatArray, across_mm: float) -> None:
         """Show so many mm, from top to bottom, around a (3,) scan position."""
@@ -135,11 +137,15 @@ class SceneView(QWidget):
         follow(self, desk.view_changed, self._on_view_changed)
 
     def _on_crosshair(self, position: FloatArray) -> None:
-        x, y = self.scene.display_of(position[None])[0]
-        width, height = self.scene.target.size
-        if self._fitted and not (0 < x < width and 0 < y < height):
+        if self._fitted and not self._shows(position, 1.0):
             self.go_to(position)
         self.update()
+
+    def _shows(self, position: FloatArray, part: float) -> bool:
+        """Whether a (3,) scan position lies in the middle part of the view, from 0 to 1."""
+        size = np.array(self.scene.target.size)
+        off = np.abs(self.scene.display_of(position[None])[0] - size / 2)
+        return bool((off < part * size / 2).all())
 
     def _on_session_replaced(self, _: object) -> None:
         self._fitted = False

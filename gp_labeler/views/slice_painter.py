@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 __all__ = ["SlicePainter", "reach_of"]
 
 _REACH_MM = 1.0
+_CLOSE_PIXELS = 12.0
+"""From so many logical pixels a millimetre on, points beside the slice are named too."""
+
 _TEXT, _HALO = "#E8EDF2", "#0B0F14"
 """Slices are black in every theme, and what is written on them light."""
 
@@ -188,7 +191,9 @@ class SlicePainter:
             radius = _radius(marks[n], self._desk.session.view.state.glyph_mm, shown, ratio)
             _draw_mark(painter, marks[n], pixels[n], radius, bool(in_slice[n]), float(fade), ratio)
         if self._desk.session.view.state.labels_visible:
-            drawn = [(marks[n], pixels[n]) for n in np.flatnonzero(near)]
+            close = shown.mm_per_pixel * _CLOSE_PIXELS * ratio < 1.0
+            named = [n for n in np.flatnonzero(near) if close or in_slice[n] or marks[n].active]
+            drawn = [(marks[n], pixels[n]) for n in named]
             _draw_labels(painter, drawn, shown.size, ratio)
 
 
