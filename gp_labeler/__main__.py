@@ -18,7 +18,6 @@ _EXAMPLE = """examples:
   gp-labeler                          the window
   gp-labeler head.nrrd                the window with a scan, or a specimen saved before
   gp-labeler --demo                   the window with a synthetic head
-  gp-labeler --offscreen demo --output out     the same window without a display
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply
 """

@@ -15,7 +15,7 @@ from gp_labeler.offscreen.script import Script, StepError
 from gp_labeler.offscreen.step import Step
 from gp_labeler.session.specimen_file import SUFFIX
 
-__all__ = ["REPORT", "Tell", "run_script"]
+__all__ = ["REPORT", "Tell", "do_step", "run_script"]
 
 _log = logging.getLogger(__name__)
 
@@ -47,7 +47,7 @@ def run_script(script: Script, output: Path, *, tell: Tell | None = None) -> Rep
     try:
         with rig.watching():
             for number, step in enumerate(script.steps, start=1):
-                report.steps.append(_done(rig, number, step))
+                report.steps.append(do_step(rig, number, step))
                 (tell or _nobody)(_line(report.steps[-1]))
     except StepError as error:
         report.error = str(error)
@@ -60,8 +60,14 @@ def run_script(script: Script, output: Path, *, tell: Tell | None = None) -> Rep
     return report
 
 
-def _done(rig: Rig, number: int, step: Step) -> StepRecord:
-    """Do one step; raise `StepError` where it, or the window meanwhile, failed."""
+def do_step(rig: Rig, number: int, step: Step) -> StepRecord:
+    """Do one step.
+
+    Raises
+    ------
+    StepError
+        It could not be done, or the window told of an error, or asked what the step does not answer.
+    """
     since, start = len(rig.messages), time.perf_counter()
     rig.prompts.prepare()
     try:

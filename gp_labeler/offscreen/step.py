@@ -67,7 +67,7 @@ def make_step(kinds: Mapping[str, type[Step]], table: Any) -> Step:
     does = table.get("do")
     if does is None:
         raise GpError("does not say what to do", remedy=f"Give do = one of {', '.join(kinds)}.")
-    if does not in kinds:
+    if not isinstance(does, str) or does not in kinds:
         raise GpError(
             f"unknown step {does!r:.40}{_nearest(does, kinds)}", remedy=f"There are {', '.join(kinds)}."
         )

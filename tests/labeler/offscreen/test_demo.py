@@ -1,0 +1,31 @@
+"""The demo, on a coarse phantom so that it takes seconds."""
+
+from __future__ import annotations
+
+import pytest
+from PySide6.QtGui import QImage
+from script_cases import content
+
+from gp_core.landmarks.files import read_landmarks
+from gp_labeler.offscreen.demo import demo_script
+from gp_labeler.offscreen.runner import run_script
+
+PICTURES = ("window.png", "mesh.png", "slices.png", "overlay.png")
+
+
+@pytest.mark.slow
+def test_the_demo_leaves_everything_it_promises(qapp, tmp_path) -> None:
+    report = run_script(demo_script(seed=1, voxel_mm=0.4), tmp_path)
+    assert report.ok, report.error
+    written = content(tmp_path / "report.json")
+    assert written["n_placed"] == 40
+    assert written["largest_error_voxels"] < 1.0
+    assert written["poses"][0]["error_mm"] < 1.0
+    assert all(step["seconds"] >= 0 for step in written["steps"])
+    for side in "LR":
+        assert len(read_landmarks(tmp_path / f"phantom-1_{side}.mrk.json").placed) == 20
+    assert (tmp_path / "phantom-1.gpspecimen.json").exists()
+    assert content(tmp_path / "pose.json")["frame"] == "tracker"
+    for name in PICTURES:
+        image = QImage(str(tmp_path / name))
+        assert min(image.width(), image.height()) >= 600
