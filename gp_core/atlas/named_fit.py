@@ -7,11 +7,13 @@ Model, in the atlas frame (left side). The point touched at feature j is
 where s_j is how this animal's feature differs from the mean, with the variance v_j the atlas gives it, and
 e_j is the error of the touch. A Student-t is a Gaussian of variance sigma^2 / w_j whose weight w_j is itself
 unknown, so a mistouch talks itself out of the fit. Expectation conditional maximisation: the weights and
-sigma from the expected squared errors, the pose by a Gauss-Newton step on the likelihood with the shape
-integrated out.
+sigma from the expected squared errors, then the pose by weighted Procrustes with the shape integrated out.
 
 Correlations between features are left out of the weights on purpose: learned from some twenty sides, they
 made the estimates of held-out animals worse (docs/method.md). They do enter the error bars, `robust_pose`.
+
+Several readings of the same touches (the other side, names exchanged, another start) are fitted at once, as
+rows of one batch: NumPy then takes hardly longer than for one.
 
 References
 ----------
@@ -21,25 +23,15 @@ https://doi.org/10.1080/01621459.1989.10478852
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
-from math import cos, log, log1p, sin
 
 import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
-from gp_core.frames import cross_matrix
-from gp_core.registration.procrustes import align, weighted_procrustes
+from gp_core.registration.procrustes import weighted_procrustes
 
-__all__ = [
-    "TYPICAL_NOISE_MM",
-    "NamedFit",
-    "TouchModel",
-    "fit_named_points",
-    "motion_jacobian",
-    "quick_misfit",
-]
+__all__ = ["NamedFit", "TouchModel", "careful_misfit", "fit_named_points", "fit_readings", "motion_jacobian"]
 
 TYPICAL_NOISE_MM = 0.05
 """Scale of a careful touch, mm a coordinate, to which the estimate of sigma is drawn."""
@@ -47,6 +39,7 @@ TYPICAL_NOISE_MM = 0.05
 _PRIOR_WEIGHT = 2.0
 _NU = 4.0
 _MAX_ITERATIONS = 100
+_SCREENING_ITERATIONS = 12
 _WEIGHT_TOLERANCE = 3e-3
 _DOUBTFUL_WEIGHT = 0.5
 _LEFT_OUT = 1e-3
@@ -82,8 +75,10 @@ class NamedFit:
     ----------
     rotation, translation : (3, 3), (3,) arrays
         The atlas in the frame of the touches, ``y = rotation @ x + translation``, mm.
+    points : (n, 3) array, mm
+        The touches, brought into the atlas frame.
     residual : (3 n,) array, mm
-        Touch minus mean, at this pose.
+        Touch minus mean.
     weights : (n,) array
         About 1 for an ordinary touch, towards 0 for one that does not fit.
     noise : float
@@ -92,41 +87,52 @@ class NamedFit:
         Whether it was found from the touches.
     precision : (3 n,) array
         Inverse variance of `residual` with these weights.
-    jacobian : (3 n, 6) array
-        `motion_jacobian` of the touches.
     misfit : float
-        Negative log posterior up to a constant; lower is better among fits of the same touches.
+        Negative log posterior up to a constant; lower is better among readings of the same touches.
     converged : bool
         False where the iterations ran out first.
     """
 
     rotation: FloatArray
     translation: FloatArray
+    points: FloatArray
     residual: FloatArray
     weights: FloatArray
     noise: float
     noise_estimated: bool
     precision: FloatArray
-    jacobian: FloatArray
     misfit: float
     converged: bool
 
     @property
+    def doubtful(self) -> bool:
+        """Whether a touch was half set aside."""
+        return bool(self.weights.min() < _DOUBTFUL_WEIGHT)
+
+    @property
+    def rough(self) -> bool:
+        """Whether the touches fit worse than careful ones do."""
+        return self.doubtful or self.noise > 3 * TYPICAL_NOISE_MM
+
+    @property
+    def jacobian(self) -> FloatArray:
+        """(3 n, 6) `motion_jacobian` of the touches."""
+        return motion_jacobian(self.points)
+
+    @property
     def touch_variances(self) -> FloatArray:
-        """(3 n,) variance of each touched coordinate, mm^2.
+        """(n,) variance of each touch, mm^2 a coordinate.
 
         A Student-t varies more than its scale says, and a scale found from few touches is itself unsure.
         """
         freedom = 3 * len(self.weights) - 6 + _PRIOR_WEIGHT
         unsure = freedom / (freedom - 2) if self.noise_estimated else 1.0
-        return np.repeat(unsure * _NU / (_NU - 2) * self.noise**2 / self.weights, 3)
+        variances: FloatArray = unsure * _NU / (_NU - 2) * self.noise**2 / self.weights
+        return variances
 
 
 def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     """Fit the atlas to touched points.
-
-    A mistouch can hold the fit in a wrong place, so wherever one touch is doubted, the fit is also started
-    without each touch in turn, and the best of these stands.
 
     Parameters
     ----------
@@ -137,77 +143,150 @@ def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     Raises
     ------
     GeometryError
-        Fewer than three touches, or touches on one line.
+        Fewer than three touches, touches on one line, or touches that no pose brings near the atlas.
     """
-    weighted_procrustes(model.mean, touches, names=model.codes)  # for its guards; below, none are needed
-    fit = _fit_from(model, touches, np.ones(len(touches)))
-    if fit.weights.min() > _DOUBTFUL_WEIGHT or len(touches) == 3:
-        return fit
-    others = [_fit_from(model, touches, start) for start in _one_left_out(model, touches)]
-    return min([fit, *others], key=lambda candidate: candidate.misfit)
+    return fit_readings(model, touches[None])[0]
 
 
-def quick_misfit(model: TouchModel, touches: FloatArray) -> float:
-    """Return -2 log likelihood, up to a constant, of careful touches with no mistouch among them.
+def fit_readings(model: TouchModel, readings: FloatArray, *, screen: bool = False) -> list[NamedFit]:
+    """Fit the atlas to several readings of the same touches.
 
-    Cheap, and on one scale for any reading of the same touches (other side, names exchanged); about
-    chi-square with 3 n - 6 degrees of freedom where the reading is right.
+    A mistouch can hold a fit in a wrong place, so where one touch is doubted, the fit is also started
+    without each touch in turn, and the best of these stands.
+
+    Parameters
+    ----------
+    model : TouchModel
+    readings : (B, n, 3) array, mm
+    screen : bool
+        Only tell good readings from bad ones: few iterations, and no second start.
+
+    Raises
+    ------
+    GeometryError
+        As `fit_named_points`.
     """
-    noise = (TYPICAL_NOISE_MM if model.noise is None else model.noise) ** 2
-    rotation, translation = align(model.mean, touches, 1 / (model.variances + noise))
-    residual = ((touches - translation) @ rotation - model.mean).ravel()
-    return float(residual @ (np.repeat(1 / (model.variances + noise), 3) * residual))
-
-
-def _one_left_out(model: TouchModel, touches: FloatArray) -> Iterator[FloatArray]:
-    for j in range(len(touches)):
-        weights = np.ones(len(touches))
-        weights[j] = _LEFT_OUT
-        try:
-            weighted_procrustes(model.mean[weights == 1], touches[weights == 1])
-        except GeometryError:
-            continue
-        yield weights
-
-
-def _fit_from(model: TouchModel, touches: FloatArray, weights: FloatArray) -> NamedFit:
-    sigma2 = (TYPICAL_NOISE_MM if model.noise is None else model.noise) ** 2
-    rotation, translation = align(model.mean, touches, 1 / (model.variances + sigma2 / weights))
-    for iteration in range(_MAX_ITERATIONS + 1):
-        local = (touches - translation) @ rotation
-        residual = (local - model.mean).ravel()
-        noise = sigma2 / weights
-        precision = np.repeat(1 / (model.variances + noise), 3)
-        jacobian = motion_jacobian(local)
-        pull = precision[:, None] * jacobian
-        pose_covariance = np.linalg.inv(jacobian.T @ pull)
-        step = pose_covariance @ (residual @ pull)
-        pulled = precision * residual - pull @ step
-        leverage = ((pull @ pose_covariance) * pull).sum(axis=1)
-        error = noise**2 * _over_coordinates(pulled * pulled)
-        spread = 3 * noise - noise**2 * _over_coordinates(precision - leverage)
-        updated = (_NU + 3) / (_NU + (error + spread) / sigma2)
-        converged = bool(np.abs(updated - weights).max() < _WEIGHT_TOLERANCE)
-        if converged or iteration == _MAX_ITERATIONS:
-            break
-        weights = updated
-        if model.noise is None:
-            sigma2 *= (_noise_variance(weights, error + spread) / sigma2) ** _OVER_RELAXATION
-        translation = translation + rotation @ step[:3]
-        rotation = rotation @ _rotation_from_vector(step[3:])
-    misfit = _misfit(model, _over_coordinates(pulled * pulled), error, sigma2)
-    return NamedFit(
-        rotation=rotation,
-        translation=translation,
-        residual=residual,
-        weights=weights,
-        noise=sigma2**0.5,
-        noise_estimated=model.noise is None,
-        precision=precision,
-        jacobian=jacobian,
-        misfit=misfit,
-        converged=converged,
+    weighted_procrustes(model.mean, readings[0], names=model.codes)  # for its guards
+    n = readings.shape[1]
+    fits = _fit_batch(
+        model, readings, np.ones((len(readings), n)), _SCREENING_ITERATIONS if screen else _MAX_ITERATIONS
     )
+    doubted = [i for i, fit in enumerate(fits) if fit.doubtful and n > 3 and not screen]
+    if doubted:
+        starts = np.where(np.eye(n, dtype=bool), _LEFT_OUT, 1.0)
+        others = _fit_batch(
+            model, np.repeat(readings[doubted], n, axis=0), np.tile(starts, (len(doubted), 1))
+        )
+        for row, i in enumerate(doubted):
+            fits[i] = min([fits[i], *others[row * n : row * n + n]], key=lambda fit: fit.misfit)
+    return fits
+
+
+def careful_misfit(model: TouchModel, reading: FloatArray, noise: float) -> float:
+    """Return -2 log likelihood, up to a constant, of a reading whose touch errors are Gaussian of this scale.
+
+    Cheap; tells the readings of careful touches apart, which one rough touch already upsets.
+    """
+    precision = 1 / (model.variances + noise**2)
+    rotations, translations = _align(model.mean, reading[None], precision[None])
+    residual = (reading - translations[0]) @ rotations[0] - model.mean
+    return float(np.sum(precision[:, None] * residual**2))
+
+
+def _fit_batch(
+    model: TouchModel, readings: FloatArray, weights: FloatArray, n_iterations: int = _MAX_ITERATIONS
+) -> list[NamedFit]:
+    sigma2 = np.full((len(readings), 1), (model.noise or TYPICAL_NOISE_MM) ** 2)
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        for iteration in range(n_iterations + 1):
+            noise = sigma2 / weights
+            precision = 1 / (model.variances + noise)
+            rotations, translations = _align(model.mean, readings, precision)
+            points = (readings - translations[:, None]) @ rotations
+            residuals = points - model.mean
+            error = noise**2 * precision**2 * (residuals**2).sum(axis=2)
+            spread = 3 * noise - noise**2 * (3 * precision - _leverage(points, precision))
+            updated = (_NU + 3) / (_NU + (error + spread) / sigma2)
+            still = np.abs(updated - weights).max(axis=1) < _WEIGHT_TOLERANCE
+            if still.all() or iteration == n_iterations:
+                break
+            weights = updated
+            if model.noise is None:
+                sigma2 = sigma2 * (_noise_variance(weights, error + spread) / sigma2) ** _OVER_RELAXATION
+        misfits = _misfits(model, precision, residuals, error, sigma2)
+    if not np.isfinite(misfits).all():
+        raise GeometryError(
+            "no pose brings these points near the atlas", remedy="Check units, names and coordinates."
+        )
+    return [
+        NamedFit(
+            rotation=rotations[i],
+            translation=translations[i],
+            points=points[i],
+            residual=residuals[i].ravel(),
+            weights=weights[i],
+            noise=float(sigma2[i, 0]) ** 0.5,
+            noise_estimated=model.noise is None,
+            precision=np.repeat(precision[i], 3),
+            misfit=float(misfits[i]),
+            converged=bool(still[i]),
+        )
+        for i in range(len(readings))
+    ]
+
+
+def _align(mean: FloatArray, readings: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weighted Procrustes of the mean (n, 3) to each reading (B, n, 3); det +1."""
+    shares = weights / weights.sum(axis=1, keepdims=True)
+    mean_centres, centres = shares @ mean, (shares[:, None] @ readings)[:, 0]
+    covariance = (readings - centres[:, None]).transpose(0, 2, 1) @ (
+        shares[..., None] * (mean - mean_centres[:, None])
+    )
+    if not np.isfinite(covariance).all():
+        raise GeometryError("the coordinates are too large to fit", remedy="Check units and coordinates.")
+    left, _, right = np.linalg.svd(covariance)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
+    rotations = left @ right
+    return rotations, centres - (rotations @ mean_centres[..., None])[..., 0]
+
+
+def _leverage(points: FloatArray, precision: FloatArray) -> FloatArray:
+    """Return (B, n): how much of each touch's precision the pose uses up, summed over its coordinates.
+
+    With the pose taken about the weighted centre, translation and rotation separate, and the rotation's
+    information is the inertia tensor of the points.
+    """
+    total = precision.sum(axis=1, keepdims=True)
+    arms = points - (precision[:, None] @ points) / total[..., None]
+    square = (arms * arms).sum(axis=2)
+    inertia = (precision * square).sum(axis=1)[:, None, None] * np.eye(3) - arms.transpose(0, 2, 1) @ (
+        precision[..., None] * arms
+    )
+    turn = np.linalg.inv(inertia)
+    through_turn = square * np.trace(turn, axis1=1, axis2=2)[:, None] - ((arms @ turn) * arms).sum(axis=2)
+    used: FloatArray = precision**2 * (3 / total + through_turn)
+    return used
+
+
+def _noise_variance(weights: FloatArray, squared_errors: FloatArray) -> FloatArray:
+    prior = _PRIOR_WEIGHT * TYPICAL_NOISE_MM**2
+    total = prior + (weights * squared_errors).sum(axis=1, keepdims=True)
+    variance: FloatArray = total / (_PRIOR_WEIGHT + 3 * weights.shape[1])
+    return variance
+
+
+def _misfits(
+    model: TouchModel, precision: FloatArray, residuals: FloatArray, error: FloatArray, sigma2: FloatArray
+) -> FloatArray:
+    """Return (B,): shape and touch errors, each by its own law, and the scale of the touches."""
+    shape = (model.variances * precision**2 * (residuals**2).sum(axis=2)).sum(axis=1) / 2
+    touches = (_NU + 3) / 2 * np.log1p(error / (_NU * sigma2)).sum(axis=1)
+    misfits: FloatArray = shape + touches
+    if model.noise is None:
+        scale = sigma2[:, 0]
+        misfits = misfits + (_PRIOR_WEIGHT + 3 * error.shape[1]) / 2 * np.log(scale)
+        misfits = misfits + _PRIOR_WEIGHT * TYPICAL_NOISE_MM**2 / (2 * scale)
+    return misfits
 
 
 def motion_jacobian(points: FloatArray) -> FloatArray:
@@ -229,33 +308,3 @@ def motion_jacobian(points: FloatArray) -> FloatArray:
     jacobian[:, 1, 3], jacobian[:, 1, 5] = -z, x
     jacobian[:, 2, 3], jacobian[:, 2, 4] = y, -x
     return jacobian.reshape(-1, 6)
-
-
-def _over_coordinates(values: FloatArray) -> FloatArray:
-    total: FloatArray = values.reshape(-1, 3).sum(axis=1)
-    return total
-
-
-def _noise_variance(weights: FloatArray, squared_errors: FloatArray) -> float:
-    prior = _PRIOR_WEIGHT * TYPICAL_NOISE_MM**2
-    return float((prior + weights @ squared_errors) / (_PRIOR_WEIGHT + 3 * len(weights)))
-
-
-def _misfit(model: TouchModel, pulled: FloatArray, error: FloatArray, sigma2: float) -> float:
-    """Shape and touch errors, each by its own law; `pulled` is |s_j|^2 / v_j^2."""
-    shape = float(model.variances @ pulled) / 2
-    touches = (_NU + 3) / 2 * sum(log1p(e / (_NU * sigma2)) for e in error.tolist())
-    prior = 0.0
-    if model.noise is None:
-        prior = (_PRIOR_WEIGHT + 3 * len(error)) / 2 * log(sigma2)
-        prior += _PRIOR_WEIGHT * TYPICAL_NOISE_MM**2 / (2 * sigma2)
-    return shape + touches + prior
-
-
-def _rotation_from_vector(vector: FloatArray) -> FloatArray:
-    """Rodrigues' formula; also for the tiny turns near convergence."""
-    angle = float(vector @ vector) ** 0.5
-    across = cross_matrix(vector)
-    first, second = (sin(angle) / angle, (1 - cos(angle)) / angle**2) if angle > 1e-8 else (1.0, 0.5)
-    turn: FloatArray = np.eye(3) + first * across + second * (across @ across)
-    return turn

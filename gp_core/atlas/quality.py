@@ -9,12 +9,12 @@ from itertools import combinations
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.named_fit import TouchModel, quick_misfit
 from gp_core.atlas.shape import LABELLING_NOISE_MM, Departure, departures
 from gp_core.errors import GpError
 from gp_core.frames import mirror_x
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
+from gp_core.registration.procrustes import align
 
 __all__ = ["Finding", "check_landmarks", "check_specimen"]
 
@@ -69,13 +69,12 @@ def check_specimen(specimen: Specimen, atlas: Atlas) -> list[Finding]:
 
 def check_landmarks(landmarks: LandmarkSet, atlas: Atlas) -> list[Finding]:
     """Return everything to look at in the labels of one side."""
-    return [
-        *_not_placed(landmarks),
-        *_duplicates(landmarks),
-        *_other_side(landmarks, atlas),
-        *_exchanged(landmarks, atlas),
-        *_far(landmarks, atlas),
-    ]
+    found = [*_not_placed(landmarks), *_duplicates(landmarks)]
+    for explain in (_other_side, _exchanged):
+        explained = list(explain(landmarks, atlas))
+        if explained:  # what else looks wrong follows from it
+            return found + explained
+    return found + list(_far(landmarks, atlas))
 
 
 def _finding(landmarks: LandmarkSet, kind: str, codes: tuple[str, ...], text: str) -> Finding:
@@ -109,13 +108,15 @@ def _other_side(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
 
 def _exchanged(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
     codes = _usable(landmarks, atlas)
+    if any(_duplicates(landmarks)):
+        return
     own = _misfit(landmarks, atlas, codes)
-    gains = []
+    others = []
     for a, b in combinations(codes, 2):
         swapped = landmarks.with_point(a, landmarks[b]).with_point(b, landmarks[a])
-        gains.append((own - _misfit(swapped, atlas, codes), (a, b)))
-    gain, pair = max(gains, default=(0.0, ("", "")))
-    if gain > _CLEARLY_BETTER:
+        others.append((_misfit(swapped, atlas, codes), (a, b)))
+    best, pair = min(others, default=(own, ("", "")))
+    if best < min(own - _CLEARLY_BETTER, 3 * len(codes) + _CLEARLY_BETTER):
         yield _finding(landmarks, "swapped", pair, f"{pair[0]} and {pair[1]} look exchanged")
 
 
@@ -137,12 +138,16 @@ def _usable(landmarks: LandmarkSet, atlas: Atlas) -> tuple[str, ...]:
 
 
 def _misfit(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...], *, mirrored: bool = False) -> float:
+    """Return -2 log likelihood, up to a constant, of labels with none misplaced among them."""
     if not codes:
         return 0.0
     points = landmarks.array(codes)
-    model = TouchModel(codes, atlas.rows(codes), atlas.variances(codes), LABELLING_NOISE_MM)
-    as_left = (landmarks.side is Side.LEFT) is not mirrored
-    return quick_misfit(model, points if as_left else mirror_x(points))
+    if (landmarks.side is Side.LEFT) is mirrored:
+        points = mirror_x(points)
+    mean, precision = atlas.rows(codes), 1 / (atlas.variances(codes) + LABELLING_NOISE_MM**2)
+    rotation, translation = align(mean, points, precision)
+    away = (points - translation) @ rotation - mean
+    return float(np.sum(precision[:, None] * away**2))
 
 
 def _shared_points(specimen: Specimen) -> Iterator[Finding]:

@@ -11,9 +11,10 @@ from gp_core.atlas.atlas import DEFINING, Atlas
 from gp_core.atlas.named_fit import (
     NamedFit,
     TouchModel,
+    careful_misfit,
     fit_named_points,
+    fit_readings,
     motion_jacobian,
-    quick_misfit,
 )
 from gp_core.atlas.pose import CochleaPose
 from gp_core.atlas.uncertainty import cochlea_jacobian
@@ -30,8 +31,11 @@ _SUSPECT_WEIGHT = 0.2
 _SUSPECT_SQUARED = 20.0
 """Squared deviation over its variance; three coordinates exceed it once in 6000 ordinary touches."""
 
-_CLEAR_MISFIT = 12.0
-"""How much worse (in -2 log likelihood) another reading must fit before it is out of the question."""
+_CLEAR_MISFIT = 6.0
+"""Difference in -2 log posterior, odds of 20 to 1, from which one side is told from the other."""
+
+_AGAINST_THE_USER = 12.0
+"""The same for saying that the user named the wrong side, or exchanged two names: odds of 400 to 1."""
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
 _MIRROR_POSE = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the other sign
@@ -60,7 +64,6 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
     fit = fit_named_points(model, points)
     defining = _defining_points(atlas, model, fit)
     frame = _cochlea_in_touches(defining, fit, touches)
-    suspects = _suspects(model, fit)
     return CochleaPose(
         side=touches.side,
         method="robust",
@@ -68,8 +71,8 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
         transform_to_touches=frame,
         covariance=_pose_covariance(atlas, model, fit, defining, touches.side),
         residuals=_residuals(model, fit),
-        suspects=suspects,
-        warnings=tuple(_warnings(model, points, fit, touches.side, suspects)),
+        suspects=_suspects(model, fit),
+        warnings=tuple(_warnings(model, points, fit, touches.side)),
         probe_noise=fit.noise,
         T_touches_atlas=_atlas_in_touches(fit, touches),
     )
@@ -165,10 +168,19 @@ def _pose_covariance(
     of_shape = np.zeros((6, len(atlas.covariance)))
     of_shape[:, atlas.coordinates(DEFINING)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
-    covariance = of_shape @ atlas.scatter @ of_shape.T + (of_touches * fit.touch_variances) @ of_touches.T
+    covariance = (
+        of_shape @ atlas.scatter @ of_shape.T + (of_touches * _touch_variances(model, fit)) @ of_touches.T
+    )
     turn = _pose_rotation(fit, side)
     in_touches: FloatArray = turn @ covariance @ turn.T
     return (in_touches + in_touches.T) / 2
+
+
+def _touch_variances(model: TouchModel, fit: NamedFit) -> FloatArray:
+    """Return (3 n,) variances of the touched coordinates; a suspect one is as wrong as it looks."""
+    seen = (fit.residual**2).reshape(-1, 3).mean(axis=1) - model.variances
+    suspect = np.isin(model.codes, _suspects(model, fit))
+    return np.repeat(np.where(suspect, np.maximum(seen, fit.touch_variances), fit.touch_variances), 3)
 
 
 def _pose_rotation(fit: NamedFit, side: Side) -> FloatArray:
@@ -190,13 +202,16 @@ def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
     return tuple(code for code, is_suspect in zip(model.codes, doubtful, strict=True) if is_suspect)
 
 
-def _warnings(
-    model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, suspects: tuple[str, ...]
-) -> Iterator[str]:
-    careful = quick_misfit(model, points)
-    swap = () if careful < _acceptable(model) else tuple(_swaps(model, points))
-    yield from swap or _side_warning(model, points, fit, side, careful)
-    if suspects:
+def _warnings(model: TouchModel, points: FloatArray, fit: NamedFit, side: Side) -> Iterator[str]:
+    worse = _other_side_worse(model, points, fit)
+    swap, gain = _best_swap(model, points, fit) if fit.rough else ("", 0.0)
+    suspects = _suspects(model, fit)
+    if gain > max(_AGAINST_THE_USER, -worse):
+        yield f"{swap} look swapped"
+    else:
+        swap = ""
+        yield from _side_warning(worse, side)
+    if suspects and not swap:
         names = " and ".join(suspects)
         verb, it = ("does", "it") if len(suspects) == 1 else ("do", "them")
         yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
@@ -206,16 +221,17 @@ def _warnings(
         yield "the fit did not settle; check the touches"
 
 
-def _side_warning(
-    model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, careful: float
-) -> Iterator[str]:
-    """Say so where the other side would fit as well or better."""
+def _other_side_worse(model: TouchModel, points: FloatArray, fit: NamedFit) -> float:
+    """Return by how much the other side fits worse, in -2 log posterior."""
     mirrored = mirror_x(points)
-    if careful < _acceptable(model):
-        worse = quick_misfit(model, mirrored) - careful
-    else:  # rough touches: only fits that allow for them compare
-        worse = 2 * (fit_named_points(model, mirrored).misfit - fit.misfit)
-    if worse < -_CLEAR_MISFIT:
+    if fit.rough:
+        return 2 * (fit_named_points(model, mirrored).misfit - fit.misfit)
+    return careful_misfit(model, mirrored, fit.noise) - careful_misfit(model, points, fit.noise)
+
+
+def _side_warning(worse: float, side: Side) -> Iterator[str]:
+    """Say so where the other side fits as well or better; `worse` is its misfit less this side's."""
+    if worse < -_AGAINST_THE_USER:
         yield f"the {side.other.word} side fits these points better than the {side.word}: check the side"
     elif worse < _CLEAR_MISFIT:
         yield (
@@ -224,19 +240,13 @@ def _side_warning(
         )
 
 
-def _acceptable(model: TouchModel) -> float:
-    """Return the misfit up to which careful touches of an ordinary animal go."""
-    return _CLEAR_MISFIT + 3 * len(model.codes)
-
-
-def _swaps(model: TouchModel, points: FloatArray) -> Iterator[str]:
-    """Name the two features which, exchanged, would explain the touches."""
-    best, pair = _acceptable(model), None
-    for i, j in combinations(range(len(points)), 2):
-        exchanged = points.copy()
-        exchanged[[i, j]] = points[[j, i]]
-        misfit = quick_misfit(model, exchanged)
-        if misfit < best:
-            best, pair = misfit, (model.codes[i], model.codes[j])
-    if pair is not None:
-        yield f"{pair[0]} and {pair[1]} look swapped"
+def _best_swap(model: TouchModel, points: FloatArray, fit: NamedFit) -> tuple[str, float]:
+    """Return the two features whose exchange explains the touches best, and its gain in -2 log posterior."""
+    pairs = list(combinations(range(len(points)), 2))
+    readings = np.repeat(points[None], len(pairs), axis=0)
+    for row, (i, j) in enumerate(pairs):
+        readings[row, [i, j]] = points[[j, i]]
+    fits = fit_readings(model, readings, screen=True)
+    best = min(range(len(pairs)), key=lambda row: fits[row].misfit)
+    i, j = pairs[best]
+    return f"{model.codes[i]} and {model.codes[j]}", 2 * (fit.misfit - fits[best].misfit)

@@ -5,7 +5,13 @@ import pytest
 from atlas_cases import random_pose
 
 from gp_core import PROBE, Atlas
-from gp_core.atlas.named_fit import TouchModel, fit_named_points, motion_jacobian, quick_misfit
+from gp_core.atlas.named_fit import (
+    TouchModel,
+    careful_misfit,
+    fit_named_points,
+    fit_readings,
+    motion_jacobian,
+)
 from gp_core.errors import GeometryError
 from gp_core.frames import mirror_x
 
@@ -70,10 +76,35 @@ def test_given_noise_is_kept() -> None:
     assert fit_named_points(model, model.mean).noise == pytest.approx(0.3)
 
 
-def test_a_mirrored_ear_fits_worse() -> None:
+def test_a_mirrored_ear_fits_worse_at_careful_and_at_rough_touches() -> None:
+    rng = np.random.default_rng(5)
+    codes = tuple(code for code in Atlas.published().codes if code not in ("IN", "ZL"))
+    model = _model(codes)
+    assert careful_misfit(model, model.mean, 0.05) < 1e-9
+    assert careful_misfit(model, mirror_x(model.mean), 0.05) > 20
+    for noise in (0.0, 0.4):
+        touches = model.mean + noise * rng.normal(size=model.mean.shape)
+        own, mirrored = fit_readings(model, np.array([touches, mirror_x(touches)]))
+        assert mirrored.misfit > own.misfit + 10
+
+
+def test_readings_fitted_together_are_as_alone() -> None:
+    rng = np.random.default_rng(6)
     model = _model()
-    assert quick_misfit(model, model.mean) < 1e-9
-    assert quick_misfit(model, mirror_x(model.mean)) > 20
+    readings = model.mean + 0.3 * rng.normal(size=(5, *model.mean.shape))
+    readings[3, 2] += 3
+    for fit, reading in zip(fit_readings(model, readings), readings, strict=True):
+        alone = fit_named_points(model, reading)
+        np.testing.assert_allclose(fit.translation, alone.translation, atol=5e-3)
+        np.testing.assert_allclose(fit.weights, alone.weights, atol=2e-2)
+
+
+@pytest.mark.parametrize("scale", [1 / 25.4, 1 / 3, 1 / 2.54, 3, 25.4])
+def test_sizes_that_are_wrong_make_no_wild_pose(scale: float) -> None:
+    model = _model()
+    fit = fit_named_points(model, model.mean * scale + 100)
+    assert np.isfinite(fit.translation).all()
+    assert np.linalg.norm(fit.translation - 100) < 30 * max(scale, 1)
 
 
 def test_the_jacobian_is_the_derivative_of_a_motion() -> None:

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from atlas_cases import draw_side, draw_specimens, errors, noisy, random_pose
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from gp_core import (
     EXTERNAL,
@@ -177,6 +179,39 @@ def test_exchanged_names_are_called_out(published: Atlas) -> None:
         swapped = {**touches, a: touches[b], b: touches[a]}
         warnings = estimate_pose(swapped, "L", published).warnings
         assert any(w == f"{a} and {b} look swapped" or w == f"{b} and {a} look swapped" for w in warnings)
+
+
+def test_names_exchanged_in_real_touches_are_called_out(published: Atlas, shared_data: Path) -> None:
+    named = []
+    for file, side in (("SkullE_Right.dat", "R"), ("SkullD_Right.dat", "R"), ("SkullA_Left_new.dat", "L")):
+        touches = read_touches(shared_data / "probe" / file, side).as_mapping()
+        assert not any("swapped" in w for w in estimate_pose(touches, side, published).warnings)
+        for a, b in combinations(PROBE, 2):
+            swapped = {**touches, a: touches[b], b: touches[a]}
+            named.append(f"{a} and {b} look swapped" in estimate_pose(swapped, side, published).warnings)
+    assert sum(named) >= 43  # of 45
+
+
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    codes=st.lists(st.sampled_from(EXTERNAL), min_size=3, max_size=11, unique=True),
+    seed=st.integers(0, 2**32 - 1),
+    scale=st.sampled_from([1e-9, 0.04, 0.3, 1.0, 3.0, 25.4, 1e9]),
+    shuffle=st.booleans(),
+)
+def test_any_touches_make_a_finite_pose_or_an_error(
+    codes: list[str], seed: int, scale: float, shuffle: bool
+) -> None:
+    rng = np.random.default_rng(seed)
+    atlas = Atlas.published()
+    points = scale * noisy(atlas.rows(codes), 0.3, rng)
+    points = rng.permutation(points) if shuffle else points
+    try:
+        pose = estimate_pose(dict(zip(codes, points, strict=True)), "L", atlas)
+    except GpError:
+        return
+    assert np.isfinite(pose.covariance).all()
+    assert pose.radius_95 < 1000
 
 
 def test_the_authors_answers_are_met(real_specimens: list[Specimen], shared_data: Path) -> None:
