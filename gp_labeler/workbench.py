@@ -85,6 +85,7 @@ class Workbench(DeskSignals):
         self.tool = "place"
         self._predict, self._author = predict, author
         self._last: tuple[Side, str] | None = None
+        self._abandoned: Session | None = None
         super().__init__()
         self.session: Session = new_session(directory, predict=predict, author=author)
         self._bone = Bone(self)
@@ -176,6 +177,10 @@ class Workbench(DeskSignals):
     def accept_scan(self, volume: Volume) -> None:
         """Go on with a scan that is not the one that was labelled."""
         self._attach(volume, accept_changes=True)
+
+    def abandon(self) -> None:
+        """Say that unsaved edits are not wanted any more, once something else is opened."""
+        self._abandoned = self.session
 
     # Working
 
@@ -299,7 +304,8 @@ class Workbench(DeskSignals):
         """Close one session and take another; the old one's unsaved edits stay in its journal."""
         self._unfollow()
         old, self.session = self.session, session
-        old.close(discard=not old.dirty)
+        old.close(discard=not old.dirty or old is self._abandoned)
+        self._abandoned = None
         self.truth = None
         self.drag = self._last = None
         self._bone.forget()

@@ -123,6 +123,8 @@ class WindowUi:
         detail = "Without saving, they are lost when this specimen is closed."
         answer = self.prompts.choose("Not saved", text, ["Save", "Do not save"], detail=detail)
         self.discarded = answer == "Do not save"
+        if self.discarded:
+            self._desk.abandon()
         return self.discarded or (answer == "Save" and self.save())
 
     discarded = False

@@ -110,6 +110,17 @@ def test_closing_with_unsaved_edits_asks(window, tmp_path, answer) -> None:
         assert find_recoveries(tmp_path / "state") == ()
 
 
+def test_edits_that_are_not_wanted_are_not_offered_again(qtbot, window, tmp_path) -> None:
+    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    (tmp_path / "x.gpspecimen.json").write_text("{}")
+    window.ui.prompts.answers = ["Do not save"]
+    window.ui.open_path(tmp_path / "x.gpspecimen.json")  # no specimen: the edits are still there
+    assert "CA" in window.workbench.session.landmarks("L")
+    window.workbench.open_volume(ball_volume())
+    settle(qtbot, window)
+    assert find_recoveries(tmp_path / "state") == ()
+
+
 def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_path) -> None:
     labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
     window.workbench.close()  # as if killed: nothing asked, nothing saved

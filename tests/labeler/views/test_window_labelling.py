@@ -353,3 +353,35 @@ def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
     x, y = scene.pixel_at(where)
     assert 0 < x < scene.width()
     assert 0 < y < scene.height()
+
+
+def test_a_right_click_on_a_point_offers_its_menu(window, scene) -> None:
+    from PySide6.QtWidgets import QApplication, QMenu
+
+    where = on_ball(0, -1, 0)
+    labelling.place(window.workbench.session, where, side=Side.LEFT, code="CA")
+    for view in (scene, window.grid.slice_views[Plane.CORONAL]):
+        window.workbench.session.set_crosshair(where)
+        QTest.mouseClick(view, Qt.MouseButton.RightButton, pos=pixel(view, where))
+        menu = QApplication.activePopupWidget()
+        assert isinstance(menu, QMenu)
+        assert any("Lock" in action.text() for action in menu.actions())
+        menu.close()
+
+
+def test_points_can_grow_with_the_zoom(window) -> None:
+    window.commands.run("view.glyph_mm")
+    assert window.grid.scene_view.scene.marks.size.unit == "mm"
+    window.commands.run("view.glyph_mm")
+    assert window.grid.scene_view.scene.marks.size.unit == "px"
+
+
+def test_looking_closely_brings_the_point_near_in_every_view(window, scene) -> None:
+    where = on_ball(0.3, -1, 0.2)
+    labelling.place(window.workbench.session, where, side=Side.LEFT, code="CA")
+    window.workbench.go_to(Side.LEFT, "CA")
+    window.commands.run("view.zoom_to_point")
+    for view in window.grid.views:
+        x, y = view.pixel_at(where)
+        assert abs(x - view.width() / 2) < 3
+        assert abs(y - view.height() / 2) < 3
