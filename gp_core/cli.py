@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import io
 import logging
 import sys
 from collections.abc import Sequence
@@ -37,6 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0; 1 where a check found something to look at; 2 where the input is wrong, said in one line.
     """
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows a question mark
     logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
     args = make_parser().parse_args(arguments)
     try:

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.landmarks.anatomy import cochlea_origin
-from gp_core.landmarks.features import CODES, check_codes
-from gp_core.landmarks.files import write_text
+from gp_core.landmarks.features import CODES, FEATURES, check_codes, index_of
+from gp_core.landmarks.files import check_plausible_size, write_text
+from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["DEFINING", "SCHEMA_VERSION", "Atlas"]
 
@@ -25,6 +26,11 @@ DEFINING = ("CA", "CB", "RWA", "RWP")
 """The features that define the cochlea's pose; every atlas holds them."""
 
 SCHEMA_VERSION = 1
+
+PLACED = tuple(row.code for row in FEATURES if not row.computed)
+"""The features an atlas may hold, in the table's order."""
+
+_FIXED = {"frame": "atlas", "side": "L", "units": "mm"}
 
 
 @dataclass(frozen=True)
@@ -64,7 +70,9 @@ class Atlas:
     specimens: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        codes = check_codes(self.codes, "the atlas")
+        codes = check_codes(self.codes, "the atlas", allowed=PLACED)
+        if list(codes) != sorted(codes, key=index_of):
+            raise FeatureError(f"the features of atlas {self.name!r} are out of order: {' '.join(codes)}")
         missing = [code for code in DEFINING if code not in codes]
         if missing:
             raise FeatureError(f"the atlas {self.name!r} lacks {' '.join(missing)}, which define the cochlea")
@@ -73,6 +81,11 @@ class Atlas:
         self._freeze("mean", self.mean, (n, 3))
         self._freeze("covariance", self.covariance, (3 * n, 3 * n))
         self._freeze("scatter", self.scatter, (3 * n, 3 * n))
+        self._check_covariance("covariance", self.covariance, least=1e-9)
+        self._check_covariance("scatter", self.scatter, least=-1e-9)
+        if self.n_samples < 1:
+            raise GpError(f"the atlas {self.name!r} must be of at least one side, got {self.n_samples}")
+        check_plausible_size(LandmarkSet.from_mapping(dict(zip(codes, self.mean, strict=True)), "L"))
 
     def _freeze(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
         array = np.array(value, dtype=np.float64)
@@ -80,6 +93,14 @@ class Atlas:
             raise GpError(f"the {name} of atlas {self.name!r} must be finite and {shape}, got {array.shape}")
         array.setflags(write=False)
         object.__setattr__(self, name, array)
+
+    def _check_covariance(self, name: str, matrix: FloatArray, *, least: float) -> None:
+        """Refuse what is no covariance, or one that promises more than any labels can."""
+        size = np.abs(matrix).max()
+        if np.abs(matrix - matrix.T).max() > 1e-9 * size:
+            raise GpError(f"the {name} of atlas {self.name!r} is not symmetric")
+        if np.linalg.eigvalsh(matrix).min() < least * size or not matrix.diagonal().min() > 0:
+            raise GpError(f"the {name} of atlas {self.name!r} is not positive")
 
     @staticmethod
     def published() -> Atlas:
@@ -100,7 +121,7 @@ class Atlas:
             content = json.loads(Path(path).read_text(encoding="utf-8"))
         except OSError as error:
             raise FileFormatError(f"cannot be read ({error.strerror})", file=path) from None
-        except ValueError:
+        except (ValueError, RecursionError):
             raise FileFormatError("is not an atlas: not valid JSON", file=path, remedy=remedy) from None
         return cls._from_content(content, path, remedy)
 
@@ -114,6 +135,11 @@ class Atlas:
                 else f"has atlas version {version!r}, not {SCHEMA_VERSION}"
             )
             raise FileFormatError(problem, file=path, remedy=remedy)
+        for key, meant in _FIXED.items():
+            if content.get(key) != meant:
+                raise FileFormatError(
+                    f"says {key} {content.get(key)!r}, not {meant!r}", file=path, remedy=remedy
+                )
         try:
             return cls(
                 name=str(content["name"]),
@@ -122,19 +148,23 @@ class Atlas:
                 covariance=content["covariance_mm2"],
                 scatter=content["scatter_mm2"],
                 n_samples=int(content["n_samples"]),
-                specimens=tuple(str(name) for name in content["specimens"]),
+                specimens=_names(content["specimens"]),
             )
-        except (KeyError, TypeError, ValueError, AttributeError, GpError) as error:
-            raise FileFormatError(f"is a damaged atlas ({error})", file=path, remedy=remedy) from None
+        except KeyError as error:
+            raise FileFormatError(f"is a damaged atlas: it lacks {error}", file=path, remedy=remedy) from None
+        except GpError as error:
+            raise FileFormatError(f"is a damaged atlas: {error.problem}", file=path, remedy=remedy) from None
+        except (TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError):
+            raise FileFormatError(
+                "is a damaged atlas: numbers or names are not where they should be", file=path, remedy=remedy
+            ) from None
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the atlas as JSON; numbers keep every bit."""
         content = {
             "gpAtlas": SCHEMA_VERSION,
             "name": self.name,
-            "frame": "atlas",
-            "side": "L",
-            "units": "mm",
+            **_FIXED,
             "n_samples": self.n_samples,
             "specimens": list(self.specimens),
             "features": list(self.codes),
@@ -184,6 +214,12 @@ class Atlas:
     @cached_property
     def _index(self) -> dict[str, int]:
         return {code: row for row, code in enumerate(self.codes)}
+
+
+def _names(value: Any) -> tuple[str, ...]:
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        raise GpError("its specimens are not a list of names")
+    return tuple(value)
 
 
 @cache

@@ -7,18 +7,17 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.atlas import DEFINING, PLACED, Atlas
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GeometryError, GpError
 from gp_core.frames import mirror_x
 from gp_core.landmarks.anatomy import cochlea_frame
-from gp_core.landmarks.features import CODES, FEATURES, Side, check_codes
+from gp_core.landmarks.features import CODES, Side, check_codes
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.procrustes import weighted_procrustes
 
 __all__ = ["fit_atlas", "left_shapes", "per_feature_covariance"]
 
-_PLACED = tuple(f.code for f in FEATURES if not f.computed)
 _MAX_ITERATIONS = 50
 _TOLERANCE_MM = 1e-9
 _LABELLING_SD_MM = 0.05
@@ -48,7 +47,8 @@ def fit_atlas(
     Raises
     ------
     GpError
-        Fewer than three sides, or a side without CA, CB, RWA and RWP among at least four points.
+        Fewer than three sides, CA, CB, RWA or RWP on fewer than two of them, or sides that share too few
+        features to be put together.
 
     References
     ----------
@@ -104,7 +104,7 @@ def per_feature_covariance(covariance: FloatArray) -> FloatArray:
 
 def _choose(shapes: FloatArray, features: Iterable[str] | None) -> tuple[str, ...]:
     counts = np.isfinite(shapes).all(axis=2).sum(axis=0)
-    common = tuple(code for code in _PLACED if counts[CODES.index(code)] >= 2)
+    common = tuple(code for code in PLACED if counts[CODES.index(code)] >= 2)
     wanted = common if features is None else check_codes(features, "the features of an atlas", allowed=CODES)
     chosen = tuple(code for code in CODES if code in wanted and code != "CO")
     for code in (*DEFINING, *chosen):
@@ -112,7 +112,7 @@ def _choose(shapes: FloatArray, features: Iterable[str] | None) -> tuple[str, ..
             raise FeatureError(
                 f"fewer than two sides have {code}", landmark=code, remedy="Label it in more specimens."
             )
-    return tuple(code for code in _PLACED if code in {*chosen, *DEFINING})
+    return tuple(code for code in PLACED if code in {*chosen, *DEFINING})
 
 
 def _generalised_procrustes(
@@ -121,7 +121,7 @@ def _generalised_procrustes(
     """Align the shapes (S, n, 3) to their mean; return it (n, 3) in its own CO frame, and them."""
     placed = ~np.isnan(shapes[:, :, 0])
     mean = shapes[int(np.argmax(placed.sum(axis=1)))]
-    mean = _complete_start(mean, shapes, placed)
+    mean = _complete_start(mean, shapes, placed, codes, owners)
     weights = np.ones(len(codes))
     for _ in range(_MAX_ITERATIONS):
         aligned = np.array(
@@ -141,13 +141,28 @@ def _generalised_procrustes(
     return T_cochlea_mean.apply(mean), np.array(turned)
 
 
-def _complete_start(mean: FloatArray, shapes: FloatArray, placed: NDArray[np.bool_]) -> FloatArray:
+def _complete_start(
+    mean: FloatArray,
+    shapes: FloatArray,
+    placed: NDArray[np.bool_],
+    codes: tuple[str, ...],
+    owners: list[str],
+) -> FloatArray:
     """Fill features that the first shape lacks from the shapes that have them, aligned to it."""
     start = mean.copy()
     for row in np.flatnonzero(np.isnan(mean).any(axis=1)):
-        donor = int(np.flatnonzero(placed[:, row])[0])
-        shared = placed[donor] & np.isfinite(start).all(axis=1)
-        rotation, translation = weighted_procrustes(shapes[donor][shared], start[shared])
+        known = np.isfinite(start).all(axis=1)
+        donor = int(np.argmax(np.where(placed[:, row], (placed & known).sum(axis=1), -1)))
+        shared = placed[donor] & known
+        names = [code for code, has in zip(codes, shared, strict=True) if has]
+        try:
+            rotation, translation = weighted_procrustes(shapes[donor][shared], start[shared], names=names)
+        except GeometryError as error:
+            raise GeometryError(
+                f"{codes[row]} cannot be put to the others: {error.problem}",
+                specimen=owners[donor],
+                remedy="Label more features on each side.",
+            ) from None
         start[row] = rotation @ shapes[donor][row] + translation
     return start
 

@@ -64,6 +64,8 @@ def run(args: argparse.Namespace) -> int:
         pose.save_tfm(args.tfm)
     for line in pose_table(pose, Path(args.touches).name):
         say(line)
+    if touches.unseen:
+        say(f"  not seen by the tracker: {' '.join(sorted(touches.unseen))}")
     return 0
 
 

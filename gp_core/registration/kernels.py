@@ -9,15 +9,15 @@ keep these loops scalar. Shapes: P points, M sets, K centres. A *piece* is a run
 from __future__ import annotations
 
 import math
-from functools import partial
 from typing import Any
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
+from gp_core.registration.compiling import compiled
 from gp_core.registration.turns import best_turn, product, write_rotation
 
 __all__ = ["expect", "maximise", "move", "run_batch"]
@@ -25,7 +25,6 @@ __all__ = ["expect", "maximise", "move", "run_batch"]
 IndexArray = NDArray[np.uint64]
 
 # Other threads may run meanwhile; a division by zero gives inf, as in NumPy, and so costs no branch.
-_compiled = partial(njit, nogil=True, error_model="numpy")
 
 # Sums may be reordered in the kernels below; the exponential relies on the order of its additions.
 _SUMS = {"contract", "reassoc", "nsz"}
@@ -60,7 +59,7 @@ _as_bits: Any = intrinsic(_to_bits)
 _from_bits: Any = intrinsic(_to_float)
 
 
-@_compiled(fastmath=_EXACT, cache=True)
+@compiled(fastmath=_EXACT, cache=True)
 def exp_negative(u: float) -> float:
     """Compute exp(u) for u <= 0 to one unit in the last place, without branches; 0 below -708.
 
@@ -86,7 +85,7 @@ def exp_negative(u: float) -> float:
     return value if u >= _LOWEST else 0.0
 
 
-@_compiled(cache=True)
+@compiled(cache=True)
 def expect(
     moved: FloatArray,
     pieces: IndexArray,
@@ -126,7 +125,7 @@ def expect(
             _moments(moved, start, pieces[s], pieces[s + np.uint64(1)], centres, table, inverse, moments[s])
 
 
-@_compiled(fastmath=_EXACT)
+@compiled(fastmath=_EXACT)
 def _responsibilities(
     moved: FloatArray,
     start: int,
@@ -150,7 +149,7 @@ def _responsibilities(
         inverse[i] = 1.0 / inverse[i]
 
 
-@_compiled(fastmath=_SUMS)
+@compiled(fastmath=_SUMS)
 def _moments(
     moved: FloatArray,
     origin: int,
@@ -175,7 +174,7 @@ def _moments(
         out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = s0, s1, s2, s3, s4
 
 
-@_compiled(cache=True)
+@compiled(cache=True)
 def maximise(
     moments: FloatArray,
     piece_sets: IndexArray,
@@ -219,7 +218,7 @@ def maximise(
     return max(change, _centre_step(sums, centres, prior, epsilon, size))
 
 
-@_compiled()
+@compiled()
 def _gather(moments: FloatArray, piece_sets: IndexArray) -> None:
     """Add the pieces of each set up, in order, into the row of the set."""
     for s in range(1, piece_sets.size):
@@ -230,7 +229,7 @@ def _gather(moments: FloatArray, piece_sets: IndexArray) -> None:
                 moments[j, c, k] = kept * moments[j, c, k] + moments[s, c, k]
 
 
-@_compiled()
+@compiled()
 def _pose_step(
     moments: FloatArray,
     j: int,
@@ -264,7 +263,7 @@ def _pose_step(
     return max(angle, math.sqrt(dx * dx + dy * dy + dz * dz) / size)
 
 
-@_compiled(fastmath=_SUMS)
+@compiled(fastmath=_SUMS)
 def _weighted_means(
     moments: FloatArray, j: int, centres: FloatArray
 ) -> tuple[float, float, float, float, float, float]:
@@ -285,7 +284,7 @@ def _weighted_means(
     return x / w, y / w, z / w, dx / w, dy / w, dz / w
 
 
-@_compiled(fastmath=_SUMS)
+@compiled(fastmath=_SUMS)
 def _covariance(
     moments: FloatArray, j: int, centres: FloatArray, x: float, y: float, z: float, h: FloatArray
 ) -> None:
@@ -314,7 +313,7 @@ def _covariance(
     h[2, 0], h[2, 1], h[2, 2] = zx, zy, zz
 
 
-@_compiled(fastmath=_SUMS)
+@compiled(fastmath=_SUMS)
 def _add_set(moments: FloatArray, j: int, motion: FloatArray, centres: FloatArray, sums: FloatArray) -> None:
     """Add what one set gives to each centre: weight, displacement from the old centre (three), its square.
 
@@ -342,7 +341,7 @@ def _add_set(moments: FloatArray, j: int, motion: FloatArray, centres: FloatArra
         )
 
 
-@_compiled()
+@compiled()
 def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: float, size: float) -> float:
     """Move each centre to the mean of its moved points, then set its variance about that mean."""
     floor = (_LEAST_SPREAD * size) ** 2
@@ -363,7 +362,7 @@ def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: f
     return change
 
 
-@_compiled(fastmath=_EXACT, cache=True)
+@compiled(fastmath=_EXACT, cache=True)
 def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: FloatArray) -> None:
     """Write the points (3, P) of all sets under their poses (M, 7); set j starts at ``starts[j]``."""
     rotation = np.empty((3, 3))
@@ -375,7 +374,7 @@ def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: Float
                 moved[a, i] = rx * points[0, i] + ry * points[1, i] + rz * points[2, i] + t
 
 
-@_compiled(cache=True)
+@compiled(cache=True)
 def run_batch(
     points: FloatArray,
     starts: IndexArray,

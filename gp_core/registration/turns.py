@@ -7,17 +7,15 @@ only: after a change here, touch that file too.
 from __future__ import annotations
 
 import math
-from functools import partial
 
 import numpy as np
-from numba import njit
 
 from gp_core.checks import FloatArray
+from gp_core.registration.compiling import compiled
 
 __all__ = ["best_turn", "product", "write_rotation"]
 
 # Other threads may run meanwhile; a division by zero gives inf, as in NumPy, and so costs no branch.
-_compiled = partial(njit, nogil=True, error_model="numpy")
 
 _OPEN = 1e-10  # relative gap below which a rotation is not determined
 _SETTLED = 1e-17  # squared angle of a Newton step whose successor would be below rounding
@@ -25,7 +23,7 @@ _NEWTON_STEPS = 8
 _JACOBI_SWEEPS = 8
 
 
-@_compiled(cache=True)
+@compiled(cache=True)
 def best_turn(h: FloatArray, turned: FloatArray) -> tuple[float, float, float, float]:
     """Return the unit quaternion (w first) of the rotation R that makes trace(R^T h) largest.
 
@@ -50,7 +48,7 @@ def best_turn(h: FloatArray, turned: FloatArray) -> tuple[float, float, float, f
     return _horn(h)
 
 
-@_compiled()
+@compiled()
 def _newton_step(g: FloatArray, least: float) -> tuple[bool, float, float, float]:
     """Solve (tr(S) I - S) o = b by L D L^T; S is the symmetric part of `g`, b its axial vector."""
     bx, by, bz = g[2, 1] - g[1, 2], g[0, 2] - g[2, 0], g[1, 0] - g[0, 1]
@@ -74,7 +72,7 @@ def _newton_step(g: FloatArray, least: float) -> tuple[bool, float, float, float
     return True, bx / d0 - l10 * oy - l20 * oz, oy, oz
 
 
-@_compiled()
+@compiled()
 def _horn(h: FloatArray) -> tuple[float, float, float, float]:
     """Return the top eigenvector of Horn's (4, 4) matrix; of many that fit, the one nearest to no turn.
 
@@ -106,7 +104,7 @@ def _horn(h: FloatArray) -> tuple[float, float, float, float]:
     return product(1.0, 0.0, 0.0, 0.0, w, x, y, z)
 
 
-@_compiled()
+@compiled()
 def _diagonalise(n: FloatArray) -> FloatArray:
     """Make a symmetric (4, 4) matrix diagonal in place, and return its eigenvectors in columns (Jacobi)."""
     v = np.eye(4)
@@ -124,7 +122,7 @@ def _diagonalise(n: FloatArray) -> FloatArray:
     return v
 
 
-@_compiled()
+@compiled()
 def _mix(columns: FloatArray, p: int, q: int, c: float, s: float) -> None:
     """Turn columns `p` and `q` into each other."""
     for k in range(4):
@@ -132,7 +130,7 @@ def _mix(columns: FloatArray, p: int, q: int, c: float, s: float) -> None:
         columns[k, p], columns[k, q] = c * a - s * b, s * a + c * b
 
 
-@_compiled()
+@compiled()
 def product(
     aw: float, ax: float, ay: float, az: float, bw: float, bx: float, by: float, bz: float
 ) -> tuple[float, float, float, float]:
@@ -145,7 +143,7 @@ def product(
     return w * scale, x * scale, y * scale, z * scale
 
 
-@_compiled(cache=True)
+@compiled(cache=True)
 def write_rotation(w: float, x: float, y: float, z: float, out: FloatArray) -> None:
     """Write the rotation matrix of a unit quaternion into the first three columns of `out`."""
     out[0, 0], out[0, 1], out[0, 2] = (
@@ -165,7 +163,7 @@ def write_rotation(w: float, x: float, y: float, z: float, out: FloatArray) -> N
     )
 
 
-@_compiled()
+@compiled()
 def _turn_back(h: FloatArray, w: float, x: float, y: float, z: float, out: FloatArray) -> None:
     """Write h R^T: the covariance after the source has been turned by R."""
     write_rotation(w, x, y, z, out)

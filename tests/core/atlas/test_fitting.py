@@ -105,6 +105,15 @@ def test_a_file_keeps_every_bit(animals: list[Specimen], tmp_path: Path) -> None
         (lambda c: c.update(features=["CA", "QQ"]), "damaged atlas"),
         (lambda c: c["mean_mm"][0].__setitem__(0, float("nan")), "damaged atlas"),
         (lambda c: c.update(n_samples="many"), "damaged atlas"),
+        (lambda c: c.update(n_samples=-3), "at least one side"),
+        (lambda c: c.update(side="R"), "says side 'R', not 'L'"),
+        (lambda c: c.update(units="in"), "says units 'in'"),
+        (lambda c: c.update(specimens="abc"), "not a list of names"),
+        (lambda c: c.update(features=c["features"][::-1]), "out of order"),
+        (lambda c: c["features"].__setitem__(2, "CO"), "may not hold CO"),
+        (lambda c: c.update(scatter_mm2=(-np.array(c["scatter_mm2"])).tolist()), "scatter .* not positive"),
+        (lambda c: c["covariance_mm2"][0].__setitem__(1, 5.0), "covariance .* not symmetric"),
+        (lambda c: c.update(mean_mm=(np.array(c["mean_mm"]) / 1000).tolist()), "look like metres"),
     ],
 )
 def test_a_bad_file_is_named(change: object, message: str, tmp_path: Path) -> None:
@@ -122,6 +131,11 @@ def test_what_is_no_file_is_named(tmp_path: Path) -> None:
     for name, content in (("empty.json", b""), ("binary.json", bytes(range(256))), ("list.json", b"[1]")):
         (tmp_path / name).write_bytes(content)
         with pytest.raises(FileFormatError, match="is not an atlas"):
+            Atlas.load(tmp_path / name)
+    (tmp_path / "deep.json").write_text("[" * 100_000)
+    (tmp_path / "huge.json").write_text('{"gpAtlas": ' + "9" * 5000 + "}")
+    for name in ("deep.json", "huge.json"):
+        with pytest.raises(FileFormatError, match=r"not valid JSON|atlas version"):
             Atlas.load(tmp_path / name)
     with pytest.raises(FileFormatError, match="cannot be read"):
         Atlas.load(tmp_path / "none.json")
