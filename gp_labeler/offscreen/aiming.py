@@ -55,7 +55,7 @@ def aim_at_bone(rig: Rig, aim: FloatArray, *, turn: bool) -> bool:
     view = rig.view("3d")
     camera = rig.scene.scene.camera
     before = camera.state()
-    rig.scene.go_to(aim)
+    camera.focus_on(aim)
     size = float(camera.viewpoint().pixel_sizes(aim[None])[0])
     middle = view.rect().center()
     turn_wheel(view, middle.x(), middle.y(), _notches(size, rig))

@@ -109,7 +109,10 @@ class Look(Step):
     def _magnify(self, rig: Rig, factor: float) -> None:
         if factor <= 0:
             raise GpError(f"zoom must be above 0, got {factor:g}")
-        rig.scene.scene.camera.zoom(factor)
+        camera = rig.scene.scene.camera
+        if self.go_to is not None:
+            camera.focus_on(rig.desk.session.crosshair)
+        camera.zoom(factor)
         rig.scene.redraw()
         for view in rig.window.grid.slice_views.values():
             if view.shown is not None:

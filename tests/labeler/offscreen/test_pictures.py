@@ -49,14 +49,15 @@ def window(qtbot, make_window):
     for name in ("outline_visible", "labels_visible"):
         window.workbench.session.view.update(**{name: False})
     window.workbench.session.view.update(level=1600.0, width=2400.0)
-    window.workbench.session.set_crosshair(SPOT)
     return window
 
 
 @pytest.mark.parametrize("size", [None, (300, 500), (900, 640)])
 @pytest.mark.parametrize("plane", list(Plane))
 def test_a_bright_spot_is_seen_where_it_lies(window, plane, size) -> None:
-    view = window.grid.slice_views[plane]
+    view, aside = window.grid.slice_views[plane], MIDDLE - 4.0
+    aside[plane.axis] = SPOT[plane.axis]  # in its slice, the crosshair's lines away from it
+    window.workbench.session.set_crosshair(aside)
     image = picture(window, plane.value, size)
     found = brightest(image)
     assert (image.width(), image.height()) == (size or (view.width(), view.height()))
@@ -93,7 +94,7 @@ def test_pictures_have_the_size_asked_for_and_are_not_blank(window, what) -> Non
     for size in (None, (1290, 940)):
         image = picture(window, what, size)
         assert size is None or (image.width(), image.height()) == size
-        assert pixels(image).std() > 5
+        assert pixels(image).std() > 2
 
 
 def test_a_picture_leaves_the_window_as_it_was(window) -> None:
