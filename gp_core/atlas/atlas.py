@@ -85,7 +85,8 @@ class Atlas:
         self._check_covariance("scatter", self.scatter, least=-1e-9)
         if self.n_samples < 1:
             raise GpError(f"the atlas {self.name!r} must be of at least one side, got {self.n_samples}")
-        check_plausible_size(LandmarkSet.from_mapping(dict(zip(codes, self.mean, strict=True)), "L"))
+        mean = dict(zip(codes, self.mean, strict=True))
+        check_plausible_size(LandmarkSet.from_mapping(mean, "L"), strict=True)
 
     def _freeze(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
         array = np.array(value, dtype=np.float64)

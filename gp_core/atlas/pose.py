@@ -177,7 +177,7 @@ def estimate_pose(
     landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
-    check_plausible_size(landmarks)
+    check_plausible_size(landmarks, strict=True)
     if method == "jrmpc":
         from gp_core.atlas.jrmpc_pose import estimate_jrmpc  # it makes the result that is defined here
 

@@ -19,6 +19,7 @@ __all__ = ["check_plausible_size"]
 
 _MIN_PAIRS = 3
 _TOLERANCE = 0.2  # of the decimal logarithm: animals differ by a tenth, mistaken units by ten times
+_LARGEST_FACTOR = 2.5  # animals differ by a tenth, and rough touches of few features by more
 _UNITS = {-6: "kilometres", -3: "metres", -1: "centimetres", 3: "micrometres", 6: "nanometres"}
 
 
@@ -34,11 +35,13 @@ def _published_mm() -> FloatArray:
     return expected
 
 
-def check_plausible_size(landmarks: LandmarkSet, file: str | PathLike[str] | None = None) -> None:
+def check_plausible_size(
+    landmarks: LandmarkSet, file: str | PathLike[str] | None = None, *, strict: bool = False
+) -> None:
     """Refuse landmarks that are a power of ten too small or too large for a guinea pig.
 
     The size is the median, over all pairs of placed features, of their distance by the published mean
-    distance (Usevitch et al. 2021, Figure 2). Other sizes, and fewer than three pairs, pass.
+    distance (Usevitch et al. 2021, Figure 2). Fewer than three pairs pass.
 
     Parameters
     ----------
@@ -46,6 +49,9 @@ def check_plausible_size(landmarks: LandmarkSet, file: str | PathLike[str] | Non
         Landmarks of one side, in any frame.
     file : path, optional
         Where they come from, for the message.
+    strict : bool
+        Refuse whatever is more than two and a half times off, powers of ten or not: what no pose should be
+        estimated from.
 
     Raises
     ------
@@ -62,9 +68,21 @@ def check_plausible_size(landmarks: LandmarkSet, file: str | PathLike[str] | Non
     if not (math.isfinite(ratio) and ratio > 0):
         return
     power = round(math.log10(ratio))
-    if power == 0 or abs(math.log10(ratio) - power) > _TOLERANCE:
+    if abs(math.log10(ratio)) < math.log10(_LARGEST_FACTOR):
         return
+    if power == 0 or abs(math.log10(ratio) - power) > _TOLERANCE:
+        if not strict:
+            return
+        raise GeometryError(
+            f"the distances between its landmarks are {ratio:.2g} times those in a guinea pig",
+            file=file,
+            remedy=f"Check the unit, which must be mm{_inches(ratio)}, and the names of the points.",
+        )
     raise GeometryError(_problem(power), file=file, remedy=_remedy(power))
+
+
+def _inches(ratio: float) -> str:
+    return " (these look like inches)" if abs(math.log10(ratio * 25.4)) < _TOLERANCE else ""
 
 
 def _problem(power: int) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from landmark_makers import SHARED, needs_shared_data
 
+from gp_core import Atlas
 from gp_core.errors import GeometryError
 from gp_core.landmarks.features import PROBE
 from gp_core.landmarks.files import check_plausible_size, read_authors_mat
@@ -53,3 +54,14 @@ def test_too_few_and_odd_points_pass():
     check_plausible_size(LandmarkSet(np.ones((20, 3)), "L"))
     huge = np.random.default_rng(0).normal(size=(20, 3)) * 1e300
     check_plausible_size(LandmarkSet(huge, "L"))
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(1 / 25.4, "look like inches"), (0.3, "0.3 times"), (3.0, "3 times")]
+)
+def test_what_a_pose_is_made_of_must_have_the_size_of_a_guinea_pig(factor, words):
+    mean = Atlas.published()
+    landmarks = LandmarkSet.from_mapping({code: factor * mean[code] for code in PROBE}, "L")
+    check_plausible_size(landmarks)
+    with pytest.raises(GeometryError, match=words):
+        check_plausible_size(landmarks, strict=True)
