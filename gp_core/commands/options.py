@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -77,8 +78,14 @@ def read_atlas(words: list[str]) -> AtlasSource:
 
 
 def _is_atlas_file(word: str) -> bool:
-    name = word.lower()
-    return not Path(word).is_dir() and name.endswith(".json") and not name.endswith(".mrk.json")
+    """Tell an atlas by what it holds, and what cannot be read by its name."""
+    path, name = Path(word), word.lower()
+    if path.is_dir():
+        return False
+    with suppress(OSError), path.open("rb") as file:
+        if b'"gpAtlas"' in file.read(1000):
+            return True
+    return name.endswith(".json") and not name.endswith(".mrk.json")
 
 
 def save_json(path: str | None, content: Any) -> None:
