@@ -164,7 +164,8 @@ class SliceView(QWidget):
 
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
         if self.shown is not None and self.shown.size != self._size():
-            self.shown = self.shown.resized(*self._size())
+            growth = min(self._size()) / min(self.shown.size)  # a maximised view shows the same, larger
+            self.shown = self.shown.resized(*self._size()).zoomed(growth)
         painter = QPainter(self)
         self._painter.paint(painter)
         painter.end()

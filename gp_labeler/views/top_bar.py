@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, QSize, Qt
-from PySide6.QtGui import QAction
+from PySide6.QtGui import QAction, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
 
 from gp_labeler.views.bind import follow, set_role, size_text, spacing_text
@@ -75,6 +75,7 @@ class TopBar(QWidget):
         undo = session.undo_text or ""
         short = undo if len(undo) <= _LONGEST_UNDO else undo[: _LONGEST_UNDO - 1] + "…"
         self._undo.setText(f"Undo {short}" if undo else "Undo")
+        self._fit()
 
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
@@ -127,6 +128,15 @@ class TopBar(QWidget):
         if id != "view.theme":
             self._working.append(button)
         return button
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
+        super().resizeEvent(event)
+        self._fit()
+
+    def _fit(self) -> None:
+        """Leave out what the scan is like where there is no room for it."""
+        self.about.hide()
+        self.about.setVisible(self.sizeHint().width() + self.about.sizeHint().width() + 12 <= self.width())
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         if event.type() == QEvent.Type.StyleChange:

@@ -120,6 +120,7 @@ def test_a_miss_places_nothing(window, scene) -> None:
     QTest.mouseClick(axial, LEFT_BUTTON, pos=QPoint(2, 2))  # beside the scan
     assert placed(window) is None
     assert window.workbench.session.undo_text is None
+    assert window.status.next_click.text() == "Click on bone or a slice to place CA left"  # and nobody scolds
 
 
 def test_shift_drag_pans_and_right_drag_zooms(window, scene) -> None:
