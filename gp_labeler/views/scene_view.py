@@ -137,7 +137,9 @@ class SceneView(QWidget):
         follow(self, desk.view_changed, self._on_view_changed)
 
     def _on_crosshair(self, position: FloatArray) -> None:
-        if self._fitted and not self._shows(position, 1.0):
+        volume = self._desk.volume
+        inside = volume is not None and bool(volume.contains(position[None])[0])
+        if self._fitted and inside and not self._shows(position, 1.0):
             self.go_to(position)
         self.update()
 

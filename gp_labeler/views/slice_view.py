@@ -97,7 +97,7 @@ class SliceView(QWidget):
     def step(self, n: int) -> None:
         """Go so many slices on."""
         if self.source is not None:
-            self._move_to(self._position() + n * self.source.step(self.plane))
+            self.move_to(self._position() + n * self.source.step(self.plane))
 
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
         """Return the logical pixel over which a (3,) scan position lies, for tests and scripts."""
@@ -145,14 +145,16 @@ class SliceView(QWidget):
 
     def _on_crosshair(self, position: FloatArray) -> None:
         if self.shown is not None:
-            self.shown = self.shown.showing(position, 0.02)
+            there = self.shown.at(float(position[self.plane.axis]))
+            self.shown = there.showing(position, 0.02) if self._is_inside(position) else there
             self.moved.emit(self.shown.position)
             self.update()
 
     def _position(self) -> float:
         return float(self._desk.session.crosshair[self.plane.axis])
 
-    def _move_to(self, position: float) -> None:
+    def move_to(self, position: float) -> None:
+        """Show the slice nearest to a position along the plane's axis, mm; the crosshair goes with it."""
         if self.source is not None:
             crosshair = np.array(self._desk.session.crosshair)
             crosshair[self.plane.axis] = self.source.snap(self.plane, position)
@@ -241,7 +243,7 @@ class SliceView(QWidget):
             self.shown = view
             self.update()
         else:
-            self._move_to(view.position)
+            self.move_to(view.position)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         key = Qt.Key(event.key())

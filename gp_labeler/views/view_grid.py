@@ -11,6 +11,7 @@ from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
+from gp_labeler.views.slice_slider import SliceSlider
 from gp_labeler.views.slice_view import SliceView
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
@@ -48,14 +49,18 @@ class ViewHeader(QWidget):
         self._button.setToolTip("Maximise or restore this view (double click)")
         self._button.setAccessibleName(f"Maximise the {name} view")
         self._button.clicked.connect(self.maximise_asked)
-        row = QHBoxLayout(self)
-        row.setContentsMargins(10, 0, 2, 0)
-        row.setSpacing(8)
-        row.addWidget(title)
-        row.addWidget(self.where)
-        row.addStretch(1)
-        row.addWidget(self._button)
+        self._row = QHBoxLayout(self)
+        self._row.setContentsMargins(10, 0, 2, 0)
+        self._row.setSpacing(8)
+        self._row.addWidget(title)
+        self._row.addWidget(self.where)
+        self._row.addStretch(1)
+        self._row.addWidget(self._button)
         self.take_theme()
+
+    def add(self, widget: QWidget) -> None:
+        """Put something before the button."""
+        self._row.insertWidget(self._row.count() - 1, widget)
 
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
@@ -99,6 +104,8 @@ class ViewFrame(QWidget):
         column.setSpacing(0)
         column.addWidget(self.header)
         column.addWidget(view, 1)
+        if isinstance(view, SliceView):
+            self.header.add(SliceSlider(view))
         self.header.maximise_asked.connect(self._ask)
         view.maximise_asked.connect(self._ask)
 

@@ -386,3 +386,18 @@ def test_looking_closely_brings_the_point_near_in_every_view(window, scene) -> N
         x, y = view.pixel_at(where)
         assert abs(x - view.width() / 2) < 3
         assert abs(y - view.height() / 2) < 3
+
+
+def test_the_slider_goes_through_the_slices(window) -> None:
+    from gp_labeler.views.slice_slider import SliceSlider
+
+    session, frame = window.workbench.session, window.grid.frames["axial"]
+    slider = frame.header.findChild(SliceSlider)
+    assert slider.maximum() == 63
+    session.set_crosshair(MIDDLE)
+    before = slider.value()
+    slider.setValue(before + 8)
+    assert session.crosshair[2] - MIDDLE[2] == pytest.approx(8 * VOXEL_MM, abs=VOXEL_MM)
+    np.testing.assert_allclose(session.crosshair[:2], MIDDLE[:2])
+    frame.view.step(-8)
+    assert slider.value() == before
