@@ -1,0 +1,77 @@
+"""A window on a real display, driven from outside by xdotool; prints as JSON what came of it.
+
+Run by `test_display.py` under Xvfb: the program gets its mouse and keys from the X server, as from a person.
+"""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+from PySide6.QtCore import QPoint, QPointF
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QWidget
+from window_cases import BALL_MM, MIDDLE, Answers, ball_volume, close
+
+from gp_core.landmarks.features import Side
+from gp_labeler.views.application import make_application, make_window
+
+INSIDE = MIDDLE + np.array([2.1, -1.7, 0.125])
+ON_BONE = MIDDLE + BALL_MM * np.array([0.3, -0.9, 0.1]) / np.linalg.norm([0.3, -0.9, 0.1])
+
+
+def xdotool(*words: object) -> None:
+    """Let the X server move the mouse or press keys, and let the window take it in."""
+    subprocess.run(["xdotool", *map(str, words)], check=True, timeout=20)
+    QTest.qWait(150)
+
+
+def point_at(widget: QWidget, pixel: tuple[float, float]) -> None:
+    where = widget.mapToGlobal(QPointF(*pixel)).toPoint()
+    xdotool("mousemove", "--sync", where.x(), where.y())
+
+
+def drive() -> dict[str, object]:
+    app = make_application()
+    window = make_window(None, atlas=False)
+    window.ui.prompts = Answers()
+    window.resize(1200, 800)
+    window.move(QPoint(20, 20))
+    window.show()
+    window.workbench.open_volume(ball_volume())
+    while window.workbench.jobs.running:
+        QTest.qWait(10)
+    QTest.qWaitForWindowExposed(window)
+    window.activateWindow()
+    QTest.qWait(200)
+    session, scene = window.workbench.session, window.grid.scene_view
+    axial = next(view for plane, view in window.grid.slice_views.items() if plane.value == "axial")
+    scene.view_from("A")
+    session.set_crosshair(INSIDE)
+    found: dict[str, object] = {"platform": app.platformName()}
+
+    point_at(axial, axial.pixel_at(INSIDE))
+    xdotool("click", 1)
+    found["slice_off"] = float(np.linalg.norm(session.landmarks(Side.LEFT)["CA"] - INSIDE))
+    point_at(scene, scene.pixel_at(ON_BONE))
+    xdotool("click", 1)
+    found["bone_off"] = float(np.linalg.norm(session.landmarks(Side.LEFT)["RWP"] - ON_BONE))
+    before = scene.scene.camera.direction
+    point_at(scene, scene.pixel_at(MIDDLE - [3.0, 5.0, 2.0]))  # on bone, away from the point
+    xdotool("mousedown", 1)
+    xdotool("mousemove_relative", "--sync", 80, 30)
+    xdotool("mouseup", 1)
+    found["turned_deg"] = float(np.degrees(np.arccos(np.clip(before @ scene.scene.camera.direction, -1, 1))))
+    found["placed"] = list(session.landmarks(Side.LEFT).placed)
+    xdotool("key", "ctrl+z")
+    found["after_undo"] = list(session.landmarks(Side.LEFT).placed)
+    xdotool("key", "z")
+    found["layout"] = session.view.state.layout
+    close(window)
+    return found
+
+
+if __name__ == "__main__":
+    sys.stdout.write(json.dumps(drive()) + "\n")
