@@ -36,6 +36,7 @@ class Ui(Protocol):
     def toggle_projection(self) -> None: ...  # noqa: D102
     def show_shortcuts(self) -> None: ...  # noqa: D102
     def show_about(self) -> None: ...  # noqa: D102
+    def toggle_recording(self) -> None: ...  # noqa: D102
 
 
 Run = Callable[[Workbench, Ui], object]

@@ -296,5 +296,7 @@ def help_rows() -> Iterator[Action]:
     """Return the commands of the menu Help."""
     yield Action("help.shortcuts", "Help", "Keyboard and mouse", ("?", "F1"),
                  lambda d, ui: ui.show_shortcuts())
+    yield Action("help.record", "Help", "Record script…", (), lambda d, ui: ui.toggle_recording(),
+                 hint="Write down what you do, for gp-labeler --offscreen; once more ends it")
     yield Action("help.about", "Help", "About gp-labeler", (), lambda d, ui: ui.show_about())
 # fmt: on

@@ -15,7 +15,7 @@ from gp_labeler.scene.planes import Plane
 
 __all__ = ["aim_at_bone", "scroll_to"]
 
-_PIXELS_PER_VOXEL = 4.0
+_PIXELS_PER_VOXEL = 5.0
 """A click is exact to a pixel: zoom until that is a small part of a voxel."""
 
 _ZOOM_PER_NOTCH = 1.15

@@ -21,6 +21,7 @@ from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.recover_dialog import RecoverDialog
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_about, export_asking, import_asking
+from gp_labeler.views.recorder import Recorder
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.workbench import Workbench
 
@@ -252,6 +253,22 @@ class WindowUi:
     def show_shortcuts(self) -> None:
         """Show what keys and mouse do."""
         ShortcutsSheet(self._window).open()
+
+    def toggle_recording(self) -> None:
+        """Begin to write down what is done, or ask where to, and write it."""
+        recorder = self._window.findChild(Recorder)
+        if recorder is None:
+            Recorder(self._window)
+            self._desk.say("Recording. Choose Help > Record script once more to end it.")
+            return
+        path = self.prompts.save_file(
+            "Save the script", str(Path(self._folder) / "script.toml"), "Scripts (*.toml *.json)"
+        )
+        if path is not None:
+            recorder.save(path)
+            self._desk.say(f"Wrote {path.name}, {len(recorder.tables)} steps")
+        recorder.setParent(None)
+        recorder.deleteLater()
 
     def show_about(self) -> None:
         """Say what this program is."""

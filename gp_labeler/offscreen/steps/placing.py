@@ -158,6 +158,10 @@ class Drag(Step):
         view = rig.view(self.view)
         rig.choose(self.side, code)
         rig.bring(start)
+        if self.view == "3d":
+            aim_at_bone(rig, start, turn=False)
+        elif self.by is None:
+            scroll_to(rig, Plane(self.view), start)
         rig.app.processEvents()
         here = view.pixel_at(start)
         there = (here[0] + self.by[0], here[1] + self.by[1]) if self.by else view.pixel_at(np.array(self.to))
