@@ -106,4 +106,4 @@ def test_a_picture_leaves_the_window_as_it_was(window) -> None:
         assert size == size_then
         if shown is not None:
             np.testing.assert_allclose(shown.centre, shown_then.centre)
-            assert shown.mm_per_pixel == shown_then.mm_per_pixel
+            np.testing.assert_allclose(shown.mm_per_pixel, shown_then.mm_per_pixel)
