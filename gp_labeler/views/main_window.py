@@ -129,6 +129,7 @@ class MainWindow(QMainWindow):
         self.welcome.open_specimen_asked.connect(self.ui.ask_open_file)
         self.welcome.demo_asked.connect(self.ui.open_demo)
         self.welcome.path_chosen.connect(self._on_path_chosen)
+        self._label.addAction(self.commands.actions["point.accept_ghost"])  # Enter means it there too
         card = self._label.card
         card.open_asked.connect(self.ui.ask_open_file)
         card.export_asked.connect(partial(self.commands.run, "file.export"))

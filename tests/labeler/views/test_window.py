@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import gc
+import os
+import subprocess
+import sys
 import time
 import weakref
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -129,6 +134,52 @@ def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_p
     again.ui.take_recoveries(find_recoveries(tmp_path / "state"))
     assert "CA" in again.workbench.session.landmarks("L")
     assert again.workbench.session.undo_text == "place CA left"
+
+
+_KILLED = """
+import sys, time
+from pathlib import Path
+from PySide6.QtCore import QPoint, Qt, QTimer
+from PySide6.QtTest import QTest
+from gp_labeler.views.application import make_application, make_window
+from window_cases import MIDDLE, ball_volume
+app = make_application()
+window = make_window(Path(sys.argv[1]), atlas=False)
+window.show()
+window.workbench.open_volume(ball_volume())
+end = time.monotonic() + 30
+while window.workbench.jobs.running and time.monotonic() < end:
+    app.processEvents()
+view = window.grid.scene_view
+x, y = view.pixel_at(MIDDLE)
+for dx in (0, 15, 30):
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(int(x) + dx, int(y)))
+marks = window.workbench.session.landmarks("L")
+print(repr({code: marks[code].tolist() for code in marks.placed}), flush=True)
+app.exec()
+"""
+
+
+@pytest.mark.slow
+def test_a_window_killed_in_the_middle_loses_nothing(make_window, tmp_path) -> None:
+    paths = os.pathsep.join([str(Path(__file__).parents[1]), str(Path(__file__).parents[3])])
+    process = subprocess.Popen(
+        [sys.executable, "-c", _KILLED, str(tmp_path / "state")],
+        stdout=subprocess.PIPE,
+        text=True,
+        env=dict(os.environ, PYTHONPATH=paths),
+    )
+    placed = ast.literal_eval(process.stdout.readline())
+    process.kill()
+    process.communicate()
+    assert sorted(placed) == ["CA", "OS", "RWP"]
+    window = make_window()
+    window.ui.prompts.answers = ["Recover"]
+    window.ui.take_recoveries(find_recoveries(tmp_path / "state"))
+    session = window.workbench.session
+    for code, where in placed.items():
+        np.testing.assert_array_equal(session.landmarks("L")[code], where)
+    assert session.undo_text == "place OS left"
 
 
 def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tmp_path) -> None:

@@ -272,6 +272,11 @@ def test_enter_accepts_the_ghost(qtbot, window) -> None:
     scene.setFocus()
     QTest.keyClick(scene, Qt.Key.Key_Return)
     np.testing.assert_allclose(placed(window, code), ghost)
+    code = session.active.code
+    table = window.steps["label"].table.view
+    table.setFocus()
+    QTest.keyClick(table, Qt.Key.Key_Return)
+    assert placed(window, code) is not None
 
 
 def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
