@@ -9,6 +9,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPolygonF
 
 from gp_core.checks import FloatArray
+from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import ellipse
 from gp_labeler.scene.label_layout import place_labels
 from gp_labeler.scene.marks import Mark
@@ -17,8 +18,9 @@ from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
 from gp_labeler.views.bind import follow
-from gp_labeler.views.drawn import drawn_ghosts, drawn_marks
+from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.qt_paths import segments_path
+from gp_labeler.views.slice_lines import paint_lines
 from gp_labeler.views.theme import Theme, base_font, theme_of
 from gp_labeler.workbench import Workbench
 
@@ -79,6 +81,8 @@ class SlicePainter:
         self._paint_crosshair(painter, view.shown, theme, ratio)
         self._paint_letters(painter, view.shown, ratio)
         self._paint_scale_bar(painter, view.shown, ratio)
+        lines, reach = drawn_segments(self._desk, theme.scene), reach_of(view.source, view.plane)
+        paint_lines(painter, lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
         self._paint_ghosts(painter, view.shown, theme, ratio)
         self._paint_marks(painter, view.source, view.shown, theme, ratio)
 
@@ -208,8 +212,6 @@ def _picture(image: SliceImage, window: object, preview: float | None) -> QImage
 
 
 def _on_black(state: str) -> str:
-    from gp_labeler.scene.colours import DARK
-
     return DARK.states[state]
 
 

@@ -406,3 +406,14 @@ def test_the_slider_goes_through_the_slices(window) -> None:
     np.testing.assert_allclose(session.crosshair[:2], MIDDLE[:2])
     frame.view.step(-8)
     assert slider.value() == before
+
+
+def test_the_axis_is_drawn_on_slices_where_it_passes() -> None:
+    from gp_labeler.views.slice_lines import near_part
+
+    start, end = np.array([0.0, 0, -4]), np.array([4.0, 0, 4])
+    np.testing.assert_allclose(near_part(start, end, (-4, 4), 1.0), [[1.5, 0, -1], [2.5, 0, 1]])
+    np.testing.assert_allclose(near_part(end, start, (4, -4), 1.0), [[2.5, 0, 1], [1.5, 0, -1]])
+    np.testing.assert_allclose(near_part(start, end, (0.5, 0.5), 1.0), [start, end])
+    assert near_part(start, end, (2.0, 9.0), 1.0) is None
+    assert near_part(start, end, (2.0, 2.0), 1.0) is None
