@@ -51,6 +51,7 @@ def _resized(window: QWidget, part: QWidget, size: tuple[int, int] | None) -> QI
         window.resize(before + QSize(*size) - part.size())
         QApplication.processEvents()
     image = part.grab().toImage()
+    image.setDevicePixelRatio(1.0)
     if size is not None:
         window.resize(before)
         QApplication.processEvents()
@@ -63,6 +64,7 @@ def _grabbed(view: QWidget, size: tuple[int, int] | None) -> QImage:
         ratio = view.devicePixelRatioF()
         view.resize(round(size[0] / ratio), round(size[1] / ratio))
     image = view.grab().toImage()
+    image.setDevicePixelRatio(1.0)  # pixels are pixels from here on
     view.resize(before)
     return image
 

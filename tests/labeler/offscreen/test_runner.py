@@ -205,3 +205,20 @@ def test_touches_are_laid_on_the_labels_of_the_same_names(tmp_path) -> None:
     rows = np.array(violet.constBits()).reshape(violet.height(), -1)[:, : 3 * violet.width()]
     red, green, blue = rows.reshape(violet.height(), -1, 3).astype(int).transpose(2, 0, 1)
     assert np.count_nonzero((red - green > 60) & (blue - green > 60)) > 200
+
+
+def test_an_atlas_is_fitted_to_labelled_animals(tmp_path) -> None:
+    from gp_core import Atlas, Side, write_markups
+    from gp_core.atlas.draw import draw_animal
+
+    rng, animals = np.random.default_rng(5), tmp_path / "animals"
+    animals.mkdir()
+    for n in range(3):
+        animal = draw_animal(Atlas.published(), rng=rng, name=f"GP-{n}")
+        for side in Side:
+            write_markups(animals / f"GP-{n}_{side.value}.mrk.json", animal.side(side), specimen=animal.name)
+    steps = make_script([{"do": "fit", "specimens": "animals", "path": "own/atlas.json"}], folder=tmp_path)
+    report = run_script(steps, tmp_path / "out")
+    assert report.ok, report.error
+    assert report.steps[0].text == "atlas.json, 3 animals"
+    assert Atlas.load(tmp_path / "out" / "own" / "atlas.json").n_samples == 6
