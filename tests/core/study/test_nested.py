@@ -67,18 +67,20 @@ def mean_pose(animals: list[Specimen], *, both_sides: bool) -> PoseErrors:
     return PoseErrors(np.array(e_co), np.array(e_ma))
 
 
-@pytest.mark.parametrize("method", ["jrmpc", "robust"])
-def test_touches_that_say_nothing_do_not_beat_the_mean_pose(method: str) -> None:
+@pytest.mark.parametrize(
+    ("method", "features"), [("jrmpc", SMALL), ("robust", [code for code in SMALL if code != "LLI"])]
+)
+def test_touches_that_say_nothing_do_not_beat_the_mean_pose(method: str, features: list[str]) -> None:
+    options = {**OPTIONS, "training": features, "fewest_training": 7}
     totals = []
-    for seed in range(3):
+    for seed in range(3):  # the mean of some herds: one alone can be lucky
         animals = uninformed(seed)
-        fewest = 7 if method == "jrmpc" else 8
-        report = nested_search(animals, method=method, **{**OPTIONS, "fewest_training": fewest})
+        report = nested_search(animals, method=method, **options)
         chance = mean_pose(animals, both_sides=method == "robust")
         totals.append((chance.e_t, report.errors.e_t, report.optimistic.errors.e_t))
     by_chance, honest, optimistic = np.mean(totals, axis=0)
     assert honest >= by_chance
-    assert optimistic < 0.93 * honest  # which is why the honest one is needed
+    assert optimistic < 0.95 * honest  # which is why the honest one is needed
 
 
 def test_held_out_animal_has_no_say() -> None:
