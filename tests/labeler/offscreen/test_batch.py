@@ -52,6 +52,14 @@ def test_a_failed_specimen_does_not_stop_the_others(folder) -> None:
     assert heard[0] == "GP-01:"
 
 
+def test_a_folder_that_cannot_be_made_stops_no_other(folder) -> None:
+    (folder / "out").mkdir()
+    (folder / "out" / "GP-01").write_text("in the way")
+    reports = run_batch(make_script(STEPS, folder=folder), ["GP-01", "GP-03"], folder / "out")
+    assert [report.ok for report in reports.values()] == [False, True]
+    assert "cannot be made" in reports["GP-01"].error
+
+
 @pytest.mark.parametrize(
     ("steps", "names", "text"),
     [
