@@ -182,8 +182,10 @@ def nested_errors(report: NestedReport) -> Figure:
         top = 1.08 * max(getattr(row, error) for row in (*report.rows, *report.optimistic.rows))
         ax.plot([0, top], [0, top], color=_INK, lw=0.8)
         ax.set(xlim=(0, top), ylim=(0, top), aspect="equal")
+        ax.xaxis.set_major_locator(MaxNLocator(6))
+        ax.yaxis.set_major_locator(MaxNLocator(6))
         label(ax, letter, f"{name},\nchosen on all animals", "chosen without the animal")
-    first.legend(fontsize=8, frameon=False, loc="upper left")
+    first.legend(fontsize=8, frameon=False, loc="lower right")
     second.set_title(f"method {report.method}", loc="right", fontsize=8, color=_INK)
     return figure
 
