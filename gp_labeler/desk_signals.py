@@ -42,6 +42,8 @@ class DeskSignals:
     view_changed = Signal(frozenset)
     """Names of the fields of `session.view.state` that changed."""
 
+    atlas_changed = Signal()
+    """Another atlas is in use: `atlas`, `atlas_specimens`."""
     volume_opened = Signal(object)
     surfaces_changed = Signal()
     threshold_previewed = Signal(object)

@@ -6,12 +6,12 @@ import importlib
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import partial
 from math import ceil, sqrt
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.progress import Progress as Told
@@ -19,7 +19,6 @@ from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
 from gp_labeler.imaging.surface import Surface, extract_isosurface, overview_stride
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.session.ghosts import Predict
 from gp_labeler.session.jobs import Progress
 
 __all__ = [
@@ -187,14 +186,11 @@ class LoadAtlas:
 
     title = "Loading the atlas"
 
-    def run(self, progress: Progress) -> Predict:
+    def run(self, progress: Progress) -> Atlas:
         """Build it from the published table."""
         _load("gp_core.atlas.shape", "gp_core.atlas.published")
-        from gp_core.atlas.atlas import Atlas  # here: SciPy takes a moment that the window need not wait for
-        from gp_core.atlas.shape import predict
-
         progress(0.0)
-        return partial(predict, Atlas.published())
+        return Atlas.published()
 
 
 @dataclass(frozen=True)

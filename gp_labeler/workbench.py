@@ -13,18 +13,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
+from gp_labeler.atlas_desk import AtlasDesk
 from gp_labeler.bone import Bone
-from gp_labeler.desk_signals import DeskSignals
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.surface import Surface
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session import labelling
 from gp_labeler.session.edited_specimen import VolumeChangedError
-from gp_labeler.session.ghosts import Predict
 from gp_labeler.session.jobs import Dispatcher, Jobs, Task
 from gp_labeler.session.opening import new_session, open_session, recover_session, tidy_name
 from gp_labeler.session.recent import RecentFiles
@@ -33,7 +33,7 @@ from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import SetThreshold
 from gp_labeler.session.specimen_file import SUFFIX
 from gp_labeler.session.state import How
-from gp_labeler.work import Demo, InspectScan, LoadAtlas, MakeDemo, ReadScan, SaveMesh
+from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, SaveMesh
 
 __all__ = ["TOOLS", "Drag", "Workbench"]
 
@@ -50,7 +50,7 @@ class Drag:
         self.side, self.code, self.position, self.how = side, code, position, how
 
 
-class Workbench(DeskSignals):
+class Workbench(AtlasDesk):
     """What one window works on; see the module.
 
     Its signals of the session's names repeat those of whatever session is open, so a listener connects once;
@@ -63,8 +63,8 @@ class Workbench(DeskSignals):
         list of recent files.
     dispatcher : callable, optional
         Brings results of jobs to this thread.
-    predict : callable, optional
-        The atlas for ghosts; by default the published one, loaded as a job by `load_atlas`.
+    atlas : Atlas, optional
+        Behind ghosts, doubts and poses; by default the published one, loaded as a job by `load_atlas`.
     author : str, optional
         Who labels.
     """
@@ -74,7 +74,7 @@ class Workbench(DeskSignals):
         directory: Path | None = None,
         dispatcher: Dispatcher | None = None,
         *,
-        predict: Predict | None = None,
+        atlas: Atlas | None = None,
         author: str | None = None,
     ) -> None:
         self.directory = directory
@@ -83,11 +83,11 @@ class Workbench(DeskSignals):
         self.truth: Specimen | None = None  # of a phantom: where its features really are
         self.drag: Drag | None = None
         self.tool = "place"
-        self._predict, self._author = predict, author
+        self._author = author
         self._last: tuple[Side, str] | None = None
         self._abandoned: Session | None = None
-        super().__init__()
-        self.session: Session = new_session(directory, predict=predict, author=author)
+        super().__init__(atlas)
+        self.session: Session = new_session(directory, predict=self._predict, author=author)
         self._bone = Bone(self)
         self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
@@ -123,11 +123,6 @@ class Workbench(DeskSignals):
         return self.session.state.specimen + (" *" if self.session.dirty else "")
 
     # Opening
-
-    def load_atlas(self) -> None:
-        """Get the published atlas ready in the background; ghosts appear when it is."""
-        if self._predict is None:
-            self.jobs.submit(LoadAtlas(), self._take_atlas, key="atlas")
 
     def open(self, path: str | PathLike[str], **options: Any) -> None:
         """Open a specimen file, or a scan as a new specimen; see `open_specimen` and `open_scan`."""
@@ -277,11 +272,6 @@ class Workbench(DeskSignals):
 
     # Inside
 
-    def _take_atlas(self, predict: Predict) -> None:
-        self._predict = predict
-        self.session.set_predict(predict)
-        self.doubts_changed.emit()
-
     def _take_plan(self, plan: ImportPlan, ask: bool) -> None:
         if plan.errors or (ask and not plan.sides_known) or (ask and len(plan.choices) > 1):
             self.import_asked.emit(plan)
@@ -352,9 +342,7 @@ class Workbench(DeskSignals):
     def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
         touched = [point for point in changed if not feature(point[1]).computed]
         self._last = touched[0] if len({code for _, code in touched}) == 1 else None
-        for side in {side for side, _ in changed}:
-            job = self.session.judging(side)
-            self.jobs.submit(job, lambda _: self.doubts_changed.emit(), key=f"judging {side.value}")
+        self._judge({side for side, _ in changed})
         self._bone.mesh_ears()
 
     def _on_failed(self, task: Task[Any]) -> None:

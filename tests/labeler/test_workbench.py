@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from window_cases import BALL_MM, MIDDLE, VOXEL_MM, ball_volume
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.actions import ACTIONS, run
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session import labelling
@@ -251,3 +254,27 @@ def test_the_mesh_is_written(on_ball, tmp_path) -> None:
     on_ball.wait()
     assert (tmp_path / "ball.ply").stat().st_size > 1000
     assert on_ball.said[-1] == ("info", "Wrote ball.ply")
+
+
+def test_the_published_atlas_is_loaded_behind_the_window(desk) -> None:
+    assert desk.atlas is None
+    desk.load_atlas()
+    desk.wait()
+    assert desk.atlas is Atlas.published()
+    assert desk.atlas_specimens == ()
+
+
+def test_an_atlas_in_use_stays_for_the_next_specimen_and_is_not_loaded_over(desk, ball) -> None:
+    told = []
+    desk.atlas_changed.connect(lambda: told.append(desk.atlas.name))
+    animal = Specimen("A", {Side.LEFT: LandmarkSet.empty("L")})
+    own = replace(Atlas.published(), name="own")
+    desk.use_atlas(own, [animal])
+    desk.load_atlas()
+    desk.open_volume(ball)
+    desk.wait()
+    assert told == ["own"]
+    assert (desk.atlas, desk.atlas_specimens) == (own, (animal,))
+    for code in ("CA", "CB", "RWA"):
+        labelling.place(desk.session, own[code] + MIDDLE, How.SLICE, side=Side.LEFT, code=code)
+    np.testing.assert_allclose(desk.session.ghosts(Side.LEFT)["RWP"].position, own["RWP"] + MIDDLE, atol=0.01)

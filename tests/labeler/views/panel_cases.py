@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 
 import numpy as np
 from PySide6.QtGui import QFontMetrics
 from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWidget
 
-from gp_core import Atlas, predict
+from gp_core import Atlas
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session import labelling
@@ -29,7 +28,7 @@ def grey_volume(seed: int = 0) -> Volume:
 
 def desk_with_scan(**options) -> Workbench:
     """Make a workbench on that scan, with the atlas, whose jobs wait to be delivered."""
-    desk = Workbench(None, QueueDispatcher(), predict=partial(predict, ATLAS), author="tester", **options)
+    desk = Workbench(None, QueueDispatcher(), atlas=ATLAS, author="tester", **options)
     volume = grey_volume()
     desk.session.attach_volume(volume)
     desk.volume_opened.emit(volume)
