@@ -13,18 +13,13 @@ from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.icp import icp
-from gp_core.registration.procrustes import fit_rigid
 from gp_core.registration.targets import Cloud, Surface
 
 __all__ = ["SkullRegistration", "register_by_icp", "register_by_names", "register_to_surface"]
 
 _FEWEST = 3
-_FEWEST_TO_DOUBT = 6
-_TELLING = 0.5
-"""A point is wrong if the others fit twice as well without it; of eight good ones, 0.3 % are called so."""
-
-_EXACT_MM = 1e-6
 
 
 @dataclass(frozen=True)
@@ -71,20 +66,10 @@ def register_by_names(touches: LandmarkSet, ct: LandmarkSet) -> SkullRegistratio
         Fewer than three features in common, or on one line.
     """
     names, touched, labelled = _common(touches, ct)
-    kept = list(range(len(names)))
-    suspects: list[int] = []
-    rms = _fit(touched, labelled, names, kept)[1]
-    while len(kept) >= _FEWEST_TO_DOUBT and rms > _EXACT_MM:
-        without = [(_rms_without(touched, labelled, names, kept, i), i) for i in kept]
-        best, worst = min(without)
-        if best > _TELLING * rms:
-            break
-        kept.remove(worst)
-        suspects.append(worst)
-        rms = best
-    transform, rms = _fit(touched, labelled, names, kept)
-    residuals = _residuals(transform, names, touched, labelled)
-    return SkullRegistration("names", transform, rms, residuals, tuple(names[i] for i in suspects))
+    found = register_fiducials(
+        dict(zip(names, touched, strict=True)), dict(zip(names, labelled, strict=True))
+    )
+    return SkullRegistration("names", found.T_scan_tracker, found.fre_mm, found.residuals_mm, found.suspects)
 
 
 def register_by_icp(touches: LandmarkSet, ct: LandmarkSet) -> SkullRegistration:
@@ -142,22 +127,6 @@ def _common(touches: LandmarkSet, ct: LandmarkSet) -> tuple[list[str], FloatArra
         )
     touched, labelled = (np.array([s.extra[name] for name in names]) for s in (touches, ct))
     return names, touched, labelled
-
-
-def _fit(
-    touched: FloatArray, labelled: FloatArray, names: Sequence[str], kept: Sequence[int]
-) -> tuple[RigidTransform, float]:
-    fit = fit_rigid(touched[kept], labelled[kept], names=[names[i] for i in kept], dst="scan", src="tracker")
-    return fit.transform, fit.rms
-
-
-def _rms_without(
-    touched: FloatArray, labelled: FloatArray, names: Sequence[str], kept: Sequence[int], i: int
-) -> float:
-    try:
-        return _fit(touched, labelled, names, [k for k in kept if k != i])[1]
-    except GeometryError:
-        return np.inf
 
 
 def _residuals(
