@@ -21,6 +21,8 @@ _RELAYED = (
     "history_changed",
     "dirty_changed",
     "saved",
+    "edited",
+    "stepped",
 )
 
 
@@ -39,6 +41,12 @@ class DeskSignals:
     history_changed = Signal()
     dirty_changed = Signal(bool)
     saved = Signal(object)
+    edited = Signal(object, bool)
+    stepped = Signal(str)
+    exported = Signal(object)
+    """The `ExportReport` of landmark files that were written."""
+    pictured = Signal(object)
+    """The file of a picture of the window."""
     view_changed = Signal(frozenset)
     """Names of the fields of `session.view.state` that changed."""
 

@@ -79,6 +79,10 @@ class EditedSpecimen:
     dirty_changed = Signal(bool)
     saved = Signal(object)
     """The file it was saved in."""
+    edited = Signal(object, bool)
+    """The edit that was made, and whether it continued the gesture before it, as `do` was told."""
+    stepped = Signal(str)
+    """``undo`` or ``redo``, after it was done."""
 
     def __init__(
         self,
@@ -162,6 +166,7 @@ class EditedSpecimen:
         self._keeper.record("merge" if merge else "edit", text, new, time=self.now())
         self._history.push(text, new, focus=self._focus(), merge=merge)
         self._tell(old)
+        self.edited.emit(edit, merge)
         return True
 
     def undo(self) -> bool:
@@ -182,6 +187,7 @@ class EditedSpecimen:
         (self._history.undo if kind == "undo" else self._history.redo)(focus=self._focus())
         self._tell(old)
         self._return_to(upcoming.focus)
+        self.stepped.emit(kind)
         return True
 
     def _tell(self, old: SpecimenState) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,6 +75,7 @@ def import_landmarks(
     GpError
         A file cannot be read, or a point that would change is locked.
     """
+    paths = list(paths)
     lists = [read_points(path) for path in paths]
     if not lists:
         raise GpError("no landmark file was given")
@@ -80,11 +83,13 @@ def import_landmarks(
     off_bone = _misfit(session, sets, near_bone, accept_misfit)
     known = {key: found for p, s in zip(lists, sets, strict=True) for key, found in _known(p, s.side).items()}
     source = ", ".join(points.source.name for points in lists)
-    session.do(
-        ImportLandmarks(
-            sets, provenance(session, How.IMPORTED, source=source), known, replace_placed=replace_placed
-        )
-    )
+    asked = {
+        "files": [str(Path(path).absolute()) for path in paths],
+        "side": None if side is None else Side.parse(side).value,
+        "accept_misfit": accept_misfit,
+    }
+    new = provenance(session, How.IMPORTED, source=source)
+    session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
     return (*_doubtful_origin(session, lists), *off_bone)
 
 
@@ -157,12 +162,15 @@ class ImportLandmarks:
         Provenance that the file carries.
     replace_placed : bool
         Whether placed points give way; otherwise only what is still to do is filled.
+    asked : mapping, optional
+        How `import_landmarks` was asked for it, for a script that does it again.
     """
 
     landmarks: tuple[LandmarkSet, ...]
     provenance: Provenance
     known: Mapping[tuple[Side, str], Provenance] | None = None
     replace_placed: bool = True
+    asked: Mapping[str, Any] | None = None
 
     @property
     def text(self) -> str:

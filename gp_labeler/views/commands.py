@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt
+from PySide6.QtCore import QObject, Qt, Signal
 from PySide6.QtGui import QAction, QKeySequence
 from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
 
@@ -33,6 +33,9 @@ class Commands(QObject):
     window, views : QWidget
         Where keys work: everywhere, or only in the views.
     """
+
+    done = Signal(str)
+    """Id of the action that was done."""
 
     def __init__(self, workbench: Workbench, ui: Ui, window: QWidget, views: QWidget) -> None:
         super().__init__(window)
@@ -96,10 +99,13 @@ class Commands(QObject):
             window.addAction(made)
         return made
 
-    def run(self, id: str, *_: object) -> None:
-        """Do an action."""
-        run(id, self._desk, self._ui)
+    def run(self, id: str, *_: object) -> bool:
+        """Do an action; return whether it could be done."""
+        was_done = run(id, self._desk, self._ui)
         self.refresh()
+        if was_done:
+            self.done.emit(id)
+        return was_done
 
     def _add_recent(self, menu: QMenu) -> None:
         recent = menu.addMenu("Open recent")

@@ -80,3 +80,4 @@ def export_asking(workbench: Workbench, folder: Path, prompts: Prompts) -> None:
             return
         report = export_landmarks(state, folder, overwrite=True)
     workbench.say(report.text.replace("\n", "  "), "info" if report.is_complete else "warning")
+    workbench.exported.emit(report)

@@ -163,8 +163,12 @@ class WindowUi:
         path = self.prompts.save_file(
             "Save a picture of the window", str(Path(self._folder) / name), "PNG (*.png)"
         )
-        if path is not None and not self._window.grab().save(str(path)):
+        if path is None:
+            return
+        if not self._window.grab().save(str(path)):
             raise GpError("cannot be written", file=path)
+        self._desk.say(f"Wrote {path.name}")
+        self._desk.pictured.emit(path)
 
     # Questions of the workbench
 

@@ -206,4 +206,5 @@ class ExportDialog(QDialog):
         level = "info" if report.is_complete else "warning"
         self._workbench.say(report.text.replace("\n", "  "), level)
         self.exported.emit(folder)
+        self._workbench.exported.emit(report)
         self.accept()
