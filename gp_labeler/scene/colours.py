@@ -25,7 +25,12 @@ _STATES = MappingProxyType(
         "active": "#FFFFFF",
         "other": "#4F9FC4",
         "ghost": "#5CB8F5",
-        "pose": "#E07BE0",
+        "pose": "#2B8AD6",
+        "pose_2": "#D55E00",
+        "truth": "#009E73",
+        "touch": "#C8619F",
+        "unseen": "#8A929B",
+        "path": "#F0E442",
     }
 )
 
@@ -69,7 +74,12 @@ LIGHT = SceneColours(
             "active": "#101820",
             "other": "#2E6F94",
             "ghost": "#1273BE",
-            "pose": "#9B309B",
+            "pose": "#0072B2",
+            "pose_2": "#CC5500",
+            "truth": "#0A7F5D",
+            "touch": "#A8397F",
+            "unseen": "#6B747E",
+            "path": "#F0E442",
         }
     ),
 )

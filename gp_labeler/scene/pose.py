@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from vtkmodules.vtkFiltersSources import vtkConeSource, vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor
@@ -13,73 +11,16 @@ from gp_labeler.imaging.vtk_arrays import triple
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.ghosts import Ghost, GhostActor
 from gp_labeler.scene.labels import Label
+from gp_labeler.scene.pose_data import DrawnPose, PoseScene
 from gp_labeler.scene.segments import Segment, SegmentActor
 from gp_labeler.scene.stage import Stage, release, solid_actor
 
-__all__ = ["AXIS_MM", "DrawnPose", "PoseActor"]
+__all__ = ["DrawnPose", "PoseActor", "PoseScene"]
 
-AXIS_MM = 5.0
-"""Length of the axis from the origin to its tip."""
-
-_BEHIND_MM = 1.5
 _HEAD_MM = (0.9, 0.32)
 _BALL_MM = 0.35
 _CONE_OPACITY = 0.16
 _CORNERS = 48
-
-
-@dataclass(frozen=True, eq=False)
-class DrawnPose:
-    """A cochlea to draw.
-
-    Parameters
-    ----------
-    key : str
-        Its name, such as ``"L"``.
-    origin : (3,) float array
-        CO, scan frame, mm.
-    axis : (3,) float array
-        Unit modiolar axis, towards the apex.
-    covariance : (3, 3) float array
-        Of the origin, mm squared.
-    cone : float
-        Half-angle of the cone that holds the true axis with 95 %, rad.
-    label : str
-        What stands beside it.
-    """
-
-    key: str
-    origin: FloatArray
-    axis: FloatArray
-    covariance: FloatArray
-    cone: float
-    label: str = "CO"
-
-    @property
-    def tip(self) -> FloatArray:
-        """(3,) end of the arrow, mm."""
-        end: FloatArray = self.origin + AXIS_MM * self.axis
-        return end
-
-    @property
-    def tail(self) -> FloatArray:
-        """(3,) where the arrow begins, a little behind the origin, mm."""
-        start: FloatArray = self.origin - _BEHIND_MM * self.axis
-        return start
-
-    @property
-    def rim(self) -> FloatArray:
-        """(N, 3) rim of the cone about the axis, mm."""
-        across = np.linalg.svd(self.axis[None])[2][1:]
-        turn = np.linspace(0.0, 2 * np.pi, _CORNERS, endpoint=False)
-        circle = np.stack([np.cos(turn), np.sin(turn)], axis=1) @ across
-        rim: FloatArray = self.tip + self.cone_radius * circle
-        return rim
-
-    @property
-    def cone_radius(self) -> float:
-        """Radius of the cone at the tip, mm; a cone too wide to draw is cut."""
-        return AXIS_MM * float(np.tan(min(self.cone, 1.2)))
 
 
 class PoseActor:
@@ -103,13 +44,14 @@ class PoseActor:
         """What is drawn."""
         return self._poses
 
-    def show(self, *poses: DrawnPose) -> None:
-        """Draw these cochleae in place of those before."""
+    def show(self, scene: PoseScene) -> None:
+        """Draw this in place of what was before."""
         self._drop()
+        poses = scene.poses
         self._poses, colour = poses, self._stage.colours.states["pose"]
         self._shafts.show([Segment(pose.tail, pose.tip, colour, 3.0) for pose in poses])
         self._balls_95.show(
-            [Ghost(pose.key, pose.origin, pose.covariance, pose.label, active=True) for pose in poses]
+            [Ghost(pose.key, pose.origin, pose.covariance[:3, :3], pose.label, active=True) for pose in poses]
         )
         for pose in poses:
             for solid, opacity in (

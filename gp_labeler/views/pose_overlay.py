@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 from gp_core.checks import FloatArray
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import ellipse
-from gp_labeler.scene.pose import DrawnPose
+from gp_labeler.scene.pose_data import DrawnPose, PoseScene
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.views.slice_view import SliceView
 
@@ -38,11 +38,11 @@ class PoseOverlay(QWidget):
         self._poses: tuple[DrawnPose, ...] = ()
         view.installEventFilter(self)
         self.resize(view.size())
-        self.show()
+        self.setVisible(True)
 
-    def show_poses(self, *poses: DrawnPose) -> None:
-        """Draw these cochleae in place of those before."""
-        self._poses = poses
+    def show(self, scene: PoseScene) -> None:  # type: ignore[override]
+        """Draw this in place of what was before."""
+        self._poses = scene.poses
         self.update()
 
     def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102, N802
@@ -73,7 +73,7 @@ def _draw(painter: QPainter, shown: Shown, pose: DrawnPose, ratio: float) -> Non
     painter.setBrush(fill)
     painter.drawPolygon(_polygon(_hull(np.concatenate([points[:1], shown.scan_to_pixel(pose.rim) + 0.5]))))
     axes = np.stack([shown.plane.right, shown.plane.down])
-    spread = axes @ pose.covariance @ axes.T / shown.mm_per_pixel**2
+    spread = axes @ pose.covariance[:3, :3] @ axes.T / shown.mm_per_pixel**2
     painter.setPen(QPen(colour, 1.8 * ratio))
     painter.drawPolygon(_polygon(ellipse(points[0], spread)))
     painter.setPen(QPen(colour, 2.6 * ratio, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap))

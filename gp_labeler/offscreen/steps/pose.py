@@ -30,7 +30,7 @@ from gp_core.registration.procrustes import fit_rigid
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step, Triple
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.pose import DrawnPose
+from gp_labeler.scene.pose_data import DrawnPose, PoseScene
 from gp_labeler.views.pose_overlay import PoseOverlay
 
 __all__ = ["Check", "Estimate", "Estimated", "Fit", "Overlay"]
@@ -64,11 +64,12 @@ class Estimated:
                 "nothing says where the touches lie in the scan",
                 remedy="Label three of the touched features of that side first.",
             )
-        pose, rotation = self.pose, self.T_scan_tracker.rotation
-        origin = self.T_scan_tracker.apply(pose.origin[None])[0]
-        covariance = rotation @ pose.covariance[:3, :3] @ rotation.T
-        label = f"CO ±{pose.radius_95:.1f} mm"
-        return DrawnPose(pose.side.value, origin, rotation @ pose.axis, covariance, pose.cone_95, label)
+        return DrawnPose.of(
+            self.pose,
+            self.T_scan_tracker,
+            key=self.pose.side.value,
+            label=f"CO ±{self.pose.radius_95:.1f} mm",
+        )
 
     @property
     def error_mm(self) -> float | None:
@@ -202,12 +203,13 @@ class Overlay(Step):
         if self.visible and not rig.poses:
             raise GpError("no pose was estimated", remedy="Let an estimate step come first.")
         drawn = [estimated.drawn for estimated in rig.poses.values()] if self.visible else []
-        rig.scene.scene.pose.show(*drawn)
+        shown = PoseScene(poses=tuple(drawn))
+        rig.scene.scene.pose.show(shown)
         rig.scene.redraw()
         for plane in Plane:
             view = rig.window.grid.slice_views[plane]
             overlay = view.findChild(PoseOverlay) or PoseOverlay(view)
-            overlay.show_poses(*drawn)
+            overlay.show(shown)
         if drawn:
             rig.bring(drawn[0].origin)
 

@@ -9,11 +9,18 @@ import pytest
 from scene_cases import MIDDLE, scan_of
 
 from gp_labeler.imaging.surface import extract_isosurface
-from gp_labeler.scene.pose import AXIS_MM, DrawnPose, PoseActor
+from gp_labeler.scene.pose import PoseActor
+from gp_labeler.scene.pose_data import AXIS_MM, DrawnPose, PoseScene
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.target import RenderTarget
 
-POSE = DrawnPose("L", MIDDLE, np.array([0.6, 0.0, 0.8]), 0.02 * np.eye(3), np.radians(9.0), "CO")
+TURN = np.array([[0.6, 0.0, -0.8], [0.0, 1.0, 0.0], [0.8, 0.0, 0.6]])
+POSE = DrawnPose(
+    "L",
+    np.block([[TURN, MIDDLE[:, None]], [np.zeros((1, 3)), 1.0]]),
+    np.diag([0.02] * 3 + [0.005] * 3),
+    np.radians(9.0),
+)
 
 
 @pytest.fixture
@@ -25,9 +32,9 @@ def scene() -> Iterator[Scene3D]:
     made.close()
 
 
-def violet(image: np.ndarray) -> np.ndarray:
+def blue(image: np.ndarray) -> np.ndarray:
     red, green, blue = image.astype(int).transpose(2, 0, 1)
-    return (red - green > 40) & (blue - green > 40)
+    return (blue - red > 40) & (blue - green > 15)
 
 
 def test_shape() -> None:
@@ -42,9 +49,9 @@ def test_shape() -> None:
 def test_origin_and_axis_are_seen_also_through_bone(scene, in_bone) -> None:
     if in_bone:
         scene.bone.show([extract_isosurface(scan_of([(MIDDLE, 7.0)], np.eye(3)), 100.0)])
-    scene.pose.show(POSE)
+    scene.pose.show(PoseScene((POSE,)))
     scene.camera.focus_on(MIDDLE, across_mm=16.0)
-    seen = violet(scene.image())
+    seen = blue(scene.image())
     for point in (POSE.origin, POSE.tip - 0.4 * POSE.axis):
         x, y = np.rint(scene.display_of(point[None])[0]).astype(int)
         assert seen[y, x]
@@ -54,9 +61,9 @@ def test_origin_and_axis_are_seen_also_through_bone(scene, in_bone) -> None:
 
 def test_showing_nothing_takes_everything_away(scene) -> None:
     empty = scene.image()
-    scene.pose.show(POSE)
+    scene.pose.show(PoseScene((POSE,)))
     assert (scene.image() != empty).any()
-    scene.pose.show()
+    scene.pose.show(PoseScene())
     np.testing.assert_array_equal(scene.image(), empty)
     assert isinstance(scene.pose, PoseActor)
     assert scene.pose.poses == ()
