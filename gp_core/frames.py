@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FrameError
 
-__all__ = ["FRAMES", "RigidTransform", "cross_matrix", "mirror_x"]
+__all__ = ["FRAMES", "RigidTransform", "angle_between_deg", "cross_matrix", "mirror_x"]
 
 FRAMES = ("scan", "tracker", "cochlea", "window", "atlas")
 
@@ -127,3 +127,11 @@ def cross_matrix(vector: FloatArray) -> FloatArray:
     """Return the (3, 3) matrix that maps v to ``vector × v``."""
     x, y, z = vector.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def angle_between_deg(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the angles (...,) between vectors (..., 3), in degrees; exact for small angles too."""
+    sine = np.linalg.norm(np.cross(first, second), axis=-1)
+    cosine = np.sum(first * second, axis=-1)
+    angle: FloatArray = np.degrees(np.arctan2(sine, cosine))
+    return angle

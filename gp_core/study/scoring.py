@@ -10,6 +10,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.robust_pose import locate_robust
 from gp_core.checks import FloatArray
+from gp_core.frames import angle_between_deg
 from gp_core.landmarks.features import index_of
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.jrmpc import JrmpcSettings, jrmpc_batch
@@ -49,14 +50,6 @@ class PoseErrors:
             np.concatenate([part.e_co_mm for part in parts]),
             np.concatenate([part.e_ma_deg for part in parts]),
         )
-
-
-def angle_between_deg(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the angles (...,) between vectors (..., 3), in degrees; exact for small angles too."""
-    sine = np.linalg.norm(np.cross(first, second), axis=-1)
-    cosine = np.sum(first * second, axis=-1)
-    angle: FloatArray = np.degrees(np.arctan2(sine, cosine))
-    return angle
 
 
 def jrmpc_errors(

@@ -23,6 +23,7 @@ from gp_labeler.session.state import (
     SpecimenState,
     point_key,
 )
+from gp_labeler.session.touches import Touch, Touches, TouchHow, TouchKey, touch_name
 from gp_labeler.session.volume_reference import VolumeReference
 
 __all__ = ["Document", "document_of", "provenance_document", "provenance_of", "state_of", "volume_document"]
@@ -41,6 +42,8 @@ def document_of(state: SpecimenState) -> Document:
         "notes": state.notes,
         "import_choices": thaw(state.import_choices),
         "pose_checks": [_pose_check_out(check) for check in state.pose_checks],
+        "touches": _touches_out(state.touches),
+        "skull": {name: list(position) for name, position in state.skull.items()},
     }
     if state.volume is not None:
         document["volume"] = volume_document(state.volume)
@@ -69,6 +72,8 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
             threshold=None if threshold is None else _number(threshold, "threshold"),
             notes=_typed(document.get("notes", ""), str, "notes"),
             pose_checks=tuple(_pose_check_in(c, f"pose_checks[{i}]") for i, c in enumerate(checks)),
+            touches=_touches_in(_typed(document.get("touches", {}), dict, "touches")),
+            skull=_skull_in(_typed(document.get("skull", {}), dict, "skull")),
         )
     except FileFormatError:
         raise
@@ -111,6 +116,21 @@ def volume_document(volume: VolumeReference) -> Document:
 def _pose_check_out(check: PoseCheck) -> Document:
     text = {name: getattr(check, name) for name in ("verdict", "by", "time", "note")}
     return {"side": check.side.value, **text, "pose": thaw(check.pose)}
+
+
+def _touches_out(touches: Touches) -> Document:
+    out: Document = {}
+    for (side, name), touch in touches.items():
+        out.setdefault(side.value, {})[name] = _touch_out(touch)
+    return out
+
+
+def _touch_out(touch: Touch) -> Document:
+    out: Document = {"position": list(touch.position), "how": touch.how.value}
+    out |= {name: text for name in ("time", "by", "source") if (text := getattr(touch, name))}
+    if touch.n_samples > 1:
+        out |= {"n_samples": touch.n_samples, "spread_mm": touch.spread_mm}
+    return out | ({"left_out": True} if touch.left_out else {})
 
 
 def _landmarks_in(document: Mapping[str, Any]) -> dict[PointKey, Landmark]:
@@ -172,6 +192,31 @@ def _pose_check_in(document: Any, where: str) -> PoseCheck:
         pose=_typed(content.get("pose", {}), dict, f"{where}.pose"),
         **{n: _typed(content.get(n, ""), str, f"{where}.{n}") for n in ("verdict", "by", "time", "note")},
     )
+
+
+def _touches_in(document: Mapping[str, Any]) -> dict[TouchKey, Touch]:
+    found: dict[TouchKey, Touch] = {}
+    for owner, touches in document.items():
+        side = _parsed(Side.parse, owner, "a side under touches")
+        for name, touch in _typed(touches, dict, f"touches.{owner}").items():
+            where = f"touches.{owner}.{name}"
+            found[side, touch_name(name)] = _touch_in(_typed(touch, dict, where), where)
+    return found
+
+
+def _touch_in(document: Mapping[str, Any], where: str) -> Touch:
+    return Touch(
+        _triple(document.get("position"), f"{where}.position"),
+        _parsed(TouchHow, document.get("how"), f"{where}.how"),
+        n_samples=int(_number(document.get("n_samples", 1), f"{where}.n_samples")),
+        spread_mm=_number(document.get("spread_mm", 0.0), f"{where}.spread_mm"),
+        left_out=_typed(document.get("left_out", False), bool, f"{where}.left_out"),
+        **{name: _typed(document.get(name, ""), str, f"{where}.{name}") for name in ("time", "by", "source")},
+    )
+
+
+def _skull_in(document: Mapping[str, Any]) -> dict[str, Position]:
+    return {name: _triple(position, f"skull.{name}") for name, position in document.items()}
 
 
 def _typed(value: Any, kind: type[T], where: str) -> T:

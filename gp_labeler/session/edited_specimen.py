@@ -69,6 +69,8 @@ class EditedSpecimen:
 
     landmarks_changed = Signal(frozenset)
     """The points that changed, (Side, code): IN for both sides, CO where it was recomputed."""
+    touches_changed = Signal()
+    """What was touched with the probe, or where the skull's registration features are on the scan."""
     volume_changed = Signal(object)
     """The loaded volume."""
     threshold_changed = Signal(object)
@@ -194,6 +196,8 @@ class EditedSpecimen:
         new = self.state
         if changed := changed_points(old, new):
             self.landmarks_changed.emit(changed)
+        if (new.touches, new.skull) != (old.touches, old.skull):
+            self.touches_changed.emit()
         if new.threshold != old.threshold:
             self.threshold_changed.emit(new.threshold)
         if _details(new) != _details(old):

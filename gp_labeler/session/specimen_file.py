@@ -27,7 +27,7 @@ __all__ = ["SUFFIX", "application", "digest", "read_specimen", "write_durably", 
 
 SUFFIX = ".gpspecimen.json"
 FORMAT = "gp-labeler specimen"
-VERSION = 1
+VERSION = 2
 
 
 def application() -> str:

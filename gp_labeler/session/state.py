@@ -21,6 +21,7 @@ from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session.frozen_json import freeze
+from gp_labeler.session.touches import Touch, TouchKey, touched_set
 from gp_labeler.session.volume_reference import VolumeReference
 
 __all__ = [
@@ -166,11 +167,16 @@ class SpecimenState:
         Free text.
     pose_checks : tuple of PoseCheck
         Verdicts, oldest first.
+    touches : mapping of TouchKey to Touch
+        What was touched with the probe; all touches of a side are in one frame.
+    skull : mapping of str to (3,) tuple
+        Skull features on the scan by which touches are registered to it, scan frame, mm.
 
     Raises
     ------
     GpError
-        The name cannot stand in a file name, the threshold is not finite, or CA and CB are at the same place.
+        The name cannot stand in a file name, the threshold is not finite, CA and CB are at the same place, or
+        touches of a side are partly in the tracker's frame and partly in the scan's.
     """
 
     specimen: str = "unnamed"
@@ -180,6 +186,8 @@ class SpecimenState:
     threshold: float | None = None
     notes: str = ""
     pose_checks: tuple[PoseCheck, ...] = ()
+    touches: Mapping[TouchKey, Touch] = field(default_factory=dict)
+    skull: Mapping[str, Position] = field(default_factory=dict)
     sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -196,10 +204,18 @@ class SpecimenState:
         object.__setattr__(self, "landmarks", MappingProxyType(kept))
         object.__setattr__(self, "import_choices", freeze(self.import_choices, "import choices"))
         object.__setattr__(self, "sets", MappingProxyType(sets))
+        _check_touches(self.touches)
+        object.__setattr__(self, "touches", MappingProxyType(dict(self.touches)))
+        skull = {name: _plausible(position, name) for name, position in self.skull.items()}
+        object.__setattr__(self, "skull", MappingProxyType(skull))
 
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side in the scan frame, with IN and, once determined, CO."""
         return self.sets[Side.parse(side)]
+
+    def touched(self, side: Side | str) -> LandmarkSet:
+        """Return the touches of one side that count, in their own frame; skull features in `extra`."""
+        return touched_set(self.touches, Side.parse(side))
 
     def landmark(self, side: Side | str, code: str) -> Landmark:
         """Return what is known of one point; see `point_key` for what it raises."""
@@ -240,6 +256,18 @@ def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> Landmar
             unseen.add(row.code)
     placed = replace(LandmarkSet.from_mapping(positions, side), unseen=frozenset(unseen))
     return with_cochlea_origin(placed)
+
+
+def _check_touches(touches: Mapping[TouchKey, Touch]) -> None:
+    frames: dict[Side, str] = {}
+    for (side, name), touch in touches.items():
+        _plausible(touch.position, name)
+        if frames.setdefault(side, touch.frame) != touch.frame:
+            raise GpError(
+                f"the {side.word} side has touches in the {frames[side]}'s frame already",
+                landmark=name,
+                remedy="Clear these first: one estimate cannot mix tracker and scan positions.",
+            )
 
 
 def _plausible(position: Position, code: str) -> Position:

@@ -25,6 +25,8 @@ from gp_labeler.session.edits import (
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.session.state import How, PoseCheck, Provenance, SpecimenState
+from gp_labeler.session.touch_edits import LeaveOutTouch, RecordTouch, RemoveTouches, SetSkull, TakeTouches
+from gp_labeler.session.touches import Touch, TouchHow
 
 PLACEABLE = tuple(f.code for f in FEATURES if not f.computed)
 quick = settings(
@@ -116,6 +118,20 @@ def landmark_sets(draw, side: Side):
     return landmarks
 
 
+touches = st.builds(
+    Touch,
+    positions,
+    st.sampled_from([how for how in TouchHow if how is not TouchHow.SCAN]),
+    st.text(max_size=5),
+    st.text(max_size=5),
+    st.text(max_size=5),
+    left_out=st.booleans(),
+)
+tracked = st.builds(
+    Touch, positions, st.just(TouchHow.TRACKED), n_samples=st.integers(2, 99), spread_mm=st.floats(0, 1)
+)
+touched_names = st.sampled_from(("MN", "LLI", "IN", "S1"))
+
 edits = st.one_of(
     st.builds(PlacePoint, sides, few_codes, positions, provenances),
     st.builds(PlacePoint, sides, few_codes, positions, provenances, st.just("nudge")),
@@ -138,4 +154,9 @@ edits = st.one_of(
     st.builds(SetNotes, st.text(max_size=20)),
     st.builds(RenameSpecimen, names),
     st.builds(RecordPoseCheck, pose_checks),
+    st.builds(RecordTouch, sides, touched_names, touches | tracked),
+    st.builds(TakeTouches, sides, st.dictionaries(touched_names, touches, max_size=3)),
+    st.builds(RemoveTouches, sides, st.none() | touched_names),
+    st.builds(LeaveOutTouch, sides, touched_names, st.booleans()),
+    st.builds(SetSkull, st.dictionaries(st.sampled_from(("S1", "S2")), positions, max_size=2)),
 )

@@ -1,0 +1,284 @@
+"""The cochlea of one side estimated from its touches, and held against the scan where there is one.
+
+Nothing here changes: an `Estimate` is made anew whenever touches, labels, settings or the atlas change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.pose import CochleaPose, estimate_pose
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform, angle_between_deg, mirror_x
+from gp_core.landmarks.anatomy import axis_frame
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
+from gp_labeler.session.state import SpecimenState
+
+__all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "make_estimate"]
+
+_DEFINING = ("CA", "CB", "RWA", "RWP")
+REGISTRATIONS = ("auto", "features", "skull")
+
+
+@dataclass(frozen=True)
+class EstimateSettings:
+    """What the user chose for an estimate.
+
+    Parameters
+    ----------
+    side : Side
+    methods : tuple of str
+        ``robust``, ``jrmpc`` or both; the first is the one that is told and exported.
+    probe_noise : float, optional
+        Scale of an ordinary touch error, mm a coordinate; None: found from the touches.
+    registration : str
+        By what touches are laid into the scan: ``features`` labelled and touched, ``skull`` features, or
+        ``auto``, the skull's where there are enough.
+    """
+
+    side: Side = Side.LEFT
+    methods: tuple[str, ...] = ("robust",)
+    probe_noise: float | None = None
+    registration: str = "auto"
+
+
+@dataclass(frozen=True, eq=False)
+class Registered:
+    """How the touches lie in the scan.
+
+    Parameters
+    ----------
+    way : str
+        ``features``, ``skull``, ``placed`` (on the scan itself) or ``known`` (given from elsewhere).
+    T_scan_touches : RigidTransform
+    fiducials : FiducialRegistration, optional
+        Where it was found from points.
+    """
+
+    way: str
+    T_scan_touches: RigidTransform
+    fiducials: FiducialRegistration | None = None
+
+    @property
+    def fre_mm(self) -> float | None:
+        """Fiducial registration error, mm; None where nothing was fitted."""
+        return None if self.fiducials is None else self.fiducials.fre_mm
+
+    def tre_mm(self, target: FloatArray) -> float | None:
+        """Target registration error expected at a (3,) scan position, mm; None where nothing was fitted."""
+        return None if self.fiducials is None else float(self.fiducials.tre_mm(target[None])[0])
+
+
+@dataclass(frozen=True, eq=False)
+class PoseInScan:
+    """An estimated cochlea in the scan.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+    T_scan_cochlea : RigidTransform
+    covariance : (6, 6) array
+        Of origin (mm) and rotation vector (rad), scan frame.
+    expected : mapping of str to (3,) array
+        Where the atlas, moved with this pose, has each of its features, mm, scan frame.
+    """
+
+    pose: CochleaPose
+    T_scan_cochlea: RigidTransform
+    covariance: FloatArray
+    expected: Mapping[str, FloatArray]
+
+    @property
+    def origin(self) -> FloatArray:
+        """(3,) CO, mm, scan frame."""
+        return self.T_scan_cochlea.translation
+
+    @property
+    def axis(self) -> FloatArray:
+        """(3,) unit modiolar axis CB->CA, scan frame."""
+        return self.T_scan_cochlea.rotation[:, 0]
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """What is known of the cochlea of one side.
+
+    Parameters
+    ----------
+    settings : EstimateSettings
+    touches : LandmarkSet
+        The touches it was made from, in their own frame.
+    poses : mapping of str to CochleaPose
+        By method, in the frame of the touches.
+    problems : mapping of str to str
+        Why a method has no pose, or (``registration``) why the touches cannot be laid into the scan.
+    registered : Registered, optional
+    truth : RigidTransform, optional
+        ``T_scan_cochlea`` of the labels, x along the modiolar axis on both sides.
+    labels : LandmarkSet
+        Of the side, scan frame.
+    atlas : Atlas
+    """
+
+    settings: EstimateSettings
+    touches: LandmarkSet
+    poses: Mapping[str, CochleaPose]
+    problems: Mapping[str, str]
+    registered: Registered | None
+    truth: RigidTransform | None
+    labels: LandmarkSet
+    atlas: Atlas
+
+    @property
+    def side(self) -> Side:
+        """Side of the head."""
+        return self.settings.side
+
+    @property
+    def pose(self) -> CochleaPose | None:
+        """The pose that is told and exported: of the first method that has one."""
+        return next((self.poses[m] for m in self.settings.methods if m in self.poses), None)
+
+    def in_scan(self, method: str | None = None) -> PoseInScan | None:
+        """Return the estimate as it lies in the scan; None where there is no pose, or no registration."""
+        pose = self.pose if method is None else self.poses.get(method)
+        if pose is None or self.registered is None:
+            return None
+        T_scan_touches = self.registered.T_scan_touches
+        turn = np.kron(np.eye(2), T_scan_touches.rotation)
+        return PoseInScan(
+            pose,
+            T_scan_touches @ pose.transform_to_touches,
+            turn @ pose.covariance @ turn.T,
+            self._expected(pose, T_scan_touches),
+        )
+
+    def _expected(self, pose: CochleaPose, T_scan_touches: RigidTransform) -> dict[str, FloatArray]:
+        if pose.T_touches_atlas is None:
+            return {}
+        left = self.atlas.mean
+        points = left if self.side is Side.LEFT else mirror_x(left)
+        moved = (T_scan_touches @ pose.T_touches_atlas).apply(points)
+        return dict(zip(self.atlas.codes, moved, strict=True))
+
+    def errors(self, method: str | None = None) -> tuple[float, float] | None:
+        """Return the distance of the origin from the labelled CO (mm) and the angle of the axes (degrees)."""
+        placed = self.in_scan(method)
+        if placed is None or self.truth is None:
+            return None
+        distance = float(np.linalg.norm(placed.origin - self.truth.translation))
+        return distance, float(angle_between_deg(placed.axis, self.truth.rotation[:, 0]))
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return what a verdict and a report keep of it."""
+        out = {} if self.pose is None else self.pose.as_dict()
+        if (placed := self.in_scan()) is not None and self.registered is not None:
+            out["T_scan_cochlea"] = placed.T_scan_cochlea.matrix.tolist()
+            out["registration"] = {
+                "way": self.registered.way,
+                "T_scan_tracker": self.registered.T_scan_touches.matrix.tolist(),
+                "fre_mm": self.registered.fre_mm,
+                "tre_mm": self.registered.tre_mm(placed.origin),
+            }
+        if (errors := self.errors()) is not None:
+            out["error_mm"], out["error_deg"] = errors
+        return out
+
+
+def make_estimate(
+    state: SpecimenState,
+    settings: EstimateSettings,
+    atlas: Atlas,
+    specimens: Sequence[Specimen] = (),
+    *,
+    known: RigidTransform | None = None,
+) -> Estimate:
+    """Estimate the cochlea of one side from the touches in a state.
+
+    Parameters
+    ----------
+    state : SpecimenState
+    settings : EstimateSettings
+    atlas : Atlas
+        Of the robust method.
+    specimens : sequence of Specimen
+        Labelled animals, for JRMPC.
+    known : RigidTransform, optional
+        ``T_scan_tracker`` where it is known from elsewhere (a simulation, a tracked scanner).
+
+    Returns
+    -------
+    Estimate
+        With as much as could be found; its `problems` say what could not, and why.
+    """
+    touches = state.touched(settings.side)
+    poses: dict[str, CochleaPose] = {}
+    problems: dict[str, str] = {}
+    for method in settings.methods:
+        try:
+            poses[method] = _pose(touches, settings, atlas, specimens, method)
+        except GpError as error:
+            problems[method] = str(error)
+    registered = None
+    try:
+        registered = _registered(state, touches, settings, known)
+    except GpError as error:
+        problems["registration"] = str(error)
+    labels = state.side(settings.side)
+    return Estimate(settings, touches, poses, problems, registered, labelled_cochlea(labels), labels, atlas)
+
+
+def _pose(
+    touches: LandmarkSet,
+    settings: EstimateSettings,
+    atlas: Atlas,
+    specimens: Sequence[Specimen],
+    method: str,
+) -> CochleaPose:
+    noise = settings.probe_noise if method == "robust" else None
+    probe = replace(touches, extra={})
+    animals = specimens if method == "jrmpc" else None
+    return estimate_pose(probe, settings.side, atlas, method=method, specimens=animals, probe_noise=noise)
+
+
+def _registered(
+    state: SpecimenState, touches: LandmarkSet, settings: EstimateSettings, known: RigidTransform | None
+) -> Registered | None:
+    if touches.frame == "scan":
+        return Registered("placed", RigidTransform.identity(dst="scan", src="scan"))
+    if known is not None:
+        return Registered("known", known)
+    way = settings.registration
+    by_skull = way == "skull" or (way == "auto" and len(touches.extra.keys() & state.skull.keys()) >= 3)
+    if by_skull:
+        fixed = {name: np.array(position) for name, position in state.skull.items()}
+        return _fitted("skull", touches.extra, fixed)
+    labelled = state.side(settings.side).as_mapping(touches.placed)
+    if not labelled and way == "auto":
+        return None
+    return _fitted("features", touches.as_mapping(), labelled)
+
+
+def _fitted(way: str, touched: Mapping[str, FloatArray], fixed: Mapping[str, FloatArray]) -> Registered:
+    found = register_fiducials(touched, fixed)
+    return Registered(way, found.T_scan_tracker, found)
+
+
+def labelled_cochlea(labels: LandmarkSet) -> RigidTransform | None:
+    """Return ``T_scan_cochlea`` of a labelled side, x along the modiolar axis; None before there is one."""
+    if "CO" not in labels or not all(code in labels for code in _DEFINING):
+        return None
+    ca, cb, rwa, rwp = labels.array(_DEFINING)
+    origin = labels["CO"]
+    try:
+        return axis_frame(origin, ca - cb, (rwa + rwp) / 2 - origin, dst="scan", src="cochlea")
+    except GpError:  # a round window on the axis gives no frame
+        return None

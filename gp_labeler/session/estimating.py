@@ -1,0 +1,174 @@
+"""The estimate that follows the touches: settings, atlas, and the `Estimate` that belongs to them now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from psygnal import Signal
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.pose import METHODS, CochleaPose
+from gp_core.checks import check_option
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform, angle_between_deg
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import Specimen
+from gp_labeler.session.estimate import REGISTRATIONS, Estimate, EstimateSettings, make_estimate
+from gp_labeler.session.session import Session
+from gp_labeler.session.specimen_edits import RecordPoseCheck
+from gp_labeler.session.state import PoseCheck
+from gp_labeler.session.touch_edits import LeaveOutTouch
+
+__all__ = ["Estimating"]
+
+FEWEST_TOUCHES = 3
+
+
+class Estimating:
+    """Keeps the estimate of one side in step with a session.
+
+    It is computed when it is asked for, and remembered until something it is made of changes. ``jrmpc`` is
+    used only once `joint_ready`: the first one on a machine compiles for seconds, which is a job's work.
+
+    Parameters
+    ----------
+    session : Session
+    """
+
+    changed = Signal()
+    """Touches, labels, settings or atlas: ask `current` again."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._settings = EstimateSettings()
+        self._atlas: Atlas | None = None
+        self._specimens: tuple[Specimen, ...] = ()
+        self._known: dict[Side, RigidTransform] = {}
+        self._made: tuple[tuple[Any, ...], Estimate] | None = None
+        self._revision = 0
+        self.joint_ready = False
+        session.touches_changed.connect(self._tell)
+        session.landmarks_changed.connect(self._tell)
+
+    # What it is made of
+
+    @property
+    def settings(self) -> EstimateSettings:
+        """What the user chose."""
+        return self._settings
+
+    @property
+    def atlas(self) -> Atlas | None:
+        """The atlas in use; None until one is loaded."""
+        return self._atlas
+
+    def choose(self, **fields: Any) -> None:
+        """Change settings, fields of `EstimateSettings`; raises `GpError` for a value that cannot be."""
+        settings = replace(self._settings, **fields)
+        noise = settings.probe_noise
+        if noise is not None and not 0 < noise < 20:
+            raise GpError(f"probe noise must lie between 0 and 20 mm, got {noise!r}")
+        for method in settings.methods:
+            check_option(method, "method", METHODS)
+        check_option(settings.registration, "registration", REGISTRATIONS)
+        if settings != self._settings:
+            self._settings = settings
+            self.changed.emit()
+
+    def use_atlas(self, atlas: Atlas, specimens: Sequence[Specimen] = ()) -> None:
+        """Take another atlas, with the labelled animals it was fitted to where they are known."""
+        self._atlas, self._specimens = atlas, tuple(specimens)
+        self._renew()
+
+    def set_joint_ready(self) -> None:
+        """Say that JRMPC is compiled."""
+        self.joint_ready = True
+        self.changed.emit()
+
+    def know_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
+        """Say how the tracker lies to the scan, where that is known otherwise than from points."""
+        if T_scan_tracker is None:
+            self._known.pop(side, None)
+        else:
+            self._known[side] = T_scan_tracker
+        self._renew()
+
+    # What comes of it
+
+    @property
+    def current(self) -> Estimate | None:
+        """The estimate of the chosen side; None without an atlas or with fewer than three touches."""
+        return self.of_side(self._settings.side)
+
+    @property
+    def waiting_text(self) -> str:
+        """What is still wanting for an estimate, in words; empty where there is one."""
+        n = len(self._session.state.touched(self._settings.side).placed)
+        if n < FEWEST_TOUCHES:
+            more = FEWEST_TOUCHES - n
+            return f"{more} more touch{'' if more == 1 else 'es'} for an estimate"
+        return "Loading the atlas" if self._atlas is None else ""
+
+    def of_side(self, side: Side) -> Estimate | None:
+        """Return the estimate of a side, as `current` does for the chosen one."""
+        state, settings = self._session.state, replace(self._settings, side=side)
+        if self._atlas is None or len(state.touched(side).placed) < FEWEST_TOUCHES:
+            return None
+        if not self.joint_ready:
+            settings = replace(settings, methods=_without_joint(settings.methods))
+        key = (self._revision, state.touches, state.skull, state.landmarks, settings)
+        if self._made is None or self._made[0] != key:
+            made = make_estimate(state, settings, self._atlas, self._specimens, known=self._known.get(side))
+            self._made = (key, made)
+        return self._made[1]
+
+    def without(self, name: str) -> tuple[float, float] | None:
+        """Return by how much the pose moves, mm and degrees, if one touch is left out."""
+        current = self.current
+        if current is None or current.pose is None or name not in current.pose.residuals:
+            return None
+        state = LeaveOutTouch(current.side, name).apply(self._session.state)
+        if self._atlas is None or len(state.touched(current.side).placed) < FEWEST_TOUCHES:
+            return None
+        other = make_estimate(state, current.settings, self._atlas, self._specimens).pose
+        return None if other is None else _difference(current.pose, other)
+
+    def judge(self, verdict: str, *, by: str = "", note: str = "") -> PoseCheck:
+        """Keep a person's verdict on the estimate, ``accept`` or ``reject``, in the specimen.
+
+        Raises
+        ------
+        GpError
+            There is no estimate, or the verdict is another word.
+        """
+        current = self.current
+        if current is None or current.pose is None:
+            raise GpError("there is no estimate to judge", remedy=self.waiting_text or None)
+        session = self._session
+        check = PoseCheck(current.side, verdict, by or session.author, session.now(), note, current.as_dict())
+        session.do(RecordPoseCheck(check))
+        return check
+
+    def close(self) -> None:
+        """Listen no more."""
+        self._session.touches_changed.disconnect(self._tell)
+        self._session.landmarks_changed.disconnect(self._tell)
+
+    def _renew(self) -> None:
+        self._revision += 1
+        self.changed.emit()
+
+    def _tell(self, *_: object) -> None:
+        self.changed.emit()
+
+
+def _without_joint(methods: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(method for method in methods if method != "jrmpc") or ("robust",)
+
+
+def _difference(one: CochleaPose, other: CochleaPose) -> tuple[float, float]:
+    distance = float(np.linalg.norm(one.origin - other.origin))
+    return distance, float(angle_between_deg(one.axis, other.axis))
