@@ -13,6 +13,7 @@ __all__ = ["DeskSignals"]
 
 _RELAYED = (
     "landmarks_changed",
+    "touches_changed",
     "active_changed",
     "crosshair_changed",
     "ghosts_changed",
@@ -32,6 +33,7 @@ class DeskSignals:
     session_replaced = Signal(object)
     """Another session is open: look at everything anew."""
     landmarks_changed = Signal(frozenset)
+    touches_changed = Signal()
     active_changed = Signal(object)
     crosshair_changed = Signal(object)
     ghosts_changed = Signal()

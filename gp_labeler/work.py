@@ -33,6 +33,7 @@ __all__ = [
     "ProposeThreshold",
     "ReadScan",
     "SaveMesh",
+    "WarmJoint",
 ]
 
 FIRST_LOOK_VOXELS = 96**3
@@ -191,6 +192,22 @@ class LoadAtlas:
         _load("gp_core.atlas.shape", "gp_core.atlas.published")
         progress(0.0)
         return Atlas.published()
+
+
+@dataclass(frozen=True)
+class WarmJoint:
+    """Make JRMPC ready: the first one on a machine is compiled, which takes seconds."""
+
+    title = "Preparing the method JRMPC"
+
+    def run(self, progress: Progress) -> None:
+        """Register three points with themselves."""
+        progress(0.0)
+        _load("gp_core.registration.kernels", "gp_core.atlas.jrmpc_pose")
+        from gp_core.registration.jrmpc import ESTIMATION, jrmpc
+
+        points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
+        jrmpc([points, points], max_iterations=ESTIMATION.max_iterations, gamma=ESTIMATION.gamma)
 
 
 @dataclass(frozen=True)

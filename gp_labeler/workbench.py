@@ -23,6 +23,7 @@ from gp_labeler.bone import Bone
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.surface import Surface
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.pose_desk import PoseDesk
 from gp_labeler.session import labelling
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.jobs import Dispatcher, Jobs, Task
@@ -92,6 +93,7 @@ class Workbench(AtlasDesk):
         self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
+        self.pose = PoseDesk(self)
 
     # What is there
 

@@ -1,0 +1,217 @@
+"""What of a workbench concerns touching and the pose: the estimate, what to touch next, how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from numpy.typing import ArrayLike
+from psygnal import Signal
+
+from gp_core.atlas.next_touch import TouchGain, gains
+from gp_core.errors import GpError
+from gp_core.landmarks.features import EXTERNAL, PROBE, Side
+from gp_labeler.session import touching
+from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.estimating import Estimating
+from gp_labeler.session.touches import TouchHow
+from gp_labeler.work import WarmJoint
+
+if TYPE_CHECKING:
+    from gp_labeler.workbench import Workbench
+
+__all__ = ["ORDER", "OverlayOptions", "PoseDesk"]
+
+ORDER = (*PROBE, *(code for code in EXTERNAL if code not in PROBE))
+"""The paper's six features first, as they give most of the pose."""
+
+
+@dataclass(frozen=True)
+class OverlayOptions:
+    """What of an estimate is drawn over bone and slices.
+
+    Parameters
+    ----------
+    estimate, region, cochlea, labelled, touches, features, vectors : bool
+        Origin and axis; where they are with 95 %; the outline of the cochlea; the labelled CO and axis; the
+        touched points in the scan; the atlas's features in this pose; from there to the labelled features.
+    opacity : float
+        From 0 to 1.
+    """
+
+    estimate: bool = True
+    region: bool = True
+    cochlea: bool = True
+    labelled: bool = True
+    touches: bool = True
+    features: bool = False
+    vectors: bool = False
+    opacity: float = 1.0
+
+
+class PoseDesk:
+    """Keeps the estimate in step with whatever session, atlas and touches a workbench has.
+
+    Parameters
+    ----------
+    desk : Workbench
+        Whose part it is.
+    """
+
+    changed = Signal()
+    """The estimate, or what it is made of, changed: ask `estimate` again."""
+    target_changed = Signal(object)
+    """The feature to touch next, or None where all are touched."""
+    overlay_changed = Signal(object)
+    """The `OverlayOptions`."""
+    recorded = Signal(str)
+    """Name of a touch that was recorded just now: time for a sound."""
+
+    def __init__(self, desk: Workbench) -> None:
+        self._desk = desk
+        self._target: str | None = ORDER[0]
+        self._overlay = OverlayOptions()
+        self._skipped: frozenset[tuple[Side, str]] = frozenset()
+        self.estimating = self._begin()
+        desk.session_replaced.connect(self._on_session_replaced)
+        desk.atlas_changed.connect(self._on_atlas_changed)
+
+    # The estimate
+
+    @property
+    def side(self) -> Side:
+        """Side of the head that is touched."""
+        return self.estimating.settings.side
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The estimate of that side; None with fewer than three touches."""
+        return self.estimating.current
+
+    def choose(self, **fields: Any) -> None:
+        """Change `EstimateSettings`; ``jrmpc`` is made ready in the background first."""
+        methods = fields.get("methods", self.estimating.settings.methods)
+        if "jrmpc" in methods and not self.estimating.joint_ready:
+            self._desk.jobs.submit(WarmJoint(), lambda _: self.estimating.set_joint_ready(), key="joint")
+        old_side = self.side
+        self.estimating.choose(**fields)
+        if self.side is not old_side:
+            self._aim(self._first_untouched())
+
+    def gains(self) -> tuple[TouchGain, ...]:
+        """Return what one more touch would gain, the best first; empty without an estimate."""
+        estimate = self.estimate
+        if estimate is None or "robust" not in estimate.poses:
+            return ()
+        touches = replace(estimate.touches, extra={})
+        return gains(touches, estimate.atlas, probe_noise=estimate.settings.probe_noise)
+
+    # Touching
+
+    @property
+    def target(self) -> str | None:
+        """The feature to touch next."""
+        return self._target
+
+    def aim(self, name: str) -> None:
+        """Choose what is touched next."""
+        self._skipped -= {(self.side, name)}
+        self._aim(name)
+
+    def skip(self) -> None:
+        """Go on to the next feature; this one comes again when all others are touched."""
+        if self._target is not None:
+            self._skipped |= {(self.side, self._target)}
+            self._aim(self._first_untouched(after=self._target))
+
+    def record(self, position: ArrayLike, how: TouchHow, *, name: str | None = None, **details: Any) -> None:
+        """Record a touch of the target, or of a feature named, and go on to the next.
+
+        Parameters
+        ----------
+        position : (3,) array_like, mm
+            Tracker frame; scan frame where it was placed on the scan.
+        how : TouchHow
+        name : str, optional
+        **details
+            `source`, `n_samples` and `spread_mm` of `Touch`.
+
+        Raises
+        ------
+        GpError
+            Nothing is left to touch, or as `touching.record_touch`.
+        """
+        wanted = name or self._target
+        if wanted is None:
+            raise GpError("all features are touched", remedy="Choose one to touch again.")
+        touching.record_touch(self._desk.session, self.side, wanted, position, how, **details)
+        self.recorded.emit(wanted)
+        if wanted == self._target:
+            self._aim(self._first_untouched(after=wanted))
+
+    def load(self, path: str | PathLike[str]) -> None:
+        """Take the touches of a file for this side in place of those there are."""
+        for text in touching.load_touches(self._desk.session, path, self.side):
+            self._desk.say(text, "warning")
+        self._desk.say(f"Took {len(self._touched())} touches from {Path(path).name}")
+        self._aim(self._first_untouched())
+
+    # Drawing
+
+    @property
+    def overlay(self) -> OverlayOptions:
+        """What is drawn of the estimate."""
+        return self._overlay
+
+    def draw(self, **fields: Any) -> None:
+        """Change `OverlayOptions`."""
+        options = replace(self._overlay, **fields)
+        if options != self._overlay:
+            self._overlay = options
+            self.overlay_changed.emit(options)
+
+    # Inside
+
+    def _begin(self) -> Estimating:
+        estimating = Estimating(self._desk.session)
+        if self._desk.atlas is not None:
+            estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
+        estimating.changed.connect(self._on_changed)
+        return estimating
+
+    def _on_session_replaced(self, _: object) -> None:
+        old = self.estimating
+        old.close()
+        self.estimating = self._begin()
+        self.estimating.joint_ready = old.joint_ready
+        self.estimating.choose(**vars(old.settings))
+        self._skipped = frozenset()
+        self._aim(self._first_untouched())
+        self.changed.emit()
+
+    def _on_atlas_changed(self) -> None:
+        if self._desk.atlas is not None:
+            self.estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
+
+    def _on_changed(self) -> None:
+        if self._target is None:
+            self._aim(self._first_untouched())
+        self.changed.emit()
+
+    def _touched(self) -> frozenset[str]:
+        return frozenset(name for side, name in self._desk.session.state.touches if side is self.side)
+
+    def _first_untouched(self, after: str | None = None) -> str | None:
+        start = ORDER.index(after) + 1 if after in ORDER else 0
+        around: Iterable[str] = (*ORDER[start:], *ORDER[:start])
+        left = [code for code in around if code not in self._touched()]
+        fresh = [code for code in left if (self.side, code) not in self._skipped]
+        return next(iter(fresh or left), None)
+
+    def _aim(self, name: str | None) -> None:
+        if name != self._target:
+            self._target = name
+            self.target_changed.emit(name)

@@ -1,0 +1,112 @@
+"""The pose's part of a workbench: guided order, the estimate through sessions and atlases, JRMPC made ready."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gp_core import PROBE, Atlas, Side
+from gp_core.atlas.draw import draw_animal
+from gp_core.errors import GpError
+from gp_core.landmarks.features import EXTERNAL
+from gp_labeler.pose_desk import ORDER
+from gp_labeler.session import touching
+from gp_labeler.session.jobs import QueueDispatcher
+from gp_labeler.session.opening import new_session
+from gp_labeler.session.touches import TouchHow
+from gp_labeler.workbench import Workbench
+
+
+@pytest.fixture
+def dispatcher():
+    return QueueDispatcher()
+
+
+@pytest.fixture
+def desk(dispatcher):
+    desk = Workbench(dispatcher=dispatcher, atlas=Atlas.published(), author="AB")
+    yield desk
+    desk.close(discard=True)
+
+
+@pytest.fixture
+def animal():
+    return draw_animal(Atlas.published(), rng=np.random.default_rng(1)).side("L")
+
+
+def test_features_are_asked_for_in_order_each_once(desk, animal):
+    asked = []
+    desk.pose.target_changed.connect(asked.append)
+    while desk.pose.target is not None:
+        desk.pose.record(animal[desk.pose.target], TouchHow.TYPED)
+    assert asked == [*ORDER[1:], None]
+    assert set(ORDER) == set(EXTERNAL)
+    assert ORDER[:6] == PROBE
+    with pytest.raises(GpError, match="all features are touched"):
+        desk.pose.record((0, 0, 0), TouchHow.TYPED)
+
+
+def test_a_skipped_feature_comes_last_and_a_chosen_one_first(desk, animal):
+    first, second = ORDER[:2]
+    desk.pose.skip()
+    assert desk.pose.target == second
+    desk.pose.aim("ZL")
+    desk.pose.record(animal["ZL"], TouchHow.TYPED)
+    rest = []
+    while desk.pose.target is not None:
+        rest.append(desk.pose.target)
+        desk.pose.record(animal[rest[-1]], TouchHow.TYPED)
+    assert rest[-1] == first
+    assert len(rest) == len(EXTERNAL) - 1
+
+
+def test_an_undone_touch_is_asked_for_again_when_all_were_touched(desk, animal):
+    while desk.pose.target is not None:
+        desk.pose.record(animal[desk.pose.target], TouchHow.TYPED)
+    desk.session.undo()
+    assert desk.pose.target == ORDER[-1]
+
+
+def test_the_estimate_follows_the_session_and_the_atlas(desk, animal):
+    told = []
+    desk.pose.changed.connect(lambda: told.append(1))
+    for code in PROBE:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    assert len(told) == 6
+    assert desk.pose.estimate.pose.radius_95 < 1.5
+    best = desk.pose.gains()[0]
+    assert best.radius_95 <= desk.pose.estimate.pose.radius_95
+    desk._replace(new_session(specimen="other"))
+    assert desk.pose.estimate is None
+    assert desk.pose.target == ORDER[0]
+    before = len(told)
+    touching.record_touch(desk.session, "L", "MN", (1, 2, 3))
+    assert len(told) == before + 1, "it listens to the new session"
+
+
+def test_the_other_side_begins_anew(desk, animal):
+    desk.pose.record(animal[ORDER[0]], TouchHow.TYPED)
+    desk.pose.choose(side=Side.RIGHT)
+    assert desk.pose.target == ORDER[0]
+    desk.pose.choose(side=Side.LEFT)
+    assert desk.pose.target == ORDER[1]
+
+
+def test_both_methods_come_once_jrmpc_is_compiled(desk, dispatcher, animal):
+    rng = np.random.default_rng(0)
+    animals = [draw_animal(Atlas.published(), rng=rng, name=f"S{n}") for n in range(4)]
+    desk.use_atlas(Atlas.published(), animals)
+    for code in PROBE:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    desk.pose.choose(methods=("robust", "jrmpc"))
+    assert set(desk.pose.estimate.poses) == {"robust"}
+    dispatcher.deliver_until_idle(desk.jobs, timeout=60)
+    assert set(desk.pose.estimate.poses) == {"robust", "jrmpc"}
+
+
+def test_what_is_drawn_can_be_chosen(desk):
+    seen = []
+    desk.pose.overlay_changed.connect(seen.append)
+    desk.pose.draw(vectors=True, opacity=0.5)
+    desk.pose.draw(vectors=True)
+    assert [(options.vectors, options.opacity) for options in seen] == [(True, 0.5)]
