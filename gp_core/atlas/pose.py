@@ -6,6 +6,7 @@ import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -107,6 +108,9 @@ class CochleaPose:
             "probe_noise_mm": self.probe_noise,
             "suspect": list(self.suspects),
             "warnings": list(self.warnings),
+            "registered_atlas": None
+            if self.T_touches_atlas is None
+            else self.T_touches_atlas.matrix.tolist(),
         }
 
     def save(self, path: str | PathLike[str]) -> None:
@@ -114,20 +118,16 @@ class CochleaPose:
         write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
 
     def save_tfm(self, path: str | PathLike[str]) -> None:
-        """Write the pose as an ITK transform file that 3D Slicer shows as cochlea to tracker.
+        """Write the pose as an ITK transform file; see `gp_core.atlas.pose_files.write_tfm`."""
+        _files().write_tfm(path, self)
 
-        By ITK's convention, which Slicer undoes on reading, the file holds the way back: it maps points of
-        the touches' frame into the cochlea frame.
-        """
-        back = self.transform_to_touches.inverse()
-        numbers = " ".join(repr(float(n)) for n in (*back.rotation.ravel(), *back.translation))
-        text = (
-            "#Insight Transform File V1.0\n"
-            f"# maps {back.src} points to {back.dst} points (mm); Slicer shows the way back\n"
-            "#Transform 0\nTransform: AffineTransform_double_3_3\n"
-            f"Parameters: {numbers}\nFixedParameters: 0 0 0\n"
-        )
-        write_text(path, text)
+    def save_csv(self, path: str | PathLike[str]) -> None:
+        """Write the 4x4 matrix as plain numbers; see `gp_core.atlas.pose_files.write_csv`."""
+        _files().write_csv(path, self)
+
+    def save_landmarks(self, path: str | PathLike[str]) -> None:
+        """Write CO and axis as Slicer markups; see `gp_core.atlas.pose_files.write_landmarks`."""
+        _files().write_landmarks(path, self)
 
 
 def estimate_pose(
@@ -191,6 +191,12 @@ def estimate_pose(
 
 def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:
     return LandmarkSet.from_mapping(touches, side, frame="tracker")
+
+
+def _files() -> ModuleType:
+    from gp_core.atlas import pose_files  # it reads what is defined here
+
+    return pose_files
 
 
 def _default_atlas(specimens: Sequence[Specimen] | None) -> Atlas:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ from gp_core.landmarks.files.points import (
 from gp_core.landmarks.files.text import flips_xy, shown
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["read_markups", "write_markups"]
+__all__ = ["read_markups", "write_markups", "write_point_lists"]
 
 _log = logging.getLogger(__name__)
 
@@ -179,8 +179,32 @@ def write_markups(
         provenance=provenance or {},
         extra=tuple(landmarks.extra),
     )
-    points = [_as_json(point, i) for i, point in enumerate(points_of(landmarks))]
-    content = {"@schema": _SCHEMA, "markups": [_markup(points)], "gpLabeler": header.as_json()}
+    write_point_lists(path, {"Fiducial": points_of(landmarks)}, header)
+
+
+def write_point_lists(
+    path: str | PathLike[str], lists: Mapping[str, Sequence[LabelledPoint]], header: FileHeader
+) -> None:
+    """Write points as 3D Slicer would, one markup for each kind.
+
+    Parameters
+    ----------
+    path : path
+        A ``.mrk.json`` file.
+    lists : mapping of str to sequence of LabelledPoint
+        Points by Slicer's word for the kind of markup, ``Fiducial`` or ``Line``; mm, LPS.
+    header : FileHeader
+
+    Raises
+    ------
+    GpError
+        The file cannot be written, or the header holds what JSON cannot.
+    """
+    content = {
+        "@schema": _SCHEMA,
+        "markups": [_markup(points, kind) for kind, points in lists.items()],
+        "gpLabeler": header.as_json(),
+    }
     try:
         text = json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:
@@ -198,9 +222,9 @@ def _plain(value: object) -> Any:
     raise TypeError(f"a {type(value).__name__}")
 
 
-def _as_json(point: LabelledPoint, index: int) -> dict[str, Any]:
+def _as_json(point: LabelledPoint, index: int, kind: str) -> dict[str, Any]:
     return {
-        "id": f"vtkMRMLMarkupsFiducialNode_{index}",
+        "id": f"vtkMRMLMarkups{kind}Node_{index}",
         "label": point.label,
         "description": point.description,
         "associatedNodeID": "",
@@ -213,16 +237,16 @@ def _as_json(point: LabelledPoint, index: int) -> dict[str, Any]:
     }
 
 
-def _markup(points: list[dict[str, Any]]) -> dict[str, Any]:
+def _markup(points: Sequence[LabelledPoint], kind: str) -> dict[str, Any]:
     return {
-        "type": "Fiducial",
+        "type": kind,
         "coordinateSystem": "LPS",
         "coordinateUnits": "mm",
         "locked": False,
         "fixedNumberOfControlPoints": True,
         "labelFormat": "%N-%d",
         "lastUsedControlPointNumber": len(points),
-        "controlPoints": points,
+        "controlPoints": [_as_json(point, i, kind) for i, point in enumerate(points)],
         "measurements": [],
         "display": _display(),
     }
