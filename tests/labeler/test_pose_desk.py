@@ -1,4 +1,4 @@
-"""The pose's part of a workbench: guided order, the estimate through sessions and atlases, JRMPC made ready."""
+"""The pose's part of a workbench: guided order, the estimate through sessions and atlases, JRMPC."""
 
 from __future__ import annotations
 
