@@ -31,24 +31,31 @@ ORDER = (*PROBE, *(code for code in EXTERNAL if code not in PROBE))
 
 @dataclass(frozen=True)
 class OverlayOptions:
-    """What of an estimate is drawn over bone and slices.
+    """What of an estimate is drawn over bone and slices; the names of parts are those of `scene.pose_data`.
 
     Parameters
     ----------
-    estimate, region, cochlea, labelled, touches, features, vectors : bool
+    visible : bool
+        Whether anything is.
+    estimate, region, cochlea, truth, features, vectors, touches, tip, path, names : bool
         Origin and axis; where they are with 95 %; the outline of the cochlea; the labelled CO and axis; the
-        touched points in the scan; the atlas's features in this pose; from there to the labelled features.
+        atlas's features in this pose; from there to the labelled ones; the touched points; the tracked probe;
+        the insertion path; names and errors.
     opacity : float
         From 0 to 1.
     """
 
+    visible: bool = True
     estimate: bool = True
     region: bool = True
     cochlea: bool = True
-    labelled: bool = True
-    touches: bool = True
+    truth: bool = True
     features: bool = False
     vectors: bool = False
+    touches: bool = True
+    tip: bool = True
+    path: bool = True
+    names: bool = True
     opacity: float = 1.0
 
 
