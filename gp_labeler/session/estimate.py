@@ -12,10 +12,11 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.expected import expected_features
 from gp_core.atlas.pose import CochleaPose, estimate_pose
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_core.frames import RigidTransform, angle_between_deg, mirror_x
+from gp_core.frames import RigidTransform, angle_between_deg
 from gp_core.landmarks.anatomy import axis_frame
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
@@ -158,16 +159,8 @@ class Estimate:
             pose,
             T_scan_touches @ pose.transform_to_touches,
             turn @ pose.covariance @ turn.T,
-            self._expected(pose, T_scan_touches),
+            {c: T_scan_touches.apply([p])[0] for c, p in expected_features(pose, self.atlas).items()},
         )
-
-    def _expected(self, pose: CochleaPose, T_scan_touches: RigidTransform) -> dict[str, FloatArray]:
-        if pose.T_touches_atlas is None:
-            return {}
-        left = self.atlas.mean
-        points = left if self.side is Side.LEFT else mirror_x(left)
-        moved = (T_scan_touches @ pose.T_touches_atlas).apply(points)
-        return dict(zip(self.atlas.codes, moved, strict=True))
 
     def errors(self, method: str | None = None) -> tuple[float, float] | None:
         """Return the distance of the origin from the labelled CO (mm) and the angle of the axes (degrees)."""

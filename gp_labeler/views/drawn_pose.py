@@ -1,0 +1,114 @@
+"""What of a workbench's estimate is drawn over bone and slices, before a view makes pixels of it."""
+
+from __future__ import annotations
+
+from gp_core.checks import FloatArray
+from gp_labeler.pose_desk import OverlayOptions
+from gp_labeler.scene.pose_data import (
+    METHOD_ROLES,
+    PARTS,
+    DrawnFeature,
+    DrawnPose,
+    DrawnTip,
+    DrawnTouch,
+    DrawnTruth,
+    DrawnVector,
+    PoseScene,
+)
+from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.touches import Touches
+from gp_labeler.workbench import Workbench
+
+__all__ = ["pose_scene"]
+
+_METHOD_WORDS = {"robust": "robust", "jrmpc": "JRMPC"}
+
+
+def pose_scene(
+    desk: Workbench, *, tip: DrawnTip | None = None, paths: tuple[FloatArray, ...] = ()
+) -> PoseScene:
+    """Return what is drawn of the current estimate; nothing of it where it cannot be laid into the scan.
+
+    Parameters
+    ----------
+    desk : Workbench
+        With the estimate, and the options of what to draw.
+    tip : DrawnTip, optional
+        The tracked probe.
+    paths : tuple of (N, 3) array
+        Insertion paths, scan frame, mm.
+    """
+    options, estimate = desk.pose.overlay, desk.pose.estimate
+    parts, opacity = _parts(options), options.opacity
+    if not options.visible:
+        return PoseScene(parts=parts, opacity=opacity)
+    if estimate is None or estimate.registered is None:
+        return PoseScene(tip=tip, parts=parts, opacity=opacity)
+    return PoseScene(
+        poses=_poses(estimate),
+        truths=_truths(estimate),
+        touches=_touches(estimate, desk.session.state.touches),
+        features=_features(estimate),
+        vectors=_vectors(estimate),
+        tip=tip,
+        paths=paths,
+        parts=parts,
+        opacity=opacity,
+    )
+
+
+def _parts(options: OverlayOptions) -> frozenset[str]:
+    return frozenset(part for part in PARTS if getattr(options, part))
+
+
+def _poses(estimate: Estimate) -> tuple[DrawnPose, ...]:
+    assert estimate.registered is not None
+    many = len(estimate.poses) > 1
+    return tuple(
+        DrawnPose.of(
+            pose,
+            estimate.registered.T_scan_touches,
+            label=_METHOD_WORDS[method] if many else f"CO ±{pose.radius_95:.1f} mm",
+        )
+        for method, pose in estimate.poses.items()
+    )
+
+
+def _truths(estimate: Estimate) -> tuple[DrawnTruth, ...]:
+    truth = estimate.truth
+    if truth is None:
+        return ()
+    return (DrawnTruth(estimate.side, truth.translation, truth.rotation[:, 0]),)
+
+
+def _touches(estimate: Estimate, touches: Touches) -> tuple[DrawnTouch, ...]:
+    assert estimate.registered is not None
+    T_scan_touches = estimate.registered.T_scan_touches
+    suspects = () if estimate.pose is None else estimate.pose.suspects
+    return tuple(
+        DrawnTouch(name, T_scan_touches.apply([touch.position])[0], name in suspects, not touch.left_out)
+        for (side, name), touch in touches.items()
+        if side is estimate.side
+    )
+
+
+def _features(estimate: Estimate) -> tuple[DrawnFeature, ...]:
+    return tuple(
+        DrawnFeature(code, position, METHOD_ROLES[method])
+        for method in estimate.poses
+        if (placed := estimate.in_scan(method)) is not None
+        for code, position in placed.expected.items()
+    )
+
+
+def _vectors(estimate: Estimate) -> tuple[DrawnVector, ...]:
+    """Return the errors of the first estimate's features against the labels."""
+    placed = estimate.in_scan()
+    if placed is None:
+        return ()
+    labels, role = estimate.labels, METHOD_ROLES[placed.pose.method]
+    return tuple(
+        DrawnVector(position, labels[code], code, role)
+        for code, position in placed.expected.items()
+        if code in labels
+    )
