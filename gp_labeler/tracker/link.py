@@ -1,0 +1,216 @@
+"""The link to a tracker: polled for samples, and always able to say in words how it stands."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+
+from gp_core.errors import GpError
+from gp_labeler.tracker.address import TrackerAddress
+from gp_labeler.tracker.connection import Arrived, Connection, Event, Lost, Opened
+from gp_labeler.tracker.judge import Fault, Judge, Limits, Sample
+from gp_labeler.tracker.messages import MessageDecoder, TrackerMessage, hello
+
+__all__ = ["LinkPhase", "LinkState", "TrackerLink"]
+
+_PRESSED = ("1", "ON", "TRUE", "DOWN", "PRESS", "PRESSED")
+_SECONDS_BETWEEN_PRESSES = 1.0
+
+
+class LinkPhase(str, Enum):
+    """How a link stands."""
+
+    OFF = "off"
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    """Messages of the probe come; whether its marker is seen, each sample says."""
+    SILENT = "silent"
+    """The connection stands, and no message of the probe comes."""
+    LOST = "lost"
+    """It is tried again by itself."""
+
+
+@dataclass(frozen=True)
+class LinkState:
+    """How a link stands, and that in words for a person."""
+
+    phase: LinkPhase
+    words: str
+
+
+class TrackerLink:
+    """Receives a probe's messages, judges them, and comes back by itself where the connection is lost.
+
+    Nothing of it blocks: call `poll` from a timer, 30 to 60 times a second, always on the same thread.
+
+    Parameters
+    ----------
+    address : TrackerAddress
+    limits : Limits, optional
+        What is believed.
+    silent_s : float
+        Without a message of the probe for that long, the link is silent.
+
+    Examples
+    --------
+    >>> link = TrackerLink(TrackerAddress(port=18944, probe="StylusToTracker"))
+    >>> link.state.phase.value
+    'off'
+    """
+
+    def __init__(
+        self,
+        address: TrackerAddress,
+        limits: Limits | None = None,
+        *,
+        silent_s: float = 0.5,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.address = address
+        self.limits = limits or Limits()
+        self.latest: Sample | None = None
+        """The newest sample of this connection."""
+        self.faults: Counter[Fault] = Counter()
+        """How many samples had what fault, since the link was opened."""
+        self.devices: dict[str, str] = {}
+        """What this connection has carried: message type by device name."""
+        self._silent_s = silent_s
+        self._clock = clock
+        self._connection: Connection | None = None
+        self._phase = LinkPhase.OFF
+        self._why = ""
+        self._presses = 0
+        self._begin()
+
+    def _begin(self) -> None:
+        """Forget the connection before: clocks, positions and names may all be others."""
+        self._decoder = MessageDecoder()
+        self._judge = Judge(self.address.probe, self.address.reference, self.limits)
+        self._heard = self._clock()
+        self._arrivals: deque[float] = deque(maxlen=400)
+        self._button_at = float("-inf")
+        self._button_on = False
+        self.latest = None
+        self.devices = {}
+
+    @property
+    def state(self) -> LinkState:
+        """How it stood at the last poll."""
+        return LinkState(self._phase, self._words())
+
+    @property
+    def rate_hz(self) -> float:
+        """Messages of the probe in the last second."""
+        now = self._clock()
+        return float(sum(now - at <= 1.0 for at in self._arrivals))
+
+    def open(self) -> None:
+        """Connect, in the background; does nothing where it is open already."""
+        if self._connection is None:
+            self._begin()
+            self.faults.clear()
+            self._phase = LinkPhase.CONNECTING
+            self._connection = Connection(self.address.host, self.address.port, hello=hello())
+
+    def close(self) -> None:
+        """End the connection and its thread."""
+        connection, self._connection = self._connection, None
+        self._phase = LinkPhase.OFF
+        self.latest = None
+        self._presses = 0
+        if connection is not None:
+            connection.close()
+
+    def poll(self) -> list[Sample]:
+        """Return the samples that have come since the last call, oldest first, good and bad."""
+        if self._connection is None:
+            return []
+        samples: list[Sample] = []
+        for event in self._connection.events():
+            samples += self._take(event)
+        if self._phase in (LinkPhase.CONNECTED, LinkPhase.SILENT):
+            samples += self._judge.take([], self._clock())
+            quiet = self._clock() - self._heard > self._silent_s
+            self._phase = LinkPhase.SILENT if quiet else LinkPhase.CONNECTED
+        for sample in samples:
+            if sample.fault:
+                self.faults[sample.fault] += 1
+        if samples:
+            self.latest = samples[-1]
+        return samples
+
+    def take_presses(self) -> int:
+        """Return how often the button was pressed since the last call."""
+        presses, self._presses = self._presses, 0
+        return presses
+
+    def _take(self, event: Event) -> list[Sample]:
+        match event:
+            case Opened():
+                self._begin()
+                self._phase = LinkPhase.CONNECTED
+            case Lost(why, pause, stood):
+                self._phase = LinkPhase.LOST
+                self._why = f"{why}. Trying again in {pause:g} s" if stood or why else why
+                self.latest = None
+            case Arrived(data, received):
+                return self._read(data, received)
+        return []
+
+    def _read(self, data: bytes, received: float) -> list[Sample]:
+        try:
+            messages = self._decoder.feed(data, received)
+        except GpError as error:
+            self._why = str(error)
+            if self._connection is not None:
+                self._connection.drop()
+            return []
+        for message in messages:
+            self._note(message)
+        return self._judge.take(messages, received)
+
+    def _note(self, message: TrackerMessage) -> None:
+        self.devices[message.device] = message.kind
+        if message.device == self.address.probe and message.kind == "TRANSFORM":
+            self._heard = message.received
+            self._arrivals.append(message.received)
+        elif message.device == self.address.button and message.kind == "STRING":
+            self._note_button(message)
+
+    def _note_button(self, message: TrackerMessage) -> None:
+        """Count a press once, whether the state is repeated in every frame or told once a press."""
+        on = message.text.strip().upper() in _PRESSED
+        paused = message.received - self._button_at > _SECONDS_BETWEEN_PRESSES
+        if on and (paused or not self._button_on):
+            self._presses += 1
+        self._button_on, self._button_at = on, message.received
+
+    def _words(self) -> str:
+        where, probe = self.address, self.address.probe
+        match self._phase:
+            case LinkPhase.OFF:
+                return "Not connected."
+            case LinkPhase.CONNECTING:
+                return f"Connecting to {where} …"
+            case LinkPhase.LOST:
+                return f"{self._why[:1].upper()}{self._why[1:]}."
+            case LinkPhase.SILENT:
+                quiet = self._clock() - self._heard
+                return f"Connected to {where}, but no {probe} for {quiet:.1f} s: {self._why_silent()}."
+            case _:
+                return f"Receiving {probe}, {self.rate_hz:.0f} a second."
+
+    def _why_silent(self) -> str:
+        probe = self.address.probe
+        kind = self.devices.get(probe)
+        if kind == "TRANSFORM":
+            return "its marker is out of sight, or the tracker is paused"
+        if kind is not None:
+            return f"it comes as {kind}; have the server send it as TRANSFORM"
+        others = [name for name, kind in self.devices.items() if kind == "TRANSFORM" and name]
+        if others:
+            return f"the server sends {', '.join(sorted(others)[:6])}; is the name right?"
+        return "its marker is out of sight, or it has another name there"
