@@ -23,7 +23,7 @@ from gp_core.landmarks.files.points import (
 from gp_core.landmarks.files.text import shown, split_fields, split_lines
 from gp_core.landmarks.sets import LandmarkSet, Status
 
-__all__ = ["read_table", "write_csv"]
+__all__ = ["delimiter_of", "read_table", "write_csv"]
 
 _NAME_COLUMNS = ("label", "name", "landmark", "feature", "code", "point")
 _AXES = {"lps": False, "ras": True, "xyz": False}  # whether x and y change sign on the way to LPS
@@ -61,7 +61,7 @@ def read_table(path: str | PathLike[str]) -> PointList:
         Columns are missing, a row has the wrong number of them, or a position is not three finite numbers.
     """
     lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
-    delimiter = _delimiter(lines[0][1]) if lines else ","
+    delimiter = delimiter_of(lines[0][1]) if lines else ","
     rows = [(number, split_fields(line, delimiter, number, path)) for number, line in lines]
     names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]] if rows else []
     has_header = any(name in _NAME_COLUMNS for name in names)
@@ -70,7 +70,8 @@ def read_table(path: str | PathLike[str]) -> PointList:
     return PointList(points, Path(path))
 
 
-def _delimiter(line: str) -> str:
+def delimiter_of(line: str) -> str:
+    """Return what separates the columns of a table, told from its first line."""
     return next((mark for mark in "\t;," if mark in line), " ")
 
 
