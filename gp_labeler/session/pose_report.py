@@ -169,8 +169,9 @@ class PoseReport:
         rows = "".join(self._touch_row(name, touch) for name, touch in touches.items())
         frame = self.estimate.touches.frame
         return (
-            f"<h2>Touches</h2>{_TABLE}<tr><th>Feature</th><th>{frame.capitalize()} frame, mm</th>"
-            f"<th>From the mean, mm</th><th></th><th>How</th></tr>{rows}</table>"
+            f'<h2>Touches</h2>{_TABLE}<tr><th width="90">Feature</th>'
+            f'<th width="165">{frame.capitalize()} frame, mm</th>'
+            f"<th>Residual, mm</th><th></th><th>How</th></tr>{rows}</table>"
         )
 
     def _touch_row(self, name: str, touch: Touch) -> str:
@@ -181,7 +182,7 @@ class PoseReport:
         mark = " <b>suspect</b>" if is_suspect else " left out" if touch.left_out else ""
         how = touch.how.value + (f", {touch.source}" if touch.source else "")
         if touch.n_samples > 1:
-            how += f", {touch.n_samples} samples, spread {touch.spread_mm:.2f} mm"
+            how += f", {touch.n_samples} samples \u00b1{touch.spread_mm:.2f} mm"
         number = "" if residual is None else f"{residual:.2f}"
         return (
             f"<tr><td>{escape(name)}{mark}</td><td>{_numbers(touch.position, 2)}</td>"
