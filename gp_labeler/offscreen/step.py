@@ -15,10 +15,11 @@ from gp_core.landmarks.features import Side
 if TYPE_CHECKING:
     from gp_labeler.offscreen.rig import Rig
 
-__all__ = ["Pair", "Step", "Triple", "make_step"]
+__all__ = ["Pair", "Ranges", "Step", "Triple", "make_step"]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+Ranges = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 S = TypeVar("S", bound="Step")
 
 
@@ -141,6 +142,12 @@ def _numbers(count: int) -> Callable[[Any], tuple[float, ...]]:
     return convert
 
 
+def _ranges(value: Any) -> tuple[tuple[int, int], ...]:
+    if len(_sequence(value)) != 3 or not all(len(_sequence(pair)) == 2 for pair in value):
+        raise TypeError
+    return tuple((_whole(low), _whole(high)) for low, high in value)
+
+
 def _texts(value: Any) -> tuple[str, ...]:
     return (value,) if isinstance(value, str) else tuple(_text(each) for each in _sequence(value))
 
@@ -164,6 +171,7 @@ _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     Side: ("L or R", Side.parse),
     Pair: ("two numbers", _numbers(2)),
     Triple: ("three numbers", _numbers(3)),
+    Ranges: ("three pairs of whole numbers", _ranges),
     tuple[str, ...]: ("texts", _texts),
     dict[str, Triple]: ("a table of positions", _positions),
 }

@@ -4,38 +4,57 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from PySide6.QtCore import QObject
-from PySide6.QtWidgets import QApplication
 
 from gp_core.landmarks.files import write_text
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.scene.planes import Plane
-from gp_labeler.session.state import TO_DO, How, Landmark, PointKey
-from gp_labeler.session.workflow import Active
+from gp_labeler.session.document import document_of
+from gp_labeler.session.edits import Edit
+from gp_labeler.session.history import History
+from gp_labeler.session.jobs import Task
+from gp_labeler.session.landmark_export import FORMATS, ExportReport
+from gp_labeler.session.opening import tidy_name
+from gp_labeler.session.specimen_file import SUFFIX, write_specimen
+from gp_labeler.session.state import SpecimenState
+from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
-from gp_labeler.views.slice_view import SliceView
+from gp_labeler.views.recorded_edits import Table, step, steps_of
+from gp_labeler.work import SaveMesh
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
 
-__all__ = ["Recorder", "script_text"]
+__all__ = ["LOOKS", "Recorder", "script_text"]
 
 _PHANTOM = "phantom-"
-_LOOKS = ("view.", "tool.")
-"""Commands that change only what is seen, taken down as they are."""
 
-Marks = Mapping[PointKey, Landmark]
+LOOKS = ("view.reset", "view.projection", "view.from_")
+"""Commands, or beginnings of their names, that change only what is seen: taken down as they are."""
+
+_VIEW_KEYS = {
+    "layout": "layout",
+    "mesh_opacity": "opacity",
+    "outline_visible": "outline",
+    "hidden_visible": "hidden",
+    "labels_visible": "names",
+    "ghosts_visible": "ghosts",
+    "axis_visible": "axes",
+    "auto_advance": "advance",
+    "follow_ghost": "follow",
+}
 
 
 class Recorder(QObject):
     """Takes steps down from now on, until it is deleted.
 
-    What is written is what was done, not how the hand moved: a point is placed where it was placed, by a
-    click that the script aims itself. Landmarks taken from files leave no step: only their names are known.
+    What is written is what was done, not how the hand moved: a point is put where it came to lie, to the last
+    digit, and a command is run. So a script leaves the same files as the person did, times aside. Where
+    recording begins in the middle of the work, and where something is undone that was done before, the
+    specimen as it stood then is written beside the script, which opens it.
 
     Parameters
     ----------
@@ -46,122 +65,177 @@ class Recorder(QObject):
     def __init__(self, window: MainWindow) -> None:
         super().__init__(window)
         self._window, desk = window, window.workbench
-        self.tables: list[dict[str, Any]] = []
-        self._threshold = desk.session.state.threshold
-        self._seen: list[Marks] = [desk.session.state.landmarks]
-        self._at = 0
-        follow(self, desk.volume_opened, self._on_volume)
-        follow(self, desk.landmarks_changed, self._on_landmarks)
-        follow(self, desk.threshold_changed, self._on_threshold)
-        follow(self, desk.saved, self._on_saved)
-        for id, action in window.commands.actions.items():
-            if id.startswith(_LOOKS):
-                action.triggered.connect(lambda *_, id=id: self._add("action", id=id))
-        if desk.volume is not None:
-            self._on_volume(desk.volume)
+        self.tables: list[Table] = []
+        self._starts: list[tuple[Table, SpecimenState]] = []
+        self._replayed = History(desk.session.state)
+        self._begin()
+        for signal, slot in (
+            (desk.volume_opened, self._on_volume),
+            (desk.edited, self._on_edited),
+            (desk.stepped, self._on_stepped),
+            (desk.saved, self._on_saved),
+            (desk.exported, self._on_exported),
+            (desk.pictured, self._on_pictured),
+            (desk.jobs.done, self._on_job),
+            (desk.view_changed, self._on_view_changed),
+            (desk.tool_changed, self._on_tool),
+        ):
+            follow(self, signal, slot)
+        window.commands.done.connect(self._on_command)
 
     def save(self, path: Path) -> None:
-        """Write the script, ``.toml`` or ``.json``.
+        """Write the script, ``.toml`` or ``.json``, and the specimens that it begins with beside it.
 
         Raises
         ------
         GpError
             It cannot be written.
         """
+        for n, (table, state) in enumerate(self._starts, start=1):
+            file = path.with_name(f"{path.stem}_start{n}{SUFFIX}")
+            write_specimen(file, state)
+            table["labels"] = file.name
         is_json = path.suffix.lower() == ".json"
         write_text(path, json.dumps(self.tables, indent=1) + "\n" if is_json else script_text(self.tables))
 
-    def _add(self, do: str, **keys: Any) -> None:
-        self.tables.append({"do": do, **{key: value for key, value in keys.items() if value is not None}})
+    # Where it begins
 
-    def _on_volume(self, volume: Volume) -> None:
-        session = self._window.workbench.session
-        self._seen, self._at = [session.state.landmarks], 0
-        if session.path is not None:
-            self._add("open", path=str(session.path))
-        elif volume.path is None and volume.name.startswith(_PHANTOM):
-            self._add("open", phantom=int(volume.name.removeprefix(_PHANTOM)), spacing=volume.spacing[0])
+    def _begin(self) -> None:
+        """Write how to come to where the specimen stands now."""
+        desk = self._window.workbench
+        self._replayed = History(desk.session.state)
+        if desk.volume is None:
+            return
+        table = step("open", **_scan(desk.volume), discard=bool(self.tables))
+        state = desk.session.state
+        if replace(state, volume=None, import_choices={}) != SpecimenState(tidy_name(desk.volume.name)):
+            self._starts.append((table, state))  # what is labelled already goes into a file
+        self.tables.append(table)
+        self._show_as_here()
+
+    def _show_as_here(self) -> None:
+        """Write how this person's window differs from one that nobody has used yet."""
+        window, state = self._window, self._window.workbench.session.view.state
+        differing = {name for name in vars(state) if getattr(state, name) != getattr(ViewState, name)}
+        theme = None if window.theme_name == "dark" else window.theme_name
+        size = [window.width(), window.height()]
+        self.tables.append(step("view", size=size, theme=theme) | self._seen(differing))
+
+    def _on_volume(self, _: Volume) -> None:
+        self._begin()
+
+    # What is done
+
+    def _on_edited(self, edit: Edit, merge: bool) -> None:
+        now, before = self._window.workbench.session.state, self._replayed.state
+        if _untimed(now) == _untimed(before):
+            return
+        tables = steps_of(edit, before, merge=merge)
+        if tables is None:
+            self._begin()
+            return
+        self._replayed.push(edit.text, now, merge=merge)
+        if merge and self.tables and _is_continued(self.tables[-1], tables[0]):
+            self.tables[-1] |= {key: value for key, value in tables[0].items() if key in ("at", "notes")}
         else:
-            self._add("open", path=str(volume.path), spacing=list(volume.spacing))
+            self.tables += tables
 
-    def _on_threshold(self, _: object) -> None:
-        value = self._window.workbench.session.state.threshold
-        if value is not None and value != self._threshold:
-            self._add("threshold", value=value)
-        self._threshold = value
+    def _on_stepped(self, kind: str) -> None:
+        now, replayed = _untimed(self._window.workbench.session.state), self._replayed
+        if now == _untimed(replayed.state):
+            return
+        upcoming = replayed.to_undo if kind == "undo" else replayed.to_redo
+        if upcoming is None or _untimed(upcoming.state) != now:
+            self._begin()  # it was done before recording began
+            return
+        (replayed.undo if kind == "undo" else replayed.redo)()
+        self.tables.append(step("undo") if kind == "undo" else step("action", id="edit.redo"))
+
+    def _on_command(self, id: str) -> None:
+        if id.startswith(LOOKS):
+            self.tables.append(step("action", id=id))
+        elif id == "view.zoom_to_point":
+            active = self._window.workbench.session.active
+            if active.code is not None:
+                self.tables.append(step("choose", feature=active.code, side=active.side.value))
+            self.tables.append(step("action", id=id))
+        elif id == "view.theme":
+            self.tables.append(step("view", theme=self._window.theme_name))
+
+    def _on_tool(self, tool: str) -> None:
+        self.tables.append(step("action", id=f"tool.{tool}"))
+
+    def _on_view_changed(self, changed: frozenset[str]) -> None:
+        seen = self._seen(changed)
+        if seen and self.tables and self.tables[-1].keys() == {"do", *seen} and len(seen) == 1:
+            self.tables[-1] |= seen  # a slider on its way
+        elif seen:
+            self.tables.append({"do": "view", **seen})
+
+    def _seen(self, changed: frozenset[str] | set[str]) -> Table:
+        """Return keys of a step ``view`` for these fields."""
+        state = self._window.workbench.session.view.state
+        seen = {key: getattr(state, name) for name, key in _VIEW_KEYS.items() if name in changed}
+        if {"level", "width"} & changed:
+            is_set = state.level is not None and state.width is not None
+            seen["greys"] = [state.level, state.width] if is_set else "auto"
+        if "glyph_mm" in changed:
+            seen["glyphs"] = "screen" if state.glyph_mm is None else state.glyph_mm
+        return seen
+
+    # What is written
 
     def _on_saved(self, file: Path) -> None:
-        self._add("save", path=Path(file).name)
+        self.tables.append(step("save", path=Path(file).name))
 
-    def _on_landmarks(self, _: object) -> None:
-        before, now = self._seen[self._at], self._window.workbench.session.state.landmarks
-        if self._at and now == self._seen[self._at - 1]:
-            self._at -= 1
-            self._add("undo")
-            return
-        if self._at + 1 < len(self._seen) and now == self._seen[self._at + 1]:
-            self._at += 1
-            self._add("action", id="edit.redo")
-            return
-        self._seen[self._at + 1 :] = [now]
-        self._at += 1
-        changed = [key for key in before.keys() | now.keys() if before.get(key) != now.get(key)]
-        if len(changed) == 1:
-            self._on_point(changed[0], before.get(changed[0], TO_DO), now.get(changed[0], TO_DO))
+    def _on_exported(self, report: ExportReport) -> None:
+        names = [file.name for file in report.files]
+        formats = [suffix for suffix in FORMATS if any(name.endswith(suffix) for name in names)]
+        self.tables.append(step("export", formats=formats))
 
-    def _on_point(self, key: PointKey, old: Landmark, new: Landmark) -> None:
-        active = self._window.workbench.session.active
-        side, code = key[0] or active.side, key[1]
-        point = {"feature": code, "side": side.value}
-        if new.position is not None and old.position is None:
-            self._place(point, new)
-        elif new.position is not None and new.position != old.position:
-            self._move(point, old, new)
-        else:
-            for field, id in (("unseen", "unseen"), ("locked", "lock"), ("checked", "check")):
-                if getattr(old, field) != getattr(new, field):
-                    self._choose(Active(side, code), f"point.{id}")
-            if new == TO_DO:
-                self._choose(Active(side, code), "point.clear")
+    def _on_pictured(self, file: Path) -> None:
+        self.tables.append(step("screenshot", path=file.name))
 
-    def _choose(self, active: Active, id: str) -> None:
-        self._add("view", go_to=f"{active.code} {active.side.value}")
-        self._add("action", id=id)
-
-    def _place(self, point: dict[str, str], mark: Landmark) -> None:
-        how = mark.provenance.how if mark.provenance else How.SLICE
-        if how is How.GHOST:
-            self._add("place", **point, at="ghost")
-        elif how is How.MESH:
-            camera = self._window.grid.scene_view.scene.camera
-            self._add("view", camera=camera.direction.round(4).tolist())
-            self._add("place", **point, at=list(mark.position or ()), view="3d")
-        else:
-            self._add("place", **point, at=list(mark.position or ()), view=_slice_in_use())
-
-    def _move(self, point: dict[str, str], old: Landmark, new: Landmark) -> None:
-        """Take down where a point came to; nudges in a row are one movement."""
-        last = self.tables[-1] if self.tables else {}
-        if (last.get("do"), last.get("feature"), last.get("side")) == ("drag", *point.values()):
-            last["to"] = list(new.position or ())
-            return
-        on_bone = new.provenance is not None and new.provenance.how is How.MESH
-        moved = np.abs(np.subtract(new.position or 0, old.position or 0))
-        plane = min(Plane, key=lambda plane: float(moved[plane.axis]))
-        view = "3d" if on_bone else plane.value
-        self._add("drag", **point, to=list(new.position or ()), view=view)
+    def _on_job(self, task: Task[Any]) -> None:
+        if isinstance(task.job, SaveMesh):
+            self.tables.append(step("mesh", save=Path(task.job.path).name))
 
 
-def script_text(tables: list[dict[str, Any]]) -> str:
+def script_text(tables: list[Table]) -> str:
     """Return steps as TOML."""
-    steps = []
-    for table in tables:
-        lines = [f"{key} = {json.dumps(value)}" for key, value in table.items()]
-        steps.append("\n".join(["[[step]]", *lines]))
+    steps = ["\n".join(["[[step]]", *(f"{key} = {_toml(each)}" for key, each in t.items())]) for t in tables]
     return "\n\n".join(steps) + "\n"
 
 
-def _slice_in_use() -> str:
-    """Return the slice view that keys go to, which is the one under the pointer."""
-    view = QApplication.focusWidget()
-    return view.plane.value if isinstance(view, SliceView) else Plane.AXIAL.value
+def _toml(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{json.dumps(k)} = {_toml(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        return f"[{', '.join(_toml(each) for each in value)}]"
+    return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _scan(volume: Volume) -> Table:
+    """Return what a step ``open`` says of a scan."""
+    if volume.path is None and volume.name.startswith(_PHANTOM):
+        return {"phantom": int(volume.name.removeprefix(_PHANTOM)), "spacing": volume.spacing[0]}
+    return {"path": volume.name if volume.path is None else str(volume.path), **volume.choices}
+
+
+def _is_continued(last: Table, new: Table) -> bool:
+    """Return whether a step continues the gesture of the last one."""
+    names = ("do", "feature", "side", "how")
+    if [last.get(name) for name in names] != [new.get(name) for name in names]:
+        return False
+    return bool(last.get("nudge")) if new["do"] == "put" else "notes" in last
+
+
+def _untimed(state: SpecimenState) -> Any:
+    """Return what a specimen holds, without when it was done: a script does it at another time."""
+    return _without_times(document_of(state))
+
+
+def _without_times(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: _without_times(each) for key, each in value.items() if key != "time"}
+    return [_without_times(each) for each in value] if isinstance(value, (list, tuple)) else value

@@ -7,17 +7,17 @@ from types import MappingProxyType
 
 from gp_labeler.offscreen.step import Step
 from gp_labeler.offscreen.steps.expecting import Expect
-from gp_labeler.offscreen.steps.files import Export, Import, Save
+from gp_labeler.offscreen.steps.files import Details, Export, Import, Save
 from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
-from gp_labeler.offscreen.steps.placing import Drag, Place
+from gp_labeler.offscreen.steps.placing import Choose, Drag, Place, Put
 from gp_labeler.offscreen.steps.pose import Check, Estimate, Fit, Overlay
 from gp_labeler.offscreen.steps.scan import Mesh, Open, Spacing, Threshold
 
 __all__ = ["STEPS"]
 
 _ALL: tuple[type[Step], ...] = (
-    *(Open, Spacing, Threshold, Mesh, Look, Place, Drag, Key, Act, Undo),
-    *(Import, Export, Fit, Estimate, Overlay, Check, Screenshot, Save, Expect),
+    *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Put, Drag, Key, Act, Undo),
+    *(Details, Import, Export, Fit, Estimate, Overlay, Check, Screenshot, Save, Expect),
 )
 
 STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 from typing import ClassVar
 
 from gp_core.errors import GpError
-from gp_labeler.imaging.near_bone import near_bone
+from gp_core.landmarks.features import Side
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 from gp_labeler.session.landmark_export import export_landmarks
 from gp_labeler.session.landmark_import import import_landmarks
+from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
 from gp_labeler.session.specimen_file import SUFFIX
 
-__all__ = ["Export", "Import", "Save"]
+__all__ = ["Details", "Export", "Import", "Save"]
 
 
 @dataclass(frozen=True)
@@ -25,23 +25,29 @@ class Import(Step):
     ----------
     files : text or texts
         Landmark files.
+    side : L or R, optional
+        Where the files do not say it.
     accept_misfit : bool
         Take them even where they cannot belong to this scan.
+    keep : bool
+        Leave what is placed already, and fill only what is to do.
     """
 
     do: ClassVar[str] = "import"
     files: tuple[str, ...]
+    side: Side | None = None
     accept_misfit: bool = False
+    keep: bool = False
 
     def run(self, rig: Rig) -> None:  # noqa: D102
-        volume, threshold = rig.desk.volume, rig.desk.threshold
-        if volume is None:
-            raise GpError("no scan is open", remedy="Let a step open one first.")
+        _ = rig.voxel  # a scan must be there
         notes = import_landmarks(
             rig.desk.session,
             [rig.to_read(file) for file in self.files],
-            near_bone=None if threshold is None else partial(near_bone, volume, threshold),
+            side=self.side,
+            near_bone=rig.desk.near_bone,
             accept_misfit=self.accept_misfit,
+            replace_placed=not self.keep,
         )
         for note in notes:
             rig.desk.say(note, "warning")
@@ -93,3 +99,31 @@ class Save(Step):
         session = rig.desk.session
         file = rig.to_write(self.path or f"{session.state.specimen}{SUFFIX}")
         return rig.wrote(session.save(file, overwrite=True))
+
+
+@dataclass(frozen=True)
+class Details(Step):
+    """Name the specimen, and write notes on it.
+
+    Parameters
+    ----------
+    name : str, optional
+        What files are called by.
+    notes : str, optional
+        In place of those before.
+    more : bool
+        Whether the notes continue those of the step before: both are one undo.
+    """
+
+    do: ClassVar[str] = "specimen"
+    name: str | None = None
+    notes: str | None = None
+    more: bool = False
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        if self.name is None and self.notes is None:
+            raise GpError("specimen needs name or notes")
+        if self.name is not None:
+            rig.desk.session.do(RenameSpecimen(self.name))
+        if self.notes is not None:
+            rig.desk.session.do(SetNotes(self.notes), merge=self.more)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,6 +18,18 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.views.theme import THEMES
 
 __all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]
+
+_FIELDS = {
+    "opacity": "mesh_opacity",
+    "outline": "outline_visible",
+    "names": "labels_visible",
+    "ghosts": "ghosts_visible",
+    "axes": "axis_visible",
+    "hidden": "hidden_visible",
+    "advance": "auto_advance",
+    "follow": "follow_ghost",
+}
+"""Keys of `Look` that are fields of `ViewState` by another name."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +58,15 @@ class Look(Step):
         Magnify the 3D view, and the slices with the crosshair in their middle.
     opacity : float, optional
         Of the bone, 0 to 1.
+    greys : two numbers or str, optional
+        Level and width of the grey window of the slices, or ``auto``.
+    outline, names, ghosts, axes, hidden : bool, optional
+        Whether the edge of bone is drawn on the slices, the names of points, where points are expected, the
+        axis and the round window, points behind bone.
+    glyphs : float or str, optional
+        Diameter of points, mm, or ``screen``: the same at any zoom.
+    advance, follow : bool, optional
+        Whether the next feature is chosen once one is placed, and shown where it is expected.
     """
 
     do: ClassVar[str] = "view"
@@ -61,9 +82,19 @@ class Look(Step):
     coronal: float | None = None
     zoom: float | None = None
     opacity: float | None = None
+    greys: Pair | str | None = None
+    outline: bool | None = None
+    names: bool | None = None
+    ghosts: bool | None = None
+    axes: bool | None = None
+    hidden: bool | None = None
+    glyphs: float | str | None = None
+    advance: bool | None = None
+    follow: bool | None = None
 
     def run(self, rig: Rig) -> None:  # noqa: D102
         self._set_window(rig)
+        rig.desk.session.view.update(**self._shown())
         if self.reset:
             rig.window.grid.reset()
         if isinstance(self.camera, str):
@@ -76,9 +107,23 @@ class Look(Step):
         self._go(rig)
         if self.zoom is not None:
             self._magnify(rig, self.zoom)
-        if self.opacity is not None:
-            rig.desk.session.view.update(mesh_opacity=self.opacity)
         rig.app.processEvents()
+
+    def _shown(self) -> dict[str, Any]:
+        """Return the fields of the view that are given."""
+        given = {name: getattr(self, key) for key, name in _FIELDS.items()}
+        shown = {name: value for name, value in given.items() if value is not None}
+        if isinstance(self.greys, str):
+            _check(self.greys, "greys", ("auto",))
+            shown |= {"level": None, "width": None}
+        elif self.greys is not None:
+            shown |= {"level": self.greys[0], "width": self.greys[1]}
+        if isinstance(self.glyphs, str):
+            _check(self.glyphs, "glyphs", ("screen",))
+            shown |= {"glyph_mm": None}
+        elif self.glyphs is not None:
+            shown |= {"glyph_mm": self.glyphs}
+        return shown
 
     def _set_window(self, rig: Rig) -> None:
         if self.size is not None:
@@ -189,16 +234,25 @@ class Act(Step):
     ----------
     id : str
         The command; an unknown one is answered with all there are.
+    answers : text or texts
+        What to answer where it asks for one of several, such as ``RWP`` for ``edit.swap``.
+    files : text or texts
+        What to answer where it asks for files or a folder, relative to the script.
     """
 
     do: ClassVar[str] = "action"
     says: ClassVar[tuple[str, ...]] = ("id",)
     id: str
+    answers: tuple[str, ...] = ()
+    files: tuple[str, ...] = ()
 
     def run(self, rig: Rig) -> None:  # noqa: D102
         if not action(self.id).enabled(rig.desk):
             raise GpError(f"{self.id} cannot be done now")
-        rig.window.commands.run(self.id)
+        rig.prompts.prepare([rig.to_read(file) for file in self.files], self.answers)
+        since = len(rig.messages)
+        if not rig.window.commands.run(self.id):
+            raise GpError(" ".join(rig.warnings(since)) or f"{self.id} was not done")
         rig.settle()
 
 

@@ -16,8 +16,11 @@ from gp_labeler.offscreen.events import click, drag, press_keys
 from gp_labeler.offscreen.rig import VIEWS, Rig
 from gp_labeler.offscreen.step import Pair, Step, Triple
 from gp_labeler.scene.planes import Plane
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import PlacePoint
+from gp_labeler.session.state import How
 
-__all__ = ["Drag", "Place"]
+__all__ = ["Choose", "Drag", "Place", "Put"]
 
 _KEYS = {"ghost": "Return", "crosshair": "Space"}
 
@@ -120,6 +123,73 @@ def _seen_in(rig: Rig, name: str, code: str, aim: FloatArray) -> str:
     if name != "3d":
         scroll_to(rig, Plane(name), aim)
     return name
+
+
+@dataclass(frozen=True)
+class Put(Step):
+    """Put a point at exactly a position, without a click: how a recorder writes what clicks and drags did.
+
+    Parameters
+    ----------
+    feature : str
+        Its code.
+    side : L or R
+        Which side.
+    at : three numbers
+        Scan position, mm.
+    how : str
+        What is remembered of it: ``mesh``, ``slice``, ``accepted ghost``, ``imported`` or ``typed``.
+    nudge : bool
+        Whether it is moved by arrow keys; such movements in a row are one undo.
+    """
+
+    do: ClassVar[str] = "put"
+    says: ClassVar[tuple[str, ...]] = ("feature", "side")
+    feature: str
+    side: Side
+    at: Triple
+    how: str = "typed"
+    nudge: bool = False
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        _ = rig.voxel  # a scan must be there
+        code, how = feature(self.feature).code, _how(self.how)
+        rig.choose(self.side, code)
+        session = rig.desk.session
+        if self.nudge:
+            found = labelling.provenance(session, how)
+            session.do(PlacePoint(self.side, code, self.at, found, verb="nudge"), merge=True)
+        else:
+            labelling.place(session, self.at, how, side=self.side, code=code)
+        rig.settle(in_passing=False)
+
+
+def _how(word: str) -> How:
+    words = [how.value for how in How if how is not How.UNSEEN]
+    if word not in words:
+        raise GpError(f"how must be one of {', '.join(words)}, got {word!r}")
+    return How(word)
+
+
+@dataclass(frozen=True)
+class Choose(Step):
+    """Choose a feature by a click on its row, for a command that follows.
+
+    Parameters
+    ----------
+    feature : str
+        Its code.
+    side : L or R
+        Which side.
+    """
+
+    do: ClassVar[str] = "choose"
+    says: ClassVar[tuple[str, ...]] = ("feature", "side")
+    feature: str
+    side: Side
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        rig.choose(self.side, self.feature)
 
 
 @dataclass(frozen=True)

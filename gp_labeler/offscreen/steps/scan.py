@@ -9,8 +9,9 @@ from typing import Any, ClassVar
 from gp_core.errors import GpError
 from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.offscreen.rig import Rig
-from gp_labeler.offscreen.step import Step, Triple
+from gp_labeler.offscreen.step import Ranges, Step, Triple
 from gp_labeler.session.specimen_file import SUFFIX
+from gp_labeler.session.volume_reference import VolumeReference
 
 __all__ = ["Mesh", "Open", "Spacing", "Threshold"]
 
@@ -29,10 +30,20 @@ class Open(Step):
         Voxel size, mm: of the scan where its file does not say, or of the phantom.
     series : str, optional
         Which scan of several.
+    channel : int, optional
+        Which colour, from 0; without it colours become luminance.
     reverse : bool
         Whether the slices run the other way.
+    stride : int
+        Keep every n-th voxel along each axis.
+    region : three pairs of int, optional
+        Voxels to keep along i, j, k: from the first up to, but without, the second.
     accept : text or texts
         Codes of problems that are knowingly accepted.
+    labels : str, optional
+        A specimen file whose labels, notes and threshold go onto the scan.
+    discard : bool
+        Drop edits of what was open that no step saved.
     """
 
     do: ClassVar[str] = "open"
@@ -41,14 +52,23 @@ class Open(Step):
     phantom: int | None = None
     spacing: float | Triple | None = None
     series: str | None = None
+    channel: int | None = None
     reverse: bool = False
+    stride: int = 1
+    region: Ranges | None = None
     accept: tuple[str, ...] = ()
+    labels: str | None = None
+    discard: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         if (self.path is None) == (self.phantom is None):
             raise GpError("open needs a path or phantom = a seed, one of them")
-        if rig.desk.session.dirty:
-            raise GpError("what is open has edits that are not saved", remedy="Let a save step come first.")
+        if rig.desk.session.dirty and not self.discard:
+            raise GpError(
+                "what is open has edits that are not saved",
+                remedy="Let a save step come first, or give discard = true.",
+            )
+        rig.desk.abandon()
         if self.phantom is not None:
             rig.desk.open_demo(self.phantom, self.spacing if isinstance(self.spacing, float) else 0.2)
         else:
@@ -57,6 +77,8 @@ class Open(Step):
         volume = rig.desk.volume
         if volume is None:
             raise GpError(rig.trouble(0) or "no scan was opened")
+        if self.labels is not None:
+            _take_labels(rig, rig.to_read(self.labels))
         return f"{volume.name}, {' x '.join(str(n) for n in volume.size)} voxels"
 
     def _open(self, rig: Rig, path: Path) -> None:
@@ -75,8 +97,27 @@ class Open(Step):
 
     def _options(self, rig: Rig) -> dict[str, Any]:
         spacing = rig.spacing if self.spacing is None else self.spacing
-        options: dict[str, Any] = {"series": self.series, "reverse": self.reverse, "accept": self.accept}
+        names = ("series", "channel", "reverse", "stride", "region", "accept")
+        options: dict[str, Any] = {name: getattr(self, name) for name in names}
         return options if spacing is None else options | {"spacing": spacing}
+
+
+def _take_labels(rig: Rig, file: Path) -> None:
+    """Lay what a specimen file holds onto the scan that is open, wherever that scan was then."""
+    desk, truth, since = rig.desk, rig.desk.truth, len(rig.messages)
+    volume = desk.volume
+    assert volume is not None
+    desk.open_specimen(file)
+    for task in desk.jobs.running:
+        if task.key == "open":
+            task.cancel()  # the scan need not be read once more
+    del rig.messages[since:]
+    reference = desk.session.state.volume
+    if reference is not None and (differences := reference.differences(VolumeReference.of(volume))):
+        raise GpError(f"belongs to another scan: {'; '.join(differences)}", file=file)
+    desk.accept_scan(volume)
+    desk.truth = truth
+    rig.settle()
 
 
 @dataclass(frozen=True)

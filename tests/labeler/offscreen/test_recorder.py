@@ -1,23 +1,138 @@
-"""What a person does in the window becomes a script that does it again."""
+"""What a person does in the window becomes a script that leaves the same files, to the byte, times aside."""
 
 from __future__ import annotations
 
+import re
+from contextlib import suppress
+
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtTest import QTest
-from script_cases import content, write_ball
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
+from script_cases import write_ball
+from window_cases import BALL_MM, MIDDLE, settle
 
+from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_labeler.actions import ACTIONS
 from gp_labeler.offscreen.runner import run_script
-from gp_labeler.offscreen.script import read_script
+from gp_labeler.offscreen.script import make_script, read_script
+from gp_labeler.offscreen.steps import STEPS
 from gp_labeler.scene.planes import Plane
+from gp_labeler.session import edits, labelling, landmark_import, specimen_edits
+from gp_labeler.session.edits import SwapPoints
+from gp_labeler.session.landmark_export import export_landmarks
+from gp_labeler.session.landmark_import import import_landmarks
+from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
+from gp_labeler.session.state import How
+from gp_labeler.session.workflow import Active
+from gp_labeler.views.recorded_edits import RECORDED
 from gp_labeler.views.recorder import Recorder, script_text
-from gp_labeler.workbench import Workbench
 
+SAVED = "ball.gpspecimen.json"
+FILES = (SAVED, "ball_L.mrk.json", "ball_R.mrk.json")
 INSIDE = MIDDLE + np.array([2.1, -1.7, 0.125])
 ON_BONE = MIDDLE + np.array([0.0, -BALL_MM, 0.0])
+
+DIALOG = "a dialog: what it does is written once it is done"
+CHOOSES = "chooses only: an edit is written with its point"
+ACTION_STEPS = {
+    **dict.fromkeys(("file.open", "file.open_folder", "file.demo", "file.find_scan"), "open"),
+    **dict.fromkeys(("file.save", "file.save_as"), "save"),
+    "file.import": "import",
+    "file.export": "export",
+    "file.save_mesh": "mesh",
+    "file.screenshot": "screenshot",
+    "edit.undo": "undo",
+    **dict.fromkeys(("edit.redo", "edit.swap", "edit.swap_sides"), "action"),
+    **{id: "view" for id in ACTIONS if id.startswith("view.")},
+    **{id: "action" for id in ACTIONS if id.startswith(("view.from_", "tool."))},
+    **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection"), "action"),
+    **dict.fromkeys(("point.accept_ghost", "point.place"), "put"),
+    **{f"point.{verb}": "action" for verb in ("unseen", "clear", "check", "lock", "lock_all")},
+}
+"""What a command is written as."""
+
+NOT_WRITTEN = {
+    "file.close": "the script ends there",
+    "help.shortcuts": "a dialog that changes nothing",
+    "help.about": "a dialog that changes nothing",
+    "help.record": "the recorder itself",
+    **dict.fromkeys(("point.skip", "point.next", "point.previous", "point.other_side"), CHOOSES),
+}
+"""Why a command leaves no step."""
+
+
+def test_every_command_is_written_or_need_not_be() -> None:
+    for id in ACTIONS:
+        assert (id in ACTION_STEPS) != (id in NOT_WRITTEN), f"say how {id} is recorded, or why it is not"
+    assert set(ACTION_STEPS.values()) <= STEPS.keys()
+
+
+def test_every_edit_of_a_session_is_written() -> None:
+    kinds = {
+        kind
+        for module in (edits, specimen_edits, landmark_import)
+        for kind in vars(module).values()
+        if isinstance(kind, type) and kind.__module__ == module.__name__ and hasattr(kind, "apply")
+    }
+    kinds = {kind for kind in kinds if not kind.__name__.startswith("_") and kind is not edits.Edit}
+    assert {kind.__name__ for kind in kinds - RECORDED.keys()} == {"RecordPoseCheck"}
+
+
+class Recording:
+    """A window on the ball, what is done in it written down, and done again by the script."""
+
+    def __init__(self, qtbot, window, folder) -> None:
+        self.qtbot, self.window, self.folder = qtbot, window, folder
+        self.desk, self.script = window.workbench, folder / "script.json"
+        (folder / "first").mkdir(exist_ok=True)
+
+    @property
+    def session(self):
+        return self.desk.session
+
+    @property
+    def recorder(self) -> Recorder:
+        return self.window.findChild(Recorder)
+
+    def begin(self) -> None:
+        self.window.commands.run("help.record")
+
+    def run(self, id: str, *answers: str) -> list[str]:
+        """Run a command; return what kinds of steps it left."""
+        n = len(self.recorder.tables)
+        self.window.ui.prompts.answers = list(answers)
+        self.window.commands.run(id)
+        settle(self.qtbot, self.window)
+        return [table["do"] for table in self.recorder.tables[n:]]
+
+    def check(self, *files: str) -> list[str]:
+        """Save, end the recording, run the script, compare what both leave; return its steps."""
+        self.session.save(self.folder / "first" / SAVED, overwrite=True)
+        export_landmarks(self.session.state, self.folder / "first", overwrite=True)
+        self.window.ui.prompts.files = [self.script]
+        self.window.commands.run("help.record")
+        assert self.recorder is None
+        script = read_script(self.script)
+        whole = make_script([*script.tables, {"do": "export"}], folder=self.folder)
+        report = run_script(whole, self.folder / "again")
+        assert report.ok, report.error
+        for name in files or FILES:
+            assert untimed(self.folder / "again" / name) == untimed(self.folder / "first" / name)
+        return [step.do for step in script.steps]
+
+
+def untimed(path) -> str:
+    return re.sub(r'"time": "[^"]*"', "", path.read_text())
+
+
+@pytest.fixture
+def recording(qtbot, make_window, tmp_path):
+    window = make_window(atlas=True)
+    window.workbench.open_scan(write_ball(tmp_path / "ball.nrrd"))
+    settle(qtbot, window)
+    return Recording(qtbot, window, tmp_path)
 
 
 def click(view, position) -> None:
@@ -25,76 +140,214 @@ def click(view, position) -> None:
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(int(x), int(y)))
 
 
-def work(qtbot, window) -> None:
-    """Do a little of everything."""
-    desk, scene = window.workbench, window.grid.scene_view
-    axial = window.grid.slice_views[Plane.AXIAL]
+def place_three(recording) -> None:
+    """Place two of the left and one of the right by clicks, and nudge one."""
+    session, scene = recording.session, recording.window.grid.scene_view
+    axial = recording.window.grid.slice_views[Plane.AXIAL]
     scene.view_from("A")
-    desk.session.set_crosshair(INSIDE)
+    session.set_crosshair(INSIDE)
     axial.setFocus()
     click(axial, INSIDE)  # CA
     for _ in range(3):
         QTest.keyClick(axial, Qt.Key.Key_Left)
     click(scene, ON_BONE)  # RWP
-    desk.go_to(Side.LEFT, "CB")
-    window.commands.run("point.unseen")
-    desk.go_to(Side.LEFT, "CA")
-    window.commands.run("point.lock")
-    click(scene, ON_BONE + np.array([1.0, 0.2, 1.0]))  # CA is locked: nothing
-    desk.go_to(Side.RIGHT, "OS")
+    recording.desk.go_to(Side.RIGHT, "OS")
     click(scene, ON_BONE + np.array([1.0, 0.1, 1.0]))
-    window.commands.actions["edit.undo"].trigger()
-    window.commands.actions["view.3d"].trigger()
-    settle(qtbot, window)
+    assert session.state.landmarks.keys() == {(Side.LEFT, "CA"), (Side.LEFT, "RWP"), (Side.RIGHT, "OS")}
 
 
-@pytest.mark.parametrize("name", ["script.toml", "script.json"])
-def test_a_recorded_script_does_it_again(qtbot, make_window, tmp_path, name) -> None:
-    if name.endswith("toml"):
-        pytest.importorskip("tomllib", reason="TOML needs Python 3.11")
-    window = make_window()
-    window.workbench.open_scan(write_ball(tmp_path / "ball.nrrd"))
-    settle(qtbot, window)
-    window.commands.run("help.record")
-    work(qtbot, window)
-    window.workbench.session.save(tmp_path / "ball.gpspecimen.json")
-    window.ui.prompts.files = [tmp_path / name]
-    window.commands.run("help.record")
-    assert window.findChild(Recorder) is None
+def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
+    recording.begin()
+    place_three(recording)
+    desk, run = recording.desk, recording.run
+    desk.go_to(Side.LEFT, "CB")
+    assert run("point.unseen") == ["choose", "action"]
+    desk.go_to(Side.LEFT, "CA")
+    assert run("point.check") == ["choose", "action"]
+    assert run("point.lock") == ["choose", "action"]
+    desk.go_to(Side.RIGHT, "OS")
+    assert run("point.place") == ["put"]  # where the crosshair is
+    assert run("edit.undo") == ["undo"]
+    assert run("edit.redo") == ["action"]
+    assert run("edit.swap", "CB") == ["choose", "action"]
+    desk.go_to(Side.LEFT, "CA")
+    assert run("point.lock") == ["choose", "action"]
+    assert run("edit.swap_sides") == ["action"]
+    assert run("point.lock_all") == ["action"]
+    assert run("edit.undo") == ["undo"]
+    desk.go_to(Side.RIGHT, "RWP")
+    assert run("point.clear") == ["choose", "action"]
+    desk.set_threshold(1003.25)
+    settle(recording.qtbot, recording.window)
+    recording.session.do(SetNotes("one"), merge=False)
+    recording.session.do(SetNotes('one "two"\nthrée'), merge=True)
+    steps = recording.check()
+    assert [do for do in steps if do in ("put", "threshold", "specimen", "save")] == [
+        *("put", "put", "put", "put", "put", "threshold", "specimen", "save")
+    ]  # the three nudges are one step
 
-    script = read_script(tmp_path / name)
-    does = [step.do for step in script.steps]
-    assert does[0] == "open"
-    assert [do for do in does if do in ("place", "drag", "undo", "save")] == [
-        *("place", "drag", "place", "place", "undo", "save")
+
+def test_imports_of_every_kind_are_done_again(recording) -> None:
+    recording.begin()
+    place_three(recording)
+    lines = [
+        "label,x,y,z",
+        *(f"{c},{INSIDE[0] + n / 7},{INSIDE[1]},1e3" for n, c in enumerate(["CA", "CB", "IN"])),
     ]
-    report = run_script(script, tmp_path / "out")
-    assert report.ok, report.error
-    first, again = (
-        content(folder / "ball.gpspecimen.json")["landmarks"] for folder in (tmp_path, tmp_path / "out")
-    )
-    assert first.keys() == again.keys() == {"L"}
-    assert first["L"].keys() == again["L"].keys() == {"CA", "CB", "RWP"}
-    for code in ("CA", "RWP"):
-        off = np.subtract(first["L"][code]["position"], again["L"][code]["position"])
-        assert np.linalg.norm(off) < VOXEL_MM
-    assert again["L"]["CB"]["unseen"]
-    assert again["L"]["CA"]["locked"]
+    (recording.folder / "far.csv").write_text("\n".join(lines))
+    files, how = [recording.folder / "far.csv"], {"side": "L", "accept_misfit": True}
+    import_landmarks(recording.session, files, replace_placed=False, **how)
+    assert recording.session.undo()
+    import_landmarks(recording.session, files, **how)
+    labelling.nudge(recording.session, [0.1, 0, 0], side="L", code="CB")
+    assert recording.check().count("import") == 2
 
 
-def test_the_text_is_toml(tmp_path) -> None:
+def test_the_ghost_is_put_where_it_was(recording) -> None:
+    recording.begin()
+    for code, at in (("CA", (2, 0, 0)), ("RWP", (-2, 1, 0)), ("OS", (0, -2, 1))):
+        labelling.place(recording.session, MIDDLE + at, How.SLICE, side="L", code=code)
+    recording.desk.go_to(Side.LEFT, "CB")
+    assert recording.run("point.accept_ghost") == ["put"]
+    assert recording.recorder.tables[-1]["how"] == "accepted ghost"
+    recording.check(*FILES[:2])
+
+
+def test_what_is_seen_is_written_with_its_value(recording) -> None:
+    recording.session.view.update(outline_visible=False)  # as this person likes it
+    recording.begin()
+    assert recording.recorder.tables[1]["outline"] is False
+    for id, do in ACTION_STEPS.items():
+        if id.startswith("view.") or (id.startswith("tool.") and id != "tool.place"):
+            layout = "axial" if id == "view.four-up" else "four-up"
+            recording.session.view.update(level=100.0, width=50.0, mesh_opacity=0.5, layout=layout)
+            recording.run(id)
+            assert recording.recorder.tables[-1]["do"] == do, id
+    recording.session.view.update(mesh_opacity=0.7)
+    n = len(recording.recorder.tables)
+    recording.session.view.update(mesh_opacity=0.8)  # a slider on its way
+    assert len(recording.recorder.tables) == n
+    assert recording.recorder.tables[-1] == {"do": "view", "opacity": 0.8}
+    labelling.place(recording.session, MIDDLE, How.SLICE, side="L", code="CA")
+    recording.check(*FILES[:2])
+
+
+def test_files_written_are_written_again(recording) -> None:
+    recording.begin()
+    place_three(recording)
+    folder, prompts = recording.folder / "first", recording.window.ui.prompts
+    for id, name, do in (
+        ("file.save_as", "other.gpspecimen.json", "save"),
+        ("file.export", "", "export"),
+        ("file.save_mesh", "bone.ply", "mesh"),
+        ("file.screenshot", "window.png", "screenshot"),
+    ):
+        prompts.files = [folder / name]
+        assert recording.run(id) == [do]
+    recording.check(*FILES, "other.gpspecimen.json")
+    assert (recording.folder / "again" / "window.png").exists()
+    assert (recording.folder / "again" / "bone.ply").read_bytes() == (folder / "bone.ply").read_bytes()
+
+
+def test_work_that_was_begun_before_is_kept_beside_the_script(recording) -> None:
+    place_three(recording)
+    recording.begin()
+    labelling.place(recording.session, MIDDLE, How.SLICE, side="R", code="CA")
+    assert recording.run("edit.undo") == ["undo"]
+    assert recording.run("edit.undo") == ["open", "view"]  # of what was done before
+    assert recording.run("edit.redo") == ["open", "view"]
+    labelling.place(recording.session, MIDDLE, How.SLICE, side="R", code="CB")
+    recording.check()
+    assert (recording.folder / "script_start1.gpspecimen.json").exists()
+
+
+def test_another_scan_is_opened_without_what_was_not_saved(recording) -> None:
+    recording.begin()
+    place_three(recording)
+    other = write_ball(recording.folder / "other.nrrd")
+    recording.window.ui.prompts.answers = ["Do not save"]
+    recording.window.ui.open_path(other)
+    settle(recording.qtbot, recording.window)
+    labelling.place(recording.session, MIDDLE, How.MESH, side="L", code="CA")
+    recording.session.do(RenameSpecimen("ball"))
+    recording.check(*FILES[:2])
+
+
+@pytest.mark.slow
+def test_a_phantom_with_labels_comes_back_with_them(qtbot, make_window, tmp_path) -> None:
+    window = make_window()
+    window.workbench.open_demo(3, 0.4)
+    settle(qtbot, window, 60)
+    recording = Recording(qtbot, window, tmp_path)
+    labelling.place(recording.session, window.workbench.truth.side(Side.LEFT)["CA"], side="L", code="CA")
+    recording.begin()
+    recording.session.do(RenameSpecimen("ball"))
+    labelling.place(recording.session, window.workbench.truth.side(Side.LEFT)["CB"], side="L", code="CB")
+    recording.check(*FILES[:2])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(2))
+def test_anything_in_any_order_is_done_again(recording, seed) -> None:
+    rng, session = np.random.default_rng(seed), recording.session
+    codes = ["CA", "CB", "IN", "RWP"]
+
+    def one() -> None:
+        side, (code, other) = Side(rng.choice(["L", "R"])), rng.choice(codes, 2, replace=False)
+        session.set_active(Active(side, code))
+        what = rng.integers(12)
+        if what < 3:
+            how = (How.MESH, How.SLICE)[rng.integers(2)]
+            labelling.place(session, MIDDLE + rng.uniform(-3, 3, 3), how, side=side, code=code)
+        elif what < 5:
+            labelling.nudge(session, rng.normal(size=3), side=side, code=code)
+        elif what < 8:
+            (session.undo, session.undo, session.redo)[what - 5]()
+        elif what == 8:
+            session.do(SetNotes(str(rng.integers(3))), merge=bool(rng.integers(2)))
+        elif what == 9 and "IN" not in (code, other):
+            session.do(SwapPoints(side, code, other))
+        else:
+            verbs = ("point.unseen", "point.lock", "point.check", "point.clear", "edit.swap_sides")
+            recording.window.commands.run(str(rng.choice(verbs)))
+
+    def some(n: int) -> None:
+        for _ in range(n):
+            with suppress(GpError):  # of what is locked, or not placed yet
+                one()
+
+    some(10)
+    recording.begin()
+    some(40)
+    labelling.lock_all(session, False)
+    labelling.place(session, MIDDLE, side="L", code="ZL")
+    labelling.place(session, MIDDLE, side="R", code="ZL")
+    recording.check()
+
+
+def test_the_text_is_toml() -> None:
     toml = pytest.importorskip("tomllib")
-    tables = [{"do": "open", "path": 'C:\\scans\\"a".nrrd', "spacing": [0.1, 0.1, 0.2]}, {"do": "undo"}]
+    tables = [
+        {"do": "open", "path": 'C:\\scans\\"ä".nrrd', "region": [[0, 1], [2, 3], [4, 5]], "reverse": True},
+        {"do": "specimen", "notes": "a\nb\t\x7f\U0001f600"},
+        {"do": "estimate", "side": "L", "touches": {"CA": [1e-7, 2.0, 3.0], "a b": [0, 0, 0]}},
+        {"do": "undo"},
+    ]
     assert toml.loads(script_text(tables)) == {"step": tables}
+
+
+def test_a_toml_script_runs(recording) -> None:
+    pytest.importorskip("tomllib", reason="TOML needs Python 3.11")
+    recording.script = recording.folder / "script.toml"
+    recording.begin()
+    place_three(recording)
+    recording.check()
 
 
 def test_a_recorder_lets_go_of_its_window(make_window) -> None:
     window = make_window()
-    recorder = Recorder(window)
-    desk: Workbench = window.workbench
+    recorder, desk = Recorder(window), window.workbench
     listening = len(desk.saved)
     recorder.deleteLater()
-    from PySide6.QtCore import QCoreApplication, QEvent
-
     QCoreApplication.sendPostedEvents(recorder, QEvent.Type.DeferredDelete)
     assert len(desk.saved) == listening - 1

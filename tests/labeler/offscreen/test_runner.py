@@ -18,6 +18,7 @@ def on_ball(*direction: float) -> np.ndarray:
     return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
 
 
+RGB = QImage.Format.Format_RGB888
 INSIDE = MIDDLE + np.array([2.1, -1.7, 1.3])
 LOOK = {"do": "view", "camera": "A"}
 CA = place("CA", on_ball(0.2, -1, 0.1))
@@ -195,16 +196,18 @@ def test_touches_are_laid_on_the_labels_of_the_same_names(tmp_path) -> None:
         tmp_path,
         {"do": "import", "files": "labels_L.csv", "accept_misfit": True},
         {"do": "estimate", "side": "L", "touches": touches},
+        {"do": "view", "go_to": MIDDLE.tolist()},
         {"do": "overlay"},
-        {"do": "screenshot", "path": "pose.png", "what": "views"},
+        {"do": "screenshot", "path": "on.png", "what": "views"},
+        {"do": "overlay", "visible": False},
+        {"do": "screenshot", "path": "off.png", "what": "views"},
     )
     assert report.ok, report.error
     pose = content(tmp_path / "out" / "pose.json")
     np.testing.assert_allclose(pose["cochlea_origin_mm"], [100, 0, 0], atol=1e-6)
-    violet = QImage(str(tmp_path / "out" / "pose.png")).convertToFormat(QImage.Format.Format_RGB888)
-    rows = np.array(violet.constBits()).reshape(violet.height(), -1)[:, : 3 * violet.width()]
-    red, green, blue = rows.reshape(violet.height(), -1, 3).astype(int).transpose(2, 0, 1)
-    assert np.count_nonzero((red - green > 60) & (blue - green > 60)) > 200
+    on, off = (QImage(str(tmp_path / "out" / f"{name}.png")).convertToFormat(RGB) for name in ("on", "off"))
+    rows = [np.array(image.constBits()).reshape(image.height(), -1).astype(int) for image in (on, off)]
+    assert np.count_nonzero(np.abs(rows[0] - rows[1]) > 60) > 600  # channels of pixels: it is drawn
 
 
 def test_an_atlas_is_fitted_to_labelled_animals(tmp_path) -> None:

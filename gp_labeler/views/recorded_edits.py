@@ -1,0 +1,132 @@
+"""Edits as steps of a script: what doing each again takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any
+
+from gp_core.landmarks.features import Side
+from gp_labeler.session.edits import (
+    CheckPoint,
+    ClearPoint,
+    Edit,
+    LockPoints,
+    MarkUnseen,
+    PlacePoint,
+    SwapPoints,
+    SwapSides,
+)
+from gp_labeler.session.landmark_import import ImportLandmarks
+from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes, SetThreshold
+from gp_labeler.session.state import PointKey, SpecimenState, point_key
+
+__all__ = ["RECORDED", "Table", "step", "steps_of"]
+
+Table = dict[str, Any]
+"""One step, as a script has it."""
+
+
+def step(do: str, **keys: Any) -> Table:
+    """Return a step without the keys that say nothing."""
+    said = {key: value for key, value in keys.items() if value is not None and value is not False}
+    return {"do": do, **said}
+
+
+def steps_of(edit: Edit, before: SpecimenState, *, merge: bool = False) -> list[Table] | None:
+    """Return the steps that make an edit again.
+
+    Parameters
+    ----------
+    edit : Edit
+        What was done.
+    before : SpecimenState
+        To what.
+    merge : bool
+        Whether it was told to continue the gesture before it.
+
+    Returns
+    -------
+    list of dict, or None
+        None where no step does the same.
+    """
+    find = RECORDED.get(type(edit))
+    return None if find is None else find(edit, before, merge)
+
+
+Find = Callable[[Any, SpecimenState, bool], "list[Table] | None"]
+
+
+def _put(edit: PlacePoint, _: SpecimenState, merge: bool) -> list[Table]:
+    point = {"feature": edit.code, "side": edit.side.value}
+    return [step("put", **point, at=list(edit.position), how=edit.provenance.how.value, nudge=merge)]
+
+
+def _on_chosen(side: Side, code: str, id: str, **more: Any) -> list[Table]:
+    return [step("choose", feature=code, side=side.value), step("action", id=id, **more)]
+
+
+def _clear(edit: ClearPoint, *_: object) -> list[Table]:
+    return _on_chosen(edit.side, edit.code, "point.clear")
+
+
+def _unseen(edit: MarkUnseen, *_: object) -> list[Table]:
+    return _on_chosen(edit.side, edit.code, "point.unseen")
+
+
+def _check(edit: CheckPoint, *_: object) -> list[Table]:
+    return _on_chosen(edit.side, edit.code, "point.check")
+
+
+def _lock(edit: LockPoints, before: SpecimenState, _: bool) -> list[Table] | None:
+    if len(edit.points) == 1:
+        return _on_chosen(*edit.points[0], "point.lock")
+    settled = {key: mark for key, mark in before.landmarks.items() if mark.settled}
+    chosen: set[PointKey] = {point_key(*point) for point in edit.points}
+    if chosen == settled.keys() and edit.locked != all(mark.locked for mark in settled.values()):
+        return [step("action", id="point.lock_all")]
+    return None
+
+
+def _swap(edit: SwapPoints, *_: object) -> list[Table]:
+    return _on_chosen(Side.parse(edit.side), edit.code, "edit.swap", answers=[edit.other])
+
+
+def _swap_sides(*_: object) -> list[Table]:
+    return [step("action", id="edit.swap_sides")]
+
+
+def _threshold(edit: SetThreshold, *_: object) -> list[Table]:
+    return [step("threshold", value=edit.threshold)]
+
+
+def _notes(edit: SetNotes, _: SpecimenState, merge: bool) -> list[Table]:
+    return [{**step("specimen", more=merge), "notes": edit.notes}]  # also where they are empty
+
+
+def _rename(edit: RenameSpecimen, *_: object) -> list[Table]:
+    return [step("specimen", name=edit.name)]
+
+
+def _import(edit: ImportLandmarks, *_: object) -> list[Table] | None:
+    if edit.asked is None:
+        return None
+    return [step("import", **edit.asked, keep=not edit.replace_placed)]
+
+
+RECORDED: Mapping[type, Find] = MappingProxyType(
+    {
+        PlacePoint: _put,
+        ClearPoint: _clear,
+        MarkUnseen: _unseen,
+        CheckPoint: _check,
+        LockPoints: _lock,
+        SwapPoints: _swap,
+        SwapSides: _swap_sides,
+        SetThreshold: _threshold,
+        SetNotes: _notes,
+        RenameSpecimen: _rename,
+        ImportLandmarks: _import,
+    }
+)
+"""How each kind of edit is written down."""
