@@ -204,8 +204,8 @@ def _check_axis(points: FloatArray, file: str | PathLike[str]) -> None:
         raise GpError(
             "the path winds about another axis than x, the modiolar axis of the cochlea frame",
             file=file,
-            remedy="Say which of its axes is which, such as 'z,-y,x' where its z is the modiolar axis and the "
-            "round window lies at its -y.",
+            remedy="Say which of its axes is which, such as 'z,-y,x' where its z is the modiolar axis and "
+            "the round window lies at its -y.",
         )
 
 
