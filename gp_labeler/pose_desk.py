@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from itertools import count
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
 from gp_core.atlas.next_touch import TouchGain, gains
+from gp_core.atlas.pose import CochleaPose
 from gp_core.errors import GpError
 from gp_core.landmarks.features import EXTERNAL, PROBE, Side
 from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.estimating import Estimating
+from gp_labeler.session.pose_exports import InsertionPath, save_pose
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.work import WarmJoint
 
@@ -82,6 +86,8 @@ class PoseDesk:
         self._target: str | None = ORDER[0]
         self._overlay = OverlayOptions()
         self._skipped: frozenset[tuple[Side, str]] = frozenset()
+        self._gains: tuple[Estimate, tuple[TouchGain, ...]] | None = None
+        self._path: InsertionPath | None = None
         self.estimating = self._begin()
         desk.session_replaced.connect(self._on_session_replaced)
         desk.atlas_changed.connect(self._on_atlas_changed)
@@ -113,10 +119,25 @@ class PoseDesk:
         estimate = self.estimate
         if estimate is None or "robust" not in estimate.poses:
             return ()
-        touches = replace(estimate.touches, extra={})
-        return gains(touches, estimate.atlas, probe_noise=estimate.settings.probe_noise)
+        if self._gains is None or self._gains[0] is not estimate:
+            touches = replace(estimate.touches, extra={})
+            found = gains(touches, estimate.atlas, probe_noise=estimate.settings.probe_noise)
+            self._gains = (estimate, found)
+        return self._gains[1]
 
     # Touching
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What can be touched: the features in the order they are asked for, then the skull's."""
+        known = self._touched() | self._desk.session.state.skull.keys() | {self._target or ORDER[0]}
+        return (*ORDER, *sorted(known - set(ORDER), key=_by_number))
+
+    @property
+    def next_skull(self) -> str:
+        """Name of the first skull feature not yet touched, such as ``S1``."""
+        touched = self._touched()
+        return next(name for n in count(1) if (name := f"S{n}") not in touched)
 
     @property
     def target(self) -> str | None:
@@ -159,12 +180,50 @@ class PoseDesk:
         if wanted == self._target:
             self._aim(self._first_untouched(after=wanted))
 
+    def show(self, name: str) -> None:
+        """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""
+        estimate, touch = self.estimate, self._desk.session.state.touches.get((self.side, name))
+        registered = None if estimate is None else estimate.registered
+        if touch is None or (registered is None and touch.frame != "scan"):
+            return
+        position = np.array(touch.position)
+        if registered is not None:
+            position = registered.T_scan_touches.apply(position[None])[0]
+        self._desk.session.set_crosshair(position)
+        self._desk.point_shown.emit(position)
+
     def load(self, path: str | PathLike[str]) -> None:
         """Take the touches of a file for this side in place of those there are."""
         for text in touching.load_touches(self._desk.session, path, self.side):
             self._desk.say(text, "warning")
         self._desk.say(f"Took {len(self._touched())} touches from {Path(path).name}")
         self._aim(self._first_untouched())
+
+    # What leaves
+
+    def export(self, path: str | PathLike[str]) -> Path:
+        """Write the pose in the format that the file's name asks for; see `pose_exports.save_pose`."""
+        file = save_pose(self._pose(), path)
+        self._desk.say(f"Wrote {file.name}")
+        return file
+
+    def carry(self, path: InsertionPath | None) -> None:
+        """Carry an insertion path to the estimate, or none any more; raises `GpError` where it cannot be."""
+        if path is not None and self.estimate is not None:
+            path.in_touches(self.estimate)
+        self._path = path
+        self.changed.emit()
+
+    @property
+    def path(self) -> InsertionPath | None:
+        """The insertion path that goes with the estimate."""
+        return self._path
+
+    def _pose(self) -> CochleaPose:
+        estimate = self.estimate
+        if estimate is None or estimate.pose is None:
+            raise GpError("there is no estimate yet", remedy=self.estimating.waiting_text or None)
+        return estimate.pose
 
     # Drawing
 
@@ -222,3 +281,9 @@ class PoseDesk:
         if name != self._target:
             self._target = name
             self.target_changed.emit(name)
+
+
+def _by_number(name: str) -> tuple[str, int, str]:
+    """Sort S2 before S10."""
+    letters = name.rstrip("0123456789")
+    return letters, int(name[len(letters) :] or 0), name

@@ -16,6 +16,7 @@ from gp_labeler.scene.pose_data import (
     PoseScene,
 )
 from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.pose_exports import InsertionPath
 from gp_labeler.session.touches import Touches
 from gp_labeler.workbench import Workbench
 
@@ -24,9 +25,7 @@ __all__ = ["pose_scene"]
 _METHOD_WORDS = {"robust": "robust", "jrmpc": "JRMPC"}
 
 
-def pose_scene(
-    desk: Workbench, *, tip: DrawnTip | None = None, paths: tuple[FloatArray, ...] = ()
-) -> PoseScene:
+def pose_scene(desk: Workbench, *, tip: DrawnTip | None = None) -> PoseScene:
     """Return what is drawn of the current estimate; nothing of it where it cannot be laid into the scan.
 
     Parameters
@@ -35,8 +34,6 @@ def pose_scene(
         With the estimate, and the options of what to draw.
     tip : DrawnTip, optional
         The tracked probe.
-    paths : tuple of (N, 3) array
-        Insertion paths, scan frame, mm.
     """
     options, estimate = desk.pose.overlay, desk.pose.estimate
     parts, opacity = _parts(options), options.opacity
@@ -51,7 +48,7 @@ def pose_scene(
         features=_features(estimate),
         vectors=_vectors(estimate),
         tip=tip,
-        paths=paths,
+        paths=_paths(desk.pose.path, estimate),
         parts=parts,
         opacity=opacity,
     )
@@ -90,6 +87,11 @@ def _touches(estimate: Estimate, touches: Touches) -> tuple[DrawnTouch, ...]:
         for (side, name), touch in touches.items()
         if side is estimate.side
     )
+
+
+def _paths(path: InsertionPath | None, estimate: Estimate) -> tuple[FloatArray, ...]:
+    carried = None if path is None else path.in_scan(estimate)
+    return () if carried is None else (carried,)
 
 
 def _features(estimate: Estimate) -> tuple[DrawnFeature, ...]:

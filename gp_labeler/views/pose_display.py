@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from PySide6.QtCore import QObject
 
-from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import DrawnTip
 from gp_labeler.views.bind import follow
@@ -32,7 +31,6 @@ class PoseDisplay(QObject):
         self._desk, self._grid = workbench, grid
         self._overlays = [PoseOverlay(grid.slice_views[plane]) for plane in Plane]
         self._tip: DrawnTip | None = None
-        self._paths: tuple[FloatArray, ...] = ()
         follow(self, workbench.pose.changed, self.show)
         follow(self, workbench.pose.overlay_changed, self.show)
         self.show()
@@ -42,14 +40,9 @@ class PoseDisplay(QObject):
         self._tip = tip
         self.show()
 
-    def set_paths(self, paths: tuple[FloatArray, ...]) -> None:
-        """Draw insertion paths, (N, 3) scan positions each."""
-        self._paths = paths
-        self.show()
-
     def show(self, *_: object) -> None:
         """Draw everything as it is now."""
-        drawn = pose_scene(self._desk, tip=self._tip, paths=self._paths)
+        drawn = pose_scene(self._desk, tip=self._tip)
         view = self._grid.scene_view
         view.scene.pose.show(drawn)
         view.redraw()

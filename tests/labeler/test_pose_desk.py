@@ -110,3 +110,12 @@ def test_what_is_drawn_can_be_chosen(desk):
     desk.pose.draw(vectors=True, opacity=0.5)
     desk.pose.draw(vectors=True)
     assert [(options.vectors, options.opacity) for options in seen] == [(True, 0.5)]
+
+
+def test_nothing_is_exported_before_there_is_an_estimate(desk, animal, tmp_path):
+    assert desk.pose.path is None
+    with pytest.raises(GpError, match="there is no estimate yet.*3 more touches"):
+        desk.pose.export(tmp_path / "pose.json")
+    for code in PROBE:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    assert desk.pose.export(tmp_path / "pose.json").exists()
