@@ -34,6 +34,7 @@ from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import SetThreshold
 from gp_labeler.session.specimen_file import SUFFIX
 from gp_labeler.session.state import How
+from gp_labeler.tracker_desk import TrackerDesk
 from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, SaveMesh
 
 __all__ = ["TOOLS", "Drag", "Workbench"]
@@ -94,6 +95,7 @@ class Workbench(AtlasDesk):
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
         self.pose = PoseDesk(self)
+        self.tracker = TrackerDesk(self)
 
     # What is there
 
@@ -268,6 +270,7 @@ class Workbench(AtlasDesk):
     def close(self, *, discard: bool = False) -> None:
         """Stop all work and let go of journal and locks; see `Session.close`."""
         self.jobs.close()
+        self.tracker.close()
         self._unfollow()
         self.session.close(discard=discard)
         self._bone.forget()
