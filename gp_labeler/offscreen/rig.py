@@ -34,6 +34,7 @@ VIEWS = ("3d", *(plane.value for plane in Plane))
 
 _SIZE = (1440, 900)
 _PATIENCE_SECONDS = 600.0
+_PAUSE_SECONDS = 0.002
 _IN_PASSING = ("judging",)
 """Work whose result changes only how things look: nobody waits for it between clicks."""
 
@@ -110,7 +111,8 @@ class Rig:
         """
         end = time.monotonic() + _PATIENCE_SECONDS
         while any(in_passing or not task.key.startswith(_IN_PASSING) for task in self.desk.jobs.running):
-            QTest.qWait(5)
+            self.app.processEvents()
+            time.sleep(_PAUSE_SECONDS)  # QTest.qWait would keep Python's lock from the work it waits for
             if time.monotonic() > end:
                 titles = ", ".join(task.job.title for task in self.desk.jobs.running)
                 raise GpError(f"still not finished after {_PATIENCE_SECONDS:g} s: {titles}")
