@@ -13,7 +13,10 @@ Examples
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.insertion import carry_path, read_path
+from gp_core.atlas.next_touch import TouchGain, gains
 from gp_core.atlas.pose import CochleaPose, estimate_pose
+from gp_core.atlas.pose_files import read_pose
 from gp_core.atlas.quality import Finding, check_specimen
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
@@ -27,7 +30,9 @@ from gp_core.landmarks.files import (
     write_markups,
 )
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
+from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
+from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
 from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
@@ -49,6 +54,7 @@ __all__ = [
     "ComparisonReport",
     "DistanceTable",
     "Feature",
+    "FiducialRegistration",
     "Finding",
     "GpError",
     "JrmpcResult",
@@ -57,18 +63,23 @@ __all__ = [
     "LeaveOneOutReport",
     "NestedReport",
     "PhysicalReport",
+    "PivotCalibration",
     "RigidTransform",
     "SearchReport",
     "Side",
     "SimulationReport",
     "Specimen",
     "Status",
+    "TouchGain",
     "__version__",
+    "calibrate_pivot",
+    "carry_path",
     "check_specimen",
     "compare",
     "distances",
     "estimate_pose",
     "fit_atlas",
+    "gains",
     "import_mat",
     "jrmpc",
     "leave_one_out",
@@ -77,7 +88,10 @@ __all__ = [
     "physical_test",
     "predict",
     "read_landmarks",
+    "read_path",
+    "read_pose",
     "read_touches",
+    "register_fiducials",
     "search_features",
     "simulate",
     "write_markups",

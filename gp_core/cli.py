@@ -9,12 +9,12 @@ import sys
 from collections.abc import Sequence
 
 from gp_core import __version__
-from gp_core.commands import estimate, labels, study, study_errors, study_physical, study_search
+from gp_core.commands import estimate, labels, study, study_errors, study_physical, study_search, tracking
 from gp_core.errors import GpError
 
 __all__ = ["main", "make_parser"]
 
-_COMMANDS = (estimate, labels, study, study_search, study_errors, study_physical)
+_COMMANDS = (estimate, tracking, labels, study, study_search, study_errors, study_physical)
 
 
 def make_parser() -> argparse.ArgumentParser:

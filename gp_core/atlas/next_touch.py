@@ -18,9 +18,9 @@ from gp_core.atlas.uncertainty import cone_95, radius_95
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["TouchGain", "gains"]
+__all__ = ["MM_A_DEGREE", "TouchGain", "gains"]
 
-_MM_A_DEGREE = 0.2
+MM_A_DEGREE = 0.2
 """Worth of a degree of axis error in mm of origin error: the paper's, in its total error E_T."""
 
 
@@ -50,7 +50,7 @@ class TouchGain:
     def worth(self) -> float:
         """How much less error to expect, mm: of the origin, and 0.2 mm for each degree of the axis."""
         turn = float(np.degrees(self.cone_95_now - self.cone_95))
-        return self.radius_95_now - self.radius_95 + _MM_A_DEGREE * turn
+        return self.radius_95_now - self.radius_95 + MM_A_DEGREE * turn
 
 
 def gains(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = None) -> tuple[TouchGain, ...]:

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
+from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.insertion import UNITS, carry_path, read_path, write_path
+from gp_core.atlas.next_touch import MM_A_DEGREE, TouchGain, gains
 from gp_core.atlas.pose import METHODS, CochleaPose, estimate_pose
-from gp_core.commands.options import Subparsers, add_command, add_json, read_atlas, save_json, say
+from gp_core.checks import FloatArray
+from gp_core.commands.options import Subparsers, add_command, add_json, blaming, read_atlas, save_json, say
 from gp_core.errors import GpError
 from gp_core.landmarks.files import read_touches
 
 __all__ = ["add", "pose_table"]
+
+_HARDLY = 0.03
+"""Part of the present error region below which a gain is not worth a touch."""
 
 
 def add(commands: Subparsers) -> None:
@@ -45,32 +52,91 @@ def add(commands: Subparsers) -> None:
     )
     add_json(parser)
     parser.add_argument("--tfm", metavar="FILE", help="write the pose as an ITK / Slicer transform here")
+    parser.add_argument(
+        "--csv", metavar="FILE", help="write the 4x4 matrix here: four rows of four numbers, mm"
+    )
+    parser.add_argument(
+        "--landmarks",
+        metavar="FILE",
+        help="write CO and a point of the axis here, as Slicer markups (.mrk.json)",
+    )
+    _add_path(parser)
+
+
+def _add_path(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("insertion path, carried to where the cochlea is")
+    group.add_argument(
+        "--path", metavar="CSV", help="three columns, in the cochlea frame: origin CO, x towards CA"
+    )
+    group.add_argument("--path-units", choices=tuple(UNITS), help="what its numbers are in; must be said")
+    group.add_argument("--path-side", choices=("L", "R"), help="the ear it was drawn for; must be said")
+    group.add_argument(
+        "--path-axes",
+        default="x,y,z",
+        metavar="AXES",
+        help="which of its axes are x, y and z of the cochlea frame, such as z,-y,x; default: x,y,z",
+    )
+    group.add_argument("--path-rows", type=int, metavar="N", help="only its first rows; default: all")
+    group.add_argument(
+        "--path-out",
+        metavar="FILE",
+        help="write it here in the frame of the touches: rows of three numbers, mm",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Estimate, print, and write what was asked for."""
+    path = _path_of(args)
     touches = read_touches(args.touches, args.side)
     atlas, specimens = read_atlas(args.atlas)
-    try:
+    if atlas is None and args.method == "robust":
+        atlas = fit_atlas(specimens or [])
+    with blaming(args.touches):
         pose = estimate_pose(
             touches, args.side, atlas, method=args.method, specimens=specimens, probe_noise=args.probe_noise
         )
-    except GpError as error:
-        raise type(error)(
-            error.problem, file=error.file or args.touches, landmark=error.landmark, remedy=error.remedy
-        ) from None
+        next_touches = () if atlas is None else gains(touches, atlas, probe_noise=args.probe_noise)
+    if path is not None:
+        with blaming(args.path):
+            carried = carry_path(path, pose, path_side=args.path_side)
+        write_path(args.path_out, carried)
     save_json(args.json, pose.as_dict())
-    if args.tfm:
-        pose.save_tfm(args.tfm)
-    for line in pose_table(pose, Path(args.touches).name):
+    for save, file in (
+        (pose.save_tfm, args.tfm),
+        (pose.save_csv, args.csv),
+        (pose.save_landmarks, args.landmarks),
+    ):
+        if file:
+            save(file)
+    for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
     if touches.unseen:
         say(f"  not seen by the tracker: {' '.join(sorted(touches.unseen))}")
     return 0
 
 
-def pose_table(pose: CochleaPose, source: str) -> Iterator[str]:
-    """Yield the lines of a short readable table."""
+def _path_of(args: argparse.Namespace) -> FloatArray | None:
+    """Return the insertion path that was given, once all is said that must be."""
+    if args.path is None:
+        if args.path_out or args.path_side or args.path_units:
+            raise GpError("--path-out, --path-side and --path-units need a path", remedy="Give --path CSV.")
+        return None
+    missing = [
+        option
+        for option, value in (
+            (f"--path-units {'|'.join(UNITS)}", args.path_units),
+            ("--path-side L|R", args.path_side),
+            ("--path-out FILE", args.path_out),
+        )
+        if value is None
+    ]
+    if missing:
+        raise GpError(f"an insertion path needs {' and '.join(missing)} too", file=args.path)
+    return read_path(args.path, units=args.path_units, axes=args.path_axes, rows=args.path_rows)
+
+
+def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain] = ()) -> Iterator[str]:
+    """Yield the lines of a short readable table, and what of `next_touches`, best first, gains most."""
     yield f"Cochlea from {source}, {pose.side.word} side, method {pose.method}, atlas {pose.atlas}"
     yield ""
     x, y, z = pose.origin
@@ -83,3 +149,15 @@ def pose_table(pose: CochleaPose, source: str) -> Iterator[str]:
         yield f"  {code:<7} {distance:6.2f}{'   doubtful' if code in pose.suspects else ''}"
     for warning in pose.warnings:
         yield f"  ! {warning}"
+    if next_touches:
+        yield f"  {_advice(next_touches[0])}"
+
+
+def _advice(best: TouchGain) -> str:
+    """Say what the best next touch gains, if anything to speak of."""
+    if best.worth < _HARDLY * (best.radius_95_now + MM_A_DEGREE * np.degrees(best.cone_95_now)):
+        return "no other touch would gain much"
+    return (
+        f"touching {best.code} too would gain most: 95 % within about {best.radius_95:.2f} mm "
+        f"and {np.degrees(best.cone_95):.1f} deg"
+    )

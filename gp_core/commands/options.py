@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ __all__ = [
     "add_command",
     "add_json",
     "add_specimens",
+    "blaming",
     "read_atlas",
     "save_json",
     "say",
@@ -86,6 +87,17 @@ def _is_atlas_file(word: str) -> bool:
         if b'"gpAtlas"' in file.read(1000):
             return True
     return name.endswith(".json") and not name.endswith(".mrk.json")
+
+
+@contextmanager
+def blaming(file: str) -> Iterator[None]:
+    """Name a file in the errors that name no other, nor a specimen."""
+    try:
+        yield
+    except GpError as error:
+        if error.file or error.specimen:
+            raise
+        raise type(error)(error.problem, file=file, landmark=error.landmark, remedy=error.remedy) from None
 
 
 def save_json(path: str | None, content: Any) -> None:

@@ -12,9 +12,11 @@ from numpy.typing import ArrayLike
 from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import feature
+from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.procrustes import RigidFit, fit_rigid
 
-__all__ = ["FiducialRegistration", "register_fiducials"]
+__all__ = ["FiducialRegistration", "named_points", "register_fiducials"]
 
 _FEWEST = 3
 _FEWEST_TO_DOUBT = 6
@@ -189,6 +191,12 @@ def register_fiducials(
         suspects=tuple(names[i] for i in suspects),
         fiducials=pairs.aims[kept],
     )
+
+
+def named_points(landmarks: LandmarkSet) -> dict[str, FloatArray]:
+    """Return every point of a set by its name, features and others; not CO, which is only computed."""
+    placed = landmarks.as_mapping(code for code in landmarks.placed if not feature(code).computed)
+    return {**placed, **landmarks.extra}
 
 
 @dataclass(frozen=True)
