@@ -16,6 +16,9 @@ __all__ = ["Arrived", "Connection", "Event", "Lost", "Opened", "Waker", "keep_al
 _CONNECT_SECONDS = 3.0
 _FIRST_PAUSE = 0.25
 _LONGEST_PAUSE = 4.0
+_GOOD_SECONDS = 2.0
+"""A connection that stood longer is tried again without delay; another may never have been any good."""
+
 _BLOCK = 65536
 _JOIN_SECONDS = 1.0
 
@@ -39,7 +42,6 @@ class Lost:
 
     why: str
     pause: float
-    stood: bool
 
 
 Event = Opened | Arrived | Lost
@@ -129,14 +131,16 @@ class Connection:
             while not self._stop.is_set():
                 try:
                     with self._connect() as sock:
+                        begun = time.monotonic()
                         self._events.put(Opened())
-                        why, pause = self._serve(sock), _FIRST_PAUSE
-                    stood = True
+                        why = self._serve(sock)
+                        if time.monotonic() - begun > _GOOD_SECONDS:
+                            pause = _FIRST_PAUSE
                 except OSError as error:
-                    why, stood = self._why(error), False
+                    why = self._why(error)
                 if self._stop.is_set():
                     return
-                self._events.put(Lost(why, pause, stood))
+                self._events.put(Lost(why, pause))
                 self._sleep(pause)
                 pause = min(2 * pause, _LONGEST_PAUSE)
         finally:

@@ -81,7 +81,9 @@ class TrackerLink:
         self._clock = clock
         self._connection: Connection | None = None
         self._phase = LinkPhase.OFF
+        self._stands = False
         self._why = ""
+        self._refusal = ""
         self._presses = 0
         self._begin()
 
@@ -119,6 +121,7 @@ class TrackerLink:
         """End the connection and its thread."""
         connection, self._connection = self._connection, None
         self._phase = LinkPhase.OFF
+        self._stands = False
         self.latest = None
         self._presses = 0
         if connection is not None:
@@ -131,10 +134,9 @@ class TrackerLink:
         samples: list[Sample] = []
         for event in self._connection.events():
             samples += self._take(event)
-        if self._phase in (LinkPhase.CONNECTED, LinkPhase.SILENT):
+        if self._stands:
             samples += self._judge.take([], self._clock())
-            quiet = self._clock() - self._heard > self._silent_s
-            self._phase = LinkPhase.SILENT if quiet else LinkPhase.CONNECTED
+            self._listen()
         for sample in samples:
             if sample.fault:
                 self.faults[sample.fault] += 1
@@ -151,20 +153,29 @@ class TrackerLink:
         match event:
             case Opened():
                 self._begin()
-                self._phase = LinkPhase.CONNECTED
-            case Lost(why, pause, stood):
+                self._stands = True
+            case Lost(why, pause):
                 self._phase = LinkPhase.LOST
-                self._why = f"{why}. Trying again in {pause:g} s" if stood or why else why
+                self._stands = False
+                self._why = f"{self._refusal or why}. Trying again in {pause:g} s."
+                self._refusal = ""
                 self.latest = None
             case Arrived(data, received):
                 return self._read(data, received)
         return []
 
+    def _listen(self) -> None:
+        """Tell silence from messages; a new connection has as long for its first."""
+        if self._clock() - self._heard > self._silent_s:
+            self._phase = LinkPhase.SILENT
+        elif self._arrivals:
+            self._phase = LinkPhase.CONNECTED
+
     def _read(self, data: bytes, received: float) -> list[Sample]:
         try:
             messages = self._decoder.feed(data, received)
         except GpError as error:
-            self._why = str(error)
+            self._refusal = str(error).rstrip(".")
             if self._connection is not None:
                 self._connection.drop()
             return []
@@ -196,7 +207,7 @@ class TrackerLink:
             case LinkPhase.CONNECTING:
                 return f"Connecting to {where} …"
             case LinkPhase.LOST:
-                return f"{self._why[:1].upper()}{self._why[1:]}."
+                return f"{self._why[:1].upper()}{self._why[1:]}"
             case LinkPhase.SILENT:
                 quiet = self._clock() - self._heard
                 return f"Connected to {where}, but no {probe} for {quiet:.1f} s: {self._why_silent()}."

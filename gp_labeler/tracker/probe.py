@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
-from gp_core.errors import GeometryError, GpError
+from gp_core.errors import GpError
 from gp_labeler.tracker.judge import Fault, Sample
 from gp_labeler.tracker.rigid import turn_deg
 
 if TYPE_CHECKING:
-    from gp_core.registration.pivot import PivotCalibration  # type: ignore[import-not-found,unused-ignore]
+    from gp_core.registration.pivot import PivotCalibration
 
 __all__ = ["PivotCollector", "Probe"]
 
@@ -146,11 +146,6 @@ class PivotCollector:
         GeometryError
             Too few poses, or too little turning, to find it.
         """
-        if self.count < 3:
-            raise GeometryError(
-                f"a pivot calibration needs more poses than {self.count}",
-                remedy="Hold the tip in a hollow and turn the probe about it.",
-            )
         from gp_core.registration.pivot import calibrate_pivot
 
         return calibrate_pivot(self.poses)

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gp_core.checks import FloatArray
+from gp_core.frames import cross_matrix
 
-__all__ = ["Step", "nearest_rigid", "step_between", "turn_deg", "why_not_rigid"]
+__all__ = ["Step", "nearest_rigid", "rotation_of", "step_between", "turn_deg", "why_not_rigid"]
 
 
 class Step(NamedTuple):
@@ -56,3 +57,13 @@ def step_between(before: FloatArray, after: FloatArray) -> Step:
     """Return the distance of the origins, mm, and the angle between two (4, 4) poses."""
     degrees = float(turn_deg(before[:3, :3].T @ after[:3, :3]))
     return Step(float(np.linalg.norm(after[:3, 3] - before[:3, 3])), degrees)
+
+
+def rotation_of(vector: FloatArray) -> FloatArray:
+    """Return the (3, 3) rotation about (3,) `vector` by its length, radians (Rodrigues' formula)."""
+    angle = float(np.linalg.norm(vector))
+    if angle == 0:
+        return np.eye(3)
+    cross = cross_matrix(vector / angle)
+    rotation: FloatArray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return rotation

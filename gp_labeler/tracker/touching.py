@@ -19,6 +19,9 @@ from gp_labeler.tracker.probe import Probe
 __all__ = ["RecordedTouch", "RefusedTouch", "TouchRecorder", "TouchSettings"]
 
 _SECONDS_BETWEEN_LOOKS = 0.015
+_SETTLING = 0.2
+"""The part of the window, at its beginning, in which a tip that comes to rest is not averaged yet."""
+
 _SECONDS_OF_GRACE = 0.3
 """How much longer than its window a press waits for samples."""
 
@@ -207,7 +210,8 @@ class TouchRecorder:
         self.progress = min(_seconds(window) / self.settings.window_s, 1.0)
         if self.progress < 1.0:
             return None
-        outcome = self._judge(window)
+        settled = window[0].time + _SETTLING * self.settings.window_s
+        outcome = self._judge([s for s in window if s.time >= settled])
         if isinstance(outcome, RefusedTouch):
             return None
         self._finish(outcome)

@@ -1,0 +1,181 @@
+"""The command that serves a simulated tracker, in a process of its own: for tests, the demo and training.
+
+``python -m gp_labeler.tracker.simulator --help`` says how it is used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import logging
+import sys
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from queue import SimpleQueue
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.draw import draw_animal
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import EXTERNAL, PROBE, Side
+from gp_core.landmarks.files import read_touches
+from gp_labeler.tracker.address import DEFAULT_PORT, check_device
+from gp_labeler.tracker.rigid import rotation_of
+from gp_labeler.tracker.simulated_probe import SimulatedProbe
+from gp_labeler.tracker.simulated_tracker import HIDDEN_BY, Simulator
+
+__all__ = ["main", "make_parser"]
+
+_COMMANDS = """commands, one a line, in a script or typed with --live:
+  go NAME [SECONDS]            send the tip to a point, or home
+  lift [MM] [SECONDS]          lift it off
+  wait SECONDS
+  turn SECONDS                 tilt the probe about its tip, for a pivot calibration
+  hide [probe|reference]       cover a marker
+  show                         uncover both
+  jump MM [SECONDS]            report the probe at a wrong place; without SECONDS in one message
+  late SECONDS                 hold messages back for so long; 0 ends that
+  bad KIND                     one bad message: nan, scale, mirror, repeat, back
+  stale [SECONDS]              repeat the last position, as if it were new
+  press                        press the button (a STRING message, 1 and then 0)
+  cut [SECONDS]                close the connection, and come back
+  quit
+"""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Serve until told to quit.
+
+    Returns
+    -------
+    int
+        0; 2 where the input is wrong, said in one line.
+    """
+    args = make_parser().parse_args(arguments)
+    logging.getLogger("pyigtl").setLevel(logging.ERROR)
+    try:
+        points, truth = _points(args)
+        simulator = _simulator(args, points)
+        if args.truth is not None:
+            args.truth.write_text(json.dumps({**truth, "port": simulator.port}, indent=2), encoding="utf-8")
+        _say(f"listening on 127.0.0.1:{simulator.port}")
+        return _serve(simulator, args, list(points))
+    except (GpError, OSError) as error:
+        sys.stderr.write(f"simulator: {error}\n")
+        return 2
+
+
+def _serve(simulator: Simulator, args: argparse.Namespace, names: list[str]) -> int:
+    commands: SimpleQueue[str | None] = SimpleQueue()
+    loop: list[str] = []
+    if args.live:
+        threading.Thread(target=_listen, args=(commands,), daemon=True).start()
+    elif args.script is not None:
+        loop = args.script.read_text(encoding="utf-8").splitlines()
+    else:
+        loop = [step for name in names for step in (f"go {name} 1.2", "wait 1.5", "lift 30 0.6")]
+    try:
+        simulator.run(commands, loop=loop)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        simulator.close()
+    return 0
+
+
+def _listen(commands: SimpleQueue[str | None]) -> None:
+    for line in sys.stdin:
+        commands.put(line)
+    commands.put(None)
+
+
+def _say(line: str) -> None:
+    sys.stdout.write(f"{line}\n")
+    sys.stdout.flush()
+
+
+def _simulator(args: argparse.Namespace, points: dict[str, FloatArray]) -> Simulator:
+    names = {"probe": args.probe, "button": args.button}
+    if args.reference is not None:
+        names["reference"] = args.reference
+    for what, name in names.items():
+        check_device(name, f"the {what}")
+    if not 1 <= args.rate <= 1000:
+        raise GpError(f"--rate must be from 1 to 1000, got {args.rate:g}")
+    probe = SimulatedProbe(
+        points,
+        args.tip,
+        noise_mm=args.noise,
+        noise_deg=args.noise_deg,
+        sway_mm=args.sway,
+        reference=args.reference is not None,
+        rng=np.random.default_rng([args.seed, 1]),
+    )
+    return Simulator(probe, port=args.port, names=names, rate_hz=args.rate, hidden=args.hidden, say=_say)
+
+
+def _points(args: argparse.Namespace) -> tuple[dict[str, FloatArray], dict[str, object]]:
+    """Return the points to touch, in the frame that touches are measured in, and what is true there."""
+    if args.touches is not None:
+        touches = read_touches(args.touches, args.side)
+        given = {code: touches[code] for code in touches.placed}
+        given.update({name: np.asarray(place) for name, place in touches.extra.items()})
+        return given, {"points": _listed(given)}
+    side = Side.parse(args.side)
+    rng = np.random.default_rng(args.seed)
+    animal = draw_animal(Atlas.published(), rng=rng, name=f"drawn {args.seed}")
+    turn = rotation_of(rng.uniform(-1.5, 1.5, 3))
+    placed = RigidTransform.from_parts(turn, rng.uniform(-60, 60, 3), dst="tracker", src="scan")
+    landmarks = animal.side(side)
+    codes = [*PROBE, *(code for code in EXTERNAL if code not in PROBE)]
+    points = {code: placed.apply(landmarks[code][None])[0] for code in codes}
+    inner = {code: placed.apply(landmarks[code][None])[0] for code in ("CO", "CA", "CB")}
+    return points, {
+        "side": side.value,
+        "points": _listed(points),
+        "cochlea": _listed(inner),
+        "T_tracker_scan": placed.matrix.tolist(),
+    }
+
+
+def _listed(points: dict[str, FloatArray]) -> dict[str, list[float]]:
+    return {name: [float(x) for x in place] for name, place in points.items()}
+
+
+def make_parser(prog: str = "python -m gp_labeler.tracker.simulator") -> argparse.ArgumentParser:
+    """Return the parser of the simulator's command line."""
+    parser = argparse.ArgumentParser(
+        prog=prog,
+        description="Serve a simulated tracked probe over OpenIGTLink, on this computer only.",
+        epilog=_COMMANDS,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="0: any that is free")
+    head = parser.add_argument_group("the head")
+    head.add_argument("--touches", type=Path, metavar="FILE", help="points to touch; else a drawn animal's")
+    head.add_argument("--side", default="L", help="side of the head")
+    head.add_argument("--seed", type=int, default=0, help="of the drawn animal and of the noise")
+    head.add_argument("--truth", type=Path, metavar="JSON", help="write where the points truly are")
+    devices = parser.add_argument_group("the devices")
+    devices.add_argument("--probe", default="ProbeToTracker", metavar="NAME")
+    devices.add_argument(
+        "--reference", metavar="NAME", help="a marker on the head; without it, the head rests"
+    )
+    devices.add_argument("--button", default="Button", metavar="NAME")
+    devices.add_argument("--tip", type=float, nargs=3, default=(0.0, 0.0, -120.0), metavar=("X", "Y", "Z"))
+    devices.add_argument("--noise", type=float, default=0.1, metavar="MM")
+    devices.add_argument("--noise-deg", type=float, default=0.02, metavar="DEG")
+    devices.add_argument("--sway", type=float, default=0.0, metavar="MM", help="how far the head moves")
+    devices.add_argument("--rate", type=float, default=60.0, metavar="HZ")
+    devices.add_argument("--hidden", choices=HIDDEN_BY, default="status", help="how a covered marker is told")
+    parser.add_argument("--script", type=Path, metavar="FILE", help="commands, done again and again")
+    parser.add_argument("--live", action="store_true", help="take commands typed; ends with the input")
+    return parser
+
+
+if __name__ == "__main__":
+    sys.exit(main())
