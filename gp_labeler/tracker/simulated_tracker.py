@@ -191,10 +191,15 @@ class Simulator:
     def _do_wait(self, seconds: str) -> float:
         return float(seconds)
 
-    def _do_turn(self, seconds: str) -> float:
+    def _do_turn(self, seconds: str = "") -> float:
         self.probe.turn(True)
-        self._later(float(seconds), lambda: self.probe.turn(False))
+        if not seconds:
+            return 0.0
+        self._later(float(seconds), self._do_still)
         return float(seconds)
+
+    def _do_still(self) -> None:
+        self.probe.turn(False)
 
     def _do_hide(self, *which: str) -> None:
         self.probe.hidden |= set(which or ("probe",))

@@ -30,11 +30,14 @@ from gp_labeler.tracker.simulated_tracker import HIDDEN_BY, Simulator
 
 __all__ = ["main", "make_parser"]
 
+_PROG = "python -m gp_labeler.tracker.simulator"
+
 _COMMANDS = """commands, one a line, in a script or typed with --live:
   go NAME [SECONDS]            send the tip to a point, or home
   lift [MM] [SECONDS]          lift it off
   wait SECONDS
-  turn SECONDS                 tilt the probe about its tip, for a pivot calibration
+  turn [SECONDS]               tilt the probe about its tip, for a pivot calibration
+  still                        end a turn that was given no time
   hide [probe|reference]       cover a marker
   show                         uncover both
   jump MM [SECONDS]            report the probe at a wrong place; without SECONDS in one message
@@ -47,15 +50,22 @@ _COMMANDS = """commands, one a line, in a script or typed with --live:
 """
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
     """Serve until told to quit.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Of the command line; by default this process's.
+    prog : str
+        What the command is called.
 
     Returns
     -------
     int
         0; 2 where the input is wrong, said in one line.
     """
-    args = make_parser().parse_args(arguments)
+    args = make_parser(prog).parse_args(arguments)
     logging.getLogger("pyigtl").setLevel(logging.ERROR)
     try:
         points, truth = _points(args)
@@ -146,7 +156,7 @@ def _listed(points: dict[str, FloatArray]) -> dict[str, list[float]]:
     return {name: [float(x) for x in place] for name, place in points.items()}
 
 
-def make_parser(prog: str = "python -m gp_labeler.tracker.simulator") -> argparse.ArgumentParser:
+def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
     """Return the parser of the simulator's command line."""
     parser = argparse.ArgumentParser(
         prog=prog,

@@ -224,7 +224,8 @@ class TouchRecorder:
             return []
         window = [sample]
         for earlier in reversed(self._recent):
-            if window[-1].time - earlier.time > self.settings.max_gap_s or earlier.fault is Fault.JUMP:
+            since = window[-1].time - earlier.time  # below 0 where the tracker came back with another clock
+            if not 0 <= since <= self.settings.max_gap_s or earlier.fault is Fault.JUMP:
                 break
             there = self.probe.tip(earlier) if earlier.usable else None
             if there is None or earlier is sample:

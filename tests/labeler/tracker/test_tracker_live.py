@@ -35,21 +35,28 @@ _CLOSE = 0.15
 
 
 @pytest.fixture(scope="module")
-def swaying(tmp_path_factory) -> Iterator[SimulatorProcess]:
-    """A head that moves by 5 mm, with a reference on it; a covered marker is told by its status."""
-    simulator = SimulatorProcess(
-        tmp_path_factory.mktemp("swaying"), "--reference", "HeadToTracker", "--sway", "5"
+def simulators(tmp_path_factory) -> Iterator[tuple[SimulatorProcess, SimulatorProcess]]:
+    """Two, that start at the same time."""
+    moving = ("--reference", "HeadToTracker", "--sway", "5")
+    both = (
+        SimulatorProcess(tmp_path_factory.mktemp("swaying"), *moving),
+        SimulatorProcess(tmp_path_factory.mktemp("resting"), "--hidden", "stop"),
     )
-    yield simulator
-    simulator.close()
+    yield both
+    for simulator in both:
+        simulator.close()
 
 
-@pytest.fixture(scope="module")
-def resting(tmp_path_factory) -> Iterator[SimulatorProcess]:
+@pytest.fixture
+def swaying(simulators) -> SimulatorProcess:
+    """A head that moves by 5 mm, with a reference on it; a covered marker is told by its status."""
+    return simulators[0]
+
+
+@pytest.fixture
+def resting(simulators) -> SimulatorProcess:
     """A head at rest, no reference; a covered marker sends nothing, as PLUS is often set."""
-    simulator = SimulatorProcess(tmp_path_factory.mktemp("resting"), "--hidden", "stop")
-    yield simulator
-    simulator.close()
+    return simulators[1]
 
 
 def _bench(simulator: SimulatorProcess, *, dwell: bool = False, limits: Limits = _PATIENT, **more) -> Bench:
@@ -177,10 +184,10 @@ def test_the_button_presses_once(swaying, bench) -> None:
 
 
 def test_late_messages_are_named_and_record_nothing(resting) -> None:
-    bench = _bench(resting, limits=Limits(late_s=0.3))
+    bench = _bench(resting, limits=Limits(late_s=0.25))
     bench.link.open()
     bench.settle()
-    resting.do("late 1.0")
+    resting.do("late 0.7")
     bench.until(lambda: bool(bench.seen(Fault.LATE)), "late messages")
     refused = bench.press()
     assert isinstance(refused, RefusedTouch)
@@ -221,13 +228,13 @@ def test_turning_the_probe_calibrates_its_tip(resting, plain) -> None:
     pivot = pytest.importorskip("gp_core.registration.pivot")
     resting.do("go CL 0.1")
     collector = PivotCollector(poses_wanted=40)
-    resting.tell("turn 1.5")
+    resting.do("turn")
     until(lambda: collector.ready, lambda: collector.update(plain.link.poll()), "enough turning")
     calibration = collector.finish()
     assert isinstance(calibration, pivot.PivotCalibration)
     assert calibration.tip_offset == pytest.approx(TIP, abs=0.5)
     assert calibration.pivot == pytest.approx(POINTS["CL"], abs=0.5)
-    resting.wait("done turn")
+    resting.do("still")
 
 
 def test_a_wrong_name_is_told_with_what_there_is(resting) -> None:

@@ -186,6 +186,15 @@ def test_dwell_takes_an_unbroken_half_second() -> None:
     assert len(hand.outcomes) == 1
 
 
+def test_a_tracker_that_comes_back_with_another_clock_dwells_again() -> None:
+    hand = _Hand(dwell=True)
+    hand.hold(_A, 0.3)
+    for k in range(60):
+        hand.time += _STEP
+        hand._take(Sample(1.0 + k * _STEP, hand.time, pose(1 + k % 3 / 10, 2, 103)))
+    assert len(hand.outcomes) == 1
+
+
 def test_a_moving_tip_never_dwells() -> None:
     hand = _Hand(dwell=True)
     hand.travel(_A, _B, 2.0)

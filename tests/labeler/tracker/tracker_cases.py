@@ -51,7 +51,13 @@ class SimulatorProcess:
         self._lines: queue.Queue[str] = queue.Queue()
         self._reader = threading.Thread(target=self._read, daemon=True)
         self._reader.start()
-        self.port = int(self.wait("listening").rsplit(":", 1)[1])
+        self._port = 0
+
+    @property
+    def port(self) -> int:
+        if not self._port:
+            self._port = int(self.wait("listening").rsplit(":", 1)[1])
+        return self._port
 
     def _read(self) -> None:
         with contextlib.suppress(ValueError):
@@ -74,6 +80,7 @@ class SimulatorProcess:
 
     def do(self, command: str) -> None:
         """Tell it, and wait until it is done."""
+        assert self.port
         self.tell(command)
         self.wait(f"done {command}")
 
