@@ -144,6 +144,11 @@ class PoseDesk:
         """The feature to touch next."""
         return self._target
 
+    @property
+    def names_touched(self) -> frozenset[str]:
+        """What is touched on this side, left out or not."""
+        return self._touched()
+
     def aim(self, name: str) -> None:
         """Choose what is touched next."""
         self._skipped -= {(self.side, name)}

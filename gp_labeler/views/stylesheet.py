@@ -34,6 +34,15 @@ QLabel[role="warning"] { color: $warning; }
 QLabel[role="danger"] { color: $danger; }
 QLabel[role="mono"], QPlainTextEdit[role="mono"] { font-family: "DejaVu Sans Mono", "Consolas", monospace; }
 
+QLabel[role="huge"] { font-size: 64px; font-weight: 700; }
+QLabel[role="large"] { font-size: 28px; font-weight: 600; }
+QLabel[role="big"] { font-size: 20px; }
+QLabel[role="big-warning"] { font-size: 20px; color: $warning; }
+QLabel[role="large-hint"] { font-size: 20px; color: $muted; }
+QLabel[role="large-good"] { font-size: 20px; color: $good; }
+QLabel[role="large-warning"] { font-size: 20px; color: $warning; }
+QLabel[role="large-danger"] { font-size: 20px; color: $danger; }
+
 QPushButton, QToolButton {
     background: $raised; border: 1px solid $border_strong; border-radius: 6px; padding: 5px 12px;
 }
@@ -49,6 +58,12 @@ QPushButton[role="primary"] {
 QPushButton[role="primary"]:hover { background: $accent_hover; }
 QPushButton[role="primary"]:focus { border: 2px solid $accent_text; padding: 4px 11px; }
 QPushButton[role="primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
+QPushButton[role="huge"] { font-size: 22px; padding: 8px 20px; }
+QPushButton[role="huge-primary"] {
+    font-size: 28px; font-weight: 600; background: $accent; border-color: $accent; color: $on_accent;
+}
+QPushButton[role="huge-primary"]:hover { background: $accent_hover; }
+QPushButton[role="huge-primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
 QPushButton[role="link"] {
     background: transparent; border: 1px solid transparent; color: $accent_text;
     text-align: left; padding: 3px 6px;

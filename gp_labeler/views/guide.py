@@ -1,0 +1,212 @@
+"""Guided touching: one feature at a time, in letters to be read from two metres, for hands in gloves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtWidgets import (
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.landmarks.features import CODES, feature
+from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
+from gp_labeler.views.feature_picture import FeaturePicture
+from gp_labeler.views.panels.parts import text_label
+from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
+from gp_labeler.workbench import Workbench
+
+__all__ = ["GuideWindow"]
+
+_RECORD = (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_PageDown)
+_REDO = (Qt.Key.Key_Backspace, Qt.Key.Key_PageUp)
+_SKIP = (Qt.Key.Key_S, Qt.Key.Key_Right)
+"""Foot pedals for presentations send the page keys."""
+
+
+class GuideWindow(QWidget):
+    """Leads through the features to touch.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose touches; with a tracked probe.
+    parent : QWidget
+        The main window, whose look it takes.
+    """
+
+    settings_asked = Signal()
+    closed = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget) -> None:
+        super().__init__(parent, Qt.WindowType.Window)
+        self._desk, self._last = workbench, ""
+        self._refusal = ""
+        self.setWindowTitle("Guided touching")
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setProperty("role", "panel")
+        self.setMinimumSize(720, 480)
+        self._make_widgets()
+        self._lay_out()
+        self._listen()
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show what is to be touched, and what is known of the cochlea."""
+        pose = self._desk.pose
+        target, touched = pose.target, pose.names_touched
+        row = feature(target) if target in CODES else None
+        self.counter.setText(f"{pose.side.word.capitalize()} ear · {len(touched)} touched")
+        self.code.setText(target or "All touched")
+        self.name.setText(row.name if row else "Skull feature" if target else "")
+        self.definition.setText(row.definition if row else "")
+        self.picture.show_feature(target if row else None, pose.side)
+        self.record.setText("Record" if target else "Done")
+        self.redo.setEnabled(bool(self._last))
+        self.redo.setText(f"Redo {self._last}" if self._last else "Redo")
+        self.skip.setEnabled(target is not None)
+        self._show_result()
+        self._show_tracker()
+
+    def _show_result(self) -> None:
+        pose = self._desk.pose
+        estimate = pose.estimate.pose if pose.estimate is not None else None
+        if estimate is None:
+            self.result.setText(pose.estimating.waiting_text or "No estimate")
+            self.warning.setText("")
+            return
+        self.result.setText(f"±{estimate.radius_95:.2f} mm · ±{degrees_text(estimate.cone_95)}")
+        self.warning.setText("\n".join(estimate.warnings[:2]))
+
+    def _show_tracker(self, *_: object) -> None:
+        tracker = self._desk.tracker
+        self.state.setText(tracker_words(self._desk))
+        set_role(self.state, f"large-{tracker_role(self._desk)}")
+        self.connect_button.setVisible(not tracker.on)
+        self.record.setEnabled(tracker.on and self._desk.pose.target is not None)
+        self.progress.setValue(round(100 * tracker.progress))
+        self.told.setText(self._refusal)
+
+    # What a person does
+
+    def _press(self) -> None:
+        self._refusal = ""
+        attempt(self._desk, self._desk.tracker.press)
+        self._show_tracker()
+
+    def _redo(self) -> None:
+        if self._last:
+            self._desk.pose.aim(self._last)
+
+    def _on_recorded(self, name: str) -> None:
+        self._last, self._refusal = name, ""
+        self.refresh()
+
+    def _on_refused(self, reason: str) -> None:
+        self._refusal = reason
+        self._show_tracker()
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
+        if event.isAutoRepeat():
+            return
+        for keys, call in ((_RECORD, self._press), (_REDO, self._redo), (_SKIP, self._desk.pose.skip)):
+            if event.key() in keys:
+                call()
+                return
+        if event.key() == Qt.Key.Key_Escape:
+            self.close()
+        elif event.key() == Qt.Key.Key_F11:
+            self.setWindowState(self.windowState() ^ Qt.WindowState.WindowFullScreen)
+        else:
+            super().keyPressEvent(event)
+
+    def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
+        self.closed.emit()
+        super().closeEvent(event)
+
+    # Widgets
+
+    def _make_widgets(self) -> None:
+        self.counter, self.code = text_label(role="large-hint"), text_label(role="huge")
+        self.name, self.definition = text_label(role="large", wrap=True), text_label(role="big", wrap=True)
+        self.result, self.warning = text_label(role="large"), text_label(role="big-warning", wrap=True)
+        self.state, self.told = text_label(wrap=True), text_label(role="large-danger", wrap=True)
+        self.picture = FeaturePicture()
+        self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
+        self.progress = QProgressBar()
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(20)
+        self.record = _big("Record", "Space, Page down or a foot pedal", self._press)
+        self.record.setProperty("role", "huge-primary")
+        self.redo = _big("Redo", "Backspace or Page up: touch the last one again", self._redo)
+        self.skip = _big("Skip", "S or Right: it comes again at the end", self._desk.pose.skip)
+        self.connect_button = _big("Connect…", "Choose the tracker", self.settings_asked.emit)
+        self.leave = _big("Close", "Escape", self.close)
+
+    def _lay_out(self) -> None:
+        whole = QVBoxLayout(self)
+        whole.setContentsMargins(32, 24, 32, 24)
+        whole.setSpacing(16)
+        whole.addLayout(_row(self.counter, None, self.state, self.connect_button, self.leave))
+        middle = QHBoxLayout()
+        middle.setSpacing(32)
+        middle.addWidget(self.picture, 5)
+        words = QVBoxLayout()
+        words.setSpacing(12)
+        for label in (self.code, self.name, self.definition):
+            words.addWidget(label)
+        words.addStretch(1)
+        words.addWidget(self.told)
+        words.addWidget(_caption("Cochlea, within 95 %"))
+        words.addWidget(self.result)
+        words.addWidget(self.warning)
+        middle.addLayout(words, 6)
+        whole.addLayout(middle, 1)
+        whole.addWidget(self.progress)
+        buttons = QHBoxLayout()
+        buttons.setSpacing(16)
+        for button, stretch in ((self.redo, 2), (self.skip, 2), (self.record, 5)):
+            buttons.addWidget(button, stretch)
+        whole.addLayout(buttons)
+
+    def _listen(self) -> None:
+        pose, tracker = self._desk.pose, self._desk.tracker
+        for signal in (pose.changed, pose.target_changed):
+            follow(self, signal, self.refresh)
+        follow(self, pose.recorded, self._on_recorded)
+        follow(self, tracker.refused, self._on_refused)
+        for signal in (tracker.changed, tracker.moved):
+            follow(self, signal, self._show_tracker)
+
+
+def _big(words: str, hint: str, call: Callable[[], object]) -> QPushButton:
+    button = QPushButton(words)
+    button.setProperty("role", "huge")
+    button.setToolTip(hint)
+    button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are the window's: Space always records
+    button.setMinimumHeight(64)
+    button.clicked.connect(lambda: call())
+    return button
+
+
+def _caption(words: str) -> QLabel:
+    return text_label(words, "large-hint")
+
+
+def _row(*widgets: QWidget | None) -> QHBoxLayout:
+    row = QHBoxLayout()
+    row.setSpacing(16)
+    for widget in widgets:
+        if widget is None:
+            row.addStretch(1)
+        else:
+            row.addWidget(widget)
+    return row

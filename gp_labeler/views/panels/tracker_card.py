@@ -1,0 +1,89 @@
+"""The tracked probe in the Pose panel: how it stands, and the button that records a touch."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QWidget
+
+from gp_labeler.tracker import LinkPhase
+from gp_labeler.views.bind import attempt, blocked, follow, set_role
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["TrackerCard", "tracker_role", "tracker_words"]
+
+
+def tracker_role(desk: Workbench) -> str:
+    """Return the look of the tracker's words: whether all is well, to be looked at, or wrong."""
+    tracker = desk.tracker
+    if tracker.phase is LinkPhase.CONNECTED:
+        return "good" if tracker.visible else "warning"
+    return "danger" if tracker.phase in (LinkPhase.LOST, LinkPhase.SILENT) else "hint"
+
+
+def tracker_words(desk: Workbench) -> str:
+    """Say how the tracker stands, and what is wrong with its newest reading."""
+    tracker = desk.tracker
+    trouble = tracker.trouble if tracker.phase is LinkPhase.CONNECTED and not tracker.visible else ""
+    return f"{trouble[:1].upper()}{trouble[1:]}." if trouble else tracker.words
+
+
+class TrackerCard(Card):
+    """Shown while a tracker is asked for.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose tracker.
+    """
+
+    settings_asked = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Tracked probe", parent)
+        self._desk = workbench
+        self.words = text_label(wrap=True)
+        self.tip = text_label("", "mono")
+        self.progress = QProgressBar()
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(6)
+        self.record = QPushButton()
+        self.record.setProperty("role", "primary")
+        self.record.setToolTip("Hold the tip still; half a second is averaged")
+        self.record.clicked.connect(lambda: attempt(workbench, workbench.tracker.press))
+        self.dwell = QCheckBox("Record when the tip is held still")
+        self.dwell.toggled.connect(workbench.tracker.set_dwell)
+        settings = QPushButton("Settings…")
+        settings.setProperty("role", "link")
+        settings.clicked.connect(self.settings_asked)
+        self.add_to_heading(settings)
+        for widget in (self.words, self.tip, self.progress):
+            self.add(widget)
+        row = QHBoxLayout()
+        row.addWidget(self.record, 1)
+        self.add(row)
+        self.add(self.dwell)
+        tracker = workbench.tracker
+        follow(self, tracker.changed, self.refresh)
+        follow(self, tracker.moved, self._on_moved)
+        follow(self, workbench.pose.target_changed, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show how the tracker stands."""
+        tracker, target = self._desk.tracker, self._desk.pose.target
+        self.setVisible(tracker.on)
+        with blocked(self.dwell):
+            self.dwell.setChecked(tracker.dwell)
+        self.record.setText(f"Record {target}" if target else "All touched")
+        self.record.setEnabled(target is not None and tracker.pivot is None)
+        self._on_moved()
+
+    def _on_moved(self) -> None:
+        tracker = self._desk.tracker
+        self.words.setText(tracker_words(self._desk))
+        set_role(self.words, tracker_role(self._desk))
+        tip = tracker.tip
+        self.tip.setText("" if tip is None else "  ".join(f"{v:8.2f}" for v in tip) + " mm")
+        self.tip.setEnabled(tracker.visible)
+        self.progress.setValue(round(100 * tracker.progress))

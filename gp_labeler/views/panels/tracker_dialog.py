@@ -1,0 +1,281 @@
+"""Where the tracker is, what its devices are called, where the tip is, and to whom the pose is sent."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import (
+    QCheckBox,
+    QDialog,
+    QFormLayout,
+    QHBoxLayout,
+    QLineEdit,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.errors import GpError
+from gp_labeler.tracker import TrackerAddress
+from gp_labeler.tracker.address import DEFAULT_PORT
+from gp_labeler.views.bind import follow, set_role
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
+from gp_labeler.views.window_state import WindowState
+from gp_labeler.workbench import Workbench
+
+__all__ = ["TrackerDialog"]
+
+_MEMORY = "tracker"
+_SEND_PORT = 18945
+_HINTS: Mapping[str, tuple[str, str]] = {
+    "host": ("Host", "127.0.0.1, or the name of the computer that runs PLUS or Slicer"),
+    "port": ("Port", f"{DEFAULT_PORT} by custom"),
+    "probe": ("Probe", "device name of its TRANSFORM, such as StylusToTracker"),
+    "reference": ("Head marker", "device name; empty where the head cannot move"),
+    "button": ("Foot switch", "device name of STRING messages; empty where there is none"),
+    "tip": ("Tip", "x y z in the probe's frame, mm; 0 0 0 where the tracker tells the tip itself"),
+}
+
+
+class TrackerDialog(QDialog):
+    """Settings of the tracked probe; stays open beside the window while the probe is tried.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose tracker.
+    memory : WindowState
+        Keeps what was typed from one day to the next.
+    """
+
+    def __init__(self, workbench: Workbench, memory: WindowState, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk, self._memory = workbench, memory
+        self.setWindowTitle("Tracked probe")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setMinimumWidth(520)
+        self._make_fields()
+        self._make_buttons()
+        self._lay_out()
+        tracker = workbench.tracker
+        for signal in (tracker.changed, tracker.moved):
+            follow(self, signal, self.refresh)
+        self._recall()
+        self.refresh()
+
+    # What it shows
+
+    def refresh(self, *_: object) -> None:
+        """Show how tracker, calibration and sending stand."""
+        tracker = self._desk.tracker
+        self.words.setText(tracker_words(self._desk))
+        set_role(self.words, tracker_role(self._desk))
+        self.connect_button.setText("Disconnect" if tracker.on else "Connect")
+        collecting = tracker.pivot is not None
+        self.pivot.setText("Stop" if collecting else "Find the tip by turning…")
+        self.pivot.setEnabled(tracker.on)
+        self.finish.setVisible(collecting)
+        self.turned.setVisible(collecting)
+        if tracker.pivot is not None:
+            self.finish.setEnabled(tracker.pivot.ready)
+            self.turned.setValue(
+                round(100 * min(tracker.pivot.turned_deg / tracker.pivot.turn_wanted_deg, 1))
+            )
+        self.pivot_words.setText(self._pivot_words())
+        self.send.setText("Stop sending" if tracker.sending else "Send the pose")
+        self.send_words.setText(
+            tracker.sending or "Sends T_tracker_cochlea as an OpenIGTLink TRANSFORM to whoever connects here."
+        )
+
+    def _pivot_words(self) -> str:
+        tracker = self._desk.tracker
+        if tracker.pivot is not None:
+            return tracker.pivot.words
+        if tracker.calibration is not None:
+            found = tracker.calibration
+            return f"Tip found from {found.n_frames} poses; residual {found.rms_mm:.2f} mm."
+        return "Set the tip in a small hollow and tilt the probe about it to all sides."
+
+    # What it does
+
+    def _toggle_link(self) -> None:
+        tracker = self._desk.tracker
+        if tracker.on:
+            tracker.disconnect()
+            return
+        try:
+            address = self._address()
+            tracker.set_tip_offset(self._numbers(self.fields["tip"].text()))
+        except GpError as error:
+            self._complain(error)
+            return
+        self._remember()
+        self._complain(None)
+        tracker.connect(address)
+
+    def _address(self) -> TrackerAddress:
+        texts = {name: field.text().strip() for name, field in self.fields.items()}
+        port = int(texts["port"]) if texts["port"].isdigit() else texts["port"]
+        return TrackerAddress(
+            texts["host"],
+            port,  # type: ignore[arg-type]  # refused there, by name
+            texts["probe"],
+            texts["reference"] or None,
+            texts["button"] or None,
+        )
+
+    def _numbers(self, text: str) -> list[float]:
+        try:
+            return [float(word) for word in text.replace(",", " ").split()]
+        except ValueError:
+            raise GpError(f"the tip must be three numbers in mm, got {text!r}") from None
+
+    def _toggle_pivot(self) -> None:
+        tracker = self._desk.tracker
+        (tracker.start_pivot if tracker.pivot is None else tracker.cancel_pivot)()
+
+    def _finish_pivot(self) -> None:
+        try:
+            found = self._desk.tracker.finish_pivot()
+        except GpError as error:
+            self._complain(error)
+            return
+        self.fields["tip"].setText(" ".join(f"{v:.3f}" for v in found.tip_offset))
+        self._remember()
+        self._complain(None)
+
+    def _toggle_sending(self) -> None:
+        tracker = self._desk.tracker
+        if tracker.sending:
+            tracker.stop_sending()
+            return
+        port = self.send_port.text().strip()
+        try:
+            tracker.start_sending(int(port) if port.isdigit() else -1)
+        except GpError as error:
+            self._complain(error)
+
+    def _complain(self, error: GpError | None) -> None:
+        self.problem.setText("" if error is None else str(error))
+        self.problem.setVisible(error is not None)
+
+    # What is remembered
+
+    def _recall(self) -> None:
+        address = self._desk.tracker.address or TrackerAddress()
+        known: dict[str, Any] = {
+            "host": address.host,
+            "port": address.port,
+            "probe": address.probe,
+            "reference": address.reference or "",
+            "button": address.button or "",
+            "tip": "0 0 0",
+        }
+        if self._desk.tracker.address is None:
+            known |= self._memory.fields(_MEMORY)
+        for name, field in self.fields.items():
+            field.setText(str(known.get(name, "")))
+        if self._desk.tracker.probe.tip_offset.any():
+            self.fields["tip"].setText(" ".join(f"{v:.3f}" for v in self._desk.tracker.probe.tip_offset))
+
+    def _remember(self) -> None:
+        self._memory.set(**{_MEMORY: {name: field.text() for name, field in self.fields.items()}})
+
+    # Widgets
+
+    def _make_fields(self) -> None:
+        self.fields = {name: QLineEdit() for name in _HINTS}
+        for name, (caption, hint) in _HINTS.items():
+            self.fields[name].setAccessibleName(caption)
+            self.fields[name].setPlaceholderText(hint)
+            self.fields[name].setToolTip(hint)
+        self.words, self.pivot_words = text_label(wrap=True), text_label(role="hint", wrap=True)
+        self.send_words, self.problem = (
+            text_label(role="hint", wrap=True),
+            text_label(role="danger", wrap=True),
+        )
+        self.problem.hide()
+        self.turned = QProgressBar()
+        self.turned.setTextVisible(False)
+        self.send_port = QLineEdit(str(_SEND_PORT))
+        self.send_port.setAccessibleName("Port to send the pose from")
+        self.send_port.setFixedWidth(72)
+        self.audible = QCheckBox("A sound for every touch: one recorded, two refused")
+
+    def _make_buttons(self) -> None:
+        self.connect_button, self.pivot = QPushButton(), QPushButton()
+        self.finish, self.send = QPushButton("Use this tip"), QPushButton()
+        for button in (self.connect_button, self.finish):
+            button.setProperty("role", "primary")
+        self.connect_button.clicked.connect(self._toggle_link)
+        self.pivot.clicked.connect(self._toggle_pivot)
+        self.finish.clicked.connect(self._finish_pivot)
+        self.send.clicked.connect(self._toggle_sending)
+        for button in (self.pivot, self.finish, self.send):
+            button.setAutoDefault(False)
+
+    def _lay_out(self) -> None:
+        column = QVBoxLayout(self)
+        column.setContentsMargins(16, 16, 16, 16)
+        column.setSpacing(8)
+        column.addWidget(self._link_card())
+        column.addWidget(self._tip_card())
+        column.addWidget(self._send_card())
+        column.addWidget(self.audible)
+        column.addWidget(self.problem)
+        close = QPushButton("Close")
+        close.setAutoDefault(False)
+        close.clicked.connect(self.accept)
+        row = QHBoxLayout()
+        row.addStretch(1)
+        row.addWidget(close)
+        column.addLayout(row)
+
+    def _link_card(self) -> Card:
+        card, form = Card("OpenIGTLink server"), _form()
+        for name in ("host", "port", "probe", "reference", "button"):
+            form.addRow(_HINTS[name][0], self.fields[name])
+        card.add(form)
+        row = QHBoxLayout()
+        row.setSpacing(12)
+        row.addWidget(self.connect_button)
+        row.addWidget(self.words, 1)
+        card.add(row)
+        return card
+
+    def _tip_card(self) -> Card:
+        card, form = Card("Probe tip"), _form()
+        form.addRow(_HINTS["tip"][0], self.fields["tip"])
+        card.add(form)
+        card.add(self.pivot_words)
+        card.add(self.turned)
+        row = QHBoxLayout()
+        row.addWidget(self.pivot)
+        row.addWidget(self.finish)
+        row.addStretch(1)
+        card.add(row)
+        return card
+
+    def _send_card(self) -> Card:
+        card = Card("Pose back out")
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(self.send)
+        row.addWidget(text_label("on port", "hint"))
+        row.addWidget(self.send_port)
+        row.addStretch(1)
+        card.add(self.send_words)
+        card.add(row)
+        return card
+
+
+def _form() -> QFormLayout:
+    form = QFormLayout()
+    form.setHorizontalSpacing(12)
+    form.setVerticalSpacing(6)
+    form.setLabelAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    return form

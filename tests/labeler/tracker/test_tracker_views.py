@@ -1,0 +1,174 @@
+"""The tracked probe as a person meets it: dialog, card and guide, against a server in another process."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+from tracker_cases import POINTS, TIP, SimulatorProcess
+
+from gp_core import Atlas, Side
+from gp_labeler.pose_desk import ORDER
+from gp_labeler.session.touches import TouchHow
+from gp_labeler.tracker import TrackerAddress
+from gp_labeler.views.guide import GuideWindow
+from gp_labeler.views.panels.tracker_card import TrackerCard
+from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.window_state import WindowState
+from gp_labeler.workbench import Workbench
+
+WAIT_MS = 30_000
+
+
+@pytest.fixture
+def desk():
+    desk = Workbench(atlas=Atlas.published(), author="AB")
+    yield desk
+    desk.close(discard=True)
+
+
+@pytest.fixture
+def top(qtbot):
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    return widget
+
+
+@pytest.fixture(scope="module")
+def simulator(tmp_path_factory):
+    process = SimulatorProcess(tmp_path_factory.mktemp("views"), "--noise", "0.05")
+    yield process
+    process.close()
+
+
+def going(qtbot, desk, true):
+    """Poll as the window's timer does, until something is true."""
+
+    def step():
+        desk.tracker.poll()
+        assert true()
+
+    qtbot.waitUntil(step, timeout=WAIT_MS)
+
+
+def connected(qtbot, desk, simulator):
+    desk.tracker.set_tip_offset(TIP)
+    desk.tracker.connect(TrackerAddress(port=simulator.port))
+    going(qtbot, desk, lambda: desk.tracker.visible)
+
+
+def typed(qtbot, field, text):
+    field.clear()
+    qtbot.keyClicks(field, text)
+
+
+def test_the_dialog_connects_remembers_and_finds_the_tip(qtbot, desk, top, simulator):
+    memory = WindowState()
+    dialog = TrackerDialog(desk, memory, top)
+    dialog.show()
+    typed(qtbot, dialog.fields["port"], str(simulator.port))
+    qtbot.mouseClick(dialog.connect_button, Qt.MouseButton.LeftButton)
+    simulator.do("go RWA 0.2")
+    going(qtbot, desk, lambda: desk.tracker.visible)
+    assert "Receiving ProbeToTracker" in dialog.words.text()
+    qtbot.mouseClick(dialog.pivot, Qt.MouseButton.LeftButton)
+    simulator.tell("turn 15")
+    going(qtbot, desk, lambda: dialog.finish.isEnabled())
+    qtbot.mouseClick(dialog.finish, Qt.MouseButton.LeftButton)
+    tip = np.array([float(word) for word in dialog.fields["tip"].text().split()])
+    assert np.linalg.norm(tip - TIP) < 1.0
+    assert "residual" in dialog.pivot_words.text()
+    qtbot.mouseClick(dialog.connect_button, Qt.MouseButton.LeftButton)
+    assert not desk.tracker.on
+    again = TrackerDialog(desk, memory, top)
+    assert again.fields["port"].text() == str(simulator.port)
+    again.close()
+    dialog.close()
+
+
+@pytest.mark.parametrize(
+    ("field", "text", "complaint"),
+    [("port", "99999", "1 to 65535"), ("host", "", "host is empty"), ("tip", "1 2", "three finite numbers"),
+     ("tip", "a b c", "three numbers")],
+)  # fmt: skip
+def test_the_dialog_refuses_what_cannot_be(qtbot, desk, top, field, text, complaint):
+    dialog = TrackerDialog(desk, WindowState(), top)
+    dialog.show()
+    typed(qtbot, dialog.fields[field], text)
+    qtbot.mouseClick(dialog.connect_button, Qt.MouseButton.LeftButton)
+    assert complaint in dialog.problem.text()
+    assert not desk.tracker.on
+    dialog.close()
+
+
+def test_the_pose_is_sent_and_stopped_from_the_dialog(qtbot, desk, top):
+    dialog = TrackerDialog(desk, WindowState(), top)
+    dialog.show()
+    typed(qtbot, dialog.send_port, "x")
+    qtbot.mouseClick(dialog.send, Qt.MouseButton.LeftButton)
+    assert "port must be a whole number" in dialog.problem.text()
+    typed(qtbot, dialog.send_port, "0")
+    qtbot.mouseClick(dialog.send, Qt.MouseButton.LeftButton)
+    assert "no pose yet" in dialog.send_words.text()
+    qtbot.mouseClick(dialog.send, Qt.MouseButton.LeftButton)
+    assert desk.tracker.sending == ""
+    dialog.close()
+
+
+def test_the_card_shows_only_a_tracker_that_is_asked_for(qtbot, desk, top, simulator):
+    card = TrackerCard(desk, top)
+    top.show()
+    assert not card.isVisible()
+    connected(qtbot, desk, simulator)
+    assert card.isVisible()
+    assert card.record.text() == f"Record {ORDER[0]}"
+    going(qtbot, desk, lambda: "mm" in card.tip.text())
+    desk.tracker.disconnect()
+    assert not card.isVisible()
+
+
+def test_guided_touching_by_a_foot_pedal(qtbot, desk, top, simulator):
+    guide = GuideWindow(desk, top)
+    guide.show()
+    connected(qtbot, desk, simulator)
+    names = list(POINTS)
+    simulator.do(f"go {names[0]} 0.2")
+    desk.pose.aim(names[0])
+    assert guide.code.text() == names[0]
+
+    def press_until_touched(key):
+        qtbot.keyClick(guide, key)
+        desk.tracker.refused.connect(lambda _: desk.tracker.press())
+        going(qtbot, desk, lambda: (Side.LEFT, names[0]) in desk.session.state.touches)
+        desk.tracker.refused.disconnect()
+
+    press_until_touched(Qt.Key.Key_PageDown)
+    assert guide.code.text() == desk.pose.target != names[0]
+    assert guide.counter.text() == "Left ear · 1 touched"
+    assert guide.redo.text() == f"Redo {names[0]}"
+    qtbot.keyClick(guide, Qt.Key.Key_Backspace)
+    assert desk.pose.target == names[0]
+    qtbot.keyClick(guide, Qt.Key.Key_S)
+    assert desk.pose.target != names[0]
+    guide.close()
+
+
+def test_the_guide_tells_the_estimate_and_why_nothing_was_recorded(qtbot, desk, top, simulator):
+    guide = GuideWindow(desk, top)
+    guide.show()
+    atlas = Atlas.published()
+    assert "3 more touches" in guide.result.text()
+    for code in ORDER[:4]:
+        desk.pose.record(atlas[code], TouchHow.TYPED)
+    assert "mm" in guide.result.text()
+    assert "only 4 points" in guide.warning.text()
+    connected(qtbot, desk, simulator)
+    simulator.do("hide")
+    going(qtbot, desk, lambda: not desk.tracker.visible)
+    qtbot.keyClick(guide, Qt.Key.Key_Space)
+    going(qtbot, desk, lambda: bool(guide.told.text()))
+    simulator.do("show")
+    assert len(desk.session.state.touches) == 4
+    qtbot.keyClick(guide, Qt.Key.Key_Escape)
+    assert not guide.isVisible()
