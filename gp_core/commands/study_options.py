@@ -100,7 +100,7 @@ def settings_of(args: argparse.Namespace, default: JrmpcSettings) -> JrmpcSettin
     return replace(named, **{name: value for name, value in numbers.items() if value is not None})
 
 
-def add_seed(parser: argparse.ArgumentParser) -> None:
+def add_seed(parser: argparse._ActionsContainer) -> None:
     """Add ``--seed``."""
     parser.add_argument("--seed", type=int, default=0, help="start of the random numbers; default: 0")
 
@@ -160,7 +160,7 @@ def _duration(seconds: float) -> str:
     return f"{minutes} min {rest:02} s" if minutes else f"{rest} s"
 
 
-def add_figure(parser: argparse.ArgumentParser) -> None:
+def add_figure(parser: argparse._ActionsContainer) -> None:
     """Add ``--figure FILE``."""
     parser.add_argument("--figure", metavar="FILE", help="draw the result here (.png, .pdf or .svg)")
 

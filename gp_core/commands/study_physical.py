@@ -6,9 +6,10 @@ import argparse
 from collections.abc import Iterator
 
 from gp_core.commands.options import Subparsers, add_command, add_json, read_atlas, save_json, say
+from gp_core.commands.study_options import add_figure, add_seed, rng_of, save_figure_of
 from gp_core.landmarks.files import read_landmarks, read_touches
 from gp_core.registration.stl import read_stl
-from gp_core.study.physical import PhysicalReport, physical_test
+from gp_core.study.physical import PhysicalReport, physical_simulations, physical_test
 
 __all__ = ["add"]
 
@@ -20,7 +21,7 @@ def add(commands: Subparsers) -> None:
         "physical",
         run,
         summary="hold the estimate from touches of a skull against its CT",
-        example="gp-core physical --touches skull.dat --ct-landmarks skull_R.mrk.json --side R",
+        example="gp-core physical --touches skull.dat --ct-landmarks ct_R.mrk.json --side R --figure out.png",
     )
     parser.add_argument(
         "--touches",
@@ -47,20 +48,34 @@ def add(commands: Subparsers) -> None:
         metavar="FILE",
         help="bone of the CT (.stl, mm): touched points that the CT does not name are registered to it",
     )
+    drawn = parser.add_argument_group("figure", "Figure 6 C and D of simulated sides, with the skull on it")
+    add_figure(drawn)
+    drawn.add_argument("--n", type=int, default=1000, help="animals to simulate a side; default: 1000")
+    drawn.add_argument(
+        "--noise", type=float, default=0.0, metavar="MM", help="SD of their touch errors; default: 0"
+    )
+    add_seed(drawn)
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Test, print, and write what was asked for."""
     atlas, specimens = read_atlas(args.atlas)
+    touches = read_touches(args.touches, args.side, unknown="extra")
+    rng = rng_of(args)
     report = physical_test(
-        read_touches(args.touches, args.side, unknown="extra"),
+        touches,
         read_landmarks(args.ct_landmarks, side=args.side, unknown="extra"),
         atlas=atlas,
         specimens=specimens,
         bone=None if args.bone is None else read_stl(args.bone),
     )
     save_json(args.json, report.as_dict())
+    if args.figure is not None:
+        simulated = physical_simulations(
+            touches, specimens=specimens, atlas=atlas, n=args.n, noise=args.noise, rng=rng
+        )
+        save_figure_of(args.figure, "draw_physical", report, simulated)
     for line in _lines(report):
         say(line)
     return 0

@@ -46,8 +46,8 @@ def add(commands: Subparsers) -> None:
     pivot.add_argument(
         "poses",
         metavar="FILE",
-        help="marker to tracker, mm: a 4x4 matrix in each row, 16 numbers or its first 12, after a time stamp "
-        "or not; or in every four rows of four",
+        help="marker to tracker, mm: a 4x4 matrix in each row, 16 numbers or the first 12, after a time stamp"
+        " or not; or four rows of four",
     )
     add_json(pivot)
 

@@ -20,12 +20,14 @@ from gp_core.study.compare import PROBES, ComparisonReport, ComparisonRow
 from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
 from gp_core.study.nested import NestedReport
+from gp_core.study.physical import PhysicalReport
 from gp_core.study.simulation import SimulationReport
 from gp_core.study.subset_search import SearchReport
 
 __all__ = [
     "comparison",
     "distance_matrix",
+    "draw_physical",
     "error_boxes",
     "error_histograms",
     "nested_errors",
@@ -40,6 +42,10 @@ AXIS_ERROR, ORIGIN_ERROR = "Modiolar-axis error (degrees)", "Cochlea-origin erro
 
 ACCENT = "#b5403a"
 """Colour of what stands out."""
+
+_SIDES = {"L": "left", "R": "right"}
+_METHODS = {"jrmpc": "JRMPC", "robust": "robust"}
+_WAYS = {"names": ("o", "by names"), "icp": ("s", "by ICP"), "surface": ("^", "to the bone's surface")}
 
 _INK, _FAINT = "#222222", "#d9d9d9"
 _SUFFIXES = (".png", ".pdf", ".svg")
@@ -223,21 +229,10 @@ def error_boxes(report: SimulationReport, physical: Sequence[tuple[float, float]
     """
     figure, (first, second) = new_figure(1, 2, (7.0, 3.2))
     groups = report.groups
-    names = [{"L": "left", "R": "right"}.get(name, name) for name in groups]
+    names = [_SIDES.get(name, name) for name in groups]
     touched = [[skull[1] for skull in physical], [skull[0] for skull in physical]]
     for ax, error, circles in ((first, "e_ma_deg", touched[0]), (second, "e_co_mm", touched[1])):
-        values = [getattr(errors, error) for errors in groups.values()]
-        drawn = ax.boxplot(
-            values,
-            showfliers=False,
-            showmeans=True,
-            widths=0.5,
-            patch_artist=True,
-            medianprops={"color": _INK},
-            meanprops={"marker": "D", "mfc": "white", "mec": _INK, "ms": 4},
-        )
-        for box, colour in zip(drawn["boxes"], (LEFT, RIGHT, "#b8b8b8")[-len(names) :], strict=True):
-            box.set(facecolor=colour, alpha=0.75, linewidth=0.8)
+        _boxes(ax, report, error, 1)
         ax.plot([len(names) + 1] * len(circles), circles, "o", mfc="none", mec=ACCENT, ms=6, mew=1.3)
         shown = [*names, "skulls"] if circles else names
         ax.set_xticks(range(1, len(shown) + 1), shown)
@@ -245,11 +240,89 @@ def error_boxes(report: SimulationReport, physical: Sequence[tuple[float, float]
         ax.set_ylim(bottom=0)
     label(first, "C", "", AXIS_ERROR)
     label(second, "D", "", ORIGIN_ERROR)
-    n = len(groups["pooled"].e_co_mm)
-    note = f"method {report.method}, {n} simulated sides"
-    note += f", noise {report.noise:g} mm" if report.noise else ""
-    figure.suptitle(note, fontsize=8, color=_INK)
+    figure.suptitle(f"method {report.method}, {_simulated(report)}", fontsize=8, color=_INK)
     return figure
+
+
+def _boxes(ax: Axes, report: SimulationReport, error: str, first: int) -> None:
+    """Draw a box for each group of simulated sides, from position `first` on."""
+    values = [getattr(errors, error) for errors in report.groups.values()]
+    drawn = ax.boxplot(
+        values,
+        positions=range(first, first + len(values)),
+        showfliers=False,
+        showmeans=True,
+        widths=0.5,
+        patch_artist=True,
+        medianprops={"color": _INK},
+        meanprops={"marker": "D", "mfc": "white", "mec": _INK, "ms": 4},
+    )
+    for box, colour in zip(drawn["boxes"], (LEFT, RIGHT, "#b8b8b8")[-len(values) :], strict=True):
+        box.set(facecolor=colour, alpha=0.75, linewidth=0.8)
+
+
+def _simulated(report: SimulationReport) -> str:
+    n = len(report.groups["pooled"].e_co_mm)
+    return f"{n} simulated sides" + (f", noise {report.noise:g} mm" if report.noise else "")
+
+
+def draw_physical(
+    report: PhysicalReport, simulation: SimulationReport | Sequence[SimulationReport] | None = None
+) -> Figure:
+    """Draw the errors of a touched skull, over those of simulated sides where these are given.
+
+    The boxes are Figure 6 C and D of the paper, one set for each method simulated; the marks of the skull
+    stand on the box of its method and side.
+
+    Parameters
+    ----------
+    report : PhysicalReport
+    simulation : SimulationReport or sequence of these, optional
+        Of one method each.
+    """
+    given = [simulation] if isinstance(simulation, SimulationReport) else list(simulation or ())
+    simulations = {each.method: each for each in given}
+    methods = list(dict.fromkeys(row.method for row in report.rows))
+    figure, (first, second) = new_figure(1, 2, (3.0 + 2.2 * max(len(methods), 2), 3.7))
+    for ax, error in ((first, "e_ma_deg"), (second, "e_co_mm")):
+        position, ticks = 1, []
+        for method in methods:
+            found = simulations.get(method)
+            names = list(found.groups) if found else [report.side]
+            if found:
+                _boxes(ax, found, error, position)
+            rows = [row for row in report.rows if row.method == method]
+            at = names.index(report.side if report.side in names else "pooled")
+            _marks(ax, [(row.registration, getattr(row, error)) for row in rows], position + at)
+            ticks += [(position + i, _SIDES.get(name, name)) for i, name in enumerate(names)]
+            middle = position + (len(names) - 1) / 2
+            ax.annotate(
+                _METHODS[method], (middle, 0), (0, -27), xycoords=ax.get_xaxis_transform(),
+                textcoords="offset points", ha="center", fontsize=9, color=_INK,
+            )  # fmt: skip
+            position += len(names) + 1
+        ax.set_xticks(*zip(*ticks, strict=True))
+        ax.set_xlim(0.3, position - 1.3)
+        ax.set_ylim(0, max(ax.get_ylim()[1], 1.08 * max(getattr(row, error) for row in report.rows)))
+    label(first, "C", " \n ", AXIS_ERROR)
+    label(second, "D", " \n ", ORIGIN_ERROR)
+    handles, texts = first.get_legend_handles_labels()
+    by_text = dict(zip(texts, handles, strict=True))
+    figure.legend(
+        by_text.values(), by_text, loc="outside lower center", ncols=3, fontsize=8, frameon=False,
+        title="Touched skull, registered to its CT", title_fontsize=8,
+    )  # fmt: skip
+    if given:
+        figure.suptitle(_simulated(given[0]), fontsize=8, color=_INK)
+    return figure
+
+
+def _marks(ax: Axes, found: Sequence[tuple[str, float]], position: float) -> None:
+    """Draw one mark a registration beside each other, so that near ones stay apart."""
+    for i, (way, value) in enumerate(found):
+        shape, text = _WAYS[way]
+        x = position + 0.36 * (i - (len(found) - 1) / 2)
+        ax.plot(x, value, shape, mfc="white", mec=ACCENT, ms=6, mew=1.4, ls="", label=text, zorder=5)
 
 
 def comparison(report: ComparisonReport) -> Figure:

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.draw import draw_animal
 from gp_core.atlas.pose import METHODS, CochleaPose, estimate_pose
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import modiolar_axis, with_cochlea_origin
+from gp_core.landmarks.features import CODES, EXTERNAL, TRAINING
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.targets import Surface
 from gp_core.study.scoring import angle_between_deg
+from gp_core.study.simulation import SimulationReport, simulate
 from gp_core.study.skull_registration import (
     SkullRegistration,
     register_by_icp,
@@ -22,7 +26,10 @@ from gp_core.study.skull_registration import (
     register_to_surface,
 )
 
-__all__ = ["PhysicalReport", "PhysicalRow", "physical_test"]
+__all__ = ["PhysicalReport", "PhysicalRow", "physical_simulations", "physical_test"]
+
+_N_DRAWN = 11
+"""As many as the paper labelled."""
 
 
 @dataclass(frozen=True)
@@ -113,6 +120,46 @@ def physical_test(
     rows = [_row(registration, pose, true) for registration in registrations for pose in poses]
     return PhysicalReport(
         touches.side.value, tuple(registrations), tuple(rows), tuple(_warnings(registrations, poses))
+    )
+
+
+def physical_simulations(
+    touches: LandmarkSet,
+    *,
+    specimens: Sequence[Specimen] | None = None,
+    atlas: Atlas | None = None,
+    n: int = 1000,
+    noise: float = 0.0,
+    rng: np.random.Generator,
+    executor: Executor | None = None,
+) -> tuple[SimulationReport, ...]:
+    """Simulate sides that are touched as this skull was, to hold its errors against (Figure 6 C and D).
+
+    Parameters
+    ----------
+    touches : LandmarkSet
+        Which features were touched.
+    specimens : sequence of Specimen, optional
+        Labelled animals: both methods are then simulated from their scatter. Without them, the robust one is,
+        from eleven animals drawn from the atlas.
+    atlas : Atlas, optional
+        By default the published one.
+    n, noise, rng, executor
+        As in `gp_core.study.simulation.simulate`.
+
+    Raises
+    ------
+    GpError
+        As `gp_core.study.simulation.simulate` does.
+    """
+    probe = [code for code in touches.placed if code in EXTERNAL and code in TRAINING]
+    methods = METHODS if specimens else METHODS[:1]
+    if not specimens:
+        whole = atlas if atlas is not None and len(atlas.codes) == len(CODES) - 1 else Atlas.published()
+        specimens = [draw_animal(whole, rng=rng, name=f"{i}") for i in range(_N_DRAWN)]
+    return tuple(
+        simulate(specimens, n=n, rng=rng, method=method, probe=probe, noise=noise, executor=executor)
+        for method in methods
     )
 
 

@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 from study_cases import herd
@@ -13,7 +14,8 @@ from study_cases import herd
 from gp_core import PROBE, GpError, RigidTransform
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.targets import Surface
-from gp_core.study.physical import PhysicalReport, PhysicalRow, physical_test
+from gp_core.study import figures
+from gp_core.study.physical import PhysicalReport, PhysicalRow, physical_simulations, physical_test
 from gp_core.study.skull_registration import register_by_icp, register_by_names
 
 HERD = herd(6, seed=3)
@@ -135,3 +137,35 @@ def test_what_cannot_be_tested_is_refused() -> None:
     both = [LandmarkSet(s.points, "R", s.frame, extra=MappingProxyType(line)) for s in (touches, ct)]  # type: ignore[arg-type]
     with pytest.raises(GpError, match="on one line"):
         physical_test(*both)
+
+
+def marks(ax: Axes) -> list[tuple[float, float]]:
+    """Where the skull's marks stand; boxes have no such colour."""
+    lines = [line for line in ax.lines if line.get_markeredgecolor() == figures.ACCENT]
+    return [(float(np.ravel(line.get_xdata())[0]), float(np.ravel(line.get_ydata())[0])) for line in lines]
+
+
+def test_the_skull_is_drawn_on_the_simulated_sides() -> None:
+    touches, ct, _ = skull(noise=0.2)
+    report = physical_test(touches, ct, specimens=HERD)
+    simulated = physical_simulations(touches, specimens=HERD, n=20, rng=np.random.default_rng(0))
+    assert [each.method for each in simulated] == ["robust", "jrmpc"]
+    assert set(simulated[0].probe) == set(PROBE)
+    figure = figures.draw_physical(report, simulated)
+    for ax, error in zip(figure.axes, ("e_ma_deg", "e_co_mm"), strict=True):
+        assert [text.get_text() for text in ax.get_xticklabels()] == 2 * ["left", "right", "pooled"]
+        values = [getattr(row, error) for row in sorted(report.rows, key=lambda row: row.method == "jrmpc")]
+        assert [y for _, y in marks(ax)] == pytest.approx(values)
+        assert [round(x) for x, _ in marks(ax)] == [2, 2, 6, 6]  # on the right side's boxes
+        assert ax.get_ylim()[1] > max(values)
+
+
+def test_without_animals_those_of_the_atlas_are_simulated() -> None:
+    touches, ct, _ = skull()
+    report = physical_test(touches, ct)
+    simulated = physical_simulations(touches, n=10, noise=0.1, rng=np.random.default_rng(0))
+    assert [each.method for each in simulated] == ["robust"]
+    assert len(marks(figures.draw_physical(report, simulated[0]).axes[0])) == 2
+    alone = figures.draw_physical(report)
+    assert [text.get_text() for text in alone.axes[0].get_xticklabels()] == ["right"]
+    assert len(marks(alone.axes[1])) == 2

@@ -130,7 +130,10 @@ def test_physical(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str
     touches.write_text("\n".join("\t".join(repr(float(x)) for x in row) for row in rows) + "\n")
     report = tmp_path / "physical.json"
     files = ["--touches", str(touches), "--ct-landmarks", str(tmp_path / "ct_R.mrk.json")]
-    assert main(["physical", *files, "--side", "R", "--atlas", folder, "--json", str(report)]) == 0
+    figure = tmp_path / "skull.png"
+    words = ["--atlas", folder, "--json", str(report), "--figure", str(figure), "--n", "10"]
+    assert main(["physical", *files, "--side", "R", *words]) == 0
+    assert figure.read_bytes().startswith(b"\x89PNG")
     content = json.loads(report.read_text())
     assert [r["way"] for r in content["registrations"]] == ["names", "icp"]
     assert content["registrations"][0]["fre_mm"] < 1e-6
