@@ -9,7 +9,7 @@ import numpy as np
 from gp_core.atlas.atlas import DEFINING, Atlas
 from gp_core.atlas.named_fit import NamedFit, TouchModel, fit_named_points, motion_jacobian
 from gp_core.checks import FloatArray
-from gp_core.errors import FeatureError
+from gp_core.errors import FeatureError, GeometryError
 from gp_core.frames import mirror_x
 from gp_core.landmarks.anatomy import cochlea_origin
 from gp_core.landmarks.features import Side
@@ -19,6 +19,9 @@ __all__ = ["Departure", "departures", "predict"]
 
 LABELLING_NOISE_MM = 0.1
 """Scale of a placed label's error: about a voxel, mm a coordinate."""
+
+UNKNOWN_ANGLE_SD = np.pi / np.sqrt(3)
+"""Standard deviation of an angle of which nothing is known, rad."""
 
 
 @dataclass(frozen=True)
@@ -119,6 +122,7 @@ def _given(
     precision = np.linalg.inv(atlas.cross_covariance(known, known) + np.diag(noise))
     jacobian = fit.jacobian
     information = jacobian.T @ precision @ jacobian
+    _check_turn(information)
     shift = np.linalg.solve(information, jacobian.T @ precision @ fit.residual)
     cross = atlas.cross_covariance(wanted, known) @ precision
     prior = atlas.rows(wanted)
@@ -127,6 +131,21 @@ def _given(
     lever = motion - cross @ jacobian
     covariance = atlas.cross_covariance(wanted, wanted) - cross @ atlas.cross_covariance(known, wanted)
     return mean, covariance + lever @ np.linalg.solve(information, lever.T)
+
+
+def _check_turn(information: FloatArray) -> None:
+    """Refuse points that tell no more of the turn of the head than no points would.
+
+    `information` (6, 6): of the translation, 1/mm^2, and the rotation, 1/rad^2.
+    """
+    about_middle = information[3:, 3:] - information[3:, :3] @ np.linalg.solve(
+        information[:3, :3], information[:3, 3:]
+    )
+    if not np.linalg.eigvalsh(about_middle)[0] > UNKNOWN_ANGLE_SD**-2:
+        raise GeometryError(
+            "the placed features lie at one place or on one line, and do not tell how the head is turned",
+            remedy="Place one that lies apart, and check that the labels are in mm.",
+        )
 
 
 def _to_frame(

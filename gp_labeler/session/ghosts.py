@@ -17,7 +17,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
 from gp_core.landmarks.sets import LandmarkSet, Status
 
-__all__ = ["Doubt", "Expectations", "Ghost", "Judging", "Predict", "mirror_ghosts"]
+__all__ = ["Departure", "Doubt", "Expectations", "Ghost", "Judging", "Predict", "mirror_ghosts"]
 
 Predict = Callable[[LandmarkSet], Mapping[str, tuple[FloatArray, FloatArray]]]
 """Mean (3,) and covariance (3, 3) of every feature, given some: `gp_core.atlas.shape.predict`."""
@@ -28,6 +28,9 @@ N_FOR_DOUBTS = 5
 
 CHI2_95 = 7.815
 """95 % quantile of the squared distance of a point from its mean, in standard deviations, in space."""
+
+HEAD_MM = 40.0
+"""No two features of a head are further apart."""
 
 N_REMEMBERED = 16
 
@@ -64,8 +67,8 @@ class Ghost:
 
 
 @dataclass(frozen=True)
-class Doubt:
-    """A placed point far from where the others make the atlas expect it.
+class Departure:
+    """How far a placed point is from where the others make the atlas expect it.
 
     Parameters
     ----------
@@ -83,6 +86,29 @@ class Doubt:
     distance: float
     expected: FloatArray
     n_sd: float
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a person should look at the point again."""
+        return self.n_sd > DOUBTFUL_SD
+
+    @property
+    def word(self) -> str:
+        """Such as ``2.6 mm``, or ``far off`` where a number would mean nothing."""
+        if self.distance > HEAD_MM:
+            return "far off"
+        return f"{self.distance:.{1 if self.distance > 0.995 else 2}f} mm"
+
+    @property
+    def text(self) -> str:
+        """Such as ``2.6 mm from where the atlas expects it``."""
+        if self.distance > HEAD_MM:
+            return "nowhere near where the other points put it: check names, side and units"
+        return f"{self.word} from where the atlas expects it"
+
+
+Doubt = Departure
+"""A departure that is doubtful."""
 
 
 T = TypeVar("T")
@@ -110,17 +136,27 @@ class Expectations:
         key = ("ghosts", _fingerprint(landmarks), _fingerprint(other))
         return self._remembered(key, lambda: self._ghosts(landmarks, other))
 
-    def doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt]:
-        """Return the placed features that are far from where the others make the atlas expect them, by code.
+    def departures(self, landmarks: LandmarkSet) -> Mapping[str, Departure]:
+        """Return how far every placed feature is from where the others make the atlas expect it, by code.
 
         That takes a while: 20 ms for a good set, 150 ms where one point is off. The atlas must see to it that
-        one wrong point does not accuse its neighbours; `gp_core.atlas.shape` does.
+        one wrong point does not accuse its neighbours; `gp_core.atlas.shape` does. Empty with fewer than
+        `N_FOR_DOUBTS` placed.
         """
-        return self._remembered(("doubts", _fingerprint(landmarks)), lambda: self._doubts(landmarks))
+        return self._remembered(("departures", _fingerprint(landmarks)), lambda: self._departures(landmarks))
+
+    def known_departures(self, landmarks: LandmarkSet) -> Mapping[str, Departure] | None:
+        """Return `departures` where they were found before, else None; at once."""
+        return self._known.get(("departures", _fingerprint(landmarks)))
+
+    def doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt]:
+        """Return those of the `departures` that are doubtful."""
+        return _doubtful(self.departures(landmarks))
 
     def known_doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt] | None:
         """Return `doubts` where they were found before, else None; at once."""
-        return self._known.get(("doubts", _fingerprint(landmarks)))
+        known = self.known_departures(landmarks)
+        return None if known is None else _doubtful(known)
 
     def _remembered(self, key: tuple[object, ...], make: Callable[[], dict[str, T]]) -> Mapping[str, T]:
         if key not in self._known:
@@ -149,13 +185,13 @@ class Expectations:
         except GpError:  # such as points on a line, which determine nothing
             return {}
 
-    def _doubts(self, landmarks: LandmarkSet) -> dict[str, Doubt]:
+    def _departures(self, landmarks: LandmarkSet) -> dict[str, Departure]:
         placed = _without(landmarks, "CO")
         if len(placed.placed) < N_FOR_DOUBTS:
             return {}
-        return {code: doubt for code in placed.placed if (doubt := self._judged(placed, code))}
+        return {code: departure for code in placed.placed if (departure := self._departure(placed, code))}
 
-    def _judged(self, landmarks: LandmarkSet, code: str) -> Doubt | None:
+    def _departure(self, landmarks: LandmarkSet, code: str) -> Departure | None:
         expected = self._expected(_without(landmarks, code))
         if code not in expected:
             return None
@@ -163,21 +199,26 @@ class Expectations:
         off = landmarks[code] - mean
         spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
         n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
-        return Doubt(code, float(np.linalg.norm(off)), mean, n_sd) if n_sd > DOUBTFUL_SD else None
+        return Departure(code, float(np.linalg.norm(off)), mean, n_sd)
 
 
 @dataclass(frozen=True)
 class Judging:
-    """A job (see `jobs`) that finds the doubts of one side, so that they are known afterwards."""
+    """A job (see `jobs`) that finds the departures of one side, so that they are known afterwards."""
 
     expectations: Expectations
     landmarks: LandmarkSet
     title: str = "Checking labels"
 
-    def run(self, progress: Callable[[float], None]) -> Mapping[str, Doubt]:
-        """Return the doubts."""
+    def run(self, progress: Callable[[float], None]) -> Mapping[str, Departure]:
+        """Return the departures."""
         progress(0.0)
-        return self.expectations.doubts(self.landmarks)
+        return self.expectations.departures(self.landmarks)
+
+    @property
+    def known(self) -> Mapping[str, Departure] | None:
+        """What it would find, where that was found before, else None; at once."""
+        return self.expectations.known_departures(self.landmarks)
 
 
 def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost]:
@@ -206,6 +247,10 @@ def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost
         variance = MIRROR_SD_MM**2 + (MIRROR_SD_PER_MM * reach) ** 2
         found[code] = Ghost(code, position, variance * np.eye(3), "mirror")
     return found
+
+
+def _doubtful(departures: Mapping[str, Departure]) -> Mapping[str, Doubt]:
+    return {code: departure for code, departure in departures.items() if departure.is_doubtful}
 
 
 def _without(landmarks: LandmarkSet, code: str) -> LandmarkSet:

@@ -125,8 +125,8 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
         who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
     if state is PointState.DOUBTFUL:
-        doubt = session.doubts(side)[code]
-        return f"{mm_text(doubt.distance)} from where the atlas expects it.", "danger"
+        words = session.doubts(side)[code].text
+        return f"{words[:1].upper()}{words[1:]}.", "danger"
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"
     if state is PointState.PLACED:

@@ -116,14 +116,13 @@ class LandmarkModel(QAbstractTableModel):
         if is_active and state in (PointState.TO_DO, PointState.GHOST):
             return "place"
         if state is PointState.DOUBTFUL:
-            return mm_text(self._workbench.session.doubts(side)[code].distance)
+            return self._workbench.session.doubts(side)[code].word
         return str(state.value)
 
     def _sentence(self, code: str, side: Side, state: PointState) -> str:
         text = f"{code} {side.word}: {state.value}"
         if state is PointState.DOUBTFUL:
-            distance = mm_text(self._workbench.session.doubts(side)[code].distance)
-            text += f", {distance} from where the atlas expects it"
+            text += f", {self._workbench.session.doubts(side)[code].text}"
         if state is PointState.GHOST:
             text += (
                 f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"

@@ -7,7 +7,7 @@ from atlas_cases import draw_side, random_pose
 from gp_core import Atlas, LandmarkSet, Side, Specimen, check_specimen, fit_atlas, predict
 from gp_core.atlas.quality import check_landmarks
 from gp_core.atlas.shape import departures
-from gp_core.errors import FeatureError
+from gp_core.errors import FeatureError, GeometryError
 from gp_core.frames import mirror_x
 
 
@@ -58,6 +58,16 @@ def test_predictions_move_with_the_head_and_mirror(published: Atlas, side: Landm
 def test_two_points_predict_nothing(published: Atlas, side: LandmarkSet) -> None:
     with pytest.raises(FeatureError, match="at least three placed features are needed, got 2"):
         predict(published, _only(side, ("CA", "OS")))
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-9, 1e-3])
+def test_labels_at_one_place_or_on_a_line_predict_nothing(published: Atlas, jitter: float) -> None:
+    rng = np.random.default_rng(0)
+    at_one_place = {code: jitter * rng.normal(size=3) for code in published.codes[:8]}
+    on_a_line = {code: (n, jitter * rng.normal(), 0) for n, code in enumerate(published.codes[:8])}
+    for points in (at_one_place, on_a_line):
+        with pytest.raises(GeometryError):
+            predict(published, LandmarkSet.from_mapping(points, "L"))
 
 
 def test_good_labels_pass(published: Atlas) -> None:

@@ -215,6 +215,17 @@ def test_the_atlas_is_asked_once_for_the_same_points():
     assert len(asked) == 19
 
 
+def test_nonsense_is_doubted_in_words_not_in_kilometres():
+    predicts = partial(shape_predict, Atlas.published())
+    rng = np.random.default_rng(0)
+    heap = {code: 1e-3 * rng.normal(size=3) for code in CODES if code != "CO"}
+    assert not Expectations(predicts).departures(LandmarkSet.from_mapping(heap, L))
+    off = {code: Atlas.published()[code] for code in heap} | {"ZL": (300.0, 0, 0)}
+    doubt = Expectations(predicts).doubts(LandmarkSet.from_mapping(off, L))["ZL"]
+    assert doubt.word == "far off"
+    assert "check names, side and units" in doubt.text
+
+
 def test_doubts_can_be_found_by_a_job():
     session = Session(BOTH.apply(SpecimenState()), predict=predict)
     session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
