@@ -34,6 +34,7 @@ __all__ = [
     "ReadScan",
     "SaveMesh",
     "WarmJoint",
+    "load_modules",
 ]
 
 FIRST_LOOK_VOXELS = 96**3
@@ -44,7 +45,7 @@ QUICK_TRIANGLES = 60_000
 _LOADING = threading.Lock()
 
 
-def _load(*modules: str) -> None:
+def load_modules(*modules: str) -> None:
     """Import what takes long, one thread at a time: two that import SciPy at once may find it half made."""
     with _LOADING:
         for module in modules:
@@ -65,7 +66,7 @@ class InspectScan:
 
     def run(self, progress: Progress) -> ImportPlan:
         """Read headers and names."""
-        _load("gp_labeler.imaging.readers.probe")
+        load_modules("gp_labeler.imaging.readers.probe")
         return inspect_volume(self.path, progress=progress, cancel=progress.cancelled, **self.options)
 
 
@@ -101,7 +102,7 @@ class ProposeThreshold:
     def run(self, progress: Progress) -> float:
         """Look at the histogram."""
         progress(0.0)
-        _load("skimage.filters")
+        load_modules("skimage.filters")
         return propose_threshold(self.volume)
 
 
@@ -189,7 +190,7 @@ class LoadAtlas:
 
     def run(self, progress: Progress) -> Atlas:
         """Build it from the published table."""
-        _load("gp_core.atlas.shape", "gp_core.atlas.published")
+        load_modules("gp_core.atlas.shape", "gp_core.atlas.published")
         progress(0.0)
         return Atlas.published()
 
@@ -203,7 +204,7 @@ class WarmJoint:
     def run(self, progress: Progress) -> None:
         """Register three points with themselves."""
         progress(0.0)
-        _load("gp_core.registration.kernels", "gp_core.atlas.jrmpc_pose")
+        load_modules("gp_core.registration.kernels", "gp_core.atlas.jrmpc_pose")
         from gp_core.registration.jrmpc import ESTIMATION, jrmpc
 
         points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]
@@ -232,7 +233,7 @@ class MakeDemo:
 
     def run(self, progress: Progress) -> Demo:
         """Draw the animal and scan it."""
-        _load("scipy.ndimage", "scipy.interpolate", "gp_labeler.imaging.phantom")
+        load_modules("scipy.ndimage", "scipy.interpolate", "gp_labeler.imaging.phantom")
         from gp_labeler.imaging.phantom import make_phantom
 
         progress(0.05)
@@ -271,6 +272,6 @@ def _mesh(
     **how: Any,
 ) -> Surface:
     """Mesh as one part, from `start` to `end`, of a job."""
-    _load("gp_labeler.imaging.islands")
+    load_modules("gp_labeler.imaging.islands")
     told: Told = lambda fraction: progress(start + (end - start) * fraction)  # noqa: E731
     return extract_isosurface(volume, threshold, progress=told, cancel=progress.cancelled, **how)

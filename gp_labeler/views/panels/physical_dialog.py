@@ -1,0 +1,165 @@
+"""The physical test of a touched and labelled skull: errors of each method, on the paper's Figure 6 C, D."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QPixmap
+from PySide6.QtWidgets import (
+    QDialog,
+    QGridLayout,
+    QHBoxLayout,
+    QLabel,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_core.errors import GpError
+from gp_core.landmarks.files import write_text
+from gp_labeler.physical_work import PhysicalResult, PhysicalTest
+from gp_labeler.session.jobs import Task
+from gp_labeler.views.bind import attempt
+from gp_labeler.views.panels.parts import Notice, text_label
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.workbench import Workbench
+
+__all__ = ["PhysicalDialog"]
+
+_METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
+_WAYS = {"names": "skull features by name", "icp": "skull features by ICP", "surface": "bone surface"}
+_FIGURE_WIDTH = 620
+
+
+class PhysicalDialog(QDialog):
+    """Runs the test in the background, and shows what comes of it.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose touches and labels; the side is the one of its Pose panel.
+    prompts : Prompts
+        Asks where to save.
+    """
+
+    def __init__(self, workbench: Workbench, prompts: Prompts, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk, self._prompts = workbench, prompts
+        self.result_found: PhysicalResult | None = None
+        side = workbench.pose.side
+        self.setWindowTitle("Test against the scan")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.setMinimumWidth(_FIGURE_WIDTH + 48)
+        self.title = text_label(f"{workbench.session.state.specimen}, {side.word} ear", "title")
+        self.busy = QProgressBar()
+        self.busy.setRange(0, 0)
+        self.busy.setTextVisible(False)
+        self.rows = QGridLayout()
+        self.rows.setHorizontalSpacing(24)
+        self.rows.setVerticalSpacing(4)
+        self.findings = QVBoxLayout()
+        self.figure = QLabel()
+        self.figure.setAccessibleName("Errors of this skull on those of simulated animals")
+        self._lay_out()
+        self._task = self._start()
+
+    def _start(self) -> Task[PhysicalResult] | None:
+        desk = self._desk
+        if desk.atlas is None:
+            self._fail("The atlas is not loaded yet. Try again in a moment.")
+            return None
+        test = PhysicalTest.of(desk.session.state, desk.pose.side, desk.atlas, desk.atlas_specimens)
+        desk.jobs.failed.connect(self._on_failed)
+        return desk.jobs.submit(test, self._show, key="physical test")
+
+    def _show(self, result: PhysicalResult) -> None:
+        self.result_found = result
+        self.busy.hide()
+        for column, words in enumerate(("Registered by", "FRE", "Method", "CO off by", "Axis off by")):
+            self.rows.addWidget(text_label(words, "hint"), 0, column)
+        fre = {registration.way: registration.fre_mm for registration in result.report.registrations}
+        for n, row in enumerate(result.report.rows, start=1):
+            cells = (
+                _WAYS.get(row.registration, row.registration),
+                f"{fre[row.registration]:.2f} mm",
+                _METHODS.get(row.method, row.method),
+                f"{row.e_co_mm:.2f} mm",
+                f"{row.e_ma_deg:.1f}°",
+            )
+            for column, text in enumerate(cells):
+                self.rows.addWidget(text_label(text), n, column)
+        for text in result.report.warnings:
+            self.findings.addWidget(Notice("warning", text))
+        if len({row.method for row in result.report.rows}) == 1:
+            hint = "JRMPC takes part where the atlas was fitted from labelled animals (step Atlas)."
+            self.findings.addWidget(Notice("info", hint))
+        self._show_figure(result.figure)
+        for button in (self.save_figure, self.save_json):
+            button.setEnabled(True)
+
+    def _show_figure(self, png: bytes) -> None:
+        ratio, picture = self.devicePixelRatioF(), QPixmap()
+        picture.loadFromData(png)
+        mode = Qt.TransformationMode.SmoothTransformation
+        picture = picture.scaledToWidth(round(_FIGURE_WIDTH * ratio), mode)
+        picture.setDevicePixelRatio(ratio)
+        self.figure.setPixmap(picture)
+
+    def _on_failed(self, task: object) -> None:
+        if task is self._task and isinstance(task, Task):
+            self._fail(task.message)
+
+    def _fail(self, words: str) -> None:
+        self.busy.hide()
+        self.findings.addWidget(Notice("error", words))
+
+    def _save_figure(self) -> None:
+        path = self._prompts.save_file("Save the figure", "physical.png", "PNG (*.png)")
+        if path is not None and self.result_found is not None:
+            attempt(self._desk, lambda: _write(path, self.result_found))
+
+    def _save_json(self) -> None:
+        path = self._prompts.save_file("Save the numbers", "physical.json", "JSON (*.json)")
+        if path is not None and self.result_found is not None:
+            text = json.dumps(self.result_found.report.as_dict(), indent=1) + "\n"
+            attempt(self._desk, lambda: write_text(path, text))
+
+    def done(self, code: int) -> None:
+        """Close, and end the work with it."""
+        self._desk.jobs.failed.disconnect(self._on_failed, missing_ok=True)
+        if self._task is not None:
+            self._task.cancel()
+        super().done(code)
+
+    def _lay_out(self) -> None:
+        self.save_figure, self.save_json = QPushButton("Save figure…"), QPushButton("Save numbers…")
+        for button, call in ((self.save_figure, self._save_figure), (self.save_json, self._save_json)):
+            button.setEnabled(False)
+            button.clicked.connect(call)
+        close = QPushButton("Close")
+        close.clicked.connect(self.accept)
+        buttons = QHBoxLayout()
+        for widget in (self.save_figure, self.save_json):
+            buttons.addWidget(widget)
+        buttons.addStretch(1)
+        buttons.addWidget(close)
+        column = QVBoxLayout(self)
+        column.setContentsMargins(20, 16, 20, 16)
+        column.setSpacing(10)
+        column.addWidget(self.title)
+        column.addWidget(self.busy)
+        column.addLayout(self.rows)
+        column.addLayout(self.findings)
+        column.addWidget(self.figure)
+        column.addLayout(buttons)
+
+
+def _write(path: Path, result: PhysicalResult | None) -> None:
+    assert result is not None
+    try:
+        Path(path).write_bytes(result.figure)
+    except OSError as error:
+        raise GpError(f"cannot be written: {error.strerror}", file=path) from None
