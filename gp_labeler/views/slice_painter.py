@@ -20,6 +20,7 @@ from gp_labeler.scene.slices import SliceImage, SliceSource
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.qt_paths import segments_path
+from gp_labeler.views.slice_layers import SliceName
 from gp_labeler.views.slice_lines import paint_lines
 from gp_labeler.views.theme import Theme, base_font, theme_of
 from gp_labeler.workbench import Workbench
@@ -83,6 +84,8 @@ class SlicePainter:
         self._paint_scale_bar(painter, view.shown, ratio)
         lines, reach = drawn_segments(self._desk, theme.scene), reach_of(view.source, view.plane)
         paint_lines(painter, lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
+        for layer in view.layers:
+            layer.paint(painter, view.shown, ratio)
         self._paint_ghosts(painter, view.shown, theme, ratio)
         self._paint_marks(painter, view.source, view.shown, theme, ratio)
 
@@ -184,9 +187,7 @@ class SlicePainter:
         self, painter: QPainter, source: SliceSource, shown: Shown, theme: Theme, ratio: float
     ) -> None:
         marks = drawn_marks(self._desk)
-        if not marks:
-            return
-        positions = np.array([mark.position for mark in marks])
+        positions = np.array([mark.position for mark in marks]).reshape(-1, 3)
         pixels, off = shown.scan_to_pixel(positions) + 0.5, np.abs(shown.off_slice(positions))
         near = off <= reach_of(source, shown.plane)
         in_slice = off <= 0.75 * source.step(shown.plane)
@@ -197,8 +198,9 @@ class SlicePainter:
         if self._desk.session.view.state.labels_visible:
             close = shown.mm_per_pixel * _CLOSE_PIXELS * ratio < 1.0
             named = [n for n in np.flatnonzero(near) if close or in_slice[n] or marks[n].active]
-            drawn = [(marks[n], pixels[n]) for n in named]
-            _draw_labels(painter, drawn, shown.size, ratio)
+            names = [_name(marks[n], pixels[n]) for n in named]
+            names += [name for layer in self._view.layers for name in layer.names(shown, ratio)]
+            _draw_names(painter, names, shown.size, ratio)
 
 
 def _picture(image: SliceImage, window: object, preview: float | None) -> QImage:
@@ -281,22 +283,23 @@ _CORNERS = {
 }
 
 
-def _draw_labels(
-    painter: QPainter, drawn: list[tuple[Mark, FloatArray]], size: tuple[int, int], ratio: float
-) -> None:
-    if not drawn:
-        return
+def _name(mark: Mark, pixel: FloatArray) -> SliceName:
+    gap, rank = (12.0, 2.0) if mark.active else (8.0, 0.0)
+    return SliceName(mark.label, pixel, _on_black(mark.state), gap, rank)
+
+
+def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int], ratio: float) -> None:
     font = _font(12, ratio, bold=True)
     metrics = QFontMetricsF(font)
-    sizes = [(metrics.horizontalAdvance(mark.label), metrics.capHeight() + 4 * ratio) for mark, _ in drawn]
+    high = metrics.capHeight() + 4 * ratio
     corners, shown = place_labels(
-        [pixel for _, pixel in drawn],
-        sizes,
+        [name.pixel for name in names],
+        [(max(metrics.horizontalAdvance(name.text), 1.0), high if name.text else 1.0) for name in names],
         size,
-        gaps=[8 * ratio + (4 * ratio if mark.active else 0) for mark, _ in drawn],
-        ranks=[2.0 * mark.active for mark, _ in drawn],
+        gaps=[name.gap * ratio for name in names],
+        ranks=[name.rank for name in names],
     )
     for n in np.flatnonzero(shown):
-        text = _outlined(drawn[n][0].label, font)
+        text = _outlined(names[n].text, font)
         text.translate(corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)
-        _draw_text(painter, text, _on_black(drawn[n][0].state), ratio)
+        _draw_text(painter, text, names[n].colour, ratio)

@@ -23,6 +23,7 @@ from gp_labeler.views.drawn import drawn_marks
 from gp_labeler.views.greys import drag_greys, greys_of
 from gp_labeler.views.hand import Hand, nudge
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.slice_layers import SliceLayer
 from gp_labeler.views.slice_painter import SlicePainter, reach_of
 from gp_labeler.workbench import Workbench
 
@@ -66,6 +67,7 @@ class SliceView(QWidget):
         self._desk = workbench
         self.source: SliceSource | None = None
         self.shown: Shown | None = None
+        self.layers: list[SliceLayer] = []
         self._control, self._hand = SliceControl(), Hand(workbench)
         self._painter = SlicePainter(workbench, self)
         self._greying: tuple[float, float] | None = None

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from gp_core.checks import FloatArray
+from gp_labeler.imaging.coil import CAP_MM, RISE, TURNS, Coil
 from gp_labeler.imaging.phantom import grey
 from gp_labeler.imaging.phantom.canvas import Canvas
 from gp_labeler.imaging.phantom.layout import Ear, unit
@@ -31,17 +32,10 @@ from gp_labeler.imaging.phantom.solids import (
 
 __all__ = ["Cochlea"]
 
-_CAP = 0.4
-_WALL = 0.34
 _LIP = 0.2
 _BRIDGE = 0.4
 """Bone to leave between the two windows, mm."""
 
-_TURNS = (0.0, 1.0, 2.0, 3.0, 3.6)
-_RISE = (0.13, 0.41, 0.64, 0.83, 0.915)
-"""Height of the middle of the duct after so many turns, as a share of CB-CA."""
-
-_DUCT = (0.5, 0.44, 0.37, 0.31, 0.26)
 _DENT_MM = 0.5
 _FILLET = 0.3
 _BULGE = 0.07
@@ -100,31 +94,16 @@ class Cochlea:
         points = [front, middle + 0.42 * away, back, middle - np.clip(room, 0.08, 0.22) * away]
         return Rim.through(points, along=along, outward=outward)
 
-    def radius(self, heights: FloatArray) -> FloatArray:
-        """Return the outer radius of the capsule at heights (n,) above CB, mm, before it is fitted to CC."""
-        from scipy.interpolate import PchipInterpolator
-
-        cc_height, cc_radius, _ = self._polar("CC")
-        cl_height, cl_radius, _ = self._polar("CL")
-        h = self.length
-        knots = [
-            (-1.4, 1.2),
-            (0.1 * h, 2.15),
-            (np.clip(cl_height, 0.25 * h, 0.4 * h), min(2.05, cl_radius - 0.22)),
-            (np.clip(cc_height, 0.5 * h, 0.72 * h), np.clip(cc_radius, 1.2, 1.5)),
-            (0.94 * h, 0.88),
-            (h + _CAP, 0.0),
-        ]
-        s, r = np.array(knots).T
-        squared = PchipInterpolator(s, r**2)(np.clip(heights, s[0], s[-1]))
-        beyond = np.maximum(heights - s[-1], 0) + np.maximum(s[0] - heights, 0)
-        return np.asarray(np.sqrt(np.maximum(squared, 0)) - beyond)
+    @cached_property
+    def coil(self) -> Coil:
+        """How its duct winds, before the capsule is fitted to CC."""
+        return Coil(self.length, self._polar("CC")[:2], self._polar("CL")[:2])
 
     def capsule(self) -> Solid:
         """Return the body of bone around the duct, bulging along its turns; its surface passes through CC."""
         steps = np.linspace(-2.5, self.length + 2.0, 2048)
-        radii = self.radius(steps).astype(np.float32)
-        turns = np.interp(steps / self.length, _RISE, _TURNS).astype(np.float32)
+        radii = self.coil.radius(steps).astype(np.float32)
+        turns = np.interp(steps / self.length, RISE, TURNS).astype(np.float32)
         bulge = (_BULGE * np.clip(steps, 0, 1) * np.clip(self.length - steps, 0, 1)).astype(np.float32)
         cc = self.ear["CC"]
         misfit = float(self._beyond(_as_grid(cc), steps, radii, turns, bulge)[0, 0, 0])
@@ -134,7 +113,7 @@ class Cochlea:
             fitted: Values = self._beyond(grid, steps, radii, turns, bulge) - np.float32(misfit) * near_cc
             return fitted
 
-        ends = np.stack([self.ear["CB"] - 1.5 * self.axis, self.ear["CA"] + _CAP * self.axis])
+        ends = np.stack([self.ear["CB"] - 1.5 * self.axis, self.ear["CA"] + CAP_MM * self.axis])
         return implicit(value, ends.min(axis=0) - 2.4, ends.max(axis=0) + 2.4)
 
     def _beyond(self, grid: Grid, steps: FloatArray, *tables: Values) -> Values:
@@ -148,11 +127,8 @@ class Cochlea:
 
     def duct_line(self, per_turn: int = 32) -> tuple[FloatArray, FloatArray]:
         """Return the middle (n, 3) of the coiled duct from base to apex, and its radius (n,)."""
-        turns = np.arange(0.08, _TURNS[-1], 1 / per_turn)
-        height = np.interp(turns, _TURNS, _RISE) * self.length
-        thick = np.interp(turns, _TURNS, _DUCT)
-        rho = np.maximum(self.radius(height) - _WALL - thick, 0.1)
-        angle = 2 * np.pi * turns[:, None]
+        height, rho, angle, thick = self.coil.duct(per_turn)
+        angle = angle[:, None]
         line = (
             self.ear["CB"]
             + height[:, None] * self.axis

@@ -1,0 +1,75 @@
+"""Outlines of an estimate on the screen, pixels."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.checks import FloatArray
+from gp_core.landmarks.features import Side
+from gp_labeler.scene.camera import Viewpoint
+from gp_labeler.scene.coil import duct_curve
+from gp_labeler.scene.ghosts import ellipse
+from gp_labeler.scene.pose_data import DrawnPose
+
+__all__ = ["coil_edges", "outline_of", "ring"]
+
+_PER_TURN = 96
+"""So many that an edge stays smooth where the duct runs towards the eye."""
+
+
+def outline_of(pose: DrawnPose, view: Viewpoint) -> FloatArray:
+    """Return the (N, 2) silhouette of the 95 % ellipsoid of CO."""
+    covariance = pose.covariance[:3, :3]
+    step = max(float(np.sqrt(np.trace(covariance))), 1e-3)
+    around = pose.origin + step * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    pixels = view.display(around)[:, :2]
+    slope = (pixels[1:4] - pixels[4:7]).T / (2 * step)
+    return ellipse(pixels[0], slope @ covariance @ slope.T)
+
+
+def ring(place: FloatArray, view: Viewpoint, radius: float) -> FloatArray:
+    """Return a closed circle, (N, 2), about a (3,) scan position."""
+    turn = np.linspace(0, 2 * np.pi, 33)
+    circle: FloatArray = view.display(place[None])[0, :2] + radius * np.stack(
+        [np.cos(turn), np.sin(turn)], axis=1
+    )
+    return circle
+
+
+def coil_edges(pose: DrawnPose, view: Viewpoint) -> list[FloatArray]:
+    """Return the edges, (N, 2) each, that the duct of the cochlea shows to the eye, without what it hides."""
+    line, along, radii = _curve(pose.side)
+    x, y, _ = view.display(pose.origin[None])[0]
+    away = view.ray(x, y)[1] @ pose.T_scan_cochlea[:3, :3]
+    across = np.cross(along, away)
+    across *= (radii / np.maximum(np.linalg.norm(across, axis=1), 1e-6))[:, None]
+    edges = []
+    for edge in (line + across, line - across):
+        pixels = view.display(pose.at(edge))[:, :2]
+        seen = np.flatnonzero(~_is_hidden(edge, line[::3], radii[::3], away))
+        runs = np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1)
+        edges += [pixels[run] for run in runs if len(run) > 1]
+    return edges
+
+
+def _is_hidden(
+    points: FloatArray, line: FloatArray, radii: FloatArray, away: FloatArray
+) -> NDArray[np.bool_]:
+    """Return which of (N, 3) points on a duct lie behind another part of it, looking along `away`."""
+    depth, line_depth = points @ away, line @ away
+    flat = points - depth[:, None] * away
+    middle = line - line_depth[:, None] * away
+    gap = (flat**2).sum(axis=1)[:, None] - 2 * flat @ middle.T + (middle**2).sum(axis=1)
+    covers = gap < (0.96 * radii) ** 2
+    hidden: NDArray[np.bool_] = (covers & (line_depth < depth[:, None] - 0.25 * radii)).any(axis=1)
+    return hidden
+
+
+@cache
+def _curve(side: Side) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the middle of the duct, its direction, and its radius."""
+    line, radii = duct_curve(side, _PER_TURN)
+    return line, np.gradient(line, axis=0), radii

@@ -1,0 +1,108 @@
+"""Strokes of an estimate on a slice, each with a dark edge that keeps it legible on bone."""
+
+from __future__ import annotations
+
+import numpy as np
+from PySide6.QtCore import QPointF, Qt
+from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.colours import DARK
+
+__all__ = ["area", "arrow", "colour_of", "hull", "line", "marker", "polygon"]
+
+_HALO = QColor(11, 15, 20, 170)
+_DASHES = {"solid": None, "dashed": [4.0, 2.2], "dotted": [1.2, 1.7]}
+_CORNERS = {
+    "diamond": ((0.0, -1.25), (1.1, 0.0), (0.0, 1.25), (-1.1, 0.0)),
+    "tall": ((0.0, -1.7), (1.0, 0.0), (0.0, 1.7), (-1.0, 0.0)),
+    "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
+}
+
+
+def colour_of(role: str) -> QColor:
+    """Return the colour of a state on slices, which are black in every theme."""
+    return QColor(DARK.states[role])
+
+
+def line(
+    painter: QPainter, points: FloatArray, colour: QColor, width: float, *, style: str = "solid"
+) -> None:
+    """Draw an open line of (N, 2) pixels."""
+    path = QPainterPath()
+    path.addPolygon(polygon(points))
+    pen = QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.RoundJoin)
+    halo = QPen(pen)
+    halo.setColor(_HALO)
+    halo.setWidthF(1.9 * width)
+    dashes = _DASHES[style]
+    if dashes is not None:
+        pen.setDashPattern(dashes)
+        halo.setDashPattern([n / 1.9 for n in dashes])
+    painter.strokePath(path, halo)
+    painter.strokePath(path, pen)
+
+
+def area(painter: QPainter, outlines: list[FloatArray], colour: QColor, alpha: int, width: float) -> None:
+    """Fill closed outlines faintly, and draw their edges."""
+    path = QPainterPath()
+    for outline in outlines:
+        path.addPolygon(polygon(outline))
+        path.closeSubpath()
+    fill = QColor(colour)
+    fill.setAlpha(alpha)
+    painter.fillPath(path, fill)
+    if width > 0:
+        painter.strokePath(path, QPen(_HALO, 2.0 * width))
+        painter.strokePath(path, QPen(colour, width))
+
+
+def marker(
+    painter: QPainter, pixel: FloatArray, shape: str, radius: float, colour: QColor, *, full: bool = True
+) -> None:
+    """Draw a ``ball``, ``diamond``, ``tall`` diamond or ``square`` about a pixel, or its outline only."""
+    path = QPainterPath()
+    if shape in _CORNERS:
+        path.addPolygon(polygon(pixel + radius * np.array(_CORNERS[shape])))
+        path.closeSubpath()
+    else:
+        path.addEllipse(QPointF(*pixel), radius, radius)
+    painter.strokePath(path, QPen(_HALO, 0.75 * radius))
+    if full:
+        painter.fillPath(path, colour)
+    painter.strokePath(path, QPen(colour, 0.35 * radius))
+
+
+def arrow(painter: QPainter, start: FloatArray, end: FloatArray, length: float, colour: QColor) -> None:
+    """Draw the head of an arrow, its point at `end`."""
+    along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    across = np.array([-along[1], along[0]])
+    shape = np.array([[0.0, 0.0], [-1.0, 0.42], [-1.0, -0.42]])
+    path = QPainterPath()
+    path.addPolygon(polygon(end + length * shape @ np.stack([along, across])))
+    path.closeSubpath()
+    painter.strokePath(path, QPen(_HALO, 0.25 * length))
+    painter.fillPath(path, colour)
+
+
+def polygon(points: FloatArray) -> QPolygonF:
+    """Return (N, 2) pixels as Qt has them."""
+    return QPolygonF([QPointF(x, y) for x, y in points.tolist()])
+
+
+def hull(points: FloatArray) -> FloatArray:
+    """Return the corners of the convex hull of (N, 2) points, in order (Andrew's monotone chain)."""
+    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
+    chains = []
+    for run in (ordered, ordered[::-1]):
+        chain: list[FloatArray] = []
+        for point in run:
+            while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
+                chain.pop()
+            chain.append(point)
+        chains += chain[:-1]
+    return np.array(chains)
+
+
+def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
+    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
