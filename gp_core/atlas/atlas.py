@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, FileFormatError, GpError
-from gp_core.landmarks.anatomy import cochlea_origin
+from gp_core.landmarks.anatomy import cochlea_frame, cochlea_origin
 from gp_core.landmarks.features import CODES, FEATURES, check_codes, index_of
 from gp_core.landmarks.files import check_plausible_size, write_text
 from gp_core.landmarks.sets import LandmarkSet
@@ -29,6 +29,8 @@ SCHEMA_VERSION = 1
 
 PLACED = tuple(row.code for row in FEATURES if not row.computed)
 """The features an atlas may hold, in the table's order."""
+
+_LARGEST_VARIANCE_MM2 = 1e4
 
 _FIXED = {"frame": "atlas", "side": "L", "units": "mm"}
 
@@ -85,8 +87,9 @@ class Atlas:
         self._check_covariance("scatter", self.scatter, least=-1e-9)
         if self.n_samples < 1:
             raise GpError(f"the atlas {self.name!r} must be of at least one side, got {self.n_samples}")
-        mean = dict(zip(codes, self.mean, strict=True))
-        check_plausible_size(LandmarkSet.from_mapping(mean, "L"), strict=True)
+        landmarks = LandmarkSet.from_mapping(dict(zip(codes, self.mean, strict=True)), "L")
+        check_plausible_size(landmarks, strict=True)
+        cochlea_frame(landmarks)  # raises where the four features give none
 
     def _freeze(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
         array = np.array(value, dtype=np.float64)
@@ -98,6 +101,8 @@ class Atlas:
     def _check_covariance(self, name: str, matrix: FloatArray, *, least: float) -> None:
         """Refuse what is no covariance, or one that promises more than any labels can."""
         size = np.abs(matrix).max()
+        if size > _LARGEST_VARIANCE_MM2:
+            raise GpError(f"the {name} of atlas {self.name!r} is larger than any animals differ")
         if np.abs(matrix - matrix.T).max() > 1e-9 * size:
             raise GpError(f"the {name} of atlas {self.name!r} is not symmetric")
         if np.linalg.eigvalsh(matrix).min() < least * size or not matrix.diagonal().min() > 0:

@@ -90,8 +90,10 @@ def run(args: argparse.Namespace) -> int:
     touches = read_touches(args.touches, args.side)
     atlas, specimens = read_atlas(args.atlas)
     if atlas is None and args.method == "robust":
-        atlas = fit_atlas(specimens or [])
-    with blaming(args.touches):
+        with blaming(" ".join(args.atlas)):
+            atlas = fit_atlas(specimens or [])
+    own_atlas = "" if args.atlas == ["published"] else f" with atlas {' '.join(args.atlas)}"
+    with blaming(args.touches + own_atlas):
         pose = estimate_pose(
             touches, args.side, atlas, method=args.method, specimens=specimens, probe_noise=args.probe_noise
         )

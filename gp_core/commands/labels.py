@@ -20,7 +20,16 @@ from gp_core.commands.options import (
     save_json,
     say,
 )
-from gp_core.landmarks.files import import_mat, load_specimens
+from gp_core.errors import GpError
+from gp_core.landmarks.anatomy import with_cochlea_origin
+from gp_core.landmarks.files import (
+    check_plausible_size,
+    import_mat,
+    landmarks_of,
+    load_specimens,
+    read_points,
+    specimen_of,
+)
 from gp_core.landmarks.sets import Specimen
 
 __all__ = ["add"]
@@ -58,6 +67,9 @@ def add(commands: Subparsers) -> None:
         example="gp-core check labelled/GP01_L.mrk.json labelled/GP01_R.mrk.json",
     )
     add_specimens(check)
+    check.add_argument(
+        "--side", choices=("L", "R"), help="side of one file that does not say it, in itself or by its name"
+    )
     check.add_argument("--atlas", nargs="+", default=["published"], metavar="ATLAS", help="as for estimate")
     add_json(check)
 
@@ -84,7 +96,9 @@ def run_import_mat(args: argparse.Namespace) -> int:
 
 def run_check(args: argparse.Namespace) -> int:
     """Print what there is to look at; status 1 where a label is doubtful."""
-    specimens = load_specimens(args.specimens)
+    specimens = (
+        load_specimens(args.specimens) if args.side is None else [_one_side(args.specimens, args.side)]
+    )
     atlas, others = read_atlas(args.atlas)
     report = {s.name: check_specimen(s, _atlas_for(s, atlas, others)) for s in specimens}
     save_json(args.json, {name: [_as_dict(f) for f in findings] for name, findings in report.items()})
@@ -95,6 +109,16 @@ def run_check(args: argparse.Namespace) -> int:
             codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
             say(f"  {mark} {finding.side.word:<5} {codes:<8} {finding.text}")
     return int(any(f.kind not in _HARMLESS for findings in report.values() for f in findings))
+
+
+def _one_side(files: list[str], side: str) -> Specimen:
+    """Read the one file whose side was said."""
+    if len(files) > 1:
+        raise GpError(f"--side is for one file, got {len(files)}", remedy="Check them one by one.")
+    points = read_points(files[0])
+    landmarks = with_cochlea_origin(landmarks_of(points, side=side))
+    check_plausible_size(landmarks, files[0])
+    return Specimen(specimen_of(points), {landmarks.side: landmarks})
 
 
 def _atlas_for(specimen: Specimen, atlas: Atlas | None, others: list[Specimen] | None) -> Atlas:

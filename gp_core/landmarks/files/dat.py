@@ -14,7 +14,7 @@ from gp_core.errors import FileFormatError
 from gp_core.landmarks.features import named_set
 from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.points import LabelledPoint, PointList, labelled_point
-from gp_core.landmarks.files.text import split_lines
+from gp_core.landmarks.files.text import DECIMAL_POINTS, has_decimal_comma, split_lines
 from gp_core.landmarks.sets import Status
 
 __all__ = ["is_sentinel", "read_dat", "skull_feature_names"]
@@ -64,14 +64,17 @@ def read_dat(path: str | PathLike[str]) -> PointList:
     FileFormatError
         Another number of rows or columns, or not finite numbers.
     """
-    rows = [(number, re.split(r"[\s,;]+", line.strip())) for number, line in split_lines(read_text(path))]
+    lines = dict(split_lines(read_text(path)))
+    rows = [(number, re.split(r"[\s,;]+", line.strip())) for number, line in lines.items()]
     layout = _LAYOUTS.get(len(rows))
     for number, fields in rows:
         if len(fields) != 3:
             raise FileFormatError(
                 f"line {number} has {len(fields)} columns, must have 3 (x y z in mm)",
                 file=path,
-                remedy="For points with names, give a .csv file with name,x,y,z.",
+                remedy=DECIMAL_POINTS
+                if all(has_decimal_comma(field) for field in lines[number].split())
+                else "For points with names, give a .csv file with name,x,y,z.",
             )
     if layout is None:
         raise FileFormatError(

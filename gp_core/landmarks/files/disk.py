@@ -71,6 +71,8 @@ def write_text(path: str | PathLike[str], text: str) -> None:
     """
     try:
         target = Path(os.path.realpath(path))  # a link stays a link
+        if target.is_dir():
+            raise GpError("is a folder, not a file", file=path, remedy="Name a file in it.")
         draft = target.with_name(f".{target.name}.{os.urandom(4).hex()}.tmp")
         try:
             with draft.open("x", encoding="utf-8", newline="\n") as stream:

@@ -20,7 +20,7 @@ from gp_core.landmarks.files.points import (
     labelled_point,
     points_of,
 )
-from gp_core.landmarks.files.text import shown, split_fields, split_lines
+from gp_core.landmarks.files.text import has_decimal_comma, shown, split_fields, split_lines
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["delimiter_of", "read_table", "write_csv"]
@@ -72,6 +72,8 @@ def read_table(path: str | PathLike[str]) -> PointList:
 
 def delimiter_of(line: str) -> str:
     """Return what separates the columns of a table, told from its first line."""
+    if all(has_decimal_comma(field) for field in line.split()[1:]) and len(line.split()) > 2:
+        return " "  # the commas are decimal ones: for the message, since such numbers are refused
     return next((mark for mark in "\t;," if mark in line), " ")
 
 
@@ -94,7 +96,7 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         raise FileFormatError(
             f"line {number} has {len(fields)} columns, must have {columns.width}",
             file=file,
-            remedy="Write name, x, y, z in every row, with decimal points.",
+            remedy="Write name, x, y, z in every row, with decimal points, not commas.",
         )
 
     def other(name: str) -> str:

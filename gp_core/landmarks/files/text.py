@@ -13,13 +13,23 @@ import numpy as np
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError
 
-__all__ = ["flips_xy", "parse_position", "shown", "split_fields", "split_lines"]
+__all__ = [
+    "DECIMAL_POINTS",
+    "flips_xy",
+    "has_decimal_comma",
+    "parse_position",
+    "shown",
+    "split_fields",
+    "split_lines",
+]
 
 _MAX_COORDINATE_MM = 1e9  # beyond nanometres of a large head: keeps squares and sums finite
 
 # What stands for "no number": R writes NA, or null through its JSON writer.
 _MISSING_WORDS = frozenset({"", "na", "null"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER_WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
+DECIMAL_POINTS = "Write decimal points, not commas."
 
 # 3D Slicer's words, and the numbers that old files have instead.
 _FLIPS_XY = {"LPS": False, "1": False, "RAS": True, "0": True, "": False}
@@ -91,8 +101,15 @@ def parse_position(
         f"position must be three finite numbers in mm, got [{got}]",
         file=file,
         landmark=landmark[:40],
-        remedy="Correct it, or clear all three if the landmark is not placed.",
+        remedy=DECIMAL_POINTS
+        if any(has_decimal_comma(value) for value in values)
+        else "Correct it, or clear all three if the landmark is not placed.",
     )
+
+
+def has_decimal_comma(value: object) -> bool:
+    """Return whether a text is a number as much of the world writes it, such as ``1,5``."""
+    return isinstance(value, str) and _NUMBER_WITH_COMMA.fullmatch(value.strip()) is not None
 
 
 def _is_missing(value: object) -> bool:
