@@ -6,21 +6,29 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from vtkmodules.vtkRenderingCore import vtkActor
+from vtkmodules.vtkCommonDataModel import vtkPlane
+from vtkmodules.vtkRenderingCore import vtkActor, vtkProperty
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.surface import Surface, SurfaceHit
 from gp_labeler.scene.colours import rgb
-from gp_labeler.scene.stage import Stage, release, solid_actor
+from gp_labeler.scene.cut import CutPlane
+from gp_labeler.scene.pieces import Piece, pieces_of
+from gp_labeler.scene.stage import Stage
 
 __all__ = ["BoneActor"]
 
 _BARELY_THERE = 0.05
 """Below this opacity the mesh is not seen, so a click must not land on it."""
 
+_INSIDE = 0.62
+"""How bright the inner side of the surface is against the outer: a cut shows as such."""
+
 
 class BoneActor:
     """Draws surfaces, and answers what lies under a ray.
+
+    What is drawn when is for the `Backdrop`: it asks for actors, and draws them one after the other.
 
     Parameters
     ----------
@@ -31,11 +39,16 @@ class BoneActor:
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._surfaces: tuple[Surface, ...] = ()
-        self._fine: list[vtkActor] = []
-        self._quick: list[vtkActor] = []
+        self._fine: list[Piece] = []
+        self._quick: list[Piece] = []
+        self._look, self._inside = vtkProperty(), vtkProperty()
         self._opacity = 1.0
         self._visible = True
-        self._hurried = False
+        self._cut: CutPlane | None = None
+        self._plane: vtkPlane | None = None
+        self.version = 0
+        """Number of the meshes shown last."""
+        self._apply()
 
     def show(self, surfaces: Sequence[Surface], quick: Sequence[Surface] = ()) -> None:
         """Draw surfaces in place of those before.
@@ -49,14 +62,19 @@ class BoneActor:
         """
         self._drop()
         self._surfaces = tuple(surfaces)
-        self._fine = [self._actor(surface) for surface in surfaces]
-        self._quick = [self._actor(surface) for surface in quick]
-        self._apply()
+        self._fine = [piece for surface in surfaces for piece in pieces_of(surface)]
+        self._quick = [Piece(surface, 0, surface.n_triangles) for surface in quick if surface.n_triangles]
+        self.version += 1
 
     @property
     def surfaces(self) -> tuple[Surface, ...]:
         """What is drawn."""
         return self._surfaces
+
+    @property
+    def has_quick(self) -> bool:
+        """Whether there is a coarser stand-in."""
+        return bool(self._quick)
 
     @property
     def bounds(self) -> FloatArray | None:
@@ -84,29 +102,77 @@ class BoneActor:
     @visible.setter
     def visible(self, value: bool) -> None:
         self._visible = bool(value)
-        self._apply()
 
-    def hurry(self, on: bool) -> None:
-        """Draw the coarser stand-in, where there is one, while the camera moves."""
-        if on != self._hurried:
-            self._hurried = on
-            self._apply()
+    @property
+    def cut(self) -> CutPlane | None:
+        """The plane that cuts it open, if any."""
+        return self._cut
+
+    @cut.setter
+    def cut(self, value: CutPlane | None) -> None:
+        if value != self._cut:
+            self._cut, self._plane = value, None if value is None else value.to_vtk()
+
+    @property
+    def look(self) -> tuple[object, ...]:
+        """Everything but the meshes on which it depends how the bone looks."""
+        return self._stage.colours, self._opacity, self._visible, self._cut
 
     def recolour(self) -> None:
         """Take the colours of the stage's theme."""
         self._apply()
 
+    def groups(
+        self, direction: FloatArray, *, quick: bool = False, at_once: bool = False
+    ) -> list[list[Piece]]:
+        """Return what is drawn one after the other to make a frame.
+
+        Parameters
+        ----------
+        direction : (3,) float array
+            Into the scene. Nearer pieces of solid bone come first, as they hide others; of transparent bone,
+            they come last, as they lie over others.
+        quick : bool
+            The stand-in, where there is one.
+        at_once : bool
+            All pieces in one group.
+        """
+        if not self._visible or self._opacity == 0:
+            return []
+        pieces = self._quick if quick and self._quick else self._fine
+        order = 1.0 if self._opacity == 1 else -1.0
+        pieces = sorted(pieces, key=lambda piece: order * float(piece.middle @ direction))
+        return [pieces] if at_once or quick else [[piece] for piece in pieces]
+
+    def actors(self, pieces: Sequence[Piece]) -> list[vtkActor]:
+        """Return what draws pieces, invisible yet."""
+        made = [piece.actor(self._stage.bone, self._look, self._plane) for piece in pieces]
+        for actor in made:
+            actor.SetBackfaceProperty(self._inside)
+        return made
+
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> SurfaceHit | None:
-        """Return the first point of the drawn surfaces along a ray, or None."""
+        """Return the first point of the drawn surfaces along a ray, or None; what is cut away is gone."""
         if not self._seen:
             return None
-        start = np.asarray(origin, dtype=np.float64)
-        hits = [hit for surface in self._surfaces if (hit := surface.pick(start, direction)) is not None]
-        return min(hits, key=lambda hit: float(np.linalg.norm(hit.point - start)), default=None)
+        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+        if self._cut is not None and not self._cut.keeps(start):
+            there = self._cut.crossing(start, along)
+            if not there >= 0:
+                return None
+            start = start + there * along
+        hits = [hit for surface in self._surfaces if (hit := surface.pick(start, along)) is not None]
+        nearest = min(hits, key=lambda hit: float(np.linalg.norm(hit.point - start)), default=None)
+        if nearest is None or self._cut is None or float(self._cut.depth(nearest.point)) >= -_ON_PLANE_MM:
+            return nearest
+        return None
 
     def blocks(self, start: ArrayLike, end: ArrayLike) -> bool:
         """Whether drawn bone lies between two scan positions."""
-        return self._seen and any(surface.blocks(start, end) for surface in self._surfaces)
+        if not self._seen:
+            return False
+        part = (start, end) if self._cut is None else self._cut.kept_part(start, end)
+        return part is not None and any(surface.blocks(*part) for surface in self._surfaces)
 
     def close(self) -> None:
         """Let go of the meshes."""
@@ -117,26 +183,20 @@ class BoneActor:
     def _seen(self) -> bool:
         return self._visible and self._opacity > _BARELY_THERE
 
-    def _actor(self, surface: Surface) -> vtkActor:
-        actor = solid_actor(surface.mesh, self._stage.colours.bone)
-        actor.GetMapper().SetStatic(True)  # the mesh never changes: spare a walk over it every frame
-        self._stage.base.AddActor(actor)
-        return actor
-
     def _apply(self) -> None:
-        hurried = self._hurried and bool(self._quick)
-        for actors, shown in ((self._fine, not hurried), (self._quick, hurried)):
-            for actor in actors:
-                actor.SetVisibility(self._visible and shown and self._opacity > 0)
-                look = actor.GetProperty()
-                look.SetColor(*rgb(self._stage.colours.bone))
-                look.SetOpacity(self._opacity)
-                look.SetAmbient(0.10)
-                look.SetDiffuse(0.90)
-                look.SetSpecular(0.18)
-                look.SetSpecularPower(18.0)
+        colour = np.array(rgb(self._stage.colours.bone))
+        for look, brightness in ((self._look, 1.0), (self._inside, _INSIDE)):
+            look.SetColor(*(brightness * colour).tolist())
+            look.SetOpacity(self._opacity)
+            look.SetAmbient(0.10)
+            look.SetDiffuse(0.90)
+            look.SetSpecular(0.18 * brightness)
+            look.SetSpecularPower(18.0)
 
     def _drop(self) -> None:
-        for actor in (*self._fine, *self._quick):
-            release(self._stage.base, actor)
+        for piece in (*self._fine, *self._quick):
+            piece.close(self._stage.bone)
         self._fine, self._quick = [], []
+
+
+_ON_PLANE_MM = 1e-6

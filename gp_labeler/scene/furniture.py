@@ -77,6 +77,7 @@ class OrientationCube:
 
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
+        self.visible = True
         self.renderer = vtkRenderer()
         self.renderer.SetLayer(1)
         self.renderer.InteractiveOff()
@@ -95,15 +96,6 @@ class OrientationCube:
         self.renderer.AddActor(self._cube)
         self.renderer.GetActiveCamera().ParallelProjectionOn()
         self.recolour()
-
-    @property
-    def visible(self) -> bool:
-        """Whether it is drawn."""
-        return bool(self.renderer.GetDraw())
-
-    @visible.setter
-    def visible(self, value: bool) -> None:
-        self.renderer.SetDraw(bool(value))
 
     def recolour(self) -> None:
         """Take the colours of the stage's theme."""

@@ -112,7 +112,9 @@ class MarkActor:
         grown: FloatArray = sizes * [_ACTIVE_GROWS if mark.active else 1.0 for mark in self._marks]
         return grown
 
-    def refresh(self, view: Viewpoint, hidden: NDArray[np.bool_]) -> list[Label]:
+    def refresh(
+        self, view: Viewpoint, hidden: NDArray[np.bool_], *, bone_opacity: float = 1.0
+    ) -> list[Label]:
         """Bring sizes and faintness up to date with the camera, and return the labels to draw.
 
         Parameters
@@ -121,12 +123,16 @@ class MarkActor:
             The projection of this frame.
         hidden : (N,) bool array
             Which marks lie behind bone.
+        bone_opacity : float
+            From 0 to 1; the fainter bone is, the clearer what lies behind it.
         """
         sizes, pixels = self.diameters(view), view.display(self.positions)[:, :2]
         colours = np.array([rgb(self._colour(mark)) for mark in self._marks]).reshape(-1, 3)
         shapes = np.array([_SHAPES.get(mark.state, 0) for mark in self._marks], dtype=int)
-        self._solid.set(self.positions, sizes, colours, shapes)
+        seen = ~hidden | (bone_opacity == 1)  # solid bone hides by its depths, be it a part of a ball only
+        self._solid.set(self.positions[seen], sizes[seen], colours[seen], shapes[seen])
         faint = hidden & self.show_hidden
+        self._faint.fade(1.0 - (1.0 - _FAINT) * bone_opacity)
         self._faint.set(self.positions[faint], sizes[faint], colours[faint], shapes[faint])
         radii = 0.5 * sizes / view.pixel_sizes(self.positions)
         self._ring_active(pixels, radii)
@@ -208,6 +214,9 @@ class _GlyphLayer:
         data.AddArray(to_vtk(sizes, "size"))
         data.AddArray(to_vtk(shapes, "shape"))
         data.AddArray(to_vtk((colours * 255).astype(np.uint8), "colour"))
+
+    def fade(self, opacity: float) -> None:
+        self._actor.GetProperty().SetOpacity(opacity)
 
     def close(self) -> None:
         release(self._renderer, self._actor)

@@ -11,6 +11,7 @@ from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.surface import SurfaceHit
+from gp_labeler.scene.backdrop import Backdrop, Sight
 from gp_labeler.scene.bone import BoneActor
 from gp_labeler.scene.camera import SceneCamera
 from gp_labeler.scene.colours import SceneColours, rgb
@@ -56,17 +57,18 @@ class Scene3D:
 
     def __init__(self, target: RenderTarget) -> None:
         self.target = target
-        base, overlay = vtkRenderer(), vtkRenderer()
-        self._stage = Stage(base, overlay)
+        bone, base, overlay = vtkRenderer(), vtkRenderer(), vtkRenderer()
+        self._stage = Stage(bone, base, overlay)
+        base.EraseOff()  # it is drawn against the depths of the bone
         overlay.SetLayer(1)
-        overlay.SetActiveCamera(base.GetActiveCamera())
         overlay.InteractiveOff()
-        target.add(base)
-        target.add(overlay)
-        _light(base)
-        _light(overlay)
-        base.UseFXAAOn()
-        self.camera = SceneCamera(base.GetActiveCamera(), lambda: target.size)
+        for renderer in (bone, base, overlay):
+            renderer.SetActiveCamera(bone.GetActiveCamera())
+            renderer.SetUseOIT(renderer is bone)  # right in any order, but it takes a pass over every pixel
+            target.add(renderer)
+            _light(renderer)
+        self._room = _Room(bone)
+        self.camera = SceneCamera(bone.GetActiveCamera(), lambda: target.size)
         self.control = CameraControl(self.camera)
         self.bone = BoneActor(self._stage)
         self.slices = SlicePlaneActor(self._stage)
@@ -80,6 +82,8 @@ class Scene3D:
         self.scale_bar = ScaleBar(self._stage)
         self.cube = OrientationCube(self._stage)
         target.add(self.cube.renderer)
+        self._backdrop = Backdrop(self._stage, target, self.bone, self.cube)
+        self._behind: tuple[Sight | None, dict[bytes, bool]] = (None, {})
         self.set_colours(self._stage.colours)
         self.camera.view_from("A")
         self.camera.fit(_EMPTY_BOUNDS)
@@ -96,22 +100,22 @@ class Scene3D:
     def set_colours(self, colours: SceneColours) -> None:
         """Take a theme; lines and ghosts take it when they are shown next."""
         self._stage.colours = colours
-        base = self._stage.base
-        base.GradientBackgroundOn()
-        base.SetBackground(rgb(colours.bottom))
-        base.SetBackground2(rgb(colours.top))
+        behind = self._stage.bone
+        behind.GradientBackgroundOn()
+        behind.SetBackground(rgb(colours.bottom))
+        behind.SetBackground2(rgb(colours.top))
         self.bone.recolour()
         self.cube.recolour()
 
     def set_ambient_occlusion(self, on: bool) -> None:
         """Darken hollows, which shows depth; without a graphics card a frame then takes twice as long."""
-        base, bounds = self._stage.base, self.bounds
-        base.SetUseSSAO(bool(on))
+        bone, bounds = self._stage.bone, self.bounds
+        bone.SetUseSSAO(bool(on))
         size = float(np.linalg.norm(bounds[1] - bounds[0]))
-        base.SetSSAORadius(0.06 * size)
-        base.SetSSAOBias(0.002 * size)
-        base.SetSSAOKernelSize(48)
-        base.SSAOBlurOn()
+        bone.SetSSAORadius(0.06 * size)
+        bone.SetSSAOBias(0.002 * size)
+        bone.SetSSAOKernelSize(48)
+        bone.SSAOBlurOn()
 
     @property
     def bounds(self) -> FloatArray:
@@ -131,23 +135,62 @@ class Scene3D:
         points = np.concatenate([*shown, self.marks.positions]) if shown else self.marks.positions
         self.camera.fit(points if len(points) > 1 else _EMPTY_BOUNDS)
 
+    @property
+    def is_fine(self) -> bool:
+        """Whether the bone as it is to be seen now is drawn finely and kept: a frame then takes a moment."""
+        self._set_clipping()
+        return self._backdrop.is_fine(self._sight())
+
+    @property
+    def n_bone_frames(self) -> int:
+        """How often bone has been drawn."""
+        return self._backdrop.n_drawn
+
     def render(self, *, quick: bool = False) -> None:
-        """Draw one frame.
+        """Draw one frame; the bone anew only where it or the camera has changed.
 
         Parameters
         ----------
         quick : bool
-            The camera is being dragged: draw the coarser stand-in of the bone, where there is one.
+            Where the bone must be drawn anew, draw its coarser stand-in, if there is one; `advance` then
+            draws it finely.
         """
-        self.bone.hurry(quick)
         self._set_clipping()
+        sight = self._sight()
+        if not quick:
+            self._advance(sight)
+        elif not (self._backdrop.is_fine(sight) or self._backdrop.will_do(sight)):
+            self._refresh_cube()
+            self._backdrop.draw_quickly(sight, self.camera.direction)
+        self._draw_points()
+
+    def advance(self, seconds: float) -> bool:
+        """Draw more of the fine bone, in about so many seconds, unseen yet; return whether it is done."""
+        self._set_clipping()
+        return self._advance(self._sight(), seconds)
+
+    def _advance(self, sight: Sight, seconds: float = np.inf) -> bool:
+        self._refresh_cube()
+        return self._backdrop.advance(sight, self.camera.direction, seconds)
+
+    def _refresh_cube(self) -> None:
+        self.cube.refresh(self.camera.viewpoint(), self.camera)
+
+    def _draw_points(self) -> None:
+        """Draw what lies over the bone."""
         view = self.camera.viewpoint()
-        labels = self.marks.refresh(view, self.hidden(self.marks.positions))
+        hidden = self.hidden(self.marks.positions)
+        labels = self.marks.refresh(view, hidden, bone_opacity=self.bone.opacity)
         self.labels.refresh(view, labels + self.ghosts.refresh(view) + self.pose.refresh(view))
         self.hover.refresh(view)
         self.scale_bar.refresh(view, self.camera)
-        self.cube.refresh(view, self.camera)
-        self.target.render()
+        self._backdrop.restore()
+        self.target.draw(self._stage.base, self._stage.overlay)
+
+    def _sight(self) -> Sight:
+        look = (*self.bone.look, self.cube.visible, self._stage.scale, self._stage.bone.GetUseSSAO())
+        matrix = self.camera.viewpoint().matrix
+        return Sight(matrix.tobytes(), self.target.size, look, self.bone.version)
 
     def image(self, width: int | None = None, height: int | None = None) -> NDArray[np.uint8]:
         """Draw a frame, of another size where given, and return it, (h, w, 3)."""
@@ -173,13 +216,22 @@ class Scene3D:
         slack = _HIDDEN_SLACK_VOXELS * max((s.voxel_mm for s in self.bone.surfaces), default=0.0)
         if not slack or not len(scan):
             return np.zeros(len(scan), dtype=bool)
+        sight = self._sight()
+        if self._behind[0] != sight:
+            self._behind = (sight, {})
+        known = self._behind[1]
+        new = [n for n, point in enumerate(scan) if point.tobytes() not in known]
+        known.update(zip((scan[n].tobytes() for n in new), self._behind_bone(scan[new], slack), strict=True))
+        return np.array([known[point.tobytes()] for point in scan], dtype=bool)
+
+    def _behind_bone(self, scan: FloatArray, slack: float) -> list[bool]:
         view = self.camera.viewpoint()
         display = view.display(scan)
         near = view.scan(np.column_stack([display[:, :2], np.full(len(scan), -1.0)]))
         towards = near - scan
         distance = np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
         ends = scan + towards / distance * np.minimum(slack, distance)
-        return np.array([self.bone.blocks(eye, end) for eye, end in zip(near, ends, strict=True)], dtype=bool)
+        return [self.bone.blocks(eye, end) for eye, end in zip(near, ends, strict=True)]
 
     def mark_at(self, x: float, y: float, within: float = 10.0) -> str | None:
         """Return the key of the mark nearest to a pixel, seen before hidden, within logical pixels."""
@@ -195,6 +247,7 @@ class Scene3D:
 
     def close(self) -> None:
         """Let go of everything drawn, and of the target."""
+        self._backdrop.close()
         for adapter in (
             self.cube,
             self.scale_bar,
@@ -209,7 +262,7 @@ class Scene3D:
             self.bone,
         ):
             adapter.close()
-        for renderer in (self._stage.overlay, self._stage.base):
+        for renderer in (self._stage.overlay, self._stage.base, self._stage.bone):
             renderer.RemoveAllLights()
             renderer.RemoveAllViewProps()
         self.target.close()
@@ -218,11 +271,8 @@ class Scene3D:
         return self.camera.viewpoint().ray(x, y)
 
     def _set_clipping(self) -> None:
-        """Keep everything between the near and the far plane; both layers share them."""
-        low, high = self._drawn_bounds()
-        margin = 0.05 * float(np.linalg.norm(high - low)) + 1.0
-        box = np.stack([low - margin, high + margin]).T.ravel().tolist()
-        self._stage.base.ResetCameraClippingRange(box)
+        """Keep everything between the near and the far plane; all layers share them."""
+        self._room.hold(self._drawn_bounds())
 
     def _drawn_bounds(self) -> FloatArray:
         boxes = [self.bounds, np.stack([self.camera.focus - 5.0, self.camera.focus + 5.0])]
@@ -231,6 +281,29 @@ class Scene3D:
             if (drawn[0] <= drawn[1]).all():
                 boxes.append(drawn)
         return np.stack([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
+
+
+class _Room:
+    """Near and far plane of the camera: moved with it, else only for what lies outside them.
+
+    A point more must not change the projection, or the bone would be drawn anew for it.
+    """
+
+    def __init__(self, renderer: vtkRenderer) -> None:
+        self._renderer = renderer
+        self._box = np.zeros((2, 3))
+        self._time = -1
+
+    def hold(self, box: FloatArray) -> None:
+        """See to it that a (2, 3) box, mm, lies between the planes."""
+        camera = self._renderer.GetActiveCamera()
+        held = (box[0] >= self._box[0]).all() and (box[1] <= self._box[1]).all()
+        if held and camera.GetMTime() == self._time:
+            return
+        margin = 0.15 * float(np.linalg.norm(box[1] - box[0])) + 2.0
+        self._box = box + margin * np.array([[-1.0], [1.0]])
+        self._renderer.ResetCameraClippingRange(self._box.T.ravel().tolist())
+        self._time = camera.GetMTime()
 
 
 def _light(renderer: vtkRenderer) -> None:

@@ -1,4 +1,4 @@
-"""What every adapter draws on: two layers that share a camera, and the theme."""
+"""What every adapter draws on: layers that share a camera, and the theme."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ class Stage:
 
     Parameters
     ----------
+    bone : vtkRenderer
+        Bone alone: drawn when it or the camera changes, and kept (`Backdrop`).
     base : vtkRenderer
-        Bone and what it may hide.
+        What bone may hide: drawn over it, against its depths.
     overlay : vtkRenderer
         What is seen through bone: drawn over the base, with the same camera.
     colours : SceneColours
@@ -28,6 +30,7 @@ class Stage:
         Device pixels per logical pixel (high-DPI), by which texts and lines grow.
     """
 
+    bone: vtkRenderer
     base: vtkRenderer
     overlay: vtkRenderer
     colours: SceneColours = DARK

@@ -7,13 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any, cast
 
 import numpy as np
 import vtkmodules.vtkRenderingFreeType  # fonts: VTK finds them through its object factory
 import vtkmodules.vtkRenderingOpenGL2  # noqa: F401 - and the OpenGL classes
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonCore import vtkObject, vtkUnsignedCharArray
+from vtkmodules.vtkCommonCore import VTK_UNSIGNED_CHAR, vtkObject, vtkUnsignedCharArray
 from vtkmodules.vtkRenderingCore import vtkRenderer, vtkRenderWindow
+from vtkmodules.vtkRenderingOpenGL2 import vtkOpenGLFramebufferObject as Framebuffer
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.vtk_arrays import to_numpy
@@ -21,6 +23,10 @@ from gp_labeler.imaging.vtk_arrays import to_numpy
 __all__ = ["RenderTarget"]
 
 _SMALLEST = 16
+
+_COLOUR, _DEPTH = 0x4000, 0x100
+_NEAREST, _LINEAR = 0x2600, 0x2601
+"""OpenGL's words for what is copied, and how it is stretched."""
 
 
 class RenderTarget:
@@ -34,6 +40,7 @@ class RenderTarget:
 
     def __init__(self, window: vtkRenderWindow) -> None:
         self._window: vtkRenderWindow | None = window
+        self._kept: dict[str, tuple[tuple[int, int], Any]] = {}
         window.SetNumberOfLayers(2)
         window.SetAlphaBitPlanes(1)
 
@@ -51,6 +58,7 @@ class RenderTarget:
         window.SetShowWindow(False)
         window.SetOffScreenRendering(True)
         window.SetMultiSamples(0)
+        cast(Any, window).SetFrameBlitModeToNoBlit()  # nothing to show it on: pixels are read as drawn
         window.SetSize(max(width, _SMALLEST), max(height, _SMALLEST))
         if not window.SupportsOpenGL():
             raise GpError(
@@ -91,6 +99,31 @@ class RenderTarget:
         """Draw one frame."""
         self.window.Render()
 
+    def draw(self, *renderers: vtkRenderer) -> None:
+        """Draw these renderers alone, over what is there, and wait until that is done."""
+        for renderer in self._renderers():
+            renderer.SetDraw(any(renderer is one for one in renderers))
+        self.window.Render()
+        self.window.WaitForCompletion()
+
+    def keep(self, name: str, *, depth: bool = True, part: tuple[int, int] | None = None) -> None:
+        """Remember the picture as drawn so far, under a name.
+
+        Parameters
+        ----------
+        name : str
+            What to call it.
+        depth : bool
+            Whether the depths are remembered too, or those of before stay.
+        part : (width, height), optional
+            Only the lower left part of the picture, enlarged to the whole of it.
+        """
+        self._copy(self._drawn, self._store(name), part or self.size, self.size, depth)
+
+    def restore(self, name: str) -> None:
+        """Bring back, with its depths, the picture remembered under a name; the size must be the same."""
+        self._copy(self._store(name), self._drawn, self.size, self.size, True)
+
     def pixels(self) -> NDArray[np.uint8]:
         """Return the frame as drawn last, (h, w, 3), rows from the top."""
         width, height = self.size
@@ -103,11 +136,58 @@ class RenderTarget:
         """Let go of the window and of what it holds on the graphics card."""
         if self._window is None:
             return
-        renderers = self._window.GetRenderers()
-        while renderers.GetNumberOfItems():
-            self._window.RemoveRenderer(renderers.GetFirstRenderer())
+        for _, store in self._kept.values():
+            store.ReleaseGraphicsResources(self._window)
+        self._kept.clear()
+        for renderer in self._renderers():
+            self._window.RemoveRenderer(renderer)
         self._window.Finalize()
         self._window = None
+
+    def _renderers(self) -> list[vtkRenderer]:
+        found = self.window.GetRenderers()
+        return [cast(vtkRenderer, found.GetItemAsObject(n)) for n in range(found.GetNumberOfItems())]
+
+    @property
+    def _gl(self) -> Any:
+        """The window, whose class for OpenGL has more to it than its declaration says."""
+        return self.window
+
+    @property
+    def _drawn(self) -> Any:
+        return self._gl.GetRenderFramebuffer()
+
+    def _store(self, name: str) -> Any:
+        """Return the memory of a name, as large as the picture."""
+        size, store = self._kept.get(name, ((0, 0), None))
+        if size == self.size:
+            return store
+        if store is not None:
+            store.ReleaseGraphicsResources(self.window)
+        self.window.MakeCurrent()
+        state, store = self._gl.GetState(), Framebuffer()
+        store.SetContext(self.window)
+        state.PushFramebufferBindings()
+        stencil = bool(self.window.GetStencilCapable())  # depths are copied between equal formats only
+        store.PopulateFramebuffer(*self.size, True, 1, VTK_UNSIGNED_CHAR, True, 32, 0, stencil)
+        state.PopFramebufferBindings()
+        self._kept[name] = (self.size, store)
+        return store
+
+    def _copy(self, source: Any, to: Any, part: tuple[int, int], whole: tuple[int, int], depth: bool) -> None:
+        self.window.MakeCurrent()
+        state = self._gl.GetState()
+        state.PushFramebufferBindings()
+        source.Bind(source.GetReadMode())
+        source.ActivateReadBuffer(0)
+        to.Bind(to.GetDrawMode())
+        to.ActivateDrawBuffer(0)
+        state.vtkglScissor(0, 0, *whole)  # the last renderer left its own corner
+        corners, everywhere = (0, part[0], 0, part[1]), (0, whole[0], 0, whole[1])
+        Framebuffer.Blit(corners, everywhere, _COLOUR, _NEAREST if part == whole else _LINEAR)
+        if depth:
+            Framebuffer.Blit(corners, everywhere, _DEPTH, _NEAREST)
+        state.PopFramebufferBindings()
 
 
 @contextmanager

@@ -1,7 +1,9 @@
 """The 3D view as a widget: the scene is drawn in memory and painted, so it needs no OpenGL of the display.
 
 What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over
-the last frame: the bone need not be drawn again for it.
+the last frame; points are drawn over a picture of the bone that is kept. When the bone must be drawn anew, a
+coarse stand-in is shown at once, and the bone is drawn finely behind it, a little at a time: the window
+answers meanwhile. A picture of the widget (`grab`) always shows the finished frame.
 """
 
 from __future__ import annotations
@@ -38,6 +40,9 @@ from gp_labeler.workbench import Drag, Workbench
 __all__ = ["SceneView"]
 
 _FINE_AFTER_MS = 180
+_SLICE_SECONDS = 0.02
+"""How long bone is drawn finely before the window answers again."""
+
 _FIRST_LOOK = (-0.45, 0.75, -0.48)
 """Direction of the first look: from the front, the left and above."""
 
@@ -75,11 +80,12 @@ class SceneView(QWidget):
         self.scene = Scene3D(RenderTarget.offscreen())
         self._hand = Hand(workbench)
         self._frame: QImage | None = None
-        self._stale, self._quick, self._fitted = True, False, False
+        self._finished = False
+        self._stale, self._fitted = True, False
         self._hover: FloatArray | None = None
         self._dragging = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
-        self._fine_timer.timeout.connect(self.redraw)
+        self._fine_timer.timeout.connect(self._refine)
         self.scene.camera.look(_FIRST_LOOK, (0, 0, 1))
         self._listen()
         self.take_theme()
@@ -87,10 +93,15 @@ class SceneView(QWidget):
     # What is shown
 
     def redraw(self, *, quick: bool = False) -> None:
-        """Draw the scene again as soon as Qt paints."""
-        self._stale, self._quick = True, quick
-        if quick:
-            self._fine_timer.start()
+        """Draw the scene again as soon as Qt paints.
+
+        Parameters
+        ----------
+        quick : bool
+            The camera is being moved: wait until it rests before the bone is drawn finely.
+        """
+        self._stale = True
+        self._fine_timer.start(_FINE_AFTER_MS if quick else 0)
         self.update()
 
     def reset(self) -> None:
@@ -187,9 +198,10 @@ class SceneView(QWidget):
     # Painting
 
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
-        if self._stale:
-            self._draw_frame()
         painter = QPainter(self)
+        on_screen = self._is_screen(painter)
+        if self._stale or not (on_screen or self._finished):
+            self._draw_frame(quick=on_screen)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is not None:
             painter.drawImage(QPointF(0, 0), self._frame)
@@ -201,16 +213,33 @@ class SceneView(QWidget):
         )
         painter.end()
 
-    def _draw_frame(self) -> None:
+    def _is_screen(self, painter: QPainter) -> bool:
+        """Whether a painter paints what is on the screen, and not a picture of it."""
+        store = self.window().backingStore()
+        return store is not None and painter.paintEngine().paintDevice() is store.paintDevice()
+
+    def _draw_frame(self, *, quick: bool) -> None:
         ratio = self.devicePixelRatioF()
         self.scene.scale = ratio
         self.scene.target.resize(round(self.width() * ratio), round(self.height() * ratio))
-        self.scene.render(quick=self._quick)
+        self.scene.render(quick=quick)
         pixels = self.scene.target.pixels()
         height, width, _ = pixels.shape
         frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
         frame.setDevicePixelRatio(ratio)
-        self._frame, self._stale = frame, False
+        self._frame, self._stale, self._finished = frame, False, self.scene.is_fine
+        if not (self._finished or self._fine_timer.isActive()):
+            self._fine_timer.start(0)
+
+    def _refine(self) -> None:
+        """Draw some more of the fine bone, behind what is shown; once it is done, show it."""
+        if self._stale:
+            return  # the frame comes first; painting it goes on here
+        if not self.scene.advance(_SLICE_SECONDS):
+            self._fine_timer.start(0)
+        elif not self._finished:
+            self._stale = True
+            self.update()
 
     # Mouse and keys
 
@@ -315,6 +344,6 @@ class SceneView(QWidget):
 
     def release(self) -> None:
         """Let go of the scene; the widget shows its last frame from then on."""
-        self._stale = False
+        self._stale, self._finished = False, True
         self._fine_timer.stop()
         self.scene.close()

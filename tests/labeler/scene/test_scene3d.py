@@ -100,7 +100,7 @@ def test_what_is_drawn_is_what_is_hit(scene: Scene3D, ball: Surface) -> None:
     scene.bone.show([ball])
     scene.target.resize(80, 60)
     scene.camera.focus_on(BALL + np.array([0.3, 0.2, 0.4]), across_mm=8)
-    scene.bone._fine[0].GetProperty().LightingOff()  # the side in the shade is dim against the background
+    scene.bone._look.LightingOff()  # the side in the shade is dim against the background
     drawn = _unlike_background(scene.image())
     hit = np.array([[scene.pick(x, y) is not None for x in range(80)] for y in range(60)])
     assert hit.sum() > 1000
@@ -291,9 +291,11 @@ def test_themes_quick_frames_and_sizes(scene: Scene3D, ball: Surface) -> None:
     scene.bone.show([ball], quick=[coarse])
     scene.fit()
     fine = _unlike_background(scene.image()).sum()
+    scene.camera.zoom(1.001)
     scene.render(quick=True)
     assert _unlike_background(scene.target.pixels()).sum() < 0.4 * fine
     assert scene.pick(160, 120).point == pytest.approx(BALL + np.array([0, -RADIUS, 0]), abs=0.1)
+    scene.camera.zoom(1 / 1.001)
     assert _unlike_background(scene.image()).sum() == fine
     scene.set_colours(LIGHT)
     assert scene.image()[0, 0].min() > 200
@@ -331,8 +333,8 @@ def test_real_landmarks_are_seen_on_the_real_skull(scene: Scene3D, shared_data: 
 
 def _drawn_objects(scene: Scene3D) -> list[weakref.ref[object]]:
     stage = scene._stage
-    found: list[object] = [stage.base, stage.overlay, scene.cube.renderer, scene.target.window]
-    for renderer in (stage.base, stage.overlay):
+    found: list[object] = [stage.bone, stage.base, stage.overlay, scene.cube.renderer, scene.target.window]
+    for renderer in (stage.bone, stage.base, stage.overlay):
         props = renderer.GetViewProps()
         found += [props.GetItemAsObject(n) for n in range(props.GetNumberOfItems())]
     return [weakref.ref(thing) for thing in found]
@@ -424,3 +426,74 @@ def test_without_a_display_nothing_is_said_on_stderr() -> None:
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n")[:2] == ["(48, 64, 3)", "[]"]
     assert done.stderr == ""
+
+
+def test_a_point_more_is_drawn_without_drawing_the_bone_again(scene: Scene3D, ball: Surface) -> None:
+    scene.cube.visible = True
+    scene.bone.show([ball], quick=[ball])
+    scene.camera.view_from("A")
+    scene.fit()
+    bare = scene.image()
+    n_drawn, drawn = scene.n_bone_frames, 0
+
+    def count(*_: object) -> None:
+        nonlocal drawn
+        drawn += 1
+
+    scene._stage.bone.AddObserver("StartEvent", count)
+    seen, behind = BALL - np.array([1, RADIUS, 1]), BALL + np.array([-1, RADIUS, 0.5])
+    for marks in ([Mark("a", seen, "CA")], [Mark("a", seen, "CA"), Mark("b", behind, "CB", "computed")], []):
+        scene.marks.show(marks)
+        scene.lines.show([Segment(mark.position, BALL, "#FF00FF") for mark in marks])
+        scene.ghosts.show([Ghost("c", mark.position, np.eye(3) / 9, "IN?", active=True) for mark in marks])
+        frame = scene.image()
+        assert (frame != bare).any() == bool(marks)
+    np.testing.assert_array_equal(frame, bare)  # and nothing is left of them
+    assert (drawn, scene.n_bone_frames) == (0, n_drawn)
+    scene.camera.rotate(3, 0)
+    scene.image()
+    assert drawn > 0
+    assert scene.n_bone_frames == n_drawn + 1
+
+
+@pytest.mark.parametrize("opacity", [1.0, 0.5])
+def test_bone_drawn_in_pieces_is_the_same_bone(
+    scene: Scene3D, ball: Surface, opacity: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene.bone.opacity = opacity
+    scene.bone.show([ball])
+    scene.fit()
+    whole = scene.image().astype(int)
+    assert len(scene.bone.groups(scene.camera.direction)) == 1
+    monkeypatch.setattr("gp_labeler.scene.pieces.pieces_of.__defaults__", (ball.n_triangles // 7,))
+    scene.bone.show([ball])
+    assert len(scene.bone.groups(scene.camera.direction)) == 7
+    assert not scene.is_fine
+    n_steps = 1
+    while not scene.advance(0.0):
+        n_steps += 1
+        assert not scene.is_fine
+        scene.render(quick=True)  # what is seen meanwhile stays as it was
+        np.testing.assert_array_equal(scene.target.pixels(), whole)
+    assert n_steps > 7
+    assert scene.is_fine
+    off = np.abs(scene.image() - whole).max(axis=2)
+    assert (off > 4).mean() < (0.001 if opacity == 1 else 0.1)
+    assert off.max() < 32  # what lies behind what is judged a piece at a time
+
+
+def test_a_camera_that_moves_while_bone_is_drawn_begins_anew(
+    scene: Scene3D, ball: Surface, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gp_labeler.scene.pieces.pieces_of.__defaults__", (ball.n_triangles // 5,))
+    scene.bone.show([ball], quick=[ball])
+    scene.fit()
+    scene.camera.zoom(1.5)
+    wanted = scene.image()
+    scene.camera.zoom(1 / 1.5)
+    assert not scene.advance(0.0)
+    scene.camera.zoom(1.5)
+    scene.render(quick=True)
+    while not scene.advance(0.0):
+        pass
+    np.testing.assert_array_equal(scene.image(), wanted)

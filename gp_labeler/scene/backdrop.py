@@ -1,0 +1,199 @@
+"""The bone as it is seen now, kept as a picture with depths, over which points are drawn again and again.
+
+Without a graphics card a large mesh takes a second to draw. So it is drawn when the camera or the bone itself
+changes, never for a point; and it is drawn in pieces, between which the window answers.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from vtkmodules.vtkCommonDataModel import vtkPolyData
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkRenderer
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.bone import BoneActor
+from gp_labeler.scene.furniture import OrientationCube
+from gp_labeler.scene.pieces import Piece
+from gp_labeler.scene.stage import Stage
+from gp_labeler.scene.target import RenderTarget
+
+__all__ = ["Backdrop", "Sight"]
+
+_STRIP_PIXELS = 100_000
+"""Edges of so many pixels are smoothed at a time."""
+
+_QUICK_SECONDS = (0.012, 0.035)
+"""A quick frame that took longer than the second is drawn in coarser pixels next time; less than the first,
+in finer ones."""
+
+_COARSEST = 3
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Everything on which the picture of the bone depends.
+
+    Parameters
+    ----------
+    camera : bytes
+        The projection.
+    size : (2,) tuple of int
+        Of the picture, pixels.
+    look : tuple
+        How bone and cube look.
+    mesh : int
+        Which meshes.
+    """
+
+    camera: bytes
+    size: tuple[int, int]
+    look: tuple[object, ...]
+    mesh: int
+
+
+class Backdrop:
+    """Draws and keeps the picture of the bone.
+
+    Parameters
+    ----------
+    stage : Stage
+        Its renderer ``bone`` is drawn here alone.
+    target : RenderTarget
+        Where.
+    bone : BoneActor
+        What is drawn.
+    cube : OrientationCube
+        Drawn into the picture too: it changes with the camera only, and its letters take their time.
+    """
+
+    def __init__(self, stage: Stage, target: RenderTarget, bone: BoneActor, cube: OrientationCube) -> None:
+        self._stage, self._target, self._bone, self._cube = stage, target, bone, cube
+        self._smoother, self._nothing = _smoother()
+        target.add(self._smoother)
+        self._kept, self._next = "bone", "bone to be"
+        self._shown: Sight | None = None
+        self._fine = False
+        self._work: Iterator[None] | None = None
+        self._work_for: Sight | None = None
+        self._coarseness = 1
+        self.n_drawn = 0
+        """How often bone has been drawn, a frame in pieces once."""
+
+    def is_fine(self, sight: Sight) -> bool:
+        """Whether the picture that is kept shows just that, finely."""
+        return self._fine and self._shown == sight
+
+    def will_do(self, sight: Sight) -> bool:
+        """Whether the picture that is kept may stand until the fine one is there: only meshes are newer."""
+        return self._shown is not None and self._fine and replace(self._shown, mesh=sight.mesh) == sight
+
+    def draw_quickly(self, sight: Sight, direction: FloatArray) -> None:
+        """Draw the coarse stand-in and keep the picture; without a stand-in, draw the bone itself."""
+        if not self._bone.has_quick:
+            self.advance(sight, direction)
+            return
+        (width, height), n = sight.size, self._coarseness
+        part = (max(1, width // n), max(1, height // n))
+        start = time.perf_counter()
+        renderer = self._stage.bone
+        renderer.SetViewport(0.0, 0.0, part[0] / width, part[1] / height)
+        renderer.EraseOn()
+        for group in self._bone.groups(direction, quick=True) or [[]]:
+            self._draw(group)
+        renderer.SetViewport(0.0, 0.0, 1.0, 1.0)
+        self._target.keep(self._kept, part=part)
+        self._target.restore(self._kept)
+        self._add_cube(self._kept)
+        self._shown, self._fine = sight, False
+        self.n_drawn += 1
+        self._adapt(time.perf_counter() - start)
+
+    def advance(self, sight: Sight, direction: FloatArray, seconds: float = np.inf) -> bool:
+        """Draw more of the bone, in about so many seconds; return whether the picture is done, and kept.
+
+        Parameters
+        ----------
+        sight : Sight
+            What is to be seen; another one than last time begins a new picture.
+        direction : (3,) float array
+            Into the scene.
+        seconds : float
+            After which to stop, at the end of a piece.
+        """
+        if self.is_fine(sight):
+            return True
+        end = time.perf_counter() + seconds
+        if self._work is None or self._work_for != sight:
+            self._work, self._work_for = self._steps(sight, direction), sight
+        else:
+            self._target.restore(self._next)
+        for _ in self._work:
+            if time.perf_counter() >= end:
+                self._target.keep(self._next)
+                return False
+        self._target.keep(self._next)
+        self._add_cube(self._next)
+        self._kept, self._next = self._next, self._kept
+        self._shown, self._fine = sight, True
+        self._work = self._work_for = None
+        self.n_drawn += 1
+        return True
+
+    def restore(self) -> None:
+        """Bring the picture back into the target, with its depths."""
+        self._target.restore(self._kept)
+
+    def close(self) -> None:
+        """Let go of everything."""
+        self._work = None
+        self._smoother.RemoveAllViewProps()
+
+    def _steps(self, sight: Sight, direction: FloatArray) -> Iterator[None]:
+        """Draw a fine picture, stopping after each piece and each strip."""
+        groups = self._bone.groups(direction, at_once=bool(self._stage.bone.GetUseSSAO()))
+        for n, group in enumerate(groups or [[]]):
+            self._stage.bone.SetErase(n == 0)
+            self._draw(group)
+            yield
+        n_strips = max(1, round(sight.size[0] * sight.size[1] / _STRIP_PIXELS)) if groups else 0
+        for n in range(n_strips):
+            self._smoother.SetViewport(0.0, n / n_strips, 1.0, (n + 1) / n_strips)
+            self._target.draw(self._smoother)
+            yield
+
+    def _draw(self, pieces: list[Piece]) -> None:
+        actors = self._bone.actors(pieces)
+        for actor in actors:
+            actor.VisibilityOn()
+        self._target.draw(self._stage.bone)
+        for actor in actors:
+            actor.VisibilityOff()
+
+    def _add_cube(self, name: str) -> None:
+        """Draw the cube into a picture; its depths are its own."""
+        if self._cube.visible:
+            self._target.draw(self._cube.renderer)
+            self._target.keep(name, depth=False)
+
+    def _adapt(self, seconds: float) -> None:
+        fast, slow = _QUICK_SECONDS
+        step = int(seconds > slow) - int(seconds < fast)
+        self._coarseness = min(max(self._coarseness + step, 1), _COARSEST)
+
+
+def _smoother() -> tuple[vtkRenderer, vtkActor2D]:
+    """Return a renderer that smooths edges in what was drawn before, and draws nothing itself."""
+    renderer = vtkRenderer()
+    renderer.EraseOff()
+    renderer.InteractiveOff()
+    renderer.AutomaticLightCreationOff()
+    renderer.UseFXAAOn()
+    nothing, mapper = vtkActor2D(), vtkPolyDataMapper2D()  # a renderer without any prop does nothing at all
+    mapper.SetInputData(vtkPolyData())
+    nothing.SetMapper(mapper)
+    renderer.AddViewProp(nothing)
+    return renderer, nothing
