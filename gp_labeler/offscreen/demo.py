@@ -33,17 +33,19 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "expect", "placed": 2 * len(FEATURES)}
     yield {"do": "export", "complete": True}
     yield {"do": "check", "path": "check.json", "strict": True}
-    yield {"do": "save"}
     yield {"do": "view", "go_to": "RWA L", "camera": [-0.75, 0.55, -0.38]}
     yield {"do": "view", "reset": True}
     yield {"do": "screenshot", "path": "window.png", "what": "window"}
     yield {"do": "screenshot", "path": "mesh.png", "what": "3d", "size": [1200, 900]}
     yield {"do": "view", "zoom": 3.0, "go_to": "CO L"}
     yield {"do": "screenshot", "path": "slices.png", "what": "slices", "size": [1800, 600]}
-    yield {"do": "estimate", "side": "L", "noise": 0.1, "seed": seed}
+    for side in (Side.RIGHT, Side.LEFT):
+        files = [f"pose_{side.value}.json", *(["pose.json"] if side is Side.LEFT else [])]
+        yield {"do": "estimate", "side": side.value, "noise": 0.1, "seed": seed, "path": files}
     yield {"do": "overlay"}
     yield {"do": "view", "opacity": 0.5}
     yield {"do": "screenshot", "path": "overlay.png", "what": "views", "size": [1400, 1000]}
+    yield {"do": "save"}
 
 
 def _order(side: Side) -> Iterator[str]:

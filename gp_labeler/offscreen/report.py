@@ -129,17 +129,7 @@ def feature_rows(rig: Rig) -> list[dict[str, Any]]:
 
 def pose_rows(rig: Rig) -> list[dict[str, Any]]:
     """Return a row for each estimated cochlea."""
-    return [
-        {
-            "side": side.value,
-            "method": estimated.pose.method,
-            "radius_95_mm": estimated.pose.radius_95,
-            "cone_95_deg": float(np.degrees(estimated.pose.cone_95)),
-            "error_mm": estimated.error_mm,
-            "error_deg": estimated.error_deg,
-        }
-        for side, estimated in rig.poses.items()
-    ]
+    return [estimated.as_dict() for estimated in rig.poses.values()]
 
 
 def _relative(file: Path, folder: Path) -> str:

@@ -18,8 +18,10 @@ from gp_labeler.session.edits import (
     SwapSides,
 )
 from gp_labeler.session.landmark_import import ImportLandmarks
-from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes, SetThreshold
+from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.session.state import PointKey, SpecimenState, point_key
+from gp_labeler.session.touch_edits import LeaveOutTouch, RecordTouch, RemoveTouches, SetSkull, TakeTouches
+from gp_labeler.session.touches import Touch
 
 __all__ = ["RECORDED", "Table", "step", "steps_of"]
 
@@ -114,6 +116,50 @@ def _import(edit: ImportLandmarks, *_: object) -> list[Table] | None:
     return [step("import", **edit.asked, keep=not edit.replace_placed)]
 
 
+def _touch(edit: RecordTouch, *_: object) -> list[Table]:
+    points = {edit.name: list(edit.touch.position)}
+    about = _about(edit.touch)
+    return [step("touches", side=edit.side.value, points=points, **about, add=True)]
+
+
+def _touches(edit: TakeTouches, *_: object) -> list[Table] | None:
+    touches = list(edit.touches.values())
+    abouts = [_about(touch) for touch in touches]
+    if not touches or any(about != abouts[0] for about in abouts) or any(t.left_out for t in touches):
+        return None
+    points = {name: list(touch.position) for name, touch in edit.touches.items()}
+    return [step("touches", side=Side.parse(edit.side).value, points=points, **abouts[0])]
+
+
+def _about(touch: Touch) -> Table:
+    """Return how a touch was made, as the keys of a step."""
+    about: Table = {"how": touch.how.value, "source": touch.source or None}
+    return about | (
+        {"n_samples": touch.n_samples, "spread_mm": touch.spread_mm} if touch.n_samples > 1 else {}
+    )
+
+
+def _leave_out(edit: LeaveOutTouch, *_: object) -> list[Table]:
+    key = "leave_out" if edit.left_out else "take_in"
+    return [step("touches", side=Side.parse(edit.side).value, **{key: [edit.name]})]
+
+
+def _forget(edit: RemoveTouches, before: SpecimenState, _: bool) -> list[Table]:
+    if edit.name is not None:
+        return [step("touches", side=Side.parse(edit.side).value, forget=[edit.name])]
+    return [step("touches", side=Side.parse(edit.side).value, clear=True)]
+
+
+def _skull(edit: SetSkull, *_: object) -> list[Table]:
+    return [{"do": "skull", "points": {name: list(point) for name, point in edit.skull.items()}}]
+
+
+def _verdict(edit: RecordPoseCheck, *_: object) -> list[Table]:
+    check = edit.check
+    said = {"verdict": check.verdict, "by": check.by, "note": check.note or None}
+    return [step("verdict", side=check.side.value, **said)]
+
+
 RECORDED: Mapping[type, Find] = MappingProxyType(
     {
         PlacePoint: _put,
@@ -127,6 +173,12 @@ RECORDED: Mapping[type, Find] = MappingProxyType(
         SetNotes: _notes,
         RenameSpecimen: _rename,
         ImportLandmarks: _import,
+        RecordTouch: _touch,
+        TakeTouches: _touches,
+        LeaveOutTouch: _leave_out,
+        RemoveTouches: _forget,
+        SetSkull: _skull,
+        RecordPoseCheck: _verdict,
     }
 )
 """How each kind of edit is written down."""

@@ -18,6 +18,7 @@ from gp_labeler.session.history import History
 from gp_labeler.session.jobs import Task
 from gp_labeler.session.landmark_export import FORMATS, ExportReport
 from gp_labeler.session.opening import tidy_name
+from gp_labeler.session.specimen_edits import RecordPoseCheck
 from gp_labeler.session.specimen_file import SUFFIX, write_specimen
 from gp_labeler.session.state import SpecimenState
 from gp_labeler.session.view import ViewState
@@ -135,10 +136,21 @@ class Recorder(QObject):
             self._begin()
             return
         self._replayed.push(edit.text, now, merge=merge)
+        if isinstance(edit, RecordPoseCheck):
+            self.tables += self._estimated()
         if merge and self.tables and _is_continued(self.tables[-1], tables[0]):
             self.tables[-1] |= {key: value for key, value in tables[0].items() if key in ("at", "notes")}
         else:
             self.tables += tables
+
+    def _estimated(self) -> list[Table]:
+        """Return the steps that lead to the estimate that is judged, as it was set up here."""
+        pose = self._window.workbench.pose
+        settings, side = pose.estimating.settings, pose.side.value
+        how = step("estimate", side=side, method=list(settings.methods), probe_noise=settings.probe_noise)
+        is_fitted = pose.estimate is not None and pose.estimate.registered is not None
+        register = [step("register", side=side, by=settings.registration)] if is_fitted else []
+        return [*register, {**how, "path": []}]
 
     def _on_stepped(self, kind: str) -> None:
         now, replayed = _untimed(self._window.workbench.session.state), self._replayed

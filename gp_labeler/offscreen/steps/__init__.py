@@ -6,18 +6,21 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from gp_labeler.offscreen.step import Step
+from gp_labeler.offscreen.steps.atlas import Check, Fit
 from gp_labeler.offscreen.steps.expecting import Expect
 from gp_labeler.offscreen.steps.files import Details, Export, Import, Save
 from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
 from gp_labeler.offscreen.steps.placing import Choose, Drag, Place, Put
-from gp_labeler.offscreen.steps.pose import Check, Estimate, Fit, Overlay
+from gp_labeler.offscreen.steps.pose import Estimate, Overlay, Report, Verdict
 from gp_labeler.offscreen.steps.scan import Mesh, Open, Spacing, Threshold
+from gp_labeler.offscreen.steps.touching import Register, Skull, Touches
 
 __all__ = ["STEPS"]
 
 _ALL: tuple[type[Step], ...] = (
     *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Put, Drag, Key, Act, Undo),
-    *(Details, Import, Export, Fit, Estimate, Overlay, Check, Screenshot, Save, Expect),
+    *(Details, Import, Export, Fit, Touches, Skull, Register, Estimate, Overlay, Verdict, Report),
+    *(Check, Screenshot, Save, Expect),
 )
 
 STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

@@ -11,10 +11,10 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import action
 from gp_labeler.offscreen.events import leave, press_keys
-from gp_labeler.views.pictures import PICTURES, picture
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Pair, Step, Triple
 from gp_labeler.scene.planes import Plane
+from gp_labeler.views.pictures import PICTURES, picture
 from gp_labeler.views.theme import THEMES
 
 __all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]

@@ -1,110 +1,76 @@
-"""Steps that ask the atlas: fit one, estimate a cochlea from touches, draw it, check the labels."""
+"""Steps on an estimated cochlea: estimate it, draw it over the scan, judge it, report it."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from PySide6.QtCore import QBuffer, QIODevice
 
-from gp_core import (
-    PROBE,
-    Atlas,
-    CochleaPose,
-    RigidTransform,
-    Specimen,
-    check_specimen,
-    estimate_pose,
-    fit_atlas,
-    load_specimens,
-    read_touches,
-)
+from gp_core import PROBE, Atlas, CochleaPose, fit_atlas, load_specimens
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.frames import angle_between_deg
 from gp_core.landmarks.anatomy import modiolar_axis
-from gp_core.landmarks.features import Side, check_codes
+from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import write_text
-from gp_core.registration.procrustes import fit_rigid
+from gp_labeler.offscreen.events import leave
 from gp_labeler.offscreen.rig import Rig
-from gp_labeler.offscreen.step import Step, Triple
-from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.pose_data import DrawnPose, PoseScene
-from gp_labeler.views.pose_overlay import PoseOverlay
+from gp_labeler.offscreen.step import Step
+from gp_labeler.offscreen.steps.touching import Points, Touches, current_estimate
+from gp_labeler.scene.pose_data import PARTS
+from gp_labeler.session.estimate import Estimate as SideEstimate
+from gp_labeler.session.pose_report import PoseReport
+from gp_labeler.views.pictures import PICTURES, picture
+from gp_labeler.views.pose_display import PoseDisplay
 
-__all__ = ["Check", "Estimate", "Estimated", "Fit", "Overlay"]
-
-_HARMLESS = ("missing", "unseen")
+__all__ = ["Estimate", "Estimated", "Overlay", "Report", "Verdict"]
 
 
 @dataclass(frozen=True, eq=False)
 class Estimated:
-    """A cochlea, and how it lies in the scan.
+    """A cochlea that a step estimated, held against what is known of it.
 
     Parameters
     ----------
+    estimate : gp_labeler.session.estimate.Estimate
+        With a pose.
     pose : CochleaPose
-        In the tracker's frame.
-    T_scan_tracker : RigidTransform, optional
-        Where the touches lie in the scan; None where nothing says it.
+        That pose.
     truth : (origin (3,), axis (3,)), optional
         Of the phantom, scan frame.
     """
 
+    estimate: SideEstimate
     pose: CochleaPose
-    T_scan_tracker: RigidTransform | None = None
     truth: tuple[FloatArray, FloatArray] | None = None
 
     @property
-    def drawn(self) -> DrawnPose:
-        """The cochlea in the scan."""
-        if self.T_scan_tracker is None:
-            raise GpError(
-                "nothing says where the touches lie in the scan",
-                remedy="Label three of the touched features of that side first.",
-            )
-        return DrawnPose.of(
-            self.pose,
-            self.T_scan_tracker,
-            key=self.pose.side.value,
-            label=f"CO ±{self.pose.radius_95:.1f} mm",
-        )
+    def errors(self) -> tuple[float, float] | None:
+        """Distance of the origin (mm) and angle of the axis (degrees) from the truth, else the labels."""
+        placed = self.estimate.in_scan()
+        if self.truth is None or placed is None:
+            return self.estimate.errors()
+        origin, axis = self.truth
+        return float(np.linalg.norm(placed.origin - origin)), float(angle_between_deg(placed.axis, axis))
 
-    @property
-    def error_mm(self) -> float | None:
-        """Distance of the estimated from the true origin, mm."""
-        return None if self.truth is None else float(np.linalg.norm(self.drawn.origin - self.truth[0]))
-
-    @property
-    def error_deg(self) -> float | None:
-        """Angle between the estimated and the true axis, degrees."""
-        if self.truth is None:
-            return None
-        return float(np.degrees(np.arccos(np.clip(self.drawn.axis @ self.truth[1], -1, 1))))
-
-
-@dataclass(frozen=True)
-class Fit(Step):
-    """Fit an atlas to labelled animals.
-
-    Parameters
-    ----------
-    specimens : text or texts
-        Landmark files, or folders of them.
-    path : str
-        The atlas file.
-    """
-
-    do: ClassVar[str] = "fit"
-    specimens: tuple[str, ...]
-    path: str = "atlas.json"
-
-    def run(self, rig: Rig) -> str:  # noqa: D102
-        specimens = load_specimens([rig.to_read(each) for each in self.specimens])
-        atlas, file = fit_atlas(specimens), rig.to_write(self.path)
-        atlas.save(file)
-        return f"{rig.wrote(file)}, {len(specimens)} animals"
+    def as_dict(self) -> dict[str, Any]:
+        """Return a row of the report."""
+        registered, placed, errors = self.estimate.registered, self.estimate.in_scan(), self.errors
+        tre = None if registered is None or placed is None else registered.tre_mm(placed.origin)
+        return {
+            "side": self.pose.side.value,
+            "method": self.pose.method,
+            "radius_95_mm": self.pose.radius_95,
+            "cone_95_deg": float(np.degrees(self.pose.cone_95)),
+            "error_mm": None if errors is None else errors[0],
+            "error_deg": None if errors is None else errors[1],
+            "registered_by": None if registered is None else registered.way,
+            "fre_mm": None if registered is None else registered.fre_mm,
+            "tre_mm": tre,
+        }
 
 
 @dataclass(frozen=True)
@@ -115,139 +81,73 @@ class Estimate(Step):
     ----------
     side : L or R
         Side of the head.
-    touches : str or table of positions
-        A file of touches; positions by feature code, tracker frame, mm; or ``simulated``: features of the
-        phantom (else as labelled), with noise, somewhere else in space.
+    touches : str or table of positions, optional
+        As ``points`` of the step ``touches``, done first. By default the touches that are there; simulated
+        ones where there are none.
     features : text or texts
         What is touched in a simulation; by default the paper's six.
     noise : float
         Standard deviation of a simulated touch, mm a coordinate.
     seed : int
         Of the simulation.
-    atlas : str
-        ``published``, or an atlas file.
-    path : str
-        Where the pose is written.
+    atlas : str, optional
+        ``published``, or an atlas file, used from here on; by default the one in use.
+    specimens : text or texts
+        Instead: landmark files of animals, or folders of them, to which the atlas is fitted; ``jrmpc`` needs
+        them.
+    method : text or texts
+        ``robust``, ``jrmpc`` or both; the first is the one that is told and written.
+    probe_noise : float, optional
+        Ordinary error of a touch, mm a coordinate; by default found from the touches.
+    path : text or texts
+        Where the pose is written: .json, .tfm, .csv (4 x 4) or .mrk.json.
     """
 
     do: ClassVar[str] = "estimate"
     says: ClassVar[tuple[str, ...]] = ("side",)
     side: Side
-    touches: str | dict[str, Triple] = "simulated"
+    touches: str | Points | None = None
     features: tuple[str, ...] = PROBE
     noise: float = 0.1
     seed: int = 0
-    atlas: str = "published"
-    path: str = "pose.json"
+    atlas: str | None = None
+    specimens: tuple[str, ...] = ()
+    method: tuple[str, ...] = ("robust",)
+    probe_noise: float | None = None
+    path: tuple[str, ...] = ("pose.json",)
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        atlas = Atlas.published() if self.atlas == "published" else Atlas.load(rig.to_read(self.atlas))
-        is_simulated = self.touches == "simulated"
-        touched, T_scan_tracker = self._simulated(rig) if is_simulated else self._given(rig)
-        pose = estimate_pose(touched, self.side, atlas)
-        estimated = Estimated(pose, T_scan_tracker, _truth(rig, self.side) if T_scan_tracker else None)
-        rig.poses[self.side] = estimated
-        file = rig.to_write(self.path)
-        pose.save(file)
-        text = (
-            f"{rig.wrote(file)}, 95 % within {pose.radius_95:.2f} mm and {np.degrees(pose.cone_95):.1f} deg"
-        )
-        if estimated.error_mm is None:
-            return text
-        return f"{text}, off by {estimated.error_mm:.2f} mm and {estimated.error_deg:.1f} deg"
+        self._take_atlas(rig)
+        there = any(side is self.side for side, _ in rig.desk.session.state.touches)
+        points = self.touches if self.touches is not None or there else "simulated"
+        if points is not None:
+            Touches(self.side, points, features=self.features, noise=self.noise, seed=self.seed).run(rig)
+        rig.desk.pose.choose(side=self.side, methods=self.method, probe_noise=self.probe_noise)
+        estimate = current_estimate(rig, self.side)
+        for method in self.method:
+            if method not in estimate.poses:
+                raise GpError(estimate.problems.get(method, f"{method} gave no pose"))
+        pose = estimate.pose
+        assert pose is not None
+        rig.poses[self.side] = Estimated(estimate, pose, _truth(rig, self.side))
+        files = [rig.desk.pose.export(rig.to_write(path)) for path in self.path]
+        return _told(rig.poses[self.side], rig.wrote(*files))
 
-    def _simulated(self, rig: Rig) -> tuple[dict[str, FloatArray], RigidTransform]:
-        """Touch features in a tracker's frame that is turned and far from the scan's."""
-        rng, codes = np.random.default_rng(self.seed), check_codes(self.features, "features", at_least=3)
-        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
-        turn *= np.sign(np.linalg.det(turn))
-        T_tracker_scan = RigidTransform.from_parts(turn, rng.uniform(-200, 200, 3), dst="tracker", src="scan")
-        touched = {}
-        for code in codes:
-            there = rig.truth(self.side, code) if rig.desk.truth else rig.placed(self.side, code)
-            if there is None:
-                raise GpError(
-                    f"{code} {self.side.word} is not placed, so it cannot be touched", landmark=code
-                )
-            touched[code] = T_tracker_scan.apply(there[None])[0] + rng.normal(0, self.noise, 3)
-        return touched, T_tracker_scan.inverse()
-
-    def _given(self, rig: Rig) -> tuple[dict[str, FloatArray], RigidTransform | None]:
-        """Take touches as they are, and lay them on the labels of the same names where there are three."""
-        if isinstance(self.touches, str):
-            landmarks = read_touches(rig.to_read(self.touches), self.side)
-            touched = {code: landmarks[code] for code in landmarks.placed}
-        else:
-            touched = {code: np.array(position) for code, position in self.touches.items()}
-        labels = {code: there for code in touched if (there := rig.placed(self.side, code)) is not None}
-        if len(labels) < 3:
-            return touched, None
-        aims, points = np.array(list(labels.values())), np.array([touched[code] for code in labels])
-        return touched, fit_rigid(points, aims, dst="scan", src="tracker").transform
+    def _take_atlas(self, rig: Rig) -> None:
+        if self.specimens:
+            animals = load_specimens([rig.to_read(each) for each in self.specimens])
+            rig.desk.use_atlas(fit_atlas(animals), animals)
+        elif self.atlas is not None:
+            is_published = self.atlas == "published"
+            rig.desk.use_atlas(Atlas.published() if is_published else Atlas.load(rig.to_read(self.atlas)))
 
 
-@dataclass(frozen=True)
-class Overlay(Step):
-    """Draw the estimated cochleae over the bone and the slices.
-
-    Parameters
-    ----------
-    visible : bool
-        Whether to draw them, or to take them away again.
-    """
-
-    do: ClassVar[str] = "overlay"
-    visible: bool = True
-
-    def run(self, rig: Rig) -> None:  # noqa: D102
-        if self.visible and not rig.poses:
-            raise GpError("no pose was estimated", remedy="Let an estimate step come first.")
-        drawn = [estimated.drawn for estimated in rig.poses.values()] if self.visible else []
-        shown = PoseScene(poses=tuple(drawn))
-        rig.scene.scene.pose.show(shown)
-        rig.scene.redraw()
-        for plane in Plane:
-            view = rig.window.grid.slice_views[plane]
-            overlay = view.findChild(PoseOverlay) or PoseOverlay(view)
-            overlay.show(shown)
-        if drawn:
-            rig.bring(drawn[0].origin)
-
-
-@dataclass(frozen=True)
-class Check(Step):
-    """Report labels that are missing, doubtful or exchanged.
-
-    Parameters
-    ----------
-    path : str, optional
-        Where to write what was found, JSON.
-    strict : bool
-        Fail where a label is doubtful.
-    """
-
-    do: ClassVar[str] = "check"
-    path: str | None = None
-    strict: bool = False
-
-    def run(self, rig: Rig) -> str:  # noqa: D102
-        state = rig.desk.session.state
-        sides = {side: state.side(side) for side in Side if state.side(side).placed}
-        findings = check_specimen(Specimen(state.specimen, sides), Atlas.published())
-        doubtful = [finding for finding in findings if finding.kind not in _HARMLESS]
-        if self.path is not None:
-            file, rows = rig.to_write(self.path), [_row(finding) for finding in findings]
-            write_text(file, json.dumps(rows, indent=1) + "\n")
-            rig.wrote(file)
-        text = " ".join(f"{finding.side.word}: {finding.text}." for finding in doubtful)
-        if doubtful and self.strict:
-            raise GpError(text)
-        return text or f"{len(findings)} not placed, none doubtful"
-
-
-def _row(finding: Any) -> Mapping[str, Any]:
-    names = ("kind", "landmarks", "text")
-    return {"side": finding.side.value, **{name: getattr(finding, name) for name in names}}
+def _told(estimated: Estimated, files: str) -> str:
+    pose, errors = estimated.pose, estimated.errors
+    text = (
+        f"{files or pose.method}, 95 % within {pose.radius_95:.2f} mm and {np.degrees(pose.cone_95):.1f} deg"
+    )
+    return text if errors is None else f"{text}, off by {errors[0]:.2f} mm and {errors[1]:.1f} deg"
 
 
 def _truth(rig: Rig, side: Side) -> tuple[FloatArray, FloatArray] | None:
@@ -255,3 +155,132 @@ def _truth(rig: Rig, side: Side) -> tuple[FloatArray, FloatArray] | None:
         return None
     ca, cb, co = (rig.truth(side, code) for code in ("CA", "CB", "CO"))
     return co, modiolar_axis(ca, cb)
+
+
+@dataclass(frozen=True)
+class Overlay(Step):
+    """Draw an estimated cochlea over the bone and the slices.
+
+    Parameters
+    ----------
+    visible : bool
+        Whether to draw it, or to take it away again.
+    side : L or R, optional
+        Which; by default the one estimated last.
+    parts : text or texts, optional
+        What of it: ``estimate``, ``region``, ``cochlea``, ``truth`` (as labelled), ``features`` (where the
+        atlas has them), ``vectors`` (from there to the labels), ``touches``, ``path`` and ``names``.
+    opacity : float, optional
+        From 0 to 1.
+    """
+
+    do: ClassVar[str] = "overlay"
+    visible: bool = True
+    side: Side | None = None
+    parts: tuple[str, ...] | None = None
+    opacity: float | None = None
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        desk, options = rig.desk, self._options()
+        if self.visible:
+            self._find(rig)
+        grid = rig.window.grid
+        if rig.window.findChild(PoseDisplay) is None:
+            PoseDisplay(desk, grid)
+        desk.pose.draw(visible=self.visible, **options)
+        rig.app.processEvents()
+
+    def _options(self) -> dict[str, Any]:
+        options: dict[str, Any] = {} if self.opacity is None else {"opacity": self.opacity}
+        if self.parts is None:
+            return options
+        for part in self.parts:
+            if part not in PARTS:
+                raise GpError(f"parts must be of {', '.join(PARTS)}, got {part!r}")
+        return options | {part: part in self.parts for part in PARTS}
+
+    def _find(self, rig: Rig) -> None:
+        """Choose what is drawn, and bring it into sight."""
+        if not rig.poses:
+            raise GpError("no pose was estimated", remedy="Let an estimate step come first.")
+        placed = current_estimate(rig, self.side or list(rig.poses)[-1]).in_scan()
+        if placed is None:
+            raise GpError(
+                "nothing says where the touches lie in the scan",
+                remedy="Label three of the touched features of that side first, or register by the skull.",
+            )
+        rig.bring(placed.origin)
+
+
+@dataclass(frozen=True)
+class Verdict(Step):
+    """Keep a verdict on an estimated cochlea in the specimen.
+
+    Parameters
+    ----------
+    side : L or R
+        Side of the head.
+    verdict : str
+        ``accept`` or ``reject``.
+    by : str
+        Initials; by default who is logged in.
+    note : str
+        Why.
+    """
+
+    do: ClassVar[str] = "verdict"
+    says: ClassVar[tuple[str, ...]] = ("side", "verdict")
+    side: Side
+    verdict: str
+    by: str = ""
+    note: str = ""
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        current_estimate(rig, self.side)
+        check = rig.desk.pose.estimating.judge(self.verdict, by=self.by, note=self.note)
+        return f"{check.verdict} by {check.by}"
+
+
+@dataclass(frozen=True)
+class Report(Step):
+    """Write a page about an estimated cochlea: what was touched, what came of it, who accepted it.
+
+    Parameters
+    ----------
+    side : L or R
+        Side of the head.
+    path : str
+        An HTML file.
+    pictures : text or texts
+        What it shows, of those that ``screenshot`` writes.
+    """
+
+    do: ClassVar[str] = "report"
+    says: ClassVar[tuple[str, ...]] = ("side",)
+    side: Side
+    path: str = "pose.html"
+    pictures: tuple[str, ...] = ("3d", "axial", "sagittal", "coronal")
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        for what in self.pictures:
+            if what not in PICTURES:
+                raise GpError(f"pictures must be of {', '.join(PICTURES)}, got {what!r}")
+        estimate, session = current_estimate(rig, self.side), rig.desk.session
+        for view in rig.window.grid.views:
+            leave(view)
+        shown = {_CAPTIONS.get(what, what): _png(rig, what) for what in self.pictures}
+        page = PoseReport(session.state, estimate, shown, session.now())
+        file = rig.to_write(self.path)
+        write_text(file, page.html())
+        return rig.wrote(file)
+
+
+_CAPTIONS: Mapping[str, str] = {"3d": "3D", "axial": "Axial", "sagittal": "Sagittal", "coronal": "Coronal"}
+_PICTURE_SIZE = (640, 480)
+
+
+def _png(rig: Rig, what: str) -> bytes:
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    picture(rig.window, what, _PICTURE_SIZE).save(buffer, "PNG")  # type: ignore[call-overload]  # stubs know bytes only
+    return bytes(buffer.data().data())

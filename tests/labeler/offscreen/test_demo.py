@@ -20,12 +20,16 @@ def test_the_demo_leaves_everything_it_promises(qapp, tmp_path) -> None:
     written = content(tmp_path / "report.json")
     assert written["n_placed"] == 40
     assert written["largest_error_voxels"] < 1.0
-    assert written["poses"][0]["error_mm"] < 1.0
+    assert {pose["side"]: pose["error_mm"] < 1.0 for pose in written["poses"]} == {"L": True, "R": True}
     assert all(step["seconds"] >= 0 for step in written["steps"])
     for side in "LR":
         assert len(read_landmarks(tmp_path / f"phantom-1_{side}.mrk.json").placed) == 20
     assert (tmp_path / "phantom-1.gpspecimen.json").exists()
-    assert content(tmp_path / "pose.json")["frame"] == "tracker"
+    poses = {name: content(tmp_path / f"pose{name}.json") for name in ("", "_L", "_R")}
+    assert poses[""] == poses["_L"]
+    assert {name: pose["side"] for name, pose in poses.items()} == {"": "L", "_L": "L", "_R": "R"}
+    assert {pose["frame"] for pose in poses.values()} == {"tracker"}
+    assert set(content(tmp_path / "phantom-1.gpspecimen.json")["touches"]) == {"L", "R"}
     for name in PICTURES:
         image = QImage(str(tmp_path / name))
         assert min(image.width(), image.height()) >= 600

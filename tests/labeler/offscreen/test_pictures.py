@@ -8,8 +8,8 @@ from PySide6.QtGui import QImage
 from window_cases import MIDDLE, VOXEL_MM, settle
 
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.views.pictures import PICTURES, picture
 from gp_labeler.scene.planes import Plane
+from gp_labeler.views.pictures import PICTURES, picture
 
 SPOT = MIDDLE + VOXEL_MM * np.array([10.5, -6.5, 8.5])  # a voxel left, front and above of the middle
 SIDES = {Plane.AXIAL: (1, -1), Plane.SAGITTAL: (-1, -1), Plane.CORONAL: (1, -1)}

@@ -19,12 +19,13 @@ from gp_labeler.offscreen.runner import run_script
 from gp_labeler.offscreen.script import make_script, read_script
 from gp_labeler.offscreen.steps import STEPS
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import edits, labelling, landmark_import, specimen_edits
+from gp_labeler.session import edits, labelling, landmark_import, specimen_edits, touch_edits, touching
 from gp_labeler.session.edits import SwapPoints
 from gp_labeler.session.landmark_export import export_landmarks
 from gp_labeler.session.landmark_import import import_landmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
 from gp_labeler.session.state import How
+from gp_labeler.session.touches import TouchHow
 from gp_labeler.session.workflow import Active
 from gp_labeler.views.recorded_edits import RECORDED
 from gp_labeler.views.recorder import Recorder, script_text
@@ -72,12 +73,12 @@ def test_every_command_is_written_or_need_not_be() -> None:
 def test_every_edit_of_a_session_is_written() -> None:
     kinds = {
         kind
-        for module in (edits, specimen_edits, landmark_import)
+        for module in (edits, specimen_edits, touch_edits, landmark_import)
         for kind in vars(module).values()
         if isinstance(kind, type) and kind.__module__ == module.__name__ and hasattr(kind, "apply")
     }
     kinds = {kind for kind in kinds if not kind.__name__.startswith("_") and kind is not edits.Edit}
-    assert {kind.__name__ for kind in kinds - RECORDED.keys()} == {"RecordPoseCheck"}
+    assert kinds == RECORDED.keys()
 
 
 class Recording:
@@ -211,6 +212,33 @@ def test_the_ghost_is_put_where_it_was(recording) -> None:
     assert recording.run("point.accept_ghost") == ["put"]
     assert recording.recorder.tables[-1]["how"] == "accepted ghost"
     recording.check(*FILES[:2])
+
+
+def test_touches_and_verdicts_are_done_again(recording) -> None:
+    session, pose, atlas = recording.session, recording.desk.pose, recording.desk.atlas
+    assert atlas is not None
+    recording.begin()
+    place_three(recording)
+    for n, code in enumerate(("MN", "OS", "RWA", "LLI")):
+        where = atlas[code] + [0.1 * n, 200, 0]
+        details = {"source": "probe", "n_samples": 9, "spread_mm": 0.07} if n % 2 else {}
+        touching.record_touch(session, "L", code, where, TouchHow.TRACKED, **details)
+    touching.leave_out(session, "L", "OS")
+    touching.leave_out(session, "L", "OS", False)
+    touching.record_touch(session, "L", "ZL", [0, 0, 0], TouchHow.TRACKED)
+    touching.clear_touches(session, "L", "ZL")
+    touching.mark_skull(session, "S1", [1, 2, 3])
+    touching.record_touch(session, "R", "MN", [0.5, 0, 0])
+    touching.clear_touches(session, "R")
+    lines = [",".join([code, *map(repr, atlas[code].tolist())]) for code in ("CL", "MN", "OI")]
+    file = recording.folder / "touches.csv"
+    file.write_text("\n".join(["label,x,y,z", *lines]))
+    touching.load_touches(session, file, "R")
+    session.undo()
+    session.redo()
+    pose.choose(probe_noise=0.3)
+    pose.estimating.judge("reject", by="AB", note="tilted")
+    assert recording.check()[-3:-1] == ["estimate", "verdict"]
 
 
 def test_what_is_seen_is_written_with_its_value(recording) -> None:

@@ -1,0 +1,78 @@
+"""Steps that ask the atlas: fit one to labelled animals, check the labels."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from gp_core import Atlas, Specimen, check_specimen, fit_atlas, load_specimens
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.files import write_text
+from gp_labeler.offscreen.rig import Rig
+from gp_labeler.offscreen.step import Step
+
+__all__ = ["Check", "Fit"]
+
+_HARMLESS = ("missing", "unseen")
+
+
+@dataclass(frozen=True)
+class Fit(Step):
+    """Fit an atlas to labelled animals.
+
+    Parameters
+    ----------
+    specimens : text or texts
+        Landmark files, or folders of them.
+    path : str
+        The atlas file.
+    """
+
+    do: ClassVar[str] = "fit"
+    specimens: tuple[str, ...]
+    path: str = "atlas.json"
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        specimens = load_specimens([rig.to_read(each) for each in self.specimens])
+        atlas, file = fit_atlas(specimens), rig.to_write(self.path)
+        atlas.save(file)
+        return f"{rig.wrote(file)}, {len(specimens)} animals"
+
+
+@dataclass(frozen=True)
+class Check(Step):
+    """Report labels that are missing, doubtful or exchanged.
+
+    Parameters
+    ----------
+    path : str, optional
+        Where to write what was found, JSON.
+    strict : bool
+        Fail where a label is doubtful.
+    """
+
+    do: ClassVar[str] = "check"
+    path: str | None = None
+    strict: bool = False
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        state = rig.desk.session.state
+        sides = {side: state.side(side) for side in Side if state.side(side).placed}
+        findings = check_specimen(Specimen(state.specimen, sides), Atlas.published())
+        doubtful = [finding for finding in findings if finding.kind not in _HARMLESS]
+        if self.path is not None:
+            file, rows = rig.to_write(self.path), [_row(finding) for finding in findings]
+            write_text(file, json.dumps(rows, indent=1) + "\n")
+            rig.wrote(file)
+        text = " ".join(f"{finding.side.word}: {finding.text}." for finding in doubtful)
+        if doubtful and self.strict:
+            raise GpError(text)
+        return text or f"{len(findings)} not placed, none doubtful"
+
+
+def _row(finding: Any) -> Mapping[str, Any]:
+    names = ("kind", "landmarks", "text")
+    return {"side": finding.side.value, **{name: getattr(finding, name) for name in names}}
