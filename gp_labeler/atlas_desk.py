@@ -1,21 +1,37 @@
-"""What of a workbench concerns the atlas: which one is in use, and where it came from."""
+"""What of a workbench concerns the atlas: which one is in use, where it came from, and how good it is."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import json
+from collections.abc import Iterable, Mapping
 from functools import partial
+from os import PathLike
+from pathlib import Path
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.shape import predict
+from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Specimen
+from gp_labeler.atlas_work import (
+    FEWEST_ANIMALS,
+    FitAtlas,
+    FittedAtlas,
+    ReadAtlas,
+    RefitAtlas,
+    Trial,
+    TryAtlas,
+)
 from gp_labeler.desk_signals import DeskSignals
-from gp_labeler.session.ghosts import Predict
+from gp_labeler.session.animals import Animals
+from gp_labeler.session.ghosts import Departure, Predict
 from gp_labeler.session.jobs import Jobs
 from gp_labeler.session.session import Session
 from gp_labeler.work import LoadAtlas
 
-__all__ = ["AtlasDesk"]
+__all__ = ["AtlasDesk", "is_atlas_file"]
+
+_HEAD = 4096
 
 
 class AtlasDesk(DeskSignals):
@@ -34,6 +50,10 @@ class AtlasDesk(DeskSignals):
         super().__init__()
         self._atlas = atlas
         self._atlas_specimens: tuple[Specimen, ...] = ()
+        self.atlas_file: Path | None = None
+        self.animals: Animals | None = None
+        self.trial: Trial | None = None
+        self.session_replaced.connect(self._hold_against)
 
     @property
     def atlas(self) -> Atlas | None:
@@ -45,12 +65,74 @@ class AtlasDesk(DeskSignals):
         """The animals that the atlas was fitted to here; none for the published one and those of files."""
         return self._atlas_specimens
 
+    @property
+    def is_published_atlas(self) -> bool:
+        """Whether the atlas in use is the one that the program comes with."""
+        return self._atlas is not None and self._atlas is Atlas.published()
+
+    @property
+    def can_try_atlas(self) -> bool:
+        """Whether there are animals enough for leave-one-out."""
+        return len(self._atlas_specimens) >= FEWEST_ANIMALS
+
+    @property
+    def is_held_out(self) -> bool:
+        """Whether the open specimen is one of the animals, so that it is held against the others alone."""
+        return any(animal.name == self.session.state.specimen for animal in self._atlas_specimens)
+
+    def departures(self, side: Side) -> Mapping[str, Departure] | None:
+        """Return how far the labels of one side are from where the atlas expects them; None while unknown."""
+        return self.session.judging(side).known
+
+    # Which atlas
+
     def load_atlas(self) -> None:
         """Get the published atlas ready in the background, where there is none; ghosts appear when it is."""
         if self._atlas is None:
-            self.jobs.submit(LoadAtlas(), self.use_atlas, key="atlas")
+            self.use_published_atlas()
 
-    def use_atlas(self, atlas: Atlas, specimens: Iterable[Specimen] = ()) -> None:
+    def use_published_atlas(self) -> None:
+        """Take the published atlas, in the background."""
+        self.jobs.submit(LoadAtlas(), self.use_atlas, key="atlas")
+
+    def open_atlas(self, path: str | PathLike[str]) -> None:
+        """Read an atlas file in the background, and take it."""
+        file = Path(path)
+
+        def take(atlas: Atlas) -> None:
+            self.use_atlas(atlas, file=file)
+            self.message.emit(f"The atlas of {file.name} is in use", "info")
+
+        self.jobs.submit(ReadAtlas(file), take, key="atlas")
+
+    def fit_atlas(self, paths: Iterable[str | PathLike[str]]) -> None:
+        """Read labelled animals in the background, fit an atlas to them, and take it."""
+        self.jobs.submit(FitAtlas(tuple(map(Path, paths))), self._take_fitted, key="atlas")
+
+    def save_atlas(self, path: str | PathLike[str]) -> None:
+        """Write the atlas in use; raises `GpError` where there is none, or it cannot be written."""
+        if self._atlas is None:
+            raise GpError("there is no atlas yet", remedy="Wait until it is loaded.")
+        file = Path(path)
+        try:
+            self._atlas.save(file)
+        except OSError as error:
+            raise GpError(f"cannot be written ({error.strerror})", file=file) from None
+        self.atlas_file = None if self.is_published_atlas else file
+        self.atlas_details_changed.emit()
+
+    def try_atlas(self) -> None:
+        """Do leave-one-out on the animals that the atlas was fitted to, in the background."""
+        if not self.can_try_atlas:
+            raise GpError(
+                f"leave-one-out needs at least {FEWEST_ANIMALS} animals, got {len(self._atlas_specimens)}",
+                remedy="Fit an atlas from labelled animals first.",
+            )
+        self.jobs.submit(TryAtlas(self._atlas_specimens), self._take_trial, key="atlas trial")
+
+    def use_atlas(
+        self, atlas: Atlas, specimens: Iterable[Specimen] = (), *, file: Path | None = None
+    ) -> None:
         """Take another atlas for ghosts, doubts and poses.
 
         Parameters
@@ -60,19 +142,70 @@ class AtlasDesk(DeskSignals):
         specimens : iterable of Specimen
             The animals it was fitted to, where they are at hand: leave-one-out and the method ``jrmpc`` need
             them.
+        file : Path, optional
+            Where it was read from.
         """
-        self._atlas, self._atlas_specimens = atlas, tuple(specimens)
+        self._take(atlas, Animals(tuple(specimens)), file)
+
+    # Inside
+
+    def _take(self, atlas: Atlas, animals: Animals, file: Path | None = None) -> None:
+        self._cancel("atlas trial")
+        self._atlas, self._atlas_specimens = atlas, animals.specimens
+        self.animals = animals if animals.specimens else None
+        self.atlas_file, self.trial = file, None
         self.session.set_predict(self._predict)
         self.atlas_changed.emit()
-        self._judge(Side)
+        self._hold_against()
+
+    def _take_fitted(self, fitted: FittedAtlas) -> None:
+        self._take(fitted.atlas, fitted.animals)
+        n = len(fitted.animals.skipped)
+        text = f"The atlas was fitted to {fitted.animals.text}" + (f"; {n} skipped" if n else "")
+        self.message.emit(text, "warning" if n else "info")
+
+    def _take_trial(self, trial: Trial) -> None:
+        self.trial = trial
+        self.atlas_details_changed.emit()
 
     @property
     def _predict(self) -> Predict | None:
         """What the session expects features by."""
         return None if self._atlas is None else partial(predict, self._atlas)
 
+    def _hold_against(self, *_: object) -> None:
+        """Judge the labels of the open specimen, by an atlas that does not know them."""
+        self._cancel("atlas without")
+        name = self.session.state.specimen
+        others = tuple(animal for animal in self._atlas_specimens if animal.name != name)
+        if self.is_held_out and sum(len(animal.sides) for animal in others) >= FEWEST_ANIMALS:
+            self.jobs.submit(RefitAtlas(others), self._expect_by, key="atlas without")
+        else:
+            self._judge(Side)
+
+    def _expect_by(self, atlas: Atlas) -> None:
+        self.session.set_predict(partial(predict, atlas))
+        self._judge(Side)
+
     def _judge(self, sides: Iterable[Side]) -> None:
         """Find the doubts of some sides in the background."""
         for side in sides:
             job = self.session.judging(side)
             self.jobs.submit(job, lambda _: self.doubts_changed.emit(), key=f"judging {side.value}")
+
+    def _cancel(self, key: str) -> None:
+        for task in self.jobs.running:
+            if task.key == key:
+                task.cancel()
+
+
+def is_atlas_file(path: str | PathLike[str]) -> bool:
+    """Whether a file says of itself that it is an atlas; it may be damaged."""
+    file = Path(path)
+    if file.suffix.lower() != ".json" or not file.is_file():
+        return False
+    try:
+        with file.open("rb") as stream:
+            return json.dumps("gpAtlas").encode() in stream.read(_HEAD)
+    except OSError:
+        return False

@@ -18,7 +18,7 @@ from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
-from gp_labeler.atlas_desk import AtlasDesk
+from gp_labeler.atlas_desk import AtlasDesk, is_atlas_file
 from gp_labeler.bone import Bone
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.surface import Surface
@@ -39,8 +39,8 @@ from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, SaveMesh
 
 __all__ = ["TOOLS", "Drag", "Workbench"]
 
-TOOLS = ("place", "look", "grey")
-"""What a plain left click or drag over a slice does: place, move the crosshair, set window and level."""
+TOOLS = ("place", "look", "grey", "touch")
+"""What a plain left click or drag over a slice does: place, move the crosshair, grey window, touch."""
 
 _NEAR_VOXELS = 3.0
 
@@ -129,9 +129,11 @@ class Workbench(AtlasDesk):
     # Opening
 
     def open(self, path: str | PathLike[str], **options: Any) -> None:
-        """Open a specimen file, or a scan as a new specimen; see `open_specimen` and `open_scan`."""
+        """Open a specimen file, an atlas file, or a scan as a new specimen."""
         if Path(path).name.endswith(SUFFIX):
             self.open_specimen(path)
+        elif is_atlas_file(path):
+            self.open_atlas(path)
         else:
             self.open_scan(path, **options)
 

@@ -1,0 +1,197 @@
+"""Labelled animals read from many files for an atlas: what can be used, what cannot, and what to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.quality import Finding, check_specimen
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.files import load_specimens
+from gp_core.landmarks.files.naming import natural_key
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_labeler.session.specimen_file import SUFFIX, read_specimen
+
+__all__ = ["Animals", "Skipped", "read_animals"]
+
+FEWEST_PLACED = 4
+"""A side with fewer says nothing that an atlas could learn from."""
+
+_IN_FOLDERS = (".mrk.json", ".fcsv", SUFFIX)
+_SAME_MM = 1e-3
+_HARMLESS = ("missing", "unseen", "unchecked")
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """A file, or one side of an animal, that is not used, and why."""
+
+    what: str
+    why: str
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        return f"{self.what}: {self.why}."
+
+
+@dataclass(frozen=True)
+class Animals:
+    """What was read.
+
+    Parameters
+    ----------
+    specimens : tuple of Specimen
+        By name; only sides that can be used.
+    skipped : tuple of Skipped
+        What cannot be used.
+    doubts : tuple of Finding
+        Labels that are used, but that a person should look at.
+    """
+
+    specimens: tuple[Specimen, ...]
+    skipped: tuple[Skipped, ...] = ()
+    doubts: tuple[Finding, ...] = ()
+
+    @property
+    def n_sides(self) -> int:
+        """Sides of all of them."""
+        return sum(len(specimen.sides) for specimen in self.specimens)
+
+    @property
+    def text(self) -> str:
+        """Such as ``11 animals, 22 sides``."""
+        n = len(self.specimens)
+        return f"{n} animal{'' if n == 1 else 's'}, {self.n_sides} side{'' if self.n_sides == 1 else 's'}"
+
+
+def read_animals(
+    paths: Iterable[str | PathLike[str]], tell: Callable[[float], object] = lambda fraction: None
+) -> Animals:
+    """Read landmark files, specimen files, and folders of them; what cannot be used is skipped.
+
+    Parameters
+    ----------
+    paths : iterable of path
+        Files and folders; a folder that holds none is searched one level deeper.
+    tell : callable
+        Receives the fraction done, and may raise to stop.
+
+    Returns
+    -------
+    Animals
+        Sides with too few labels, or labelled on the wrong side, are left out.
+
+    Raises
+    ------
+    GpError
+        A folder holds no labelled animals.
+    """
+    reading = _Reading()
+    files = list(dict.fromkeys(file for path in paths for file in _files_at(Path(path))))
+    for n, file in enumerate(files):
+        tell(0.3 * n / max(len(files), 1))
+        reading.read(file)
+    names = sorted(reading.sides, key=natural_key)
+    checked = []
+    for n, name in enumerate(names):
+        tell(0.3 + 0.7 * n / len(names))
+        checked.append(reading.checked(name))
+    return Animals(
+        tuple(specimen for specimen in checked if specimen.sides),
+        tuple(reading.skipped),
+        tuple(reading.doubts),
+    )
+
+
+class _Reading:
+    """The animals read so far, and what was wrong with the rest."""
+
+    def __init__(self) -> None:
+        self.sides: dict[str, dict[Side, LandmarkSet]] = {}
+        self.sources: dict[tuple[str, Side], Path] = {}
+        self.skipped: list[Skipped] = []
+        self.doubts: list[Finding] = []
+
+    def read(self, file: Path) -> None:
+        """Take in the sides that a file holds."""
+        try:
+            specimens = _specimens_in(file)
+        except GpError as error:
+            self.skipped.append(Skipped(file.name, error.problem.rstrip(".")))
+            return
+        for specimen in specimens:
+            for landmarks in specimen.sides.values():
+                self._take(specimen.name, landmarks, file)
+
+    def checked(self, name: str) -> Specimen:
+        """Return an animal with the sides that can be used, and note what to look at."""
+        animal = Specimen(name, self.sides[name])
+        findings = [f for f in check_specimen(animal, Atlas.published()) if f.kind not in _HARMLESS]
+        exchanged = {finding.side: finding for finding in findings if finding.kind == "other side"}
+        for side, finding in exchanged.items():
+            self.skipped.append(Skipped(f"{name} {side.word}", finding.text))
+        self.doubts += [finding for finding in findings if finding.side not in exchanged]
+        return Specimen(name, {s: marks for s, marks in animal.sides.items() if s not in exchanged})
+
+    def _take(self, name: str, landmarks: LandmarkSet, file: Path) -> None:
+        side, what = landmarks.side, f"{name} {landmarks.side.word} in {file.name}"
+        n_placed = sum(code != "CO" for code in landmarks.placed)
+        if n_placed < FEWEST_PLACED:
+            self.skipped.append(Skipped(what, f"{n_placed} placed, {FEWEST_PLACED} or more are needed"))
+        elif side not in self.sides.get(name, {}):
+            self.sides.setdefault(name, {})[side] = landmarks
+            self.sources[name, side] = file
+        elif not _are_same(self.sides[name][side], landmarks):
+            earlier = self.sources[name, side].name
+            self.skipped.append(Skipped(what, f"this side is in {earlier} too, with other labels"))
+
+
+def _specimens_in(file: Path) -> list[Specimen]:
+    if not file.name.endswith(SUFFIX):
+        return load_specimens(file)
+    state = read_specimen(file)
+    sides = {side: landmarks for side in Side if _has_own_labels(landmarks := state.side(side))}
+    if not sides:
+        raise GpError("nothing is placed in it", file=file)
+    return [Specimen(state.specimen, sides)]
+
+
+def _has_own_labels(landmarks: LandmarkSet) -> bool:
+    """Whether anything is placed that does not belong to the other side as well."""
+    rows = [feature(code) for code in landmarks.placed]
+    return any(not (row.shared or row.computed) for row in rows)
+
+
+def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
+    """Whether two files hold the same labels, such as a specimen and what was exported from it."""
+    return one.placed == other.placed and bool(
+        np.abs(one.array(one.placed) - other.array(one.placed)).max() < _SAME_MM
+    )
+
+
+def _files_at(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    here = list(_labelled_files(path))
+    found = here or [file for folder in sorted(path.iterdir()) for file in _labelled_files(folder)]
+    if not found:
+        raise GpError(
+            f"holds no labelled animals ({', '.join('*' + suffix for suffix in _IN_FOLDERS)})",
+            file=path,
+            remedy="Choose another folder, or the files themselves.",
+        )
+    return found
+
+
+def _labelled_files(folder: Path) -> Iterator[Path]:
+    if folder.is_dir():
+        for file in sorted(folder.iterdir()):
+            if file.name.lower().endswith(_IN_FOLDERS) and not file.name.startswith("."):
+                yield file

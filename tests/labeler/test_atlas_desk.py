@@ -1,0 +1,144 @@
+"""The atlas of a workbench: opened, fitted, saved, tried out; what goes wrong is said, with the remedy."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from animal_cases import drawn_animals, write_animals, write_side
+from test_workbench import Desk
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_labeler.atlas_desk import is_atlas_file
+from gp_labeler.session.landmark_import import ImportLandmarks
+from gp_labeler.session.specimen_edits import RenameSpecimen
+from gp_labeler.session.state import How, Provenance
+
+L = Side.LEFT
+
+
+@pytest.fixture
+def desk(tmp_path):
+    made = Desk(tmp_path / "state")
+    yield made
+    made.close(discard=True)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_animals(tmp_path / "animals", drawn_animals(4))
+
+
+def label(desk, animal) -> None:
+    desk.session.do(ImportLandmarks((animal.side(L),), Provenance(How.IMPORTED, "AB", "now")))
+
+
+def test_an_atlas_fitted_here_is_saved_and_opened_again(desk, folder, tmp_path) -> None:
+    desk.fit_atlas([folder])
+    desk.wait()
+    fitted = desk.atlas
+    assert fitted.n_samples == 8
+    assert [animal.name for animal in desk.atlas_specimens] == ["GP01", "GP02", "GP03", "GP04"]
+    assert desk.said[-1] == ("info", "The atlas was fitted to 4 animals, 8 sides")
+    file = tmp_path / "own.json"
+    desk.save_atlas(file)
+    assert desk.atlas_file == file
+    desk.use_published_atlas()
+    desk.wait()
+    assert desk.is_published_atlas
+    assert (desk.atlas_file, desk.atlas_specimens) == (None, ())
+    assert is_atlas_file(file)
+    desk.open(file)
+    desk.wait()
+    np.testing.assert_array_equal(desk.atlas.mean, fitted.mean)
+    assert desk.atlas_file == file
+    assert desk.atlas_specimens == ()
+
+
+def test_leave_one_out_of_the_animals_by_both_methods(desk, folder) -> None:
+    with pytest.raises(GpError, match=r"needs at least 3 animals, got 0\. Fit an atlas"):
+        desk.try_atlas()
+    desk.fit_atlas([folder])
+    desk.wait()
+    changes = []
+    desk.atlas_changed.connect(lambda: changes.append("atlas"))
+    desk.atlas_details_changed.connect(lambda: changes.append("details"))
+    desk.try_atlas()
+    desk.wait()
+    assert changes == ["details"]
+    trial = desk.trial
+    assert (trial.n_animals, trial.n_sides, trial.skipped) == (4, 8, ())
+    assert [report.method for report in trial.reports] == ["robust", "jrmpc"]
+    for report in trial.reports:
+        assert 0 < report.errors.e_co_mm.mean() < 1.5
+    desk.use_atlas(desk.atlas)
+    assert desk.trial is None
+
+
+def test_leave_one_out_is_what_the_core_says(desk, folder) -> None:
+    from gp_core import leave_one_out, load_specimens
+
+    desk.fit_atlas([folder])
+    desk.wait()
+    desk.try_atlas()
+    desk.wait()
+    for report in desk.trial.reports:
+        core = leave_one_out(load_specimens(folder), method=report.method)
+        here = {(row.specimen, row.side): row.e_co_mm for row in report.rows}
+        assert here == {(row.specimen, row.side): pytest.approx(row.e_co_mm) for row in core.rows}
+
+
+def test_sides_that_lack_a_needed_feature_do_not_take_part(desk, folder) -> None:
+    animal = drawn_animals(4)[0]
+    write_side(folder, animal.name, animal.side(L).with_point("LLI", None))
+    desk.fit_atlas([folder])
+    desk.wait()
+    desk.try_atlas()
+    desk.wait()
+    assert desk.trial.n_sides == 7
+    assert [skipped.text for skipped in desk.trial.skipped] == ["GP01 left: lacks LLI."]
+
+
+@pytest.mark.parametrize("text", ["{", '{"gpAtlas": 9}', '{"gpAtlas": 1, "frame": "atlas"}'])
+def test_a_damaged_atlas_is_named_and_the_old_one_stays(desk, tmp_path, text) -> None:
+    desk.use_atlas(Atlas.published())
+    file = tmp_path / "broken.json"
+    file.write_text(text)
+    desk.open_atlas(file)
+    desk.wait()
+    (level, said) = desk.said[-1]
+    assert level == "error"
+    assert "broken.json" in said
+    assert "Make it with" in said
+    assert desk.is_published_atlas
+
+
+def test_too_few_animals_are_told_with_what_was_skipped(desk, tmp_path) -> None:
+    animal = drawn_animals(1)[0]
+    write_side(tmp_path, "GP01", animal.side(L))
+    (tmp_path / "GP02_L.mrk.json").write_text(json.dumps({"markups": []}))
+    desk.fit_atlas([tmp_path])
+    desk.wait()
+    (level, said) = desk.said[-1]
+    assert level == "error"
+    assert "at least three labelled sides, got 1" in said
+    assert "GP02_L.mrk.json: " in said
+
+
+def test_an_animal_is_held_against_an_atlas_that_does_not_know_it(desk, folder) -> None:
+    animals = drawn_animals(4)
+    label(desk, animals[0])
+    desk.fit_atlas([folder])
+    desk.wait()
+    assert not desk.is_held_out
+    known = {code: found.n_sd for code, found in desk.departures(L).items()}
+    desk.session.do(RenameSpecimen("GP01"))
+    desk.use_atlas(desk.atlas, desk.atlas_specimens)
+    desk.wait()
+    assert desk.is_held_out
+    alone = {code: found.n_sd for code, found in desk.departures(L).items()}
+    assert alone.keys() == known.keys()
+    assert np.mean(list(alone.values())) > np.mean(list(known.values()))
