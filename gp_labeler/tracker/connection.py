@@ -11,6 +11,9 @@ import time
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 
+from gp_core.errors import GpError
+from gp_labeler.tracker.messages import MessageDecoder, TrackerMessage
+
 __all__ = ["Arrived", "Connection", "Event", "Lost", "Opened", "Waker", "keep_alive"]
 
 _CONNECT_SECONDS = 3.0
@@ -20,6 +23,7 @@ _GOOD_SECONDS = 2.0
 """A connection that stood longer is tried again without delay; another may never have been any good."""
 
 _BLOCK = 65536
+_MOST_WAITING = 2000
 _JOIN_SECONDS = 1.0
 
 
@@ -30,10 +34,9 @@ class Opened:
 
 @dataclass(frozen=True)
 class Arrived:
-    """Bytes, and when they came on this computer's monotonic clock."""
+    """Messages that came together."""
 
-    data: bytes
-    received: float
+    messages: list[TrackerMessage]
 
 
 @dataclass(frozen=True)
@@ -96,7 +99,6 @@ class Connection:
         self._events: SimpleQueue[Event] = SimpleQueue()
         self._outgoing: SimpleQueue[bytes] = SimpleQueue()
         self._stop = threading.Event()
-        self._drop = threading.Event()
         self._waker = Waker()
         self._thread = threading.Thread(target=self._run, name="gp-tracker", daemon=True)
         self._thread.start()
@@ -112,11 +114,6 @@ class Connection:
     def send(self, data: bytes) -> None:
         """Send bytes, as soon as the connection stands."""
         self._outgoing.put(data)
-        self._waker.wake()
-
-    def drop(self) -> None:
-        """Give up the connection as it is, and make it again."""
-        self._drop.set()
         self._waker.wake()
 
     def close(self) -> None:
@@ -191,29 +188,36 @@ class Connection:
 
     def _serve(self, sock: socket.socket) -> str:
         """Receive and send until that ends; return why it ended."""
-        self._drop.clear()
         self._unsent()  # what was meant for the connection before is out of date
         waiting = bytearray(self._hello)
+        decoder = MessageDecoder()
         selector = self._waker.selector
         selector.register(sock, selectors.EVENT_READ | selectors.EVENT_WRITE)
         try:
-            while not self._stop.is_set() and not self._drop.is_set():
+            while not self._stop.is_set():
                 for _, ready in self._waker.wait(None):
                     if ready & selectors.EVENT_READ:
                         data = sock.recv(_BLOCK)
                         if not data:
                             return "the other end closed the connection"
-                        self._events.put(Arrived(data, time.monotonic()))
+                        self._tell(decoder.feed(data, time.monotonic()))
                     if ready & selectors.EVENT_WRITE and waiting:
                         del waiting[: sock.send(waiting)]
                 waiting += self._unsent()
                 wanted = selectors.EVENT_READ | (selectors.EVENT_WRITE if waiting else 0)
                 selector.modify(sock, wanted)
-            return "given up"
+            return "closed"
+        except GpError as error:
+            return str(error).rstrip(".")
         except OSError as error:
             return f"the connection broke ({error.strerror or error})"
         finally:
             selector.unregister(sock)
+
+    def _tell(self, messages: list[TrackerMessage]) -> None:
+        """Pass on messages, unless nobody has asked for long: what would wait is out of date."""
+        if messages and self._events.qsize() < _MOST_WAITING:
+            self._events.put(Arrived(messages))
 
     def _unsent(self) -> bytes:
         data = bytearray()

@@ -8,11 +8,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
 
-from gp_core.errors import GpError
 from gp_labeler.tracker.address import TrackerAddress
 from gp_labeler.tracker.connection import Arrived, Connection, Event, Lost, Opened
 from gp_labeler.tracker.judge import Fault, Judge, Limits, Sample
-from gp_labeler.tracker.messages import MessageDecoder, TrackerMessage, hello
+from gp_labeler.tracker.messages import TrackerMessage, hello
 
 __all__ = ["LinkPhase", "LinkState", "TrackerLink"]
 
@@ -83,16 +82,15 @@ class TrackerLink:
         self._phase = LinkPhase.OFF
         self._stands = False
         self._why = ""
-        self._refusal = ""
         self._presses = 0
         self._begin()
 
     def _begin(self) -> None:
         """Forget the connection before: clocks, positions and names may all be others."""
-        self._decoder = MessageDecoder()
         self._judge = Judge(self.address.probe, self.address.reference, self.limits)
         self._heard = self._clock()
         self._arrivals: deque[float] = deque(maxlen=400)
+        self._told_hz, self._told_at = 0.0, self._clock()
         self._button_at = float("-inf")
         self._button_on = False
         self.latest = None
@@ -157,11 +155,12 @@ class TrackerLink:
             case Lost(why, pause):
                 self._phase = LinkPhase.LOST
                 self._stands = False
-                self._why = f"{self._refusal or why}. Trying again in {pause:g} s."
-                self._refusal = ""
+                self._why = f"{why}. Trying again in {pause:g} s."
                 self.latest = None
-            case Arrived(data, received):
-                return self._read(data, received)
+            case Arrived(messages):
+                for message in messages:
+                    self._note(message)
+                return self._judge.take(messages, messages[-1].received)
         return []
 
     def _listen(self) -> None:
@@ -170,18 +169,8 @@ class TrackerLink:
             self._phase = LinkPhase.SILENT
         elif self._arrivals:
             self._phase = LinkPhase.CONNECTED
-
-    def _read(self, data: bytes, received: float) -> list[Sample]:
-        try:
-            messages = self._decoder.feed(data, received)
-        except GpError as error:
-            self._refusal = str(error).rstrip(".")
-            if self._connection is not None:
-                self._connection.drop()
-            return []
-        for message in messages:
-            self._note(message)
-        return self._judge.take(messages, received)
+        if self._clock() - self._told_at >= 1.0:  # not oftener: whoever shows it need not flicker
+            self._told_at, self._told_hz = self._clock(), self.rate_hz
 
     def _note(self, message: TrackerMessage) -> None:
         self.devices[message.device] = message.kind
@@ -209,10 +198,11 @@ class TrackerLink:
             case LinkPhase.LOST:
                 return f"{self._why[:1].upper()}{self._why[1:]}"
             case LinkPhase.SILENT:
-                quiet = self._clock() - self._heard
-                return f"Connected to {where}, but no {probe} for {quiet:.1f} s: {self._why_silent()}."
+                quiet = max(round(self._clock() - self._heard), 1)
+                return f"Connected to {where}, but no {probe} for {quiet} s: {self._why_silent()}."
             case _:
-                return f"Receiving {probe}, {self.rate_hz:.0f} a second."
+                often = f", {self._told_hz:.0f} a second" if self._told_hz else ""
+                return f"Receiving {probe}{often}."
 
     def _why_silent(self) -> str:
         probe = self.address.probe

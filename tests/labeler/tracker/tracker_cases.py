@@ -63,6 +63,7 @@ class SimulatorProcess:
         with contextlib.suppress(ValueError):
             for line in self._process.stdout or ():
                 self._lines.put(line.strip())
+            self._lines.put("error: the simulator has ended")
 
     def wait(self, beginning: str) -> str:
         """Return the next line that begins so."""
