@@ -65,7 +65,10 @@ def read_path(
     """
     check_option(units, "units of the path", UNITS)
     turn = _as_rotation(axes)
-    raw = _read_rows(path)[:rows]
+    raw = _read_rows(path)
+    if rows is not None and not 2 <= rows <= len(raw):
+        raise GpError(f"rows of the path must be 2 to {len(raw)}, got {rows}", file=path)
+    raw = raw[:rows]
     if len(raw) < 2:
         raise FileFormatError(f"a path needs two rows or more, got {len(raw)}", file=path)
     _check_size(raw, units, path)
@@ -102,7 +105,7 @@ def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> 
     if wound not in (None, side):
         raise GpError(
             f"the path is said to be of a {side.word} ear, but winds as in a {side.other.word} one",
-            remedy="Check its side, and which way its axes point.",
+            remedy="Check its side, which way its axes point, and that it runs from the base to the apex.",
         )
     return pose.transform_to_touches.apply(points if side is pose.side else points * _MIRROR_Z)
 

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import gp_core
@@ -181,3 +183,37 @@ def test_the_commands_explain_themselves(capsys: pytest.CaptureFixture[str]) -> 
         with pytest.raises(SystemExit):
             main([command, "--help"])
         assert f"example:\n  gp-core {command}" in capsys.readouterr().out
+
+
+_NUMBERS = st.one_of(st.floats(width=32), st.integers(-300, 300), st.sampled_from(["", "NaN", "x", "1,5"]))
+_TABLES = st.integers(2, 17).flatmap(
+    lambda width: st.lists(st.lists(_NUMBERS, min_size=width, max_size=width), max_size=14)
+)
+_FILES = st.one_of(
+    st.binary(max_size=200),
+    st.tuples(_TABLES, st.sampled_from([",", ";", " ", "\t"])).map(
+        lambda given: "\n".join(given[1].join(map(str, row)) for row in given[0]).encode()
+    ),
+)
+
+
+@settings(
+    max_examples=60,
+    deadline=None,
+    derandomize=True,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(content=_FILES)
+def test_no_file_makes_a_traceback(content: bytes, tmp_path: Path) -> None:
+    fuzzed, touches = tmp_path / "fuzz.csv", tmp_path / "touches.csv"
+    fuzzed.write_bytes(content)
+    if not touches.exists():
+        _table(touches, _touched(gp_core.PROBE))
+    estimate = ["estimate", str(touches), "--side", "L", "--path", str(fuzzed), "--path-units", "mm"]
+    for words in (
+        ["pivot", str(fuzzed)],
+        ["register", str(touches), str(fuzzed), "--side", "L"],
+        ["register", str(fuzzed), str(touches), "--side", "L"],
+        [*estimate, "--path-side", "L", "--path-out", str(tmp_path / "out.csv")],
+    ):
+        assert main(words) in (0, 2)

@@ -150,6 +150,14 @@ def test_what_is_no_path_is_refused(text: str, message: str, tmp_path: Path) -> 
         read_path(file, units="mm")
 
 
+@pytest.mark.parametrize("rows", [-3, 0, 1, 41])
+def test_rows_that_are_not_there_are_refused(rows: int, tmp_path: Path) -> None:
+    file = _write(tmp_path / "path.csv", _spiral())
+    with pytest.raises(GpError, match=f"must be 2 to 40, got {rows}"):
+        read_path(file, units="mm", rows=rows)
+    assert len(read_path(file, units="mm", rows=40)) == 40
+
+
 def test_a_missing_file_is_named() -> None:
     with pytest.raises(FileFormatError, match="does not exist"):
         read_path("none.csv", units="mm")
