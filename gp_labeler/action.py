@@ -11,7 +11,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["MENUS", "Action", "Run", "Test", "Ui"]
 
-MENUS = ("File", "Edit", "View", "Landmarks", "Help")
+MENUS = ("File", "Edit", "View", "Landmarks", "Estimate", "Help")
 
 
 class Ui(Protocol):
@@ -26,6 +26,11 @@ class Ui(Protocol):
     def ask_save_mesh(self) -> None: ...  # noqa: D102
     def ask_screenshot(self) -> None: ...  # noqa: D102
     def ask_swap(self) -> None: ...  # noqa: D102
+    def ask_open_touches(self) -> None: ...  # noqa: D102
+    def ask_open_skull(self) -> None: ...  # noqa: D102
+    def judge_pose(self, verdict: str) -> None: ...  # noqa: D102
+    def look_along_axis(self) -> None: ...  # noqa: D102
+    def look_through_window(self) -> None: ...  # noqa: D102
     def open_demo(self) -> None: ...  # noqa: D102
     def save(self, *, ask: bool = False) -> bool: ...  # noqa: D102
     def close_window(self) -> None: ...  # noqa: D102

@@ -8,12 +8,17 @@ from types import MappingProxyType
 from gp_core.errors import GpError
 from gp_labeler.action import MENUS, Action, Ui
 from gp_labeler.action_rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
+from gp_labeler.action_rows_pose import pose_rows
 from gp_labeler.workbench import Workbench
 
 __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
 
 ACTIONS: Mapping[str, Action] = MappingProxyType(
-    {row.id: row for rows in (file_rows, edit_rows, view_rows, landmark_rows, help_rows) for row in rows()}
+    {
+        row.id: row
+        for rows in (file_rows, edit_rows, view_rows, landmark_rows, pose_rows, help_rows)
+        for row in rows()
+    }
 )
 
 

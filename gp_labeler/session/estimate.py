@@ -170,6 +170,14 @@ class Estimate:
         distance = float(np.linalg.norm(placed.origin - self.truth.translation))
         return distance, float(angle_between_deg(placed.axis, self.truth.rotation[:, 0]))
 
+    def apart(self) -> tuple[float, float] | None:
+        """Return how far the poses of two methods lie apart, mm and degrees; None where there is but one."""
+        if len(self.poses) < 2:
+            return None
+        one, other = (self.poses[method] for method in self.settings.methods[:2])
+        distance = float(np.linalg.norm(one.origin - other.origin))
+        return distance, float(angle_between_deg(one.axis, other.axis))
+
     def as_dict(self) -> dict[str, Any]:
         """Return what a verdict and a report keep of it."""
         out = {} if self.pose is None else self.pose.as_dict()

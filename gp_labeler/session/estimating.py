@@ -19,7 +19,7 @@ from gp_core.landmarks.sets import Specimen
 from gp_labeler.session.estimate import REGISTRATIONS, Estimate, EstimateSettings, make_estimate
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import RecordPoseCheck
-from gp_labeler.session.state import PoseCheck
+from gp_labeler.session.state import PoseCheck, SpecimenState
 from gp_labeler.session.touch_edits import LeaveOutTouch
 
 __all__ = ["Estimating"]
@@ -47,7 +47,7 @@ class Estimating:
         self._atlas: Atlas | None = None
         self._specimens: tuple[Specimen, ...] = ()
         self._known: dict[Side, RigidTransform] = {}
-        self._made: tuple[tuple[Any, ...], Estimate] | None = None
+        self._made: tuple[tuple[Any, ...], Estimate | None] | None = None
         self._revision = 0
         self.joint_ready = False
         session.touches_changed.connect(self._tell)
@@ -115,25 +115,29 @@ class Estimating:
     def of_side(self, side: Side) -> Estimate | None:
         """Return the estimate of a side, as `current` does for the chosen one."""
         state, settings = self._session.state, replace(self._settings, side=side)
-        if self._atlas is None or len(state.touched(side).placed) < FEWEST_TOUCHES:
-            return None
         if not self.joint_ready:
             settings = replace(settings, methods=_without_joint(settings.methods))
         key = (self._revision, state.touches, state.skull, state.landmarks, settings)
         if self._made is None or self._made[0] != key:
-            made = make_estimate(state, settings, self._atlas, self._specimens, known=self._known.get(side))
-            self._made = (key, made)
+            self._made = (key, self._make(state, settings))
         return self._made[1]
 
+    def _make(self, state: SpecimenState, settings: EstimateSettings) -> Estimate | None:
+        if self._atlas is None or len(state.touched(settings.side).placed) < FEWEST_TOUCHES:
+            return None
+        known = self._known.get(settings.side)
+        return make_estimate(state, settings, self._atlas, self._specimens, known=known)
+
     def without(self, name: str) -> tuple[float, float] | None:
-        """Return by how much the pose moves, mm and degrees, if one touch is left out."""
-        current = self.current
-        if current is None or current.pose is None or name not in current.pose.residuals:
+        """Return by how much the pose moves, mm and degrees, if a touch is left out, or taken in again."""
+        current, touch = self.current, self._session.state.touches.get((self._settings.side, name))
+        if current is None or current.pose is None or touch is None or name not in current.atlas.codes:
             return None
-        state = LeaveOutTouch(current.side, name).apply(self._session.state)
-        if self._atlas is None or len(state.touched(current.side).placed) < FEWEST_TOUCHES:
+        state = LeaveOutTouch(current.side, name, not touch.left_out).apply(self._session.state)
+        if len(state.touched(current.side).placed) < FEWEST_TOUCHES:
             return None
-        other = make_estimate(state, current.settings, self._atlas, self._specimens).pose
+        settings = replace(current.settings, methods=(current.pose.method,))
+        other = make_estimate(state, settings, current.atlas, self._specimens).pose
         return None if other is None else _difference(current.pose, other)
 
     def judge(self, verdict: str, *, by: str = "", note: str = "") -> PoseCheck:

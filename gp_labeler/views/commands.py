@@ -51,6 +51,8 @@ class Commands(QObject):
             workbench.volume_opened,
             workbench.surfaces_changed,
             workbench.tool_changed,
+            workbench.pose.changed,
+            workbench.pose.overlay_changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()

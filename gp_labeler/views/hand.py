@@ -11,6 +11,7 @@ from gp_core.landmarks.features import feature
 from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How
+from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.drawn import point_of
 from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.workbench import Workbench
@@ -73,6 +74,10 @@ class Hand:
         A point that is to do is placed; else a mark is chosen; else the chosen point moves here.
         """
         desk, active = self._desk, self._desk.session.active
+        if desk.tool == "touch":
+            if position is not None:
+                self._guarded(lambda: self._touch(position))
+            return
         is_new = active.code is not None and not desk.session.state.landmark(active.side, active.code).settled
         if mark is not None and not (desk.tool == "place" and is_new):
             desk.go_to(*point_of(mark))
@@ -112,8 +117,13 @@ class Hand:
         self._placed = labelling.place(self._desk.session, position, how)
         return self._placed
 
+    def _touch(self, position: FloatArray) -> None:
+        self._desk.session.set_crosshair(position)
+        self._desk.pose.record(position, TouchHow.SCAN)
+        self._placed = True
+
     def _can_drag(self, mark: str) -> bool:
-        return not feature(point_of(mark)[1]).computed
+        return self._desk.tool != "touch" and not feature(point_of(mark)[1]).computed
 
     def _guarded(self, edit: object) -> None:
         try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import fields
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 from typing import TypeVar
 
 from PySide6.QtCore import QByteArray
@@ -24,6 +25,7 @@ from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.panels.label_panel import LabelPanel
+from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.panels.scan_panel import ScanPanel
 from gp_labeler.views.panels.welcome import Welcome
@@ -39,6 +41,9 @@ from gp_labeler.workbench import Workbench
 __all__ = ["MainWindow"]
 
 Layout = TypeVar("Layout", bound=QBoxLayout)
+
+_ALONE = MappingProxyType({"pose": "Touch features, or drop a file of touches"})
+"""Steps that need no scan, and what the line at the bottom says then."""
 
 _LIKED = (
     "outline_visible",
@@ -93,13 +98,23 @@ class MainWindow(QMainWindow):
         self.memory.set(theme=name)
 
     def set_step(self, step: str) -> None:
-        """Show the panel of a step: ``scan`` or ``label``."""
+        """Show the panel of a step: ``scan``, ``label`` or ``pose``."""
         self.rail.set_step(step)
         self.panels.setCurrentWidget(self.steps[step])
+        self._arrange()
+
+    def take_touches(self, path: Path) -> bool:
+        """Take the touches of a file; return whether it could be read."""
+        return self._pose.take_file(path)
+
+    def judge_pose(self, verdict: str) -> bool:
+        """Keep a verdict on the estimate with the initials and the note that stand in the panel."""
+        return self._pose.verdict.judge(verdict)
 
     def _dock(self) -> None:
         self._scan, self._label = ScanPanel(self.workbench), LabelPanel(self.workbench)
-        self.steps: dict[str, QWidget] = {"scan": self._scan, "label": self._label}
+        self._pose = PosePanel(self.workbench, self.commands.actions)
+        self.steps: dict[str, QWidget] = {"scan": self._scan, "label": self._label, "pose": self._pose}
         for panel in self.steps.values():
             self.panels.addWidget(panel)
         self.panels.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
@@ -134,6 +149,9 @@ class MainWindow(QMainWindow):
         card.open_asked.connect(self.ui.ask_open_file)
         card.export_asked.connect(partial(self.commands.run, "file.export"))
         self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
+        self._pose.touch_file_asked.connect(partial(self.commands.run, "pose.open_touches"))
+        self._pose.skull_file_asked.connect(partial(self.commands.run, "pose.open_skull"))
+        self._pose.atlas_asked.connect(partial(self.rail.buttons["atlas"].click))
         follow(self, desk.volume_opened, self._show_page)
         follow(self, desk.session_replaced, self._show_page)
         follow(self, desk.import_asked, self._on_import_asked)
@@ -142,15 +160,27 @@ class MainWindow(QMainWindow):
             follow(self, signal, self._show_title)
 
     def _show_page(self, *_: object) -> None:
-        """Show the first page until a scan, or a specimen that lies on one, is open."""
-        is_open = self.workbench.session.state.volume is not None
+        """Show the first page until there is something to work on."""
+        state = self.workbench.session.state
+        is_open = state.volume is not None
         if is_open and self.pages.currentIndex() == 0 and self.workbench.volume is not None:
             self.set_step("label")
             self.grid.scene_view.setFocus()
-        self.pages.setCurrentIndex(int(is_open))
-        if not is_open:
-            self.set_step("scan")
+        if not is_open and self.rail.step not in _ALONE:
+            self.set_step("pose" if state.touches else "scan")
             self.welcome.refresh()
+        self._arrange()
+
+    def _arrange(self) -> None:
+        """Show the views beside a scan, a panel alone where its step needs none, else the first page."""
+        is_open, step = self.workbench.session.state.volume is not None, self.rail.step
+        alone = not is_open and step in _ALONE
+        self.grid.setVisible(not alone)
+        self._pose.set_wide(alone)
+        wide = QSizePolicy.Policy.Expanding
+        self.panels.setSizePolicy(wide if alone else QSizePolicy.Policy.Fixed, wide)
+        self.pages.setCurrentIndex(int(is_open or alone))
+        self.status.set_without_scan(_ALONE[step] if alone else "")
 
     def _on_path_chosen(self, path: str) -> None:
         self.ui.open_path(Path(path))
@@ -205,7 +235,11 @@ class MainWindow(QMainWindow):
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802
         for url in event.mimeData().urls()[:1]:
-            self.ui.open_path(Path(url.toLocalFile()))
+            path = Path(url.toLocalFile())
+            if self.rail.step == "pose" and holds_touches(path):
+                self.take_touches(path)
+            else:
+                self.ui.open_path(path)
 
 
 def _tight(layout: Layout, *, spacing: int = 0) -> Layout:

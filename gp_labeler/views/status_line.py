@@ -54,6 +54,7 @@ class StatusLine(QWidget):
         row.addWidget(self.where, 3)
         row.addWidget(self.next_click, 4)
         row.addWidget(self.work, 3)
+        self.without_scan = ""
         self._message_timer = QTimer(self, singleShot=True)
         self._message_timer.timeout.connect(self._say_next)
         for signal in (
@@ -63,6 +64,7 @@ class StatusLine(QWidget):
             workbench.tool_changed,
             workbench.volume_opened,
             workbench.dragged,
+            workbench.pose.target_changed,
         ):
             follow(self, signal, self._on_changed)
         follow(self, workbench.message, self.say)
@@ -78,6 +80,11 @@ class StatusLine(QWidget):
         value = volume.value_at(position)
         grey = "outside" if value is None else f"{value:.6g}"
         self.where.setText(f"{where_text(position)}  ·  voxel {i}, {j}, {k}  ·  {grey}")
+
+    def set_without_scan(self, text: str) -> None:
+        """Say what comes next where there is no scan and none is needed; empty where one is."""
+        self.without_scan = text
+        self._on_changed()
 
     def say(self, text: str, level: str = "info") -> None:
         """Show a message in the middle for a while; an error until the next edit."""
@@ -97,7 +104,11 @@ class StatusLine(QWidget):
             point = point_text(desk.drag.side, desk.drag.code)
             self._show(f"Let go to leave {point} here, or press Esc to take it back", "next")
         elif desk.volume is None:
-            self._show("Open a scan, or try the demo", "hint")
+            self._show(self.without_scan or "Open a scan, or try the demo", "hint")
+        elif desk.tool == "touch":
+            target = desk.pose.target
+            where = f"where {point_text(desk.pose.side, target)} is" if target else "in vain: all are touched"
+            self._show(f"Click on bone or a slice {where}", "next")
         elif desk.tool == "look":
             self._show("Drag over a slice to move the crosshair", "hint")
         elif desk.tool == "grey":

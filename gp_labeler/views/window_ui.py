@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,6 +10,9 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
+from gp_labeler.scene.pose_data import DrawnPose
+from gp_labeler.session import touching
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.edits import SwapPoints
 from gp_labeler.session.lock import InUseError
@@ -35,6 +39,7 @@ _SCANS = (
     "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
+_TOUCHES = "Touches (*.dat *.csv *.mrk.json *.fcsv *.json *.txt);;All files (*)"
 _CLOSE_MM = 12.0
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
 
@@ -150,6 +155,24 @@ class WindowUi:
         if folder is not None:
             export_asking(self._desk, folder, self.prompts)
 
+    def ask_open_touches(self) -> None:
+        """Ask for a file of touches, and take them."""
+        self._window.set_step("pose")
+        for path in self.prompts.open_files("Open touches", self._folder, _TOUCHES):
+            self._remember_folder(path)
+            self._window.take_touches(path)
+
+    def ask_open_skull(self) -> None:
+        """Ask for a landmark file that says where the skull features are on the scan."""
+        for path in self.prompts.open_files("Skull features on the scan", self._folder, _POINTS):
+            self._remember_folder(path)
+            names = touching.load_skull(self._desk.session, path)
+            self._desk.say(f"Took {' '.join(names)} from {path.name}")
+
+    def judge_pose(self, verdict: str) -> None:
+        """Keep a verdict on the estimate, with the initials and the note of the panel."""
+        self._window.judge_pose(verdict)
+
     def ask_save_mesh(self) -> None:
         """Ask where, and write the bone surface."""
         name = f"{self._desk.session.state.specimen}.ply"
@@ -243,6 +266,23 @@ class WindowUi:
     def look_from(self, letter: str) -> None:
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
         self._window.grid.scene_view.view_from(letter)
+
+    def look_along_axis(self) -> None:
+        """Look at the estimated cochlea along its axis, the apex first."""
+        self._look_at_pose(along_axis)
+
+    def look_through_window(self) -> None:
+        """Look at the estimated cochlea through its round window."""
+        self._look_at_pose(through_round_window)
+
+    def _look_at_pose(self, placement: Callable[[DrawnPose], Placement]) -> None:
+        estimate = self._desk.pose.estimate
+        if estimate is None or estimate.pose is None or estimate.registered is None:
+            raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")
+        view = self._window.grid.scene_view
+        pose = DrawnPose.of(estimate.pose, estimate.registered.T_scan_touches, label="")
+        place_camera(view.scene.camera, placement(pose))
+        view.redraw()
 
     def toggle_theme(self) -> None:
         """Change between dark and light."""

@@ -59,7 +59,7 @@ class Rail(QWidget):
         actions: object = None,
         parent: QWidget | None = None,
         *,
-        built: tuple[str, ...] = ("scan", "label"),
+        built: tuple[str, ...] = ("scan", "label", "pose"),
     ) -> None:
         super().__init__(parent)
         self._workbench = workbench

@@ -1,0 +1,97 @@
+"""What an estimate is made with: side, method, probe noise, atlas."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import Signal
+from PySide6.QtWidgets import QHBoxLayout, QWidget
+
+from gp_core.landmarks.features import Side
+from gp_labeler.views.bind import attempt, follow
+from gp_labeler.views.panels.number_field import NumberField
+from gp_labeler.views.panels.parts import Card, ElidedLabel, text_label
+from gp_labeler.views.panels.pose_parts import Segments, link
+from gp_labeler.workbench import Workbench
+
+__all__ = ["HeadCard"]
+
+_METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmpc")}
+_HINTS = {
+    "robust": "Uses the names of the touched points, and sets a wrong touch aside",
+    "jrmpc": "The published method; needs the labelled animals of an atlas fitted here",
+    "both": "Side by side",
+}
+
+
+class HeadCard(Card):
+    """Settings of the estimate.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose estimate it sets.
+    """
+
+    atlas_asked = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Estimate", parent)
+        self._desk = workbench
+        hints = {side.value: f"The {side.word} ear was touched" for side in Side}
+        self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
+        self.method = Segments({"robust": "Robust", "jrmpc": "JRMPC", "both": "Both"}, _HINTS)
+        self.noise = NumberField("Probe noise")
+        self.noise.step = 0.05
+        self.noise.setPlaceholderText("found")
+        self.noise.setToolTip(
+            "Ordinary error of a touch in mm a coordinate; empty: found from the touches themselves"
+        )
+        self.noise.setFixedWidth(64)
+        self.found = text_label("", "hint")
+        self.atlas = ElidedLabel()
+        self.to_atlas = link("Change", "Choose or fit another atlas (step 3)")
+        self._lay_out()
+        self.side.chosen.connect(lambda side: self._choose(side=Side.parse(side)))
+        self.method.chosen.connect(lambda name: self._choose(methods=_METHODS[name]))
+        self.noise.value_chosen.connect(lambda mm: self._choose(probe_noise=mm))
+        self.noise.textEdited.connect(self._on_edited)
+        self.to_atlas.clicked.connect(self.atlas_asked)
+        follow(self, workbench.atlas_changed, self.refresh)
+
+    def refresh(self, *_: object) -> None:
+        """Show the settings in effect."""
+        settings, estimate = self._desk.pose.estimating.settings, self._desk.pose.estimate
+        self.side.set_value(settings.side.value)
+        self.method.set_value(next(name for name, methods in _METHODS.items() if methods == settings.methods))
+        self.noise.set_value(settings.probe_noise)
+        pose = None if estimate is None else estimate.poses.get("robust")
+        is_found = settings.probe_noise is None and pose is not None and pose.probe_noise is not None
+        self.found.setText(f"mm, found {pose.probe_noise:.2f}" if is_found and pose is not None else "mm")
+        atlas = self._desk.atlas
+        self.atlas.set_words("being loaded" if atlas is None else atlas.name)
+
+    def _lay_out(self) -> None:
+        self.heading.hide()
+        choices = QHBoxLayout()
+        choices.setSpacing(12)
+        choices.addWidget(self.side, 2)
+        choices.addWidget(self.method, 3)
+        noise, atlas = QHBoxLayout(), QHBoxLayout()
+        for row, caption in ((noise, "Probe noise"), (atlas, "Atlas")):
+            row.setSpacing(6)
+            words = text_label(caption, "hint")
+            words.setFixedWidth(72)
+            row.addWidget(words)
+        noise.addWidget(self.noise)
+        noise.addWidget(self.found, 1)
+        atlas.addWidget(self.atlas, 1)
+        atlas.addWidget(self.to_atlas)
+        for row in (choices, noise, atlas):
+            self.add(row)
+
+    def _on_edited(self, text: str) -> None:
+        if not text.strip():
+            self._choose(probe_noise=None)
+
+    def _choose(self, **fields: object) -> None:
+        attempt(self._desk, lambda: self._desk.pose.choose(**fields))
+        self.refresh()

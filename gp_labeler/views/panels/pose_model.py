@@ -1,0 +1,188 @@
+"""The touches of one side as a Qt model: one row for whatever can be touched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import CODES
+from gp_labeler.session.touches import Touch, TouchHow, frame_of
+from gp_labeler.views.panels.pose_words import fine_mm, parse_position, touch_text, triple
+from gp_labeler.workbench import Workbench
+
+__all__ = ["CLEAR", "MISFIT", "NAME", "ROW_ROLE", "USE", "XYZ", "TouchModel", "TouchRow"]
+
+NAME, XYZ, MISFIT, USE, CLEAR = range(5)
+_HEADINGS = ("Point", "x, y, z in mm", "Misfit", "Use", "")
+ROW_ROLE = int(Qt.ItemDataRole.UserRole) + 1
+
+Index = QModelIndex | QPersistentModelIndex
+
+
+@dataclass(frozen=True)
+class TouchRow:
+    """What one row shows.
+
+    Parameters
+    ----------
+    name : str
+    touch : Touch, optional
+    state : str
+        A shape, see `chips.SHAPES`.
+    misfit : float, optional
+        Distance from where the others expect the point, mm.
+    suspect, target : bool
+    """
+
+    name: str
+    touch: Touch | None
+    state: str
+    misfit: float | None
+    suspect: bool
+    target: bool
+
+
+class TouchModel(QAbstractTableModel):
+    """Names, positions and misfits of the touches of the side in work.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose touches it shows and edits.
+    tell : callable
+        Is told of a `GpError` that an edit came to, and of None where one was made.
+    """
+
+    def __init__(
+        self, workbench: Workbench, tell: Callable[[GpError | None], object], parent: QObject | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._desk, self._tell = workbench, tell
+        self.rows: tuple[TouchRow, ...] = ()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Ask the workbench anew."""
+        rows = tuple(self._row(name) for name in self._desk.pose.names)
+        if [row.name for row in rows] != [row.name for row in self.rows]:
+            self.beginResetModel()
+            self.rows = rows
+            self.endResetModel()
+            return
+        self.rows, before = rows, self.rows
+        for n, (new, old) in enumerate(zip(rows, before, strict=True)):
+            if new != old:
+                self.dataChanged.emit(self.index(n, 0), self.index(n, CLEAR))
+
+    @property
+    def largest(self) -> float:
+        """The longest misfit, mm: full length of the bars, which are of 1 mm at least."""
+        return max([1.0, *(row.misfit for row in self.rows if row.misfit is not None)])
+
+    def row_of(self, name: str | None) -> int:
+        """Return the number of a row by its name; -1 where there is none."""
+        return next((n for n, row in enumerate(self.rows) if row.name == name), -1)
+
+    def record(self, name: str, text: str) -> bool:
+        """Take a typed position; return whether it could be taken."""
+        pose = self._desk.pose
+        try:
+            position = parse_position(text, name)
+            on_scan = frame_of(self._desk.session.state.touches, pose.side) == "scan"
+            pose.record(position, TouchHow.SCAN if on_scan else TouchHow.TYPED, name=name)
+        except GpError as error:
+            self._tell(error)
+            return False
+        self._tell(None)
+        return True
+
+    def _row(self, name: str) -> TouchRow:
+        pose = self._desk.pose
+        touch = self._desk.session.state.touches.get((pose.side, name))
+        misfit, suspect = self._misfit(name)
+        target = pose.target == name
+        state = "active" if target else "to do"
+        if touch is not None:
+            state = "unseen" if touch.left_out else "doubtful" if suspect else "placed"
+        return TouchRow(name, touch, state, misfit, suspect, target)
+
+    def _misfit(self, name: str) -> tuple[float | None, bool]:
+        estimate = self._desk.pose.estimate
+        if estimate is None:
+            return None, False
+        if name in CODES:
+            found = estimate.pose
+            return (None, False) if found is None else (found.residuals.get(name), name in found.suspects)
+        fiducials = estimate.registered and estimate.registered.fiducials
+        if not fiducials:
+            return None, False
+        return fiducials.residuals_mm.get(name), name in fiducials.suspects
+
+    # Qt's methods
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's name
+        return 0 if parent.isValid() else len(self.rows)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's name
+        return 0 if parent.isValid() else len(_HEADINGS)
+
+    def headerData(self, section: int, way: Qt.Orientation, role: int = 0) -> Any:  # noqa: D102, N802
+        if way is Qt.Orientation.Horizontal and role == Qt.ItemDataRole.DisplayRole:
+            return _HEADINGS[section]
+        if role == Qt.ItemDataRole.TextAlignmentRole and section == XYZ:
+            return Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter
+        if role == Qt.ItemDataRole.ToolTipRole and way is Qt.Orientation.Horizontal:
+            return _HEADING_HINTS[section]
+        return None
+
+    def flags(self, index: Index) -> Qt.ItemFlag:  # noqa: D102
+        flags = Qt.ItemFlag.ItemIsEnabled | Qt.ItemFlag.ItemIsSelectable
+        return flags | Qt.ItemFlag.ItemIsEditable if index.column() == XYZ else flags
+
+    def data(self, index: Index, role: int = int(Qt.ItemDataRole.DisplayRole)) -> Any:  # noqa: D102
+        if not index.isValid():
+            return None
+        row = self.rows[index.row()]
+        if role == ROW_ROLE:
+            return row
+        if role == Qt.ItemDataRole.EditRole and index.column() == XYZ:
+            return "" if row.touch is None else " ".join(f"{x:.6g}" for x in row.touch.position)
+        if role == Qt.ItemDataRole.DisplayRole:
+            return self._words(row, index.column())
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
+            return self._hint(row, index.column())
+        return None
+
+    def setData(self, index: Index, value: Any, role: int = 0) -> bool:  # noqa: D102, N802 - Qt's name
+        if index.column() != XYZ or str(value) == self.data(index, Qt.ItemDataRole.EditRole):
+            return False
+        return self.record(self.rows[index.row()].name, str(value))
+
+    def _words(self, row: TouchRow, column: int) -> str:
+        if column == NAME:
+            return row.name
+        if column == XYZ:
+            return "" if row.touch is None else triple(row.touch.position)
+        return fine_mm(row.misfit) if column == MISFIT and row.misfit is not None else ""
+
+    def _hint(self, row: TouchRow, column: int) -> str:
+        if row.touch is not None and column == USE:
+            return (
+                f"Take {row.name} in again" if row.touch.left_out else f"Leave {row.name} out of the estimate"
+            )
+        if row.touch is not None and column == CLEAR:
+            return f"Clear {row.name}"
+        return touch_text(row.name, row.touch, self._desk.pose.estimate)
+
+
+_HEADING_HINTS = (
+    "What can be touched; the next one is highlighted",
+    "Where it was touched; double-click, or type, to change it",
+    "How far the touch lies from where the others expect it",
+    "Whether the estimate uses it",
+    None,
+)

@@ -1,0 +1,105 @@
+"""The card of what is drawn of the estimate over bone and slices."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QAction
+from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
+
+from gp_labeler.views.bind import blocked, follow
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.pose_parts import link
+from gp_labeler.workbench import Workbench
+
+__all__ = ["OverlayCard"]
+
+_PARTS = {
+    "estimate": ("Origin and axis", "The estimated CO, and the modiolar axis as an arrow"),
+    "region": ("95 % region", "Where CO and axis are with 95 %: an ellipsoid and a cone"),
+    "cochlea": ("Cochlea", "The outline of a cochlea in the estimated pose"),
+    "truth": ("Labelled", "The labelled CO and axis, and the errors against them"),
+    "features": ("Atlas features", "Where the atlas has its features in this pose"),
+    "vectors": ("Error vectors", "From there to where they are labelled"),
+    "touches": ("Touches", "The touched points in the scan"),
+    "tip": ("Probe", "The tracked probe"),
+    "path": ("Insertion path", "The path of an electrode, where one was loaded"),
+    "names": ("Names and errors", "In words beside what is drawn"),
+}
+
+
+class OverlayCard(Card):
+    """Check boxes for the parts, opacity, and two cameras.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose overlay it sets.
+    actions : mapping of str to QAction
+        Of the cameras: ``pose.along_axis`` and ``pose.through_window``, where they are.
+    """
+
+    def __init__(
+        self, workbench: Workbench, actions: Mapping[str, QAction], parent: QWidget | None = None
+    ) -> None:
+        super().__init__("Overlay", parent)
+        self._desk = workbench
+        self.visible = self._box("visible", "Show", "Draw the estimate over bone and slices")
+        self.parts = {name: self._box(name, *words) for name, words in _PARTS.items()}
+        self.opacity = QSlider(Qt.Orientation.Horizontal)
+        self.opacity.setRange(5, 100)
+        self.opacity.setAccessibleName("Opacity of the overlay, percent")
+        self.percent = text_label("", "hint")
+        self.cameras = {name: link(word) for name, word in _CAMERAS.items()}
+        self._lay_out(actions)
+        self.opacity.valueChanged.connect(lambda percent: self._desk.pose.draw(opacity=percent / 100))
+        follow(self, workbench.pose.overlay_changed, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show what is drawn."""
+        options = self._desk.pose.overlay
+        for name, box in {"visible": self.visible, **self.parts}.items():
+            with blocked(box):
+                box.setChecked(getattr(options, name))
+            box.setEnabled(options.visible or name == "visible")
+        with blocked(self.opacity):
+            self.opacity.setValue(round(100 * options.opacity))
+        self.percent.setText(f"{100 * options.opacity:.0f} %")
+
+    def _box(self, name: str, word: str, hint: str) -> QCheckBox:
+        box = QCheckBox(word)
+        box.setToolTip(hint)
+        box.toggled.connect(lambda on: self._desk.pose.draw(**{name: on}))
+        return box
+
+    def _lay_out(self, actions: Mapping[str, QAction]) -> None:
+        self.add_to_heading(self.visible)
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(8)
+        grid.setVerticalSpacing(1)
+        for n, box in enumerate(self.parts.values()):
+            grid.addWidget(box, n // 2, n % 2)
+        self.add(grid)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(text_label("Opacity", "hint"))
+        row.addWidget(self.opacity, 1)
+        row.addWidget(self.percent)
+        self.percent.setFixedWidth(self.percent.fontMetrics().horizontalAdvance("100 %") + 4)
+        self.add(row)
+        looks = QHBoxLayout()
+        looks.setSpacing(2)
+        for name, button in self.cameras.items():
+            action = actions.get(name)
+            button.setVisible(action is not None)
+            if action is not None:
+                button.clicked.connect(action.trigger)
+                button.setToolTip(action.toolTip())
+            looks.addWidget(button)
+        looks.addStretch(1)
+        self.add(looks)
+
+
+_CAMERAS = {"pose.along_axis": "Look along the axis", "pose.through_window": "Through the round window"}

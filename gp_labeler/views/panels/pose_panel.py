@@ -1,0 +1,181 @@
+"""The panel of the step Pose: touches, the cochlea estimated from them, where it lies, the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QHideEvent, QResizeEvent, QShowEvent
+from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+
+from gp_labeler.views.bind import follow
+from gp_labeler.views.panels.label_panel import PANEL_WIDTH
+from gp_labeler.views.panels.parts import Card, scrolled
+from gp_labeler.views.panels.pose_head import HeadCard
+from gp_labeler.views.panels.pose_overlay import OverlayCard
+from gp_labeler.views.panels.pose_result import ResultCard
+from gp_labeler.views.panels.pose_scan import InScanCard
+from gp_labeler.views.panels.pose_touches import TouchesCard
+from gp_labeler.views.panels.pose_verdict import VerdictCard
+from gp_labeler.views.panels.welcome import dropped_path
+from gp_labeler.workbench import Workbench
+
+__all__ = ["PosePanel", "holds_touches"]
+
+_TOUCH_FILES = (".dat", ".csv", ".mrk.json", ".fcsv", ".txt")
+_WIDE, _WIDEST = 760, 1120
+"""From which width on, logical pixels, cards stand in two columns, and how wide these become."""
+
+
+def holds_touches(path: Path) -> bool:
+    """Return whether a file may hold touches, by its name."""
+    return path.name.lower().endswith(_TOUCH_FILES)
+
+
+class PosePanel(QWidget):
+    """All cards of the step; in two columns where there is room.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose touches and estimate it shows and edits.
+    actions : mapping of str to QAction, optional
+        What some of its buttons do.
+    """
+
+    touch_file_asked = Signal()
+    skull_file_asked = Signal()
+    tracker_asked = Signal()
+    guide_asked = Signal()
+    atlas_asked = Signal()
+    report_asked = Signal()
+    export_asked = Signal()
+
+    def __init__(
+        self,
+        workbench: Workbench,
+        actions: Mapping[str, QAction] | None = None,
+        parent: QWidget | None = None,
+    ) -> None:
+        super().__init__(parent)
+        self._desk = workbench
+        self._stale = True
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("role", "panel")
+        self.setAcceptDrops(True)
+        self.head, self.touches = HeadCard(workbench), TouchesCard(workbench)
+        self.result, self.in_scan = ResultCard(workbench), InScanCard(workbench)
+        self.overlay, self.verdict = OverlayCard(workbench, actions or {}), VerdictCard(workbench)
+        self.report, self.export = QPushButton("Report…"), QPushButton("Export…")
+        self.report.setToolTip("One page with touches, estimate, errors and pictures")
+        self.export.setToolTip("The pose as JSON, Slicer transform, 4x4 table or markups")
+        self._lay_out()
+        self._connect()
+        self.set_wide(False)
+
+    def refresh(self, *_: object) -> None:
+        """Show everything as it stands; not before somebody looks."""
+        self._stale = not self.isVisible()
+        if self._stale:
+            return
+        for card in (self.head, self.touches, self.result, self.in_scan, self.verdict):
+            card.refresh()
+        is_there = self._desk.pose.estimate is not None and self._desk.pose.estimate.pose is not None
+        for button in (self.report, self.export):
+            button.setEnabled(is_there)
+
+    def set_wide(self, wide: bool) -> None:
+        """Take all the width there is, where there is no scan beside; else that of the other panels."""
+        self.setMinimumWidth(PANEL_WIDTH)
+        self.setMaximumWidth(_ANY if wide else PANEL_WIDTH)
+
+    def add_card(self, card: QWidget) -> None:
+        """Put a card under the others, before the verdict."""
+        self.right.insertWidget(self.right.indexOf(self.verdict), card)
+
+    def take_file(self, path: Path) -> bool:
+        """Take the touches of a file; return whether it could be read."""
+        return self.touches.take_file(path)
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(PANEL_WIDTH, super().sizeHint().height())
+
+    def _lay_out(self) -> None:
+        self.left, self.right = QVBoxLayout(), QVBoxLayout()
+        out = Card("Hand on")
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        row.addWidget(self.report, 1)
+        row.addWidget(self.export, 1)
+        out.add(row)
+        for column, cards in (
+            (self.left, (self.head, self.touches)),
+            (self.right, (self.result, self.in_scan, self.overlay, self.verdict, out)),
+        ):
+            column.setSpacing(6)
+            for card in cards:
+                column.addWidget(card)
+        body = QWidget()
+        body.setMaximumWidth(_WIDEST)
+        self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom, body)
+        self._columns.setContentsMargins(4, 8, 8, 8)
+        self._columns.setSpacing(6)
+        self._columns.addLayout(self.left)
+        self._columns.addLayout(self.right)
+        self.left.addStretch(1)
+        self.right.addStretch(1)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        middle = QHBoxLayout(content)
+        middle.setContentsMargins(0, 0, 0, 0)
+        middle.addWidget(body, 0, Qt.AlignmentFlag.AlignTop)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolled(content))
+
+    def _connect(self) -> None:
+        self.head.atlas_asked.connect(self.atlas_asked)
+        self.touches.file_asked.connect(self.touch_file_asked)
+        self.touches.tracker_asked.connect(self.tracker_asked)
+        self.touches.guide_asked.connect(self.guide_asked)
+        self.in_scan.skull_file_asked.connect(self.skull_file_asked)
+        self.report.clicked.connect(self.report_asked)
+        self.export.clicked.connect(self.export_asked)
+        pose = self._desk.pose
+        for signal in (pose.changed, pose.target_changed):
+            follow(self, signal, self.refresh)
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().showEvent(event)
+        if self._stale:
+            self.refresh()
+
+    def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().hideEvent(event)
+        self._stale = True
+        if self._desk.tool == "touch" and not event.spontaneous():
+            self._desk.set_tool("place")
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        way = QBoxLayout.Direction
+        wide = event.size().width() >= _WIDE
+        self._columns.setDirection(way.LeftToRight if wide else way.TopToBottom)
+        for column in (0, 1):
+            self._columns.setStretch(column, int(wide))
+        super().resizeEvent(event)
+
+    def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: D102, N802 - Qt's name
+        path = dropped_path(event)
+        if path is not None and holds_touches(path):
+            event.acceptProposedAction()
+
+    def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802 - Qt's name
+        path = dropped_path(event)
+        if path is not None:
+            event.acceptProposedAction()
+            self.take_file(path)
+
+
+_ANY = 16777215
+"""What Qt takes for no limit."""

@@ -1,0 +1,177 @@
+"""The card of the estimated cochlea: where it is, how it is turned, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+
+from gp_core.atlas.pose import CochleaPose
+from gp_labeler.session.confidence import confidence
+from gp_labeler.session.estimate import Estimate
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.pose_parts import Notices, Verdict, link, numbers
+from gp_labeler.views.panels.pose_words import (
+    METHOD_WORDS,
+    fine_mm,
+    gain_text,
+    region_text,
+    sentence,
+    triple,
+    unit_triple,
+)
+from gp_labeler.workbench import Workbench
+
+__all__ = ["ResultCard"]
+
+_FRAMES = {"tracker": "in the tracker's frame", "scan": "in the scan, LPS"}
+
+
+class ResultCard(Card):
+    """The estimate, or what is wanting for one.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose estimate it shows.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Cochlea", parent)
+        self._desk = workbench
+        self.verdict, self.notices = Verdict(), Notices()
+        self.waiting = text_label("", "title", wrap=True)
+        self.one, self.two = _OnePose(), _TwoPoses()
+        self.next = link("", "Make it the next to touch")
+        self.frame = text_label("", "hint")
+        self.add_to_heading(self.verdict)
+        for what in (self.waiting, self.one, self.two, self.notices):
+            self.add(what)
+        row = QHBoxLayout()
+        row.setSpacing(4)
+        row.addWidget(self.next)
+        row.addStretch(1)
+        self.add(row)
+        self.next.clicked.connect(self._aim)
+
+    def refresh(self, *_: object) -> None:
+        """Show the estimate as it stands."""
+        desk = self._desk.pose
+        estimate, pose = desk.estimate, None if desk.estimate is None else desk.estimate.pose
+        self.heading.setText(_heading(estimate))
+        self.waiting.setVisible(pose is None)
+        self.waiting.setText(
+            "" if estimate is not None and pose is None else _waiting(desk.estimating.waiting_text)
+        )
+        both = estimate is not None and len(estimate.poses) > 1
+        self.one.setVisible(pose is not None and not both)
+        self.two.setVisible(both)
+        if pose is not None and not both:
+            self.one.show_pose(pose)
+        if estimate is not None and both:
+            self.two.show_poses(estimate)
+        self.verdict.setVisible(pose is not None)
+        if pose is not None:
+            trust = confidence(pose)
+            self.verdict.show_verdict(trust.level, trust.word, trust.reason)
+        self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
+        self._show_gain()
+
+    def _show_gain(self) -> None:
+        gains = self._desk.pose.gains()
+        self.next.setVisible(bool(gains))
+        if gains:
+            self.next.setText(gain_text(gains[0]))
+
+    def _aim(self) -> None:
+        gains = self._desk.pose.gains()
+        if gains:
+            self._desk.pose.aim(gains[0].code)
+
+
+class _OnePose(QWidget):
+    """Origin, axis and region of one pose, large."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        grid = QGridLayout(self)
+        grid.setContentsMargins(0, 2, 0, 2)
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(3)
+        self.origin, self.axis, self.region = numbers(17, bold=True), numbers(13), numbers(15, bold=True)
+        for row, (caption, label) in enumerate((("CO", self.origin), ("Axis", self.axis))):
+            grid.addWidget(text_label(caption, "hint"), row, 0, Qt.AlignmentFlag.AlignBaseline)
+            grid.addWidget(label, row, 1, Qt.AlignmentFlag.AlignBaseline)
+        grid.addWidget(self.region, 2, 0, 1, 2)
+        grid.setColumnStretch(1, 1)
+
+    def show_pose(self, pose: CochleaPose) -> None:
+        self.origin.setText(f"{triple(pose.origin)}  mm")
+        self.axis.setText(unit_triple(pose.axis))
+        self.axis.setToolTip("Unit vector along the modiolar axis, from the base CB to the apex CA")
+        self.region.setText(region_text(pose))
+        self.region.setToolTip("The true origin and axis are in this ball and in this cone with 95 %")
+
+
+class _TwoPoses(QWidget):
+    """Two poses side by side, a coordinate a row."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._grid = QGridLayout(self)
+        self._grid.setContentsMargins(0, 2, 0, 2)
+        self._grid.setHorizontalSpacing(12)
+        self._grid.setVerticalSpacing(2)
+        self._grid.setColumnStretch(3, 1)
+        self.apart = numbers(13, bold=True)
+        self.cells = [[numbers(13) for _ in range(3)] for _ in range(9)]
+        for row, cells in enumerate(self.cells):
+            for column, cell in enumerate(cells):
+                side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft
+                cell.setAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+                self._grid.addWidget(cell, row, column)
+        self._grid.addWidget(self.apart, len(self.cells), 0, 1, 4)
+
+    def show_poses(self, estimate: Estimate) -> None:
+        methods = [method for method in estimate.settings.methods if method in estimate.poses]
+        columns = [_column(METHOD_WORDS[method], estimate.poses[method]) for method in methods]
+        names = ("", "CO x", "y", "z", "Axis x", "y", "z", "95 % within", "Cone")
+        for cells, name, *values in zip(self.cells, names, *columns, strict=True):
+            for cell, value in zip(cells, (name, *values), strict=True):
+                cell.setText(value)
+        apart = estimate.apart()
+        if apart is not None:
+            self.apart.setText(f"They lie {fine_mm(apart[0])} and {apart[1]:.1f}° apart")
+
+
+def _column(word: str, pose: CochleaPose) -> tuple[str, ...]:
+    cone = f"{math.degrees(pose.cone_95):.1f}°"
+    origin, axis = triple(pose.origin).split(), unit_triple(pose.axis).split()
+    return (word, *origin, *axis, fine_mm(pose.radius_95), cone)
+
+
+def _heading(estimate: Estimate | None) -> str:
+    if estimate is None or estimate.pose is None:
+        return "Cochlea"
+    return f"Cochlea  ·  {_FRAMES.get(estimate.touches.frame, estimate.touches.frame)}"
+
+
+def _waiting(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _notices(desk: Workbench, estimate: Estimate) -> Iterator[tuple[str, ...]]:
+    for method in estimate.settings.methods:
+        if method in estimate.problems:
+            yield ("error", f"{METHOD_WORDS[method]}: {estimate.problems[method]}")
+    if "jrmpc" in desk.pose.estimating.settings.methods and not desk.pose.estimating.joint_ready:
+        yield ("info", "JRMPC is being made ready; that takes some seconds once.")
+    said: set[str] = set()
+    for pose in estimate.poses.values():
+        for warning in pose.warnings:
+            if warning not in said:
+                said.add(warning)
+                words, _, remedy = warning.partition(": ")
+                yield ("warning", sentence(words), sentence(remedy) if remedy else "")

@@ -1,0 +1,182 @@
+"""The card of how the touches lie in the scan, and how far the estimate is from the labels."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from PySide6.QtCore import Qt, Signal
+from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+
+from gp_labeler.session import touching
+from gp_labeler.session.estimate import Estimate
+from gp_labeler.views.bind import NONE, attempt, follow, position_text
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.pose_parts import Notices, Segments, link, numbers
+from gp_labeler.views.panels.pose_words import METHOD_WORDS, fine_mm, sentence
+from gp_labeler.workbench import Workbench
+
+__all__ = ["InScanCard"]
+
+_WAYS = {"auto": "Automatic", "features": "Features", "skull": "Skull"}
+_NO_SCAN = "No scan is open: the pose stays in the frame of the touches."
+_NO_ESTIMATE = "Once there is an estimate, it is laid into the scan."
+_HINTS = {
+    "auto": "By the skull's features where three of them are touched and on the scan, else by the labels",
+    "features": "By the features that are both touched and labelled",
+    "skull": "By the skull's registration features, S1 and so on",
+}
+_FOUND = {
+    "features": "by features touched and labelled",
+    "skull": "by skull features",
+    "placed": "placed on the scan itself",
+    "known": "known from elsewhere",
+}
+
+
+class InScanCard(Card):
+    """Registration, and the error against the labels.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose estimate it shows.
+    """
+
+    skull_file_asked = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("In the scan", parent)
+        self._desk = workbench
+        self.way = Segments(_WAYS, _HINTS)
+        self.facts = {name: numbers() for name in ("Laid in", "CO", "FRE", "TRE at CO", "From the labels")}
+        self.notices, self.waiting = Notices(), text_label("", "hint", wrap=True)
+        self.skull = text_label("", "hint", wrap=True)
+        self.file = link("Load…", "Where the skull features are on the scan: a landmark file that names them")
+        self.mark = link("Mark S1 here", "Say that this skull feature is at the crosshair")
+        self._lay_out()
+        self.way.chosen.connect(self._choose)
+        self.file.clicked.connect(self.skull_file_asked)
+        self.mark.clicked.connect(self._mark)
+        follow(self, workbench.volume_opened, self.refresh)
+
+    def refresh(self, *_: object) -> None:
+        """Show the registration as it stands."""
+        estimate, has_scan = self._desk.pose.estimate, self._desk.volume is not None
+        self.way.set_value(self._desk.pose.estimating.settings.registration)
+        known = estimate is not None and (has_scan or estimate.registered is not None)
+        self.way.setVisible(known and self._frame() != "scan")
+        self._table.setVisible(known)
+        self.waiting.setVisible(not known)
+        self.waiting.setText(_NO_ESTIMATE if has_scan else _NO_SCAN)
+        for name, words in _facts(estimate).items():
+            self.facts[name].setText(words)
+        if estimate is not None and (placed := estimate.in_scan()) is not None:
+            self.facts["CO"].setText(position_text(placed.origin))
+        self.notices.show_notices([] if estimate is None else [*_notices(estimate, has_scan)])
+        self._show_skull()
+
+    def take_file(self, path: Path) -> bool:
+        """Take the skull features of a file; return whether it could be read."""
+        return attempt(self._desk, lambda: touching.load_skull(self._desk.session, path))
+
+    @property
+    def unmarked(self) -> str:
+        """The skull feature to mark next: one touched and not marked, else the next number."""
+        state = self._desk.session.state
+        touched = [name for name in self._desk.pose.names if (self._desk.pose.side, name) in state.touches]
+        numbered = (f"S{n}" for n in range(1, 100))
+        names = [name for name in touched if name.startswith("S")]
+        return next(name for name in (*names, *numbered) if name not in state.skull)
+
+    def _lay_out(self) -> None:
+        self.add(self.waiting)
+        self.add(self.way)
+        self._table = QWidget()
+        grid = QGridLayout(self._table)
+        grid.setContentsMargins(0, 0, 0, 0)
+        grid.setHorizontalSpacing(10)
+        grid.setVerticalSpacing(3)
+        grid.setColumnStretch(1, 1)
+        for row, (name, label) in enumerate(self.facts.items()):
+            label.setWordWrap(True)
+            caption = text_label(name, "hint")
+            caption.setToolTip(_CAPTIONS.get(name, ""))
+            grid.addWidget(caption, row, 0, Qt.AlignmentFlag.AlignTop)
+            grid.addWidget(label, row, 1)
+        self.add(self._table)
+        self.add(self.notices)
+        row_of_skull = QHBoxLayout()
+        row_of_skull.setSpacing(2)
+        row_of_skull.addWidget(self.skull, 1)
+        row_of_skull.addWidget(self.file)
+        row_of_skull.addWidget(self.mark)
+        self.add(row_of_skull)
+
+    def _show_skull(self) -> None:
+        n = len(self._desk.session.state.skull)
+        self.skull.setText(f"Skull features on the scan: {n or 'none'}")
+        self.mark.setText(f"Mark {self.unmarked} here")
+        self.mark.setEnabled(self._desk.volume is not None)
+
+    def _frame(self) -> str:
+        return self._desk.session.state.touched(self._desk.pose.side).frame
+
+    def _choose(self, way: str) -> None:
+        attempt(self._desk, lambda: self._desk.pose.choose(registration=way))
+
+    def _mark(self) -> None:
+        session = self._desk.session
+        attempt(self._desk, lambda: touching.mark_skull(session, self.unmarked, session.crosshair))
+
+
+_CAPTIONS = {
+    "FRE": "Fiducial registration error: how well the points of both lists meet",
+    "TRE at CO": "Target registration error to expect at the cochlea, from the registration alone",
+}
+
+
+def _facts(estimate: Estimate | None) -> dict[str, str]:
+    registered = None if estimate is None else estimate.registered
+    if estimate is None or registered is None:
+        return dict.fromkeys(("Laid in", "CO", "FRE", "TRE at CO", "From the labels"), NONE)
+    placed, fiducials = estimate.in_scan(), registered.fiducials
+    tre = NONE
+    if placed is not None and fiducials is not None:
+        bound = float(fiducials.tre_95_mm(placed.origin[None])[0])
+        tre = f"{fine_mm(registered.tre_mm(placed.origin))}  (95 %: {fine_mm(bound)})"
+    n = "" if fiducials is None else f", {len(fiducials.fiducials)} of {len(fiducials.names)} points"
+    return {
+        "Laid in": _FOUND[registered.way] + n,
+        "CO": NONE,
+        "FRE": fine_mm(registered.fre_mm),
+        "TRE at CO": tre,
+        "From the labels": _errors(estimate),
+    }
+
+
+def _errors(estimate: Estimate) -> str:
+    if estimate.truth is None:
+        return "CA, CB, RWA, RWP are not all labelled"
+    lines = []
+    for method in estimate.poses:
+        found = estimate.errors(method)
+        if found is not None:
+            name = f"{METHOD_WORDS[method]}: " if len(estimate.poses) > 1 else ""
+            lines.append(f"{name}CO {fine_mm(found[0])}, axis {found[1]:.1f}°")
+    return "\n".join(lines) or NONE
+
+
+def _notices(estimate: Estimate, has_scan: bool) -> Iterator[tuple[str, ...]]:
+    if (problem := estimate.problems.get("registration")) is not None:
+        yield ("warning", sentence(problem))
+    elif estimate.registered is None and has_scan:
+        yield (
+            "info",
+            "The touches do not lie in this scan yet.",
+            "Label features that were touched, or say where the skull features are.",
+        )
+    fiducials = None if estimate.registered is None else estimate.registered.fiducials
+    for warning in () if fiducials is None else fiducials.warnings:
+        words, _, rest = warning.partition(": ")
+        yield ("warning", sentence(words), sentence(rest) if rest else "")

@@ -1,0 +1,232 @@
+"""The table of touches: where each point was touched, how well it fits, and whether it counts."""
+
+from __future__ import annotations
+
+from PySide6.QtCore import (
+    QEvent,
+    QModelIndex,
+    QObject,
+    QPersistentModelIndex,
+    QPoint,
+    QRectF,
+    QSize,
+    Qt,
+    Signal,
+)
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPen
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QApplication,
+    QHeaderView,
+    QLineEdit,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QWidget,
+)
+
+from gp_labeler.views.panels.pose_cells import COLUMN_WIDTHS, paint_cell, paint_ground
+from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ, TouchModel
+from gp_labeler.views.theme import FONT_PX, theme_of
+
+__all__ = ["ROW_HEIGHT", "TouchTable"]
+
+ROW_HEIGHT, _HEADER = 22, 24
+_BEGINS_NUMBER = "0123456789-+."
+Index = QModelIndex | QPersistentModelIndex
+
+
+class TouchTable(QTableView):
+    """Rows of `TouchModel`.
+
+    Parameters
+    ----------
+    model : TouchModel
+        What it shows.
+    """
+
+    use_asked = Signal(str)
+    """Leave this one out, or take it in again."""
+    clear_asked = Signal(str)
+    chosen = Signal(str)
+    """A row was clicked, or reached by keys."""
+    looked_at = Signal(str)
+    """Name under the pointer, else the current one; empty for none."""
+    menu_asked = Signal(str, QPoint)
+    typed = Signal(str)
+    """A position was typed for this one and confirmed with Enter."""
+    pasted = Signal(str, str)
+    """Text that was pasted on a row."""
+
+    def __init__(self, model: TouchModel, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._model = model
+        self.setModel(model)
+        self.setItemDelegate(_TouchDelegate(self))
+        self.setAccessibleName("Touches")
+        self._set_up()
+        self._fit()
+        model.modelReset.connect(self._fit)
+        self.entered.connect(lambda index: self.looked_at.emit(self.name_at(index)))
+        self.selectionModel().currentChanged.connect(self._on_current)
+        self.customContextMenuRequested.connect(self._on_menu)
+
+    def name_at(self, index: Index) -> str:
+        """Return the point that a cell is about."""
+        return self._model.rows[index.row()].name if index.isValid() else ""
+
+    def edit_position(self, name: str) -> None:
+        """Let a position be typed."""
+        index = self._model.index(self._model.row_of(name), XYZ)
+        if index.isValid():
+            self.setCurrentIndex(index)
+            self.scrollTo(index)
+            self.edit(index)
+
+    def _set_up(self) -> None:
+        self.setShowGrid(False)
+        self.setMouseTracking(True)
+        self.setTabKeyNavigation(False)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        trigger = QAbstractItemView.EditTrigger
+        self.setEditTriggers(trigger.DoubleClicked | trigger.EditKeyPressed | trigger.AnyKeyPressed)
+        self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
+        self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.verticalHeader().hide()
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.verticalHeader().setMinimumSectionSize(ROW_HEIGHT)
+        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+        header = self.horizontalHeader()
+        header.setFixedHeight(_HEADER)
+        header.setHighlightSections(False)
+        header.setSectionsClickable(False)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setMinimumSectionSize(16)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
+        for column, width in COLUMN_WIDTHS.items():
+            self.setColumnWidth(column, width)
+
+    def _fit(self) -> None:
+        self.setFixedHeight(_HEADER + ROW_HEIGHT * self._model.rowCount() + 4)
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(340, self.height())
+
+    def _on_current(self, current: QModelIndex, _: QModelIndex) -> None:
+        self.viewport().update()
+        self.looked_at.emit(self.name_at(current))
+
+    def _on_menu(self, where: QPoint) -> None:
+        index = self.indexAt(where)
+        if index.isValid():
+            self.menu_asked.emit(self.name_at(index), self.viewport().mapToGlobal(where))
+
+    def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().mouseReleaseEvent(event)
+        index = self.indexAt(event.position().toPoint())
+        if event.button() is not Qt.MouseButton.LeftButton or not index.isValid():
+            return
+        row = self._model.rows[index.row()]
+        if index.column() in (USE, CLEAR) and row.touch is not None:
+            (self.use_asked if index.column() == USE else self.clear_asked).emit(row.name)
+        else:
+            self.chosen.emit(row.name)
+
+    def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802 - Qt's name
+        index = self.indexAt(event.position().toPoint())
+        if index.isValid() and index.column() not in (USE, CLEAR):
+            self.edit_position(self.name_at(index))
+
+    def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802 - Qt's name
+        name = self.name_at(self.currentIndex())
+        if event.matches(QKeySequence.StandardKey.Paste):
+            self.pasted.emit(name, QApplication.clipboard().text())
+        elif not name:
+            super().keyPressEvent(event)
+        elif event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
+            self.clear_asked.emit(name)
+        elif event.key() == Qt.Key.Key_Space:
+            self.use_asked.emit(name)
+        elif event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_F2):
+            self.edit_position(name)
+        elif event.key() == Qt.Key.Key_Menu:
+            self._on_menu(self.visualRect(self.currentIndex()).center())
+        elif event.text() and event.text() in _BEGINS_NUMBER:
+            self.setCurrentIndex(self._model.index(self.currentIndex().row(), XYZ))
+            super().keyPressEvent(event)
+        elif event.text() and event.text().isprintable():
+            event.ignore()  # letters are the window's shortcuts
+        else:
+            super().keyPressEvent(event)
+
+    def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().leaveEvent(event)
+        self.viewport().update()
+        self.looked_at.emit(self.name_at(self.currentIndex()))
+
+
+class _TouchDelegate(QStyledItemDelegate):
+    """Paints the cells, and lets positions be typed."""
+
+    def __init__(self, table: TouchTable) -> None:
+        super().__init__(table)
+        self._table = table
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        table, box = self._table, QRectF(option.rect)
+        theme, row = theme_of(table), table._model.rows[index.row()]
+        is_current = table.currentIndex().row() == index.row()
+        is_over = table.underMouse() and table.indexAt(_pointer(table)).row() == index.row()
+        painter.save()
+        paint_ground(painter, box, row, theme, current=is_current, over=is_over)
+        if table.hasFocus() and table.currentIndex() == index:
+            painter.setPen(QPen(QColor(theme.accent_text), 1))
+            painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
+        painter.setClipRect(box)
+        font = QFont(table.font())
+        font.setPixelSize(FONT_PX)
+        painter.setFont(font)
+        paint_cell(painter, index.column(), box, row, theme, longest=table._model.largest, over=is_over)
+        painter.restore()
+
+    def createEditor(self, parent: QWidget, option: QStyleOptionViewItem, index: Index) -> QWidget:  # noqa: N802
+        editor = QLineEdit(parent)
+        editor.setPlaceholderText("x y z in mm")
+        editor.setStyleSheet("padding: 0 4px; border-radius: 0")
+        editor.setAccessibleName(f"Position of {self._table.name_at(index)}, x y z in mm")
+        return editor
+
+    def updateEditorGeometry(self, editor: QWidget, option: QStyleOptionViewItem, index: Index) -> None:  # noqa: N802
+        box = option.rect
+        wide = QFontMetrics(editor.font()).horizontalAdvance("-1000.000 -1000.000 -1000.000") + 12
+        editor.setGeometry(box.x() - 4, box.y(), max(box.width(), wide) + 4, box.height())
+
+    def eventFilter(self, editor: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        if (
+            isinstance(editor, QLineEdit)
+            and isinstance(event, QKeyEvent)
+            and event.type() is QEvent.Type.KeyPress
+        ) and event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Tab):
+            self._confirm(editor)
+            return True
+        return super().eventFilter(editor, event)
+
+    def _confirm(self, editor: QLineEdit) -> None:
+        """Take what was typed; where it is no position, leave it there to be mended."""
+        index = self._table.currentIndex()
+        name, unchanged = self._table.name_at(index), not editor.text().strip()
+        if unchanged or editor.text() == index.data(Qt.ItemDataRole.EditRole):
+            self.closeEditor.emit(editor)
+        elif self._table._model.record(name, editor.text()):
+            self.closeEditor.emit(editor)
+            self._table.typed.emit(name)
+        else:
+            editor.setProperty("wrong", "true")
+            editor.style().unpolish(editor)
+            editor.style().polish(editor)
+
+
+def _pointer(table: QTableView) -> QPoint:
+    return table.viewport().mapFromGlobal(table.cursor().pos())

@@ -1,0 +1,221 @@
+"""The card of what was touched: how touches come in, the table of them, and what each of them does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from PySide6.QtCore import QPoint, Qt, QTimer, Signal
+from PySide6.QtWidgets import QHBoxLayout, QMenu, QSizePolicy, QToolButton, QWidget
+
+from gp_core.errors import GpError
+from gp_labeler.session import touching
+from gp_labeler.session.touches import Touch
+from gp_labeler.views.bind import blocked, follow
+from gp_labeler.views.panels.parts import Card, ElidedLabel
+from gp_labeler.views.panels.pose_model import TouchModel
+from gp_labeler.views.panels.pose_parts import Notices, link
+from gp_labeler.views.panels.pose_table import TouchTable
+from gp_labeler.views.panels.pose_words import change_text
+from gp_labeler.workbench import Workbench
+
+__all__ = ["TouchesCard"]
+
+_DELETE = Qt.WidgetAttribute.WA_DeleteOnClose
+_LOOK_MS = 90
+"""The pointer may pass over rows; only one it rests on is worth an estimate without it."""
+
+_WAYS = {
+    "file": ("File…", "Take the touches of a file (.dat, .csv, .mrk.json, .fcsv); or drop one here"),
+    "type": ("Type", "Type or paste x y z of one point after the other"),
+    "scan": ("On the scan", "A dry run: click where each feature is, on bone or on a slice"),
+    "tracker": ("Tracker…", "Touch with a tracked probe (OpenIGTLink)"),
+}
+
+
+class TouchesCard(Card):
+    """Touches of the side in work.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose touches it shows and edits.
+    """
+
+    file_asked = Signal()
+    tracker_asked = Signal()
+    guide_asked = Signal()
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Touches", parent)
+        self._desk = workbench
+        self._looked_at = ""
+        self.model = TouchModel(workbench, self.tell, self)
+        self.table = TouchTable(self.model)
+        self.notices, self.change = Notices(), ElidedLabel("", "hint")
+        self.change.setAccessibleName("What leaving a point out changes")
+        self.skull = link("+ S1", "Touch a feature of the skull that serves the registration to the scan")
+        self.guide = link("Guide…", "One feature after the other in large type, with its picture")
+        self.clear = link("Clear all", "Forget all touches of this side; undo brings them back")
+        self.ways = {name: self._way(name) for name in _WAYS}
+        self._timer = QTimer(self, interval=_LOOK_MS, singleShot=True)
+        self._timer.timeout.connect(self._show_change)
+        self._lay_out()
+        self._connect()
+
+    def refresh(self, *_: object) -> None:
+        """Show the touches as they stand."""
+        self.model.refresh()
+        touched = [row for row in self.model.rows if row.touch is not None]
+        out = sum(row.touch is not None and row.touch.left_out for row in touched)
+        words = f"Touches  {len(touched)}" + (f", {out} left out" if out else "")
+        self.heading.setText(words if touched else "Touches")
+        self.clear.setEnabled(bool(touched))
+        self._timer.start()
+        self.skull.setText(f"+ {self._desk.pose.next_skull}")
+
+    def tell(self, error: GpError | None) -> None:
+        """Say what could not be done, until something can; None takes it away."""
+        notices: list[tuple[str, ...]] = []
+        if error is not None:
+            self._desk.say(str(error), "error")
+            plain = str(error).removesuffix(error.remedy or "").rstrip()
+            notices = [("error", _short_path(plain, error.file), error.remedy or "")]
+        self.notices.show_notices(notices)
+
+    def take_file(self, path: Path) -> bool:
+        """Take the touches of a file; return whether it could be read."""
+        return self._do(lambda: self._desk.pose.load(path))
+
+    def _way(self, name: str) -> QToolButton:
+        button = QToolButton()
+        button.setText(_WAYS[name][0])
+        button.setToolTip(_WAYS[name][1])
+        button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        return button
+
+    def _lay_out(self) -> None:
+        self.add_to_heading(self.guide)
+        self.add_to_heading(self.clear)
+        row = QHBoxLayout()
+        row.setSpacing(4)
+        for button in self.ways.values():
+            row.addWidget(button, 1)
+        self.ways["scan"].setCheckable(True)
+        self.add(row)
+        self.add(self.notices)
+        self._layout.setContentsMargins(0, 6, 0, 6)
+        for item in (self._top, row):
+            item.setContentsMargins(12, 0, 8, 0)
+        self.notices.setContentsMargins(12, 0, 12, 0)
+        self.table.setStyleSheet("QTableView { border: none; border-radius: 0 }")
+        self.add(self.table)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(12, 0, 8, 0)
+        foot.addWidget(self.change, 1)
+        foot.addWidget(self.skull)
+        self.add(foot)
+
+    def _connect(self) -> None:
+        table, pose = self.table, self._desk.pose
+        self.ways["file"].clicked.connect(self.file_asked)
+        self.ways["type"].clicked.connect(self._type_next)
+        self.ways["scan"].clicked.connect(lambda on: self._desk.set_tool("touch" if on else "place"))
+        self.ways["tracker"].clicked.connect(self.tracker_asked)
+        self.guide.clicked.connect(self.guide_asked)
+        self.clear.clicked.connect(lambda: self._do(lambda: self._clear(None)))
+        self.skull.clicked.connect(lambda: pose.aim(pose.next_skull))
+        table.clear_asked.connect(lambda name: self._do(lambda: self._clear(name)))
+        table.use_asked.connect(self._toggle_use)
+        table.chosen.connect(self._on_chosen)
+        table.looked_at.connect(self._on_looked_at)
+        table.menu_asked.connect(self._open_menu)
+        table.typed.connect(lambda _: QTimer.singleShot(0, self, self._type_next))
+        table.pasted.connect(self._on_pasted)
+        follow(self, self._desk.tool_changed, self._show_tool)
+        follow(self, self._desk.volume_opened, self._show_tool)
+        follow(self, self._desk.session_replaced, self._show_tool)
+        self._show_tool()
+
+    def _show_tool(self, *_: object) -> None:
+        button = self.ways["scan"]
+        button.setEnabled(self._desk.volume is not None)
+        with blocked(button):
+            button.setChecked(self._desk.tool == "touch")
+
+    def _type_next(self) -> None:
+        target = self._desk.pose.target
+        if target is not None:
+            self.table.setFocus()
+            self.table.edit_position(target)
+
+    def _on_chosen(self, name: str) -> None:
+        """Aim at what is not touched yet; show what is."""
+        if self._touch(name) is None:
+            self._desk.pose.aim(name)
+        else:
+            self._do(lambda: self._desk.pose.show(name))
+
+    def _on_pasted(self, name: str, text: str) -> None:
+        """Take a position for the row; of several lines, each names its point."""
+        lines = [line.strip() for line in text.splitlines() if line.strip()]
+        if len(lines) == 1 and not lines[0][0].isalpha():
+            self.model.record(name or self._desk.pose.target or "", lines[0])
+            return
+        for line in lines:
+            code, _, rest = line.replace(",", " ", 1).replace("\t", " ", 1).partition(" ")
+            if not self.model.record(code, rest):
+                return
+
+    def _toggle_use(self, name: str) -> None:
+        touch = self._touch(name)
+        if touch is not None:
+            pose = self._desk.pose
+            self._do(lambda: touching.leave_out(self._desk.session, pose.side, name, not touch.left_out))
+
+    def _clear(self, name: str | None) -> None:
+        touching.clear_touches(self._desk.session, self._desk.pose.side, name)
+        if name is not None:
+            self._desk.pose.aim(name)
+
+    def _open_menu(self, name: str, where: QPoint) -> None:
+        pose, touch, menu = self._desk.pose, self._touch(name), QMenu(self)
+        menu.setAttribute(_DELETE)
+        menu.addAction("Touch next" if touch is None else "Touch again", lambda: pose.aim(name))
+        menu.addAction("Type position…", lambda: self.table.edit_position(name))
+        if touch is not None:
+            word = "Take in again" if touch.left_out else "Leave out"
+            menu.addAction(word, lambda: self._toggle_use(name))
+            menu.addAction("Clear", lambda: self._do(lambda: self._clear(name)))
+        menu.popup(where)
+
+    def _on_looked_at(self, name: str) -> None:
+        if name != self._looked_at:
+            self._looked_at = name
+            self._timer.start()
+
+    def _show_change(self) -> None:
+        name, touch = self._looked_at, self._touch(self._looked_at)
+        words = "" if self._any_touch() else "Drop a file of touches here"
+        if touch is not None and self._desk.pose.estimate is not None:
+            words = change_text(name, touch, self._desk.pose.estimating.without(name))
+        self.change.set_words(words)
+
+    def _any_touch(self) -> bool:
+        return any(row.touch is not None for row in self.model.rows)
+
+    def _touch(self, name: str) -> Touch | None:
+        return self._desk.session.state.touches.get((self._desk.pose.side, name))
+
+    def _do(self, edit: Callable[[], object]) -> bool:
+        try:
+            edit()
+        except GpError as error:
+            self.tell(error)
+            return False
+        self.tell(None)
+        return True
+
+
+def _short_path(text: str, file: str | None) -> str:
+    return text if file is None else text.replace(file, Path(file).name)

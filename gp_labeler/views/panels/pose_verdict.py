@@ -1,0 +1,93 @@
+"""The card of the verdict: somebody looked at the estimate, and takes it or not."""
+
+from __future__ import annotations
+
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
+
+from gp_labeler.session.state import PoseCheck
+from gp_labeler.views.bind import attempt, follow
+from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["VerdictCard"]
+
+_N_SHOWN = 3
+_WORDS = {"accept": ("good", "Accepted"), "reject": ("error", "Rejected")}
+
+
+class VerdictCard(Card):
+    """Initials, a note, accept and reject; and what was said before.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose estimate is judged.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__("Verdict", parent)
+        self._desk = workbench
+        self.initials, self.note = QLineEdit(), QLineEdit()
+        self.initials.setPlaceholderText("Initials")
+        self.initials.setAccessibleName("Initials of who judges")
+        self.initials.setMaxLength(24)
+        self.initials.setFixedWidth(84)
+        self.note.setPlaceholderText("Why, in a few words")
+        self.note.setAccessibleName("Note to the verdict")
+        self.accept, self.reject = QPushButton("Accept"), QPushButton("Reject")
+        self.accept.setToolTip("Keep in the specimen that this estimate was looked at and is good")
+        self.reject.setToolTip("Keep in the specimen that this estimate is not to be used")
+        self._said = QVBoxLayout()
+        self._said.setSpacing(4)
+        self._shown: tuple[PoseCheck, ...] | None = None
+        who, what = QHBoxLayout(), QHBoxLayout()
+        for row, widgets in ((who, (self.initials, self.note)), (what, (self.accept, self.reject))):
+            row.setSpacing(6)
+            for widget in widgets:
+                row.addWidget(widget, 1)
+            self.add(row)
+        self.add(self._said)
+        self.accept.clicked.connect(lambda: self.judge("accept"))
+        self.reject.clicked.connect(lambda: self.judge("reject"))
+        follow(self, workbench.details_changed, self.refresh)
+        follow(self, workbench.session_replaced, self._on_session)
+        self._on_session()
+
+    def refresh(self, *_: object) -> None:
+        """Show what was said of this side, the latest first."""
+        desk = self._desk.pose
+        is_there = desk.estimate is not None and desk.estimate.pose is not None
+        for button in (self.accept, self.reject):
+            button.setEnabled(is_there)
+        checks = tuple(c for c in self._desk.session.state.pose_checks if c.side is desk.side)[::-1]
+        if checks == self._shown:
+            return
+        self._shown = checks
+        emptied(self._said)
+        for check in checks[:_N_SHOWN]:
+            self._said.addWidget(_said(check))
+        if len(checks) > _N_SHOWN:
+            self._said.addWidget(text_label(f"and {len(checks) - _N_SHOWN} before", "hint"))
+
+    def judge(self, verdict: str) -> bool:
+        """Keep a verdict with the initials and the note that stand here."""
+        by, note = self.initials.text().strip(), self.note.text().strip()
+        done = attempt(self._desk, lambda: self._desk.pose.estimating.judge(verdict, by=by, note=note))
+        if done:
+            self.note.clear()
+            self._desk.say(f"{_WORDS[verdict][1]}; it is kept in the specimen")
+        return done
+
+    def _on_session(self, *_: object) -> None:
+        self.initials.setText(self._desk.session.author)
+        self.note.clear()
+        self.refresh()
+
+
+def _said(check: PoseCheck) -> Notice:
+    level, word = _WORDS[check.verdict]
+    when = check.time.replace("T", " ").removesuffix("+00:00")
+    radius = check.pose.get("radius_95_mm")
+    about = f"95 % within {radius:.2f} mm" if isinstance(radius, float) else ""
+    by = f" by {check.by}" if check.by else ""
+    return Notice(level, f"{word}{by}, {when} UTC", "  ·  ".join(filter(None, (check.note, about))))

@@ -1,0 +1,141 @@
+"""Numbers of a pose in words, and words that somebody typed as numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from gp_core.atlas.next_touch import TouchGain
+from gp_core.atlas.pose import CochleaPose
+from gp_core.errors import GpError
+from gp_core.landmarks.features import CODES, feature
+from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.touches import Touch, TouchHow
+from gp_labeler.views.bind import NONE, degrees_text
+
+__all__ = [
+    "METHOD_WORDS",
+    "change_text",
+    "fine_mm",
+    "gain_text",
+    "name_of",
+    "parse_position",
+    "region_text",
+    "sentence",
+    "touch_text",
+    "triple",
+    "unit_triple",
+]
+
+METHOD_WORDS = {"robust": "Robust", "jrmpc": "JRMPC"}
+
+_MINUS = "\N{MINUS SIGN}"
+_LITTLE_MM = 0.1
+"""Worth of a touch, see `TouchGain.worth`, below which it is not worth the while."""
+
+
+def parse_position(text: str, name: str) -> tuple[float, float, float]:
+    """Return x, y, z in mm as they were typed or pasted: between them blanks, tabs, commas or semicolons.
+
+    Raises
+    ------
+    GpError
+        These are not three numbers.
+    """
+    plain = text.replace(_MINUS, "-").strip().strip("()[]")
+    parts = plain.replace(";", " ").split()
+    if len(parts) == 3:  # a comma inside a number is a decimal one
+        parts = [part.rstrip(",").replace(",", ".") for part in parts]
+    else:
+        parts = plain.replace(";", " ").replace(",", " ").split()
+    try:
+        x, y, z = (float(part) for part in parts)
+    except ValueError:
+        got = f"{text!r}" if text.strip() else "nothing"
+        raise GpError(
+            f"a position is three numbers, got {got}",
+            landmark=name,
+            remedy="Type x y z in mm, such as 12.3 -4.5 101.2.",
+        ) from None
+    if not all(map(math.isfinite, (x, y, z))):
+        raise GpError(f"a position is three finite numbers, got {text!r}", landmark=name)
+    return x, y, z
+
+
+def name_of(name: str) -> str:
+    """Return what a touched point is, such as ``lateral process of the malleus`` or ``skull feature``."""
+    return feature(name).name if name in CODES else "skull feature"
+
+
+def triple(position: Iterable[float]) -> str:
+    """Return a position such as ``12.34  -4.50  101.22``, with true minus signs."""
+    return "   ".join(f"{value:.2f}".replace("-", _MINUS) for value in position)
+
+
+def unit_triple(direction: Iterable[float]) -> str:
+    """Return a direction to three digits."""
+    return "   ".join(f"{value:.3f}".replace("-", _MINUS) for value in direction)
+
+
+def fine_mm(length: float | None) -> str:
+    """Return a length such as ``0.42 mm``: two digits, as probes are worth."""
+    return NONE if length is None or not math.isfinite(length) else f"{length:.2f} mm"
+
+
+def region_text(pose: CochleaPose) -> str:
+    """Return where the cochlea is with 95 %."""
+    return f"95 % within {fine_mm(pose.radius_95)}  ·  cone {degrees_text(pose.cone_95)}"
+
+
+def gain_text(gain: TouchGain) -> str:
+    """Return what a touch would gain, such as ``Touch IN next: 0.52 → 0.41 mm, 9.3 → 7.6°``."""
+    if gain.worth < _LITTLE_MM:
+        return f"More touches gain little now; {gain.code} the most"
+    now, then = (math.degrees(angle) for angle in (gain.cone_95_now, gain.cone_95))
+    return (
+        f"Touch {gain.code} next:  {gain.radius_95_now:.2f} \N{RIGHTWARDS ARROW} {gain.radius_95:.2f} mm,  "
+        f"{now:.1f} \N{RIGHTWARDS ARROW} {then:.1f}°"
+    )
+
+
+def change_text(name: str, touch: Touch, change: tuple[float, float] | None) -> str:
+    """Return what leaving a touch out, or taking it in again, would change."""
+    word = "With" if touch.left_out else "Without"
+    if change is None:
+        return f"{word} {name}: no estimate" if name in CODES else ""
+    moved, turned = change
+    return f"{word} {name}: CO {fine_mm(moved)}, axis {turned:.1f}°"
+
+
+def touch_text(name: str, touch: Touch | None, estimate: Estimate | None) -> str:
+    """Return everything that is known of a touch, a line each."""
+    lines = [f"{name}: {name_of(name)}"]
+    if name in CODES:
+        lines.append(feature(name).definition)
+    if touch is None:
+        return "\n".join([*lines, "Not touched yet"])
+    lines.append(_how(touch))
+    if touch.n_samples > 1:
+        lines.append(f"Average of {touch.n_samples} readings, spread {touch.spread_mm:.3f} mm")
+    if touch.left_out:
+        lines.append("Left out of the estimate")
+    for method, pose in () if estimate is None else estimate.poses.items():
+        if name in pose.residuals:
+            lines.append(
+                f"{METHOD_WORDS[method]}: {fine_mm(pose.residuals[name])} from where the atlas has it"
+            )
+        if name in pose.suspects:
+            lines.append("It does not fit the other points")
+    return "\n".join(lines)
+
+
+def _how(touch: Touch) -> str:
+    words = {TouchHow.FILE: "From a file", TouchHow.TYPED: "Typed", TouchHow.SCAN: "Placed on the scan"}
+    text = words.get(touch.how, str(touch.how.value).capitalize())
+    details = [touch.source, touch.by, touch.time.replace("T", " ").removesuffix("+00:00")]
+    return ", ".join(part for part in (text, *details) if part)
+
+
+def sentence(text: str) -> str:
+    """Return a clause with a capital letter and a full stop."""
+    return text[:1].upper() + text[1:].rstrip(".") + "."

@@ -1,0 +1,485 @@
+"""The panel of the step Pose by real clicks, keys and drops: what it takes, what it says, what it keeps."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from panel_cases import cut_words, deliver, desk_with_scan
+from PySide6.QtCore import QMimeData, QPoint, QPointF, QSize, Qt, QUrl
+from PySide6.QtGui import QDragEnterEvent, QDropEvent, QGuiApplication
+from PySide6.QtWidgets import QApplication, QLineEdit
+
+from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
+from gp_core.atlas.draw import draw_animal
+from gp_core.errors import GpError
+from gp_labeler.pose_desk import ORDER
+from gp_labeler.session import labelling, touching
+from gp_labeler.session.jobs import QueueDispatcher
+from gp_labeler.session.touches import TouchHow
+from gp_labeler.views.panels.label_panel import PANEL_WIDTH
+from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
+from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
+from gp_labeler.views.panels.pose_words import parse_position
+from gp_labeler.views.theme import DARK, LIGHT, apply_theme
+from gp_labeler.workbench import Workbench
+
+DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
+FILES = {
+    "SkullD_Right.dat": Side.RIGHT,
+    "SkullA_Left_new.dat": Side.LEFT,
+    "SkullE_Right.dat": Side.RIGHT,
+    "sample_data_file.dat": Side.RIGHT,
+}
+LEFT, CLICK = Side.LEFT, Qt.MouseButton.LeftButton
+ATLAS = Atlas.published()
+ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
+THERE = np.array([40.0, -120.5, -1180.2])
+"""Where a tracker may well have its points."""
+
+NARROW, WIDE = QSize(PANEL_WIDTH, 698), QSize(1180, 740)
+
+
+def find(name: str) -> Path:
+    path = DATA / ("usevitch2021" if name.startswith("sample") else "probe") / name
+    if not path.exists():
+        pytest.skip(f"{path} is not here")
+    return path
+
+
+@pytest.fixture
+def desk() -> Iterator[Workbench]:
+    desk = Workbench(None, QueueDispatcher(), atlas=ATLAS, author="AB")
+    yield desk
+    desk.close(discard=True)
+
+
+@pytest.fixture
+def panel(desk: Workbench, qtbot) -> PosePanel:
+    return shown(desk, qtbot)
+
+
+def shown(desk: Workbench, qtbot, size: QSize = NARROW, theme=DARK) -> PosePanel:
+    panel = PosePanel(desk)
+    apply_theme(panel, theme)
+    qtbot.addWidget(panel)
+    panel.set_wide(size.width() > PANEL_WIDTH)
+    panel.resize(size)
+    panel.show()
+    qtbot.waitExposed(panel)
+    panel.activateWindow()
+    return panel
+
+
+def touch(desk: Workbench, *codes: str, noise: float = 0.1, seed: int = 1) -> None:
+    rng = np.random.default_rng(seed)
+    for code in codes:
+        desk.pose.record(ANIMAL[code] + THERE + noise * rng.normal(size=3), TouchHow.TYPED, name=code)
+
+
+def touches(desk: Workbench, side: Side = LEFT) -> dict[str, tuple[float, float, float]]:
+    return {name: t.position for (of, name), t in desk.session.state.touches.items() if of is side}
+
+
+def cell(panel: PosePanel, name: str, column: int) -> QPoint:
+    table, model = panel.touches.table, panel.touches.model
+    return table.visualRect(model.index(model.row_of(name), column)).center()
+
+
+def click(qtbot, panel: PosePanel, name: str, column: int) -> None:
+    qtbot.mouseClick(panel.touches.table.viewport(), CLICK, pos=cell(panel, name, column))
+
+
+def drop(widget, path: Path) -> None:
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    where, action = QPointF(20, 200), Qt.DropAction.CopyAction
+    none = Qt.KeyboardModifier.NoModifier
+    entering = QDragEnterEvent(where.toPoint(), action, data, CLICK, none)
+    QApplication.sendEvent(widget, entering)
+    assert entering.isAccepted()
+    QApplication.sendEvent(widget, QDropEvent(where, action, data, CLICK, none))
+
+
+def editor(panel: PosePanel) -> QLineEdit:
+    fields = panel.touches.table.viewport().findChildren(QLineEdit)
+    found = [field for field in fields if field.isVisible()]
+    assert len(found) == 1
+    return found[0]
+
+
+def notices(panel: PosePanel) -> str:
+    return " ".join(" ".join(notice) for notice in panel.result.notices.shown)
+
+
+# Touches come in
+
+
+@pytest.mark.parametrize("name", list(FILES))
+def test_a_dropped_probe_file_gives_the_numbers_of_the_library(desk, panel, qtbot, name):
+    path, side = find(name), FILES[name]
+    qtbot.mouseClick(panel.head.side.buttons[side.value], CLICK)
+    drop(panel, path)
+    alone = estimate_pose(read_touches(path, side), side, ATLAS)
+    assert desk.pose.estimate.pose.as_dict() == alone.as_dict()
+    shown_origin = panel.result.one.origin.text().replace("\N{MINUS SIGN}", "-").removesuffix("mm").split()
+    np.testing.assert_allclose([float(x) for x in shown_origin], alone.origin, atol=0.005)
+    assert f"{alone.radius_95:.2f} mm" in panel.result.one.region.text()
+    for code, misfit in alone.residuals.items():
+        row = panel.touches.model.rows[panel.touches.model.row_of(code)]
+        assert row.misfit == misfit
+        assert row.suspect is (code in alone.suspects)
+
+
+def test_six_touches_are_typed_one_after_the_other(desk, panel, qtbot):
+    qtbot.mouseClick(panel.touches.ways["type"], CLICK)
+    for code in ORDER[:6]:
+        position = ANIMAL[code] + THERE
+        assert desk.pose.target == code
+        qtbot.keyClicks(editor(panel), " ".join(f"{x:.4f}" for x in position))
+        qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
+        QApplication.processEvents()
+    np.testing.assert_allclose(touches(desk)["RWP"], ANIMAL["RWP"] + THERE, atol=1e-4)
+    assert set(touches(desk)) == set(PROBE)
+    assert "95 % within" in panel.result.one.region.text()
+    assert panel.result.verdict.label.text() == "Good"
+    assert "Touch IN next" in panel.result.next.text()
+    qtbot.keyClick(editor(panel), Qt.Key.Key_Escape)
+    assert set(touches(desk)) == set(PROBE)
+
+
+def test_before_the_third_touch_it_says_how_many_are_wanting(desk, panel):
+    assert panel.result.waiting.text() == "3 more touches for an estimate"
+    touch(desk, "CL", "MN")
+    assert panel.result.waiting.text() == "1 more touch for an estimate"
+    assert not panel.result.one.isVisible()
+    touch(desk, "OS")
+    assert panel.result.one.isVisible()
+    assert not panel.result.waiting.isVisible()
+
+
+@pytest.mark.parametrize(
+    "text", ["1.5 -2 3", "1.5, -2, 3", "1.5,-2,3", "1,5 -2 3", "1.5\t-2\t3", "(1.5; \N{MINUS SIGN}2; 3)"]
+)
+def test_positions_are_read_as_they_are_pasted(text):
+    assert parse_position(text, "MN") == (1.5, -2.0, 3.0)
+
+
+@pytest.mark.parametrize("text", ["", "1 2", "1 2 3 4", "1 2 x", "nan 1 2", "1e999 0 0"])
+def test_what_is_no_position_is_said_so(text):
+    with pytest.raises(GpError, match=r"MN.*three"):
+        parse_position(text, "MN")
+
+
+def test_a_slip_while_typing_keeps_what_was_typed(desk, panel, qtbot):
+    told = []
+    desk.message.connect(lambda *what: told.append(what))
+    panel.touches.table.edit_position("CL")
+    qtbot.keyClicks(editor(panel), "1.5 2.5")
+    qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
+    assert editor(panel).text() == "1.5 2.5"
+    assert editor(panel).property("wrong") == "true"
+    assert "CL" in told[-1][0]
+    assert "Type x y z in mm" in " ".join(panel.touches.notices.shown[0])
+    qtbot.keyClicks(editor(panel), " 3.5")
+    qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
+    assert touches(desk) == {"CL": (1.5, 2.5, 3.5)}
+    assert not panel.touches.notices.isVisible()
+
+
+def test_a_touch_is_changed_by_a_double_click(desk, panel, qtbot):
+    touch(desk, "CL", "MN", "OS", noise=0)
+    where = cell(panel, "MN", XYZ)
+    qtbot.mouseClick(panel.touches.table.viewport(), CLICK, pos=where)
+    qtbot.mouseDClick(panel.touches.table.viewport(), CLICK, pos=where)
+    assert editor(panel).text() == " ".join(f"{x:.6g}" for x in ANIMAL["MN"] + THERE)
+    editor(panel).selectAll()
+    qtbot.keyClicks(editor(panel), "1, 2, 3")
+    qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
+    assert touches(desk)["MN"] == (1, 2, 3)
+
+
+def test_lines_with_names_are_pasted_at_once(desk, panel, qtbot):
+    lines = "\n".join(f"{code}, " + ", ".join(f"{x:.3f}" for x in ANIMAL[code]) for code in PROBE)
+    QGuiApplication.clipboard().setText(lines)
+    panel.touches.table.setFocus()
+    qtbot.keyClick(panel.touches.table, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
+    assert set(touches(desk)) == set(PROBE)
+    QGuiApplication.clipboard().setText("7 8 9")
+    click(qtbot, panel, "ZL", NAME)
+    qtbot.keyClick(panel.touches.table, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
+    assert touches(desk)["ZL"] == (7, 8, 9)
+
+
+def test_a_bad_file_is_named_with_what_to_do_and_nothing_is_lost(desk, panel, tmp_path):
+    touch(desk, *PROBE)
+    before = desk.session.state
+    bad = tmp_path / "milk.dat"
+    bad.write_text("milk, bread")
+    told = []
+    desk.message.connect(lambda *what: told.append(what))
+    drop(panel, bad)
+    assert desk.session.state == before
+    assert told[-1][1] == "error"
+    assert "milk.dat" in told[-1][0]
+    level, words, remedy = panel.touches.notices.shown[0]
+    assert (level, "milk.dat" in words) == ("error", True)
+    assert panel.touches.notices.isVisible()
+    assert remedy or "." in words
+    touch(desk, "ZL")
+    panel.touches.table.use_asked.emit("ZL")
+    assert not panel.touches.notices.isVisible(), "what works takes the message away"
+
+
+def test_only_files_of_touches_are_taken(tmp_path):
+    assert all(holds_touches(Path(name)) for name in ("a.DAT", "b.csv", "c.mrk.json", "d.fcsv"))
+    assert not any(holds_touches(Path(name)) for name in ("a.nrrd", "b.gpspecimen.json", "c"))
+
+
+def test_undo_takes_a_file_back(desk, panel):
+    touch(desk, "CL", "MN", "OS")
+    drop(panel, find("SkullA_Left_new.dat"))
+    assert "S1" in touches(desk)
+    assert panel.touches.model.row_of("S1") >= len(ORDER)
+    desk.session.undo()
+    assert set(touches(desk)) == {"CL", "MN", "OS"}
+    assert panel.touches.model.row_of("S1") == -1
+
+
+# What is made of them
+
+
+def test_a_click_leaves_a_point_out_and_takes_it_in_again(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    before = desk.pose.estimate.pose
+    click(qtbot, panel, "MN", USE)
+    assert desk.session.state.touches[LEFT, "MN"].left_out
+    assert "MN" not in desk.pose.estimate.pose.residuals
+    assert "1 left out" in panel.touches.heading.text()
+    row = panel.touches.model.rows[panel.touches.model.row_of("MN")]
+    assert (row.state, row.misfit) == ("unseen", None)
+    click(qtbot, panel, "MN", USE)
+    assert desk.pose.estimate.pose.as_dict() == before.as_dict()
+
+
+def test_it_says_beforehand_what_leaving_out_changes(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    moved, turned = desk.pose.estimating.without("MN")
+    click(qtbot, panel, "MN", NAME)
+    qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()), timeout=2000)
+    said = panel.touches.change.toolTip()
+    assert said == f"Without MN: CO {moved:.2f} mm, axis {turned:.1f}°"
+    before = desk.pose.estimate.pose
+    click(qtbot, panel, "MN", USE)
+    after = desk.pose.estimate.pose
+    assert np.linalg.norm(after.origin - before.origin) == pytest.approx(moved)
+    qtbot.waitUntil(lambda: panel.touches.change.toolTip().startswith("With MN"), timeout=2000)
+
+
+def test_one_touch_or_all_are_cleared_and_come_back(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    click(qtbot, panel, "OS", CLEAR)
+    assert "OS" not in touches(desk)
+    assert desk.pose.target == "OS"
+    qtbot.mouseClick(panel.touches.clear, CLICK)
+    assert touches(desk) == {}
+    assert panel.result.waiting.isVisible()
+    desk.session.undo()
+    desk.session.undo()
+    assert set(touches(desk)) == set(PROBE)
+    panel.touches.table.setFocus()
+    click(qtbot, panel, "MN", NAME)
+    qtbot.keyClick(panel.touches.table, Qt.Key.Key_Delete)
+    assert "MN" not in touches(desk)
+
+
+def test_a_mistouch_is_marked_by_shape_and_called_out(desk, panel):
+    touch(desk, *PROBE)
+    desk.pose.record(ANIMAL["MN"] + THERE + [3.0, 0, 0], TouchHow.TYPED, name="MN")
+    rows = {row.name: row for row in panel.touches.model.rows}
+    assert (rows["MN"].state, rows["MN"].suspect, rows["OS"].state) == ("doubtful", True, "placed")
+    assert "MN does not fit the other points" in notices(panel)
+    assert panel.result.verdict.label.text() == "Look twice"
+
+
+def test_the_wrong_side_is_called_out_and_right_on_the_other(desk, panel, qtbot):
+    qtbot.mouseClick(panel.head.side.buttons["R"], CLICK)
+    touch(desk, *PROBE)
+    assert "left side fits these points better than the right" in notices(panel)
+    assert "check the side" in notices(panel).lower()
+    assert panel.result.verdict.label.text() == "Do not use"
+    qtbot.mouseClick(panel.head.side.buttons["L"], CLICK)
+    assert panel.result.waiting.isVisible()
+
+
+def test_swapped_names_are_called_out(desk, panel):
+    touch(desk, *PROBE)
+    at = touches(desk)
+    desk.pose.record(at["MN"], TouchHow.TYPED, name="OS")
+    desk.pose.record(at["OS"], TouchHow.TYPED, name="MN")
+    assert "look swapped" in notices(panel)
+    assert panel.result.verdict.label.text() == "Do not use"
+
+
+def test_two_methods_stand_side_by_side(desk, panel, qtbot):
+    rng = np.random.default_rng(0)
+    desk.use_atlas(ATLAS, [draw_animal(ATLAS, rng=rng, name=f"S{n}") for n in range(4)])
+    touch(desk, *PROBE)
+    qtbot.mouseClick(panel.head.method.buttons["both"], CLICK)
+    assert "being made ready" in notices(panel)
+    deliver(desk)
+    poses = desk.pose.estimate.poses
+    first = [row[0].text() for row in panel.result.two.cells]
+    assert first[1] == "CO x"
+    assert panel.result.two.cells[1][1].text() == f"{poses['robust'].origin[0]:.2f}"
+    assert panel.result.two.cells[1][2].text() == f"{poses['jrmpc'].origin[0]:.2f}"
+    apart = np.linalg.norm(poses["robust"].origin - poses["jrmpc"].origin)
+    assert f"{apart:.2f} mm" in panel.result.two.apart.text()
+
+
+def test_a_method_without_what_it_needs_says_so(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    desk.pose.estimating.set_joint_ready()
+    qtbot.mouseClick(panel.head.method.buttons["jrmpc"], CLICK)
+    assert "JRMPC" in notices(panel)
+    assert not panel.result.one.isVisible()
+
+
+def test_probe_noise_is_given_and_found_again(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    found = f"{desk.pose.estimate.pose.probe_noise:.2f}"
+    assert found in panel.head.found.text()
+    qtbot.keyClicks(panel.head.noise, "0.5")
+    qtbot.keyClick(panel.head.noise, Qt.Key.Key_Return)
+    assert desk.pose.estimating.settings.probe_noise == 0.5
+    qtbot.keyClick(panel.head.noise, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
+    qtbot.keyClick(panel.head.noise, Qt.Key.Key_Delete)
+    assert desk.pose.estimating.settings.probe_noise is None
+    assert found in panel.head.found.text()
+
+
+def test_the_point_that_gains_most_is_aimed_at_with_a_click(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    best = desk.pose.gains()[0].code
+    desk.pose.aim("OI")
+    qtbot.mouseClick(panel.result.next, CLICK)
+    assert desk.pose.target == best
+
+
+# In the scan, and the verdict
+
+
+def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
+    desk = desk_with_scan()
+    panel = shown(desk, qtbot)
+    shift = np.array([3.0, -12.0, 4.0])
+    for code in ("CA", "CB", *PROBE):
+        labelling.place(desk.session, ANIMAL[code] + shift, side=LEFT, code=code)
+    touch(desk, *PROBE, noise=0.05)
+    estimate, facts = desk.pose.estimate, panel.in_scan.facts
+    mm, deg = estimate.errors()
+    assert facts["From the labels"].text() == f"CO {mm:.2f} mm, axis {deg:.1f}°"
+    assert facts["FRE"].text() == f"{estimate.registered.fre_mm:.2f} mm"
+    assert "6 of 6 points" in facts["Laid in"].text()
+    qtbot.mouseClick(panel.in_scan.way.buttons["skull"], CLICK)
+    assert desk.pose.estimate.registered is None
+    assert "at least 3 points" in " ".join(panel.in_scan.notices.shown[0])
+    for n, corner in enumerate(np.eye(3) * 9, 1):
+        touching.record_touch(desk.session, LEFT, f"S{n}", corner + THERE)
+        desk.session.set_crosshair(corner + shift)
+        assert panel.in_scan.mark.text() == f"Mark S{n} here"
+        qtbot.mouseClick(panel.in_scan.mark, CLICK)
+    assert desk.pose.estimate.registered.way == "skull"
+    shown_at = []
+    desk.point_shown.connect(shown_at.append)
+    click(qtbot, panel, "S2", NAME)
+    np.testing.assert_allclose(shown_at[-1], np.add(shift, (0, 9, 0)), atol=1e-6)
+    assert list(cut_words(panel)) == []
+    desk.close(discard=True)
+
+
+def test_skull_features_come_from_a_file(desk, panel, tmp_path):
+    (tmp_path / "skull.csv").write_text("label,x,y,z\nS1,1,2,3\nS2,4,5,7\nS3,9,1,0\n")
+    assert panel.in_scan.take_file(tmp_path / "skull.csv")
+    assert desk.session.state.skull["S2"] == (4, 5, 7)
+    assert "3" in panel.in_scan.skull.text()
+    (tmp_path / "none.csv").write_text("label,x,y,z\nCA,1,2,3\n")
+    assert not panel.in_scan.take_file(tmp_path / "none.csv")
+    assert len(desk.session.state.skull) == 3
+
+
+def test_a_verdict_is_kept_with_initials_and_note(desk, panel, qtbot):
+    assert not panel.verdict.accept.isEnabled()
+    touch(desk, *PROBE)
+    panel.verdict.initials.clear()
+    qtbot.keyClicks(panel.verdict.initials, "CD")
+    qtbot.keyClicks(panel.verdict.note, "seen on the mesh")
+    qtbot.mouseClick(panel.verdict.accept, CLICK)
+    check = desk.session.state.pose_checks[-1]
+    assert (check.side, check.verdict, check.by, check.note) == (LEFT, "accept", "CD", "seen on the mesh")
+    assert check.pose["radius_95_mm"] == desk.pose.estimate.pose.radius_95
+    said = panel.verdict._said.itemAt(0).widget()
+    assert said.words.startswith("Accepted by CD")
+    qtbot.mouseClick(panel.verdict.reject, CLICK)
+    assert [c.verdict for c in desk.session.state.pose_checks] == ["accept", "reject"]
+    desk.session.undo()
+    assert [c.verdict for c in desk.session.state.pose_checks] == ["accept"]
+
+
+def test_what_is_drawn_is_chosen(desk, panel, qtbot):
+    panel.overlay.parts["vectors"].click()
+    assert desk.pose.overlay.vectors
+    panel.overlay.opacity.setValue(40)
+    assert desk.pose.overlay.opacity == 0.4
+    panel.overlay.visible.click()
+    assert not desk.pose.overlay.visible
+    assert not panel.overlay.parts["region"].isEnabled()
+
+
+def test_other_parts_of_the_program_are_asked_for(desk, panel, qtbot):
+    asked = []
+    for name in ("tracker", "guide", "atlas", "report", "export", "touch_file", "skull_file"):
+        getattr(panel, f"{name}_asked").connect(lambda *_, name=name: asked.append(name))
+    touch(desk, *PROBE)
+    for button in (panel.touches.ways["file"], panel.touches.ways["tracker"], panel.touches.guide):
+        qtbot.mouseClick(button, CLICK)
+    for button in (panel.head.to_atlas, panel.report, panel.export, panel.in_scan.file):
+        button.click()
+    assert asked == ["touch_file", "tracker", "guide", "atlas", "report", "export", "skull_file"]
+
+
+# Looks, and speed
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda theme: theme.name)
+@pytest.mark.parametrize("size", [NARROW, WIDE], ids=["narrow", "wide"])
+@pytest.mark.parametrize("n", [0, 3, 11])
+def test_no_word_is_cut(desk, qtbot, theme, size, n):
+    touch(desk, *ORDER[:n])
+    panel = shown(desk, qtbot, size, theme)
+    assert list(cut_words(panel)) == []
+    panel.hide()
+
+
+def test_a_hidden_panel_computes_nothing_and_is_right_when_shown(desk, panel, monkeypatch):
+    panel.hide()
+    asked = []
+    monkeypatch.setattr(type(desk.pose), "gains", lambda self: asked.append(1) or ())
+    touch(desk, *PROBE)
+    assert asked == []
+    panel.show()
+    assert panel.result.one.isVisible()
+
+
+def test_a_touch_shows_at_once(desk, panel):
+    touch(desk, *PROBE)
+    took = []
+    for n in range(8):
+        start = time.process_time()  # not what else the machine does
+        touch(desk, ORDER[n], seed=n)
+        QApplication.processEvents()
+        took.append(time.process_time() - start)
+    assert min(took) < 0.03
