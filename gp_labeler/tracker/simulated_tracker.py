@@ -107,6 +107,7 @@ class Simulator:
         self._server: _Server | None = _Server(port)
         self.port: int = self._server.server_address[1]
         self._begun = time.monotonic()
+        self._epoch = time.time()
         self._commands: list[str] = []
         self._busy_until = 0.0
         self._then: list[tuple[float, int, Callable[[], None]]] = []
@@ -250,11 +251,12 @@ class Simulator:
         heapq.heappush(self._then, (self.now + seconds, self._number, call))
 
     def _send_reading(self) -> None:
-        readings = self.probe.read(self.now)
-        if self.now < self._stale_until:
+        now = self.now
+        readings = self.probe.read(now)
+        if now < self._stale_until:
             readings = {**readings, **self._last}
         self._last = readings
-        moment = time.time()
+        moment = self._epoch + now
         for name, reading in sorted(readings.items(), reverse=True):  # the reference first, as PLUS may
             bad, self._bad = (self._bad, "") if name == "probe" else ("", self._bad)
             for message in self._messages(self._names[name], reading, moment, bad):

@@ -77,7 +77,7 @@ class RecordedTouch:
     n_samples : int
         How many were averaged; strays are not.
     duration_s : float
-        From the first to the last of them.
+        From the first to the last sample.
     time : str
         When it ended, ISO 8601, UTC.
     """
@@ -269,7 +269,7 @@ class TouchRecorder:
                     f"The tip moved by {moved:.1f} mm ({allowed:g} is allowed). Hold it still."
                 )
         spread = float(np.sqrt(np.mean(distances**2)))
-        return RecordedTouch(position, spread, int(kept.sum()), _seconds(usable), _utc_now())
+        return RecordedTouch(position, spread, int(kept.sum()), usable[-1].time - usable[0].time, _utc_now())
 
     def _too_little(self, window: Sequence[Sample], usable: Sequence[Sample]) -> RefusedTouch | None:
         faults = Counter(s.fault for s in window if not s.usable)

@@ -120,6 +120,11 @@ def test_a_jump_and_back_records_nothing_between() -> None:
     assert set(faults[:20] + faults[32:]) == {Fault.NONE}
 
 
+def test_a_second_jump_to_a_third_place_is_doubted_too() -> None:
+    faults = _stream(Judge("ProbeToTracker"), [0.0] * 20 + [40.0] * 12 + [-700.0] * 12)
+    assert faults[20:] == [Fault.JUMP] * 24
+
+
 def test_a_jump_that_stays_is_believed_after_a_while() -> None:
     faults = _stream(Judge("ProbeToTracker"), [0.0] * 20 + [40.0] * 60)
     doubted = faults.count(Fault.JUMP)

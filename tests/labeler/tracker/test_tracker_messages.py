@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 
 import numpy as np
@@ -68,3 +69,15 @@ def test_a_pose_goes_out_as_pyigtl_reads_it() -> None:
 
 def test_the_greeting_has_a_header_of_version_2() -> None:
     assert struct.unpack("> H", hello()[:2]) == (2,)
+
+
+def test_spoilt_bytes_raise_nothing_unexpected() -> None:
+    rng = np.random.default_rng(0)
+    string = pyigtl.StringMessage("pressed", device_name="Button").pack()
+    whole = _transform(1.0, TransformStatus="OK", TransformValid="1") + string + _transform(2.0)
+    for _ in range(2000):
+        spoilt = bytearray(whole)
+        for place in rng.integers(0, len(whole), rng.integers(1, 6)):
+            spoilt[place] = rng.integers(0, 256)
+        with contextlib.suppress(GpError):
+            MessageDecoder().feed(bytes(spoilt), 1.0)

@@ -148,6 +148,8 @@ def test_what_was_held_up_and_comes_at_once_is_no_touch() -> None:
     assert all(isinstance(o, RefusedTouch) for o in hand.outcomes)
     dwelling = _Hand(dwell=True)
     dwelling._take(*held_up)
+    at = held_up[-1].time + _STEP
+    dwelling._take(Sample(at, hand.time + _STEP, pose(1, 2, 3)))
     assert dwelling.outcomes == []
 
 
