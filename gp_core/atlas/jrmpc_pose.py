@@ -67,13 +67,23 @@ def register_with_training(
 ) -> JrmpcResult:
     """Register points touched (n, 3), in the RW frame, with the training sides; the probe is the last set."""
     codes = tuple(features)
-    sets = [side.landmarks.array(codes) for side in training]
+    sets = [_labelled(side, codes) for side in training]
     return jrmpc(
         [*sets, probe],
         max_iterations=settings.max_iterations,
         gamma=settings.gamma,
         epsilon=settings.epsilon,
     )
+
+
+def _labelled(side: TrainingSide, codes: Iterable[str]) -> FloatArray:
+    """Return the features (n, 3) of a training side; an error names its specimen."""
+    try:
+        return side.landmarks.array(codes)
+    except FeatureError as error:
+        raise FeatureError(
+            error.problem, specimen=side.name, landmark=error.landmark, remedy=error.remedy
+        ) from None
 
 
 def estimate_jrmpc(

@@ -100,6 +100,15 @@ def test_bad_frames_are_named_and_do_no_harm(seed: int) -> None:
     assert f"{len(found.left_out)} of 200 frames do not fit" in found.warnings[0]
 
 
+def test_many_frames_off_to_one_side_do_no_harm() -> None:
+    """Plain least squares would be drawn so far off that no frame stood out."""
+    poses = recorded(200, noise=0.2)
+    poses[:70, :3, 3] += [30.0, 0.0, 10.0]
+    found = calibrate_pivot(poses)
+    assert found.left_out == tuple(range(70))
+    assert np.linalg.norm(found.tip_offset - TIP) < 0.3
+
+
 def test_matrices_that_are_not_rigid_are_left_out() -> None:
     poses = recorded(60, noise=0.1)
     poses[3] = 0.0
