@@ -24,7 +24,7 @@ _GOOD_SECONDS = 2.0
 
 _BLOCK = 65536
 _MOST_WAITING = 2000
-_JOIN_SECONDS = 1.0
+_JOIN_SECONDS = 0.25
 
 
 @dataclass(frozen=True)

@@ -81,4 +81,4 @@ def test_closing_leaves_no_thread() -> None:
     before = threading.active_count()
     for host in (None, "127.0.0.1"):
         PoseSender(0 if host is None else 9, host=host).close()
-    assert threading.active_count() == before
+    until(lambda: threading.active_count() == before, what="the threads' end")

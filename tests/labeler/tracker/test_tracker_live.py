@@ -260,8 +260,7 @@ def test_opening_and_closing_leaves_nothing_behind(resting) -> None:
         link.close()
         assert link.state.phase is LinkPhase.OFF
         assert link.poll() == []
-    assert threading.active_count() == threads
-    assert _open_files() == files
+    until(lambda: threading.active_count() == threads and _open_files() == files, what="all to be closed")
 
 
 def test_where_nobody_listens_it_says_so_and_blocks_nobody() -> None:
