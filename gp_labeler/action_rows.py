@@ -32,6 +32,10 @@ def _has_scan(desk: Workbench) -> bool:
     return desk.volume is not None
 
 
+def _in_use(desk: Workbench) -> bool:
+    return desk.in_use
+
+
 def _has_labels(desk: Workbench) -> bool:
     return bool(desk.session.state.landmarks)
 
@@ -172,6 +176,8 @@ def file_rows() -> Iterator[Action]:
             hint: str = "", group: str = "", icon: str = "") -> Action:
         return Action(f"file.{id}", "File", title, keys, run, enabled, hint=hint, group=group, icon=icon)
 
+    yield row("new", "New, without a scan", ("Ctrl+N",), lambda d, ui: ui.begin(),
+              hint="A specimen that is only touched; a scan can be opened for it later", group="open")
     yield row("open", "Open…", ("Ctrl+O",), lambda d, ui: ui.ask_open_file(),
               hint="A scan, or a specimen saved before", group="open", icon="file")
     yield row("open_folder", "Open folder…", ("Ctrl+Shift+O",), lambda d, ui: ui.ask_open_folder(),
@@ -179,8 +185,8 @@ def file_rows() -> Iterator[Action]:
     yield row("demo", "Open the demo", (), lambda d, ui: ui.open_demo(),
               hint="A synthetic guinea-pig head to try everything on", group="open", icon="play")
     yield row("find_scan", "Find scan…", (), lambda d, ui: ui.ask_find_scan(), _lacks_scan, group="open")
-    yield row("save", "Save", ("Ctrl+S",), lambda d, ui: ui.save(), _has_scan, group="save", icon="save")
-    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda d, ui: ui.save(ask=True), _has_scan,
+    yield row("save", "Save", ("Ctrl+S",), lambda d, ui: ui.save(), _in_use, group="save", icon="save")
+    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda d, ui: ui.save(ask=True), _in_use,
               group="save")
     yield row("import", "Import landmarks…", ("Ctrl+I",), lambda d, ui: ui.ask_import(), _has_scan,
               group="exchange", icon="import")

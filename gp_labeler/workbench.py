@@ -31,9 +31,9 @@ from gp_labeler.session.opening import new_session, open_session, recover_sessio
 from gp_labeler.session.recent import RecentFiles
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.session import Session
-from gp_labeler.session.specimen_edits import SetThreshold
+from gp_labeler.session.specimen_edits import RenameSpecimen, SetThreshold
 from gp_labeler.session.specimen_file import SUFFIX
-from gp_labeler.session.state import How
+from gp_labeler.session.state import How, SpecimenState
 from gp_labeler.tracker_desk import TrackerDesk
 from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, SaveMesh
 
@@ -106,6 +106,17 @@ class Workbench(AtlasDesk):
         return volume if isinstance(volume, Volume) else None
 
     @property
+    def in_use(self) -> bool:
+        """Whether there is a specimen to work on and to keep: one with a scan, or one that was touched."""
+        state = self.session.state
+        return state.volume is not None or bool(state.touches)
+
+    @property
+    def lacks_scan(self) -> bool:
+        """Whether the specimen was touched, and has no scan yet: the next one that is opened is its own."""
+        return self.in_use and self.session.state.volume is None
+
+    @property
     def threshold(self) -> float | None:
         """The grey value at which bone begins: what the user set, else what was proposed."""
         chosen = self.session.state.threshold
@@ -169,6 +180,10 @@ class Workbench(AtlasDesk):
     def open_volume(self, volume: Volume) -> None:
         """Begin a new specimen on a scan that is in memory already."""
         self._begin_with(volume)
+
+    def begin(self) -> None:
+        """Begin a new specimen without a scan, such as one that is only touched."""
+        self._replace(new_session(self.directory, predict=self._predict, author=self._author))
 
     def find_scan(self, path: str | PathLike[str]) -> None:
         """Say where the scan of this specimen is now, and read it from there."""
@@ -286,13 +301,17 @@ class Workbench(AtlasDesk):
             self.read_scan(plan)
 
     def _begin_demo(self, demo: Demo) -> None:
-        self._begin_with(demo.volume)
+        self._begin_with(demo.volume, join=False)
         self.truth = demo.specimen
 
-    def _begin_with(self, volume: Volume) -> None:
+    def _begin_with(self, volume: Volume, *, join: bool = True) -> None:
+        """Begin a specimen on a scan; one that was touched without a scan gets it, and goes on."""
         name = tidy_name(volume.name)
         options = {"predict": self._predict, "author": self._author}
-        self._replace(new_session(self.directory, specimen=name, **options))
+        if not (join and self.lacks_scan):
+            self._replace(new_session(self.directory, specimen=name, **options))
+        elif self.session.state.specimen == SpecimenState().specimen:
+            self.session.do(RenameSpecimen(name))
         self._attach(volume)
         if volume.path is not None:
             self._remember(volume.path)

@@ -44,7 +44,7 @@ class TopBar(QWidget):
         self.name.setProperty("role", "heading")
         self.about.setProperty("role", "hint")
         self._icons: list[tuple[QToolButton, str]] = []
-        self._working: list[QToolButton] = []  # mean nothing before a scan is open
+        self._working: list[tuple[QToolButton, str]] = []  # mean nothing before a scan is open
         self._lay_out()
         for signal in (
             workbench.session_replaced,
@@ -61,7 +61,7 @@ class TopBar(QWidget):
     def refresh(self, *_: object) -> None:
         """Show the specimen as it stands."""
         session, volume = self._desk.session, self._desk.volume
-        self.name.setText(session.state.specimen if session.state.volume else "gp-labeler")
+        self.name.setText(session.state.specimen if self._desk.in_use else "gp-labeler")
         about = (
             "" if volume is None else f"{size_text(volume.size)}  ·  {spacing_text(volume.spacing)}  ·  LPS"
         )
@@ -70,8 +70,9 @@ class TopBar(QWidget):
         known = session.path is not None
         self.saved.setText("● not saved" if session.dirty else "● saved" if known else "")
         self.saved.setToolTip("Every edit is kept in a journal at once; Ctrl+S writes the specimen file")
-        for button in self._working:
-            button.setVisible(session.state.volume is not None)
+        for button, id in self._working:
+            is_edit = id.startswith("edit.") and self._desk.in_use
+            button.setVisible(session.state.volume is not None or is_edit)
         undo = session.undo_text or ""
         short = undo if len(undo) <= _LONGEST_UNDO else undo[: _LONGEST_UNDO - 1] + "…"
         self._undo.setText(f"Undo {short}" if undo else "Undo")
@@ -126,7 +127,7 @@ class TopBar(QWidget):
         follow_action()
         self._icons.append((button, picture))
         if id != "view.theme":
-            self._working.append(button)
+            self._working.append((button, id))
         return button
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
 
 from gp_core.landmarks.features import Side
+from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, text_label
@@ -32,11 +33,15 @@ class HeadCard(Card):
     """
 
     atlas_asked = Signal()
+    new_asked = Signal()
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__("Estimate", parent)
         self._desk = workbench
         hints = {side.value: f"The {side.word} ear was touched" for side in Side}
+        self.specimen, self.new = QLineEdit(), link("New", "Begin another specimen without a scan")
+        self.specimen.setAccessibleName("Name of the specimen")
+        self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
         self.method = Segments({"robust": "Robust", "jrmpc": "JRMPC", "both": "Both"}, _HINTS)
         self.noise = NumberField("Probe noise")
@@ -55,6 +60,10 @@ class HeadCard(Card):
         self.noise.value_chosen.connect(lambda mm: self._choose(probe_noise=mm))
         self.noise.textEdited.connect(self._on_edited)
         self.to_atlas.clicked.connect(self.atlas_asked)
+        self.specimen.editingFinished.connect(self._rename)
+        self.new.clicked.connect(self.new_asked)
+        for signal in (workbench.details_changed, workbench.session_replaced, workbench.volume_opened):
+            follow(self, signal, self.refresh)
         follow(self, workbench.atlas_changed, self.refresh)
 
     def refresh(self, *_: object) -> None:
@@ -66,6 +75,10 @@ class HeadCard(Card):
         pose = None if estimate is None else estimate.poses.get("robust")
         is_found = settings.probe_noise is None and pose is not None and pose.probe_noise is not None
         self.found.setText(f"mm, found {pose.probe_noise:.2f}" if is_found and pose is not None else "mm")
+        state = self._desk.session.state
+        self._named.setVisible(state.volume is None)
+        if not self.specimen.hasFocus() or not self.specimen.isModified():
+            self.specimen.setText(state.specimen)
         atlas = self._desk.atlas
         self.atlas.set_words("being loaded" if atlas is None else atlas.name)
 
@@ -75,18 +88,29 @@ class HeadCard(Card):
         choices.setSpacing(12)
         choices.addWidget(self.side, 2)
         choices.addWidget(self.method, 3)
-        noise, atlas = QHBoxLayout(), QHBoxLayout()
-        for row, caption in ((noise, "Probe noise"), (atlas, "Atlas")):
+        self._named = QWidget()
+        name, noise, atlas = QHBoxLayout(self._named), QHBoxLayout(), QHBoxLayout()
+        name.setContentsMargins(0, 0, 0, 0)
+        for row, caption in ((name, "Specimen"), (noise, "Probe noise"), (atlas, "Atlas")):
             row.setSpacing(6)
             words = text_label(caption, "hint")
             words.setFixedWidth(72)
             row.addWidget(words)
+        name.addWidget(self.specimen, 1)
+        name.addWidget(self.new)
         noise.addWidget(self.noise)
         noise.addWidget(self.found, 1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
-        for row in (choices, noise, atlas):
-            self.add(row)
+        for what in (self._named, choices, noise, atlas):
+            self.add(what)
+
+    def _rename(self) -> None:
+        name = self.specimen.text().strip()
+        self.specimen.setModified(False)
+        if name != self._desk.session.state.specimen:
+            attempt(self._desk, lambda: self._desk.session.do(RenameSpecimen(name)))
+            self.refresh()
 
     def _on_edited(self, text: str) -> None:
         if not text.strip():

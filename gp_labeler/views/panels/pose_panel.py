@@ -49,6 +49,7 @@ class PosePanel(QWidget):
     tracker_asked = Signal()
     guide_asked = Signal()
     atlas_asked = Signal()
+    new_asked = Signal()
     report_asked = Signal()
     export_asked = Signal()
 
@@ -136,6 +137,7 @@ class PosePanel(QWidget):
 
     def _connect(self) -> None:
         self.head.atlas_asked.connect(self.atlas_asked)
+        self.head.new_asked.connect(self.new_asked)
         self.touches.file_asked.connect(self.touch_file_asked)
         self.touches.tracker_asked.connect(self.tracker_asked)
         self.touches.guide_asked.connect(self.guide_asked)
