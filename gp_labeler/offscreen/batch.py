@@ -54,6 +54,8 @@ def run_batch(
         if tell is not None:
             tell(f"{name}:")
         reports[name] = _run_one(script, name, output / tidy_name(name), tell)
+        if tell is not None and not reports[name].ok:
+            tell(f"   ! {reports[name].error}")
     write_text(output / SUMMARY, _table(reports))
     return reports
 

@@ -50,6 +50,8 @@ def run_offscreen(script: str, output: Path | None, specimens: Sequence[str] = (
         return int(not all(report.ok for report in reports.values()))
     report = run_script(content, output, tell=_say)
     if not report.ok:
+        if report.files:
+            _say(f"What was written before is in {output}: {', '.join(report.files)}")
         sys.stderr.write(f"gp-labeler: {report.error}\n")
         return 1
     _say(f"{len(report.steps)} steps in {report.seconds:.1f} s: {output}")

@@ -45,7 +45,11 @@ class Step:
     def title(self) -> str:
         """The step in a few words, such as ``place CA left``."""
         values = [getattr(self, name) for name in self.says]
-        return " ".join([self.do, *(str(getattr(v, "word", v)) for v in values if v is not None)])
+        return " ".join([self.do, *(_word(value) for value in values if value is not None)])
+
+
+def _word(value: object) -> str:
+    return f"{value:g}" if isinstance(value, float) else str(getattr(value, "word", value))
 
 
 def make_step(kinds: Mapping[str, type[Step]], table: Any) -> Step:

@@ -12,6 +12,8 @@ from PySide6.QtCore import QObject
 
 from gp_core.landmarks.files import write_text
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.pose_desk import OverlayOptions
+from gp_labeler.scene.pose_data import PARTS
 from gp_labeler.session.document import document_of
 from gp_labeler.session.edits import Edit
 from gp_labeler.session.history import History
@@ -33,7 +35,7 @@ __all__ = ["LOOKS", "Recorder", "script_text"]
 
 _PHANTOM = "phantom-"
 
-LOOKS = ("view.reset", "view.projection", "view.from_")
+LOOKS = ("view.reset", "view.projection", "view.from_", "pose.along_axis", "pose.through_window")
 """Commands, or beginnings of their names, that change only what is seen: taken down as they are."""
 
 _VIEW_KEYS = {
@@ -80,6 +82,7 @@ class Recorder(QObject):
             (desk.jobs.done, self._on_job),
             (desk.view_changed, self._on_view_changed),
             (desk.tool_changed, self._on_tool),
+            (desk.pose.overlay_changed, self._on_overlay),
         ):
             follow(self, signal, slot)
         window.commands.done.connect(self._on_command)
@@ -175,7 +178,16 @@ class Recorder(QObject):
             self.tables.append(step("view", theme=self._window.theme_name))
 
     def _on_tool(self, tool: str) -> None:
-        self.tables.append(step("action", id=f"tool.{tool}"))
+        self.tables.append(step("action", id="pose.touch" if tool == "touch" else f"tool.{tool}"))
+
+    def _on_overlay(self, options: OverlayOptions) -> None:
+        estimate = self._window.workbench.pose.estimate
+        if not options.visible:
+            self.tables.append({"do": "overlay", "visible": False})
+        elif estimate is not None and estimate.in_scan() is not None:
+            parts = [part for part in PARTS if getattr(options, part)]
+            side = estimate.side.value
+            self.tables.append(step("overlay", side=side, parts=parts, opacity=options.opacity))
 
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         seen = self._seen(changed)

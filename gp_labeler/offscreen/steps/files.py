@@ -78,8 +78,8 @@ class Export(Step):
         report = export_landmarks(state, folder, formats=self.formats, overwrite=True)
         rig.wrote(*report.files)
         if self.complete and not report.is_complete:
-            raise GpError(report.text)
-        return report.text
+            raise GpError(report.text.replace("\n", " "))
+        return report.text.replace("\n", " ")
 
 
 @dataclass(frozen=True)

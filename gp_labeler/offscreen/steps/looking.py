@@ -19,6 +19,9 @@ from gp_labeler.views.theme import THEMES
 
 __all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]
 
+_SMALLEST, _LARGEST = 16, 8192
+"""Pixels; beyond, graphics memory and the PNG's reader give in."""
+
 _FIELDS = {
     "opacity": "mesh_opacity",
     "outline": "outline_visible",
@@ -127,7 +130,7 @@ class Look(Step):
 
     def _set_window(self, rig: Rig) -> None:
         if self.size is not None:
-            rig.window.resize(round(self.size[0]), round(self.size[1]))
+            rig.window.resize(*_pixels(self.size))
         if self.theme is not None:
             _check(self.theme, "theme", tuple(THEMES))
             rig.window.set_theme(self.theme)
@@ -191,7 +194,7 @@ class Screenshot(Step):
         rig.settle()
         for view in rig.window.grid.views:
             leave(view)
-        size = None if self.size is None else (round(self.size[0]), round(self.size[1]))
+        size = None if self.size is None else _pixels(self.size)
         image, file = picture(rig.window, self.what, size), rig.to_write(self.path)
         if not image.save(str(file)):
             raise GpError("cannot be written", file=file, remedy="Give a path that ends with .png.")
@@ -248,7 +251,7 @@ class Act(Step):
 
     def run(self, rig: Rig) -> None:  # noqa: D102
         if not action(self.id).enabled(rig.desk):
-            raise GpError(f"{self.id} cannot be done now")
+            raise GpError(f"{self.id} cannot be done now: {rig.desk.session.click_text}")
         rig.prompts.prepare([rig.to_read(file) for file in self.files], self.answers)
         since = len(rig.messages)
         if not rig.window.commands.run(self.id):
@@ -279,6 +282,13 @@ class Undo(Step):
             rig.window.commands.run("edit.undo")
         rig.settle(in_passing=False)
         return ", ".join(undone)
+
+
+def _pixels(size: Pair) -> tuple[int, int]:
+    width, height = (round(each) for each in size)
+    if not (min(width, height) >= _SMALLEST and max(width, height) <= _LARGEST):
+        raise GpError(f"size must be from {_SMALLEST} to {_LARGEST} pixels, got {width} x {height}")
+    return width, height
 
 
 def _check(value: str, name: str, allowed: tuple[str, ...]) -> None:

@@ -93,7 +93,12 @@ class Place(Step):
             if self.at != "truth":
                 raise GpError(f"at must be truth, ghost, crosshair or a position, got {self.at!r}")
             return rig.truth(self.side, code)
-        return np.array(self.at, dtype=np.float64)
+        aim, volume = np.array(self.at, dtype=np.float64), rig.desk.volume
+        if volume is not None and not volume.contains(aim[None])[0]:
+            low, high = volume.extent
+            reach = ", ".join(f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True))
+            raise GpError(f"at lies outside the scan, which reaches from {reach} mm", landmark=code)
+        return aim
 
     def _result(self, rig: Rig, code: str, name: str) -> str:
         there = rig.placed(self.side, code)

@@ -166,7 +166,7 @@ class Overlay(Step):
     visible : bool
         Whether to draw it, or to take it away again.
     side : L or R, optional
-        Which; by default the one estimated last.
+        Which; by default the one estimated, or chosen, last.
     parts : text or texts, optional
         What of it: ``estimate``, ``region``, ``cochlea``, ``truth`` (as labelled), ``features`` (where the
         atlas has them), ``vectors`` (from there to the labels), ``touches``, ``path`` and ``names``.
@@ -201,9 +201,7 @@ class Overlay(Step):
 
     def _find(self, rig: Rig) -> None:
         """Choose what is drawn, and bring it into sight."""
-        if not rig.poses:
-            raise GpError("no pose was estimated", remedy="Let an estimate step come first.")
-        placed = current_estimate(rig, self.side or list(rig.poses)[-1]).in_scan()
+        placed = current_estimate(rig, self.side or rig.desk.pose.side).in_scan()
         if placed is None:
             raise GpError(
                 "nothing says where the touches lie in the scan",

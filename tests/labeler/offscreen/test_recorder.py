@@ -51,6 +51,11 @@ ACTION_STEPS = {
     **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection"), "action"),
     **dict.fromkeys(("point.accept_ghost", "point.place"), "put"),
     **{f"point.{verb}": "action" for verb in ("unseen", "clear", "check", "lock", "lock_all")},
+    **dict.fromkeys(("pose.open_touches", "pose.clear"), "touches"),
+    "pose.open_skull": "skull",
+    **dict.fromkeys(("pose.touch", "pose.along_axis", "pose.through_window"), "action"),
+    "pose.overlay": "overlay",
+    **dict.fromkeys(("pose.accept", "pose.reject"), "verdict"),
 }
 """What a command is written as."""
 
@@ -60,6 +65,8 @@ NOT_WRITTEN = {
     "help.about": "a dialog that changes nothing",
     "help.record": "the recorder itself",
     **dict.fromkeys(("point.skip", "point.next", "point.previous", "point.other_side"), CHOOSES),
+    **dict.fromkeys(("pose.skip", "pose.other_side"), CHOOSES),
+    **dict.fromkeys(("pose.robust", "pose.jrmpc", "pose.both"), "written with a verdict"),
 }
 """Why a command leaves no step."""
 
@@ -238,7 +245,26 @@ def test_touches_and_verdicts_are_done_again(recording) -> None:
     session.redo()
     pose.choose(probe_noise=0.3)
     pose.estimating.judge("reject", by="AB", note="tilted")
-    assert recording.check()[-3:-1] == ["estimate", "verdict"]
+    steps = recording.check()
+    assert steps[-3:-1] == ["estimate", "verdict"]
+
+
+def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
+    desk, run = recording.desk, recording.run
+    recording.begin()
+    place_three(recording)
+    assert run("pose.touch") == ["action"]
+    for n, code in enumerate(("MN", "OS", "RWA", "LLI")):
+        touching.record_touch(desk.session, "L", code, desk.atlas[code] + MIDDLE + n / 9, TouchHow.SCAN)
+    assert run("pose.overlay") == ["overlay"]
+    assert run("pose.overlay") == ["overlay"]
+    assert run("pose.along_axis") == ["action"]
+    assert run("tool.place") == ["action"]
+    desk.pose.estimating.judge("accept", by="AB")
+    assert recording.recorder.tables[-1]["do"] == "verdict"
+    assert run("pose.clear") == ["touches"]
+    assert run("edit.undo") == ["undo"]
+    recording.check()
 
 
 def test_what_is_seen_is_written_with_its_value(recording) -> None:
