@@ -11,7 +11,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["MENUS", "Action", "Run", "Test", "Ui"]
 
-MENUS = ("File", "Edit", "View", "Landmarks", "Estimate", "Help")
+MENUS = ("File", "Edit", "View", "Landmarks", "Atlas", "Estimate", "Help")
 
 
 class Ui(Protocol):
@@ -31,6 +31,10 @@ class Ui(Protocol):
     def judge_pose(self, verdict: str) -> None: ...  # noqa: D102
     def look_along_axis(self) -> None: ...  # noqa: D102
     def look_through_window(self) -> None: ...  # noqa: D102
+    def ask_open_atlas(self) -> None: ...  # noqa: D102
+    def ask_fit_atlas(self, *, folder: bool = False) -> None: ...  # noqa: D102
+    def ask_save_atlas(self) -> None: ...  # noqa: D102
+    def show_step(self, step: str) -> None: ...  # noqa: D102
     def open_demo(self) -> None: ...  # noqa: D102
     def save(self, *, ask: bool = False) -> bool: ...  # noqa: D102
     def close_window(self) -> None: ...  # noqa: D102

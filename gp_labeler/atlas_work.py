@@ -109,6 +109,19 @@ class Trial:
         """Sides that were held out."""
         return len(self.reports[0].rows)
 
+    @property
+    def figures(self) -> dict[str, tuple[float, float, float, float]]:
+        """Mean and largest error of CO, mm, and mean and largest of the axis, degrees, by method."""
+        return {
+            report.method: (
+                float(report.errors.e_co_mm.mean()),
+                float(report.errors.e_co_mm.max()),
+                float(report.errors.e_ma_deg.mean()),
+                float(report.errors.e_ma_deg.max()),
+            )
+            for report in self.reports
+        }
+
 
 @dataclass(frozen=True, eq=False)
 class TryAtlas:

@@ -18,7 +18,7 @@ from gp_core.landmarks.files.naming import natural_key
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.session.specimen_file import SUFFIX, read_specimen
 
-__all__ = ["Animals", "Skipped", "read_animals"]
+__all__ = ["Animals", "Skipped", "may_hold_labels", "read_animals"]
 
 FEWEST_PLACED = 4
 """A side with fewer says nothing that an atlas could learn from."""
@@ -69,6 +69,11 @@ class Animals:
         """Such as ``11 animals, 22 sides``."""
         n = len(self.specimens)
         return f"{n} animal{'' if n == 1 else 's'}, {self.n_sides} side{'' if self.n_sides == 1 else 's'}"
+
+
+def may_hold_labels(path: Path) -> bool:
+    """Return whether labelled animals may be in a file or folder, by its name."""
+    return path.name.lower().endswith(_IN_FOLDERS) or path.is_dir()
 
 
 def read_animals(

@@ -51,6 +51,7 @@ class Commands(QObject):
             workbench.volume_opened,
             workbench.surfaces_changed,
             workbench.tool_changed,
+            workbench.atlas_changed,
             workbench.pose.changed,
             workbench.pose.overlay_changed,
         ):

@@ -20,10 +20,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_labeler.session.animals import may_hold_labels
 from gp_labeler.session.view import View as SessionView
 from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
+from gp_labeler.views.panels.atlas_panel import AtlasPanel
 from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
 from gp_labeler.views.panels.rail import Rail
@@ -42,7 +44,12 @@ __all__ = ["MainWindow"]
 
 Layout = TypeVar("Layout", bound=QBoxLayout)
 
-_ALONE = MappingProxyType({"pose": "Touch features, or drop a file of touches"})
+_ALONE = MappingProxyType(
+    {
+        "atlas": "Drop an atlas, or a folder of labelled animals",
+        "pose": "Touch features, or drop a file of touches",
+    }
+)
 """Steps that need no scan, and what the line at the bottom says then."""
 
 _LIKED = (
@@ -98,7 +105,7 @@ class MainWindow(QMainWindow):
         self.memory.set(theme=name)
 
     def set_step(self, step: str) -> None:
-        """Show the panel of a step: ``scan``, ``label`` or ``pose``."""
+        """Show the panel of a step: ``scan``, ``label``, ``atlas`` or ``pose``."""
         self.rail.set_step(step)
         self.panels.setCurrentWidget(self.steps[step])
         self._arrange()
@@ -113,8 +120,14 @@ class MainWindow(QMainWindow):
 
     def _dock(self) -> None:
         self._scan, self._label = ScanPanel(self.workbench), LabelPanel(self.workbench)
+        self._atlas = AtlasPanel(self.workbench)
         self._pose = PosePanel(self.workbench, self.commands.actions)
-        self.steps: dict[str, QWidget] = {"scan": self._scan, "label": self._label, "pose": self._pose}
+        self.steps: dict[str, QWidget] = {
+            "scan": self._scan,
+            "label": self._label,
+            "atlas": self._atlas,
+            "pose": self._pose,
+        }
         for panel in self.steps.values():
             self.panels.addWidget(panel)
         self.panels.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
@@ -149,6 +162,7 @@ class MainWindow(QMainWindow):
         card.open_asked.connect(self.ui.ask_open_file)
         card.export_asked.connect(partial(self.commands.run, "file.export"))
         self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
+        self._atlas.asked.connect(self.commands.run)
         self._pose.touch_file_asked.connect(partial(self.commands.run, "pose.open_touches"))
         self._pose.skull_file_asked.connect(partial(self.commands.run, "pose.open_skull"))
         self._pose.atlas_asked.connect(partial(self.rail.buttons["atlas"].click))
@@ -176,7 +190,8 @@ class MainWindow(QMainWindow):
         is_open, step = self.workbench.session.state.volume is not None, self.rail.step
         alone = not is_open and step in _ALONE
         self.grid.setVisible(not alone)
-        self._pose.set_wide(alone)
+        for panel in (self._atlas, self._pose):
+            panel.set_wide(alone)
         wide = QSizePolicy.Policy.Expanding
         self.panels.setSizePolicy(wide if alone else QSizePolicy.Policy.Fixed, wide)
         self.pages.setCurrentIndex(int(is_open or alone))
@@ -234,12 +249,13 @@ class MainWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802
-        for url in event.mimeData().urls()[:1]:
-            path = Path(url.toLocalFile())
-            if self.rail.step == "pose" and holds_touches(path):
-                self.take_touches(path)
-            else:
-                self.ui.open_path(path)
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls()]
+        if self.rail.step == "atlas" and all(map(may_hold_labels, paths)):
+            self.workbench.fit_atlas(paths)
+        elif self.rail.step == "pose" and holds_touches(paths[0]):
+            self.take_touches(paths[0])
+        else:
+            self.ui.open_path(paths[0])
 
 
 def _tight(layout: Layout, *, spacing: int = 0) -> Layout:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
+from gp_labeler.atlas_desk import is_atlas_file
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
@@ -19,6 +20,7 @@ from gp_labeler.session.lock import InUseError
 from gp_labeler.session.opening import UnsavedEditsError
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.specimen_file import SUFFIX
+from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.panels.export_dialog import ExportDialog
 from gp_labeler.views.panels.import_dialog import ImportDialog
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
@@ -44,7 +46,7 @@ _CLOSE_MM = 12.0
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
 
 
-class WindowUi:
+class WindowUi(AtlasUi):
     """The answers that a main window gives to actions.
 
     Parameters
@@ -63,8 +65,8 @@ class WindowUi:
     # Files
 
     def open_path(self, path: Path) -> None:
-        """Open a scan or specimen, once unsaved edits are settled."""
-        if not self.settle():
+        """Open a scan or specimen, once unsaved edits are settled; an atlas at once."""
+        if not is_atlas_file(path) and not self.settle():
             return
         self._remember_folder(path)
         try:

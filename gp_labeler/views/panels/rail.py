@@ -31,10 +31,15 @@ class Step:
 STEPS = (
     Step("scan", "Scan", "scan", "The scan: what it is, its grey window, where bone begins"),
     Step("label", "Label", "label", "Place the 20 features on both sides"),
-    Step("atlas", "Atlas", "atlas", "Fit an atlas from labelled specimens"),
+    Step(
+        "atlas",
+        "Atlas",
+        "atlas",
+        "What labels are held against: the published atlas, or one fitted to your animals",
+    ),
     Step("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )
-_NOT_BUILT = " (not in this version; the command gp-core does it)"
+_NEEDS_SCAN = ("label",)
 
 
 class Rail(QWidget):
@@ -46,8 +51,6 @@ class Rail(QWidget):
         Whose progress it shows.
     actions : object, optional
         Not needed here; all panels are made alike.
-    built : tuple of str
-        Steps that can be chosen; the others say that they cannot.
     """
 
     step_chosen = Signal(str)
@@ -58,8 +61,6 @@ class Rail(QWidget):
         workbench: Workbench,
         actions: object = None,
         parent: QWidget | None = None,
-        *,
-        built: tuple[str, ...] = ("scan", "label", "pose"),
     ) -> None:
         super().__init__(parent)
         self._workbench = workbench
@@ -67,7 +68,7 @@ class Rail(QWidget):
         self.setProperty("role", "rail")
         self.setFixedWidth(84)
         self._group = QButtonGroup(self)
-        self.buttons = {step.id: self._button(n, step, built) for n, step in enumerate(STEPS, 1)}
+        self.buttons = {step.id: self._button(n, step) for n, step in enumerate(STEPS, 1)}
         self.keys_button = _RailButton("keys", "Keys", "?", "info", self)
         self.keys_button.setToolTip("All keyboard shortcuts (?)")
         self.keys_button.clicked.connect(self.keys_asked)
@@ -95,11 +96,10 @@ class Rail(QWidget):
             button.setChecked(True)
             self.step_chosen.emit(step)
 
-    def _button(self, number: int, step: Step, built: tuple[str, ...]) -> _RailButton:
+    def _button(self, number: int, step: Step) -> _RailButton:
         button = _RailButton(step.id, step.title, str(number), step.icon, self)
         button.setCheckable(True)
-        button.setEnabled(step.id in built)
-        button.setToolTip(step.hint + ("" if step.id in built else _NOT_BUILT))
+        button.setToolTip(step.hint)
         button.setAccessibleDescription(button.toolTip())
         button.clicked.connect(lambda: self.step_chosen.emit(step.id))
         self._group.addButton(button)
@@ -108,6 +108,8 @@ class Rail(QWidget):
     def _refresh(self, *_: object) -> None:
         session = self._workbench.session
         done = [session.progress(side) for side in Side]
+        for id in _NEEDS_SCAN:
+            self.buttons[id].setEnabled(session.state.volume is not None)
         self.buttons["scan"].set_done(self._workbench.volume is not None)
         self.buttons["label"].set_done(all(p.n_placed + p.n_unseen >= p.n_total for p in done))
 

@@ -90,12 +90,19 @@ def facts_of(volume: Volume) -> dict[str, str]:
         "Name": volume.name,
         "Voxels": f"{size_text(volume.size)} of {spacing_text(volume.spacing)}",
         "Size": f"{lengths} mm",
-        "Values": f"{volume.array.dtype}, {volume.array.nbytes / 2**20:.0f} MB in memory",
+        "Values": f"{volume.array.dtype}, {_memory(volume.array.nbytes)}",
         "Axes": _axes(volume),
     }
     if volume.path is not None:
         facts["File"] = str(volume.path.name)
     return facts
+
+
+def _memory(n_bytes: int) -> str:
+    for unit, size in (("GB", 2**30), ("MB", 2**20)):
+        if n_bytes >= size:
+            return f"{n_bytes / size:.3g} {unit} in memory"
+    return f"{n_bytes / 2**10:.0f} kB in memory"
 
 
 def _axes(volume: Volume) -> str:

@@ -1,0 +1,63 @@
+"""What actions of the menu Atlas ask of the window: files, folders, which panel is shown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.workbench import Workbench
+
+if TYPE_CHECKING:
+    from gp_labeler.views.main_window import MainWindow
+
+__all__ = ["AtlasUi"]
+
+_ATLASES = "Atlases (*.json);;All files (*)"
+_LABELLED = "Labelled animals (*.mrk.json *.fcsv *.gpspecimen.json);;All files (*)"
+
+
+class AtlasUi:
+    """The part of `WindowUi` that concerns the atlas."""
+
+    _window: MainWindow
+    _desk: Workbench
+    prompts: Prompts
+
+    if TYPE_CHECKING:
+
+        @property
+        def _folder(self) -> str: ...
+
+        def _remember_folder(self, path: Path) -> None: ...
+
+    def show_step(self, step: str) -> None:
+        """Show the panel of a step of the rail."""
+        self._window.set_step(step)
+
+    def ask_open_atlas(self) -> None:
+        """Ask for an atlas file, and take it."""
+        for path in self.prompts.open_files("Open an atlas", self._folder, _ATLASES):
+            self._remember_folder(path)
+            self._desk.open_atlas(path)
+
+    def ask_fit_atlas(self, *, folder: bool = False) -> None:
+        """Ask for the files of labelled animals, or a folder of them, and fit an atlas."""
+        title = "Fit an atlas to these animals"
+        if folder:
+            chosen = self.prompts.folder(title, self._folder)
+            paths = [] if chosen is None else [chosen]
+        else:
+            paths = self.prompts.open_files(title, self._folder, _LABELLED, many=True)
+        if paths:
+            self._remember_folder(paths[0])
+            self._window.set_step("atlas")
+            self._desk.fit_atlas(paths)
+
+    def ask_save_atlas(self) -> None:
+        """Ask where, and write the atlas in use."""
+        path = self.prompts.save_file("Save the atlas", str(Path(self._folder) / "atlas.json"), _ATLASES)
+        if path is not None:
+            self._desk.save_atlas(path)
+            self._remember_folder(path)
+            self._desk.say(f"Wrote {path.name}")

@@ -1,0 +1,381 @@
+"""The panel of the step Atlas: which atlas is in use, fitting another, how labels fit it, leave-one-out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtWidgets import (
+    QBoxLayout,
+    QGridLayout,
+    QHBoxLayout,
+    QProgressBar,
+    QPushButton,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_labeler.atlas_work import FEWEST_ANIMALS, FitAtlas
+from gp_labeler.session.animals import Animals
+from gp_labeler.session.jobs import Task
+from gp_labeler.views.bind import follow
+from gp_labeler.views.panels.atlas_table import AtlasTable
+from gp_labeler.views.panels.label_panel import PANEL_WIDTH
+from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.workbench import Workbench
+
+__all__ = ["AtlasPanel"]
+
+_ANY = 16_777_215
+_WIDEST = 900
+_N_NOTICES = 4
+_METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
+
+
+class AtlasPanel(QWidget):
+    """All that concerns the atlas.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose atlas it shows and changes.
+    actions : object, optional
+        Not needed here; all panels are made alike.
+    """
+
+    asked = Signal(str)
+    """Id of an action of the menu Atlas."""
+
+    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+        self.setProperty("role", "panel")
+        self.which, self.own = AtlasCard(workbench), OwnCard(workbench)
+        self.trial, self.labels = TrialCard(workbench), LabelsCard(workbench)
+        for asking in (self.which, self.own, self.trial):
+            asking.asked.connect(self.asked)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        content.setMaximumWidth(_WIDEST)
+        self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom, content)
+        self._columns.setContentsMargins(4, 8, 8, 8)
+        self._columns.setSpacing(6)
+        self._left, self._right = _column(self.which), _column(self.labels)
+        for column in (self._left, self._right):
+            self._columns.addLayout(column, 1)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        area = scrolled(content)
+        area.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(area)
+        self.set_wide(False)
+
+    def set_wide(self, wide: bool) -> None:
+        """Take all the width there is, in two columns, where there is no scan beside."""
+        self.setMinimumWidth(PANEL_WIDTH)
+        self.setMaximumWidth(_ANY if wide else PANEL_WIDTH)
+        ways = QBoxLayout.Direction
+        self._columns.setDirection(ways.LeftToRight if wide else ways.TopToBottom)
+        column = self._left if wide else self._right
+        for card in (self.own, self.trial):
+            for other in (self._left, self._right):
+                other.removeWidget(card)
+            column.insertWidget(column.count() - 1, card)  # before the stretch
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(PANEL_WIDTH, super().sizeHint().height())
+
+
+def _column(*cards: QWidget) -> QVBoxLayout:
+    column = QVBoxLayout()
+    column.setSpacing(6)
+    for card in cards:
+        column.addWidget(card)
+    column.addStretch(1)
+    return column
+
+
+class _AskingCard(Card):
+    """A card whose buttons are actions of the menu Atlas."""
+
+    asked = Signal(str)
+
+    def _button(self, row: QHBoxLayout, id: str, words: str, hint: str) -> QPushButton:
+        button = QPushButton(words)
+        button.setToolTip(hint)
+        button.clicked.connect(lambda: self.asked.emit(id))
+        row.addWidget(button, 1)
+        return button
+
+
+class AtlasCard(_AskingCard):
+    """Which atlas is in use."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__("Atlas in use")
+        self._desk = workbench
+        self.name, self.facts = ElidedLabel("", "title"), Facts()
+        self.add(self.name)
+        self.add(self.facts)
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        self.published, self.open, self.save = (
+            self._button(row, f"atlas.{name}", *texts) for name, texts in _BUTTONS.items()
+        )
+        self.add(row)
+        for signal in (workbench.atlas_changed, workbench.atlas_details_changed, workbench.session_replaced):
+            follow(self, signal, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show which it is."""
+        desk, atlas = self._desk, self._desk.atlas
+        self.name.set_words(_title(desk))
+        self.published.setEnabled(not desk.is_published_atlas)
+        self.save.setEnabled(atlas is not None)
+        if atlas is None:
+            self.facts.show_facts({})
+            return
+        facts = {"Source": _source(desk)}
+        if _made_from(desk) != atlas.name:
+            facts["Made from"] = _made_from(desk)
+        facts["Features"] = f"{len(atlas.codes)} of 19"
+        if desk.atlas_file is not None:
+            facts["File"] = desk.atlas_file.name
+        if desk.is_held_out:
+            facts["Here"] = f"{desk.session.state.specimen} is one of them, and is held against the others"
+        self.facts.show_facts(facts)
+
+
+_BUTTONS = {
+    "published": ("Published", "Use the atlas rebuilt from the paper's table of distances"),
+    "open": ("Open file…", "Use an atlas that was saved here, or made with gp-core fit"),
+    "save": ("Save…", "Save the atlas for gp-core, and for other machines"),
+}
+
+
+def _title(desk: Workbench) -> str:
+    atlas = desk.atlas
+    if atlas is None:
+        return "It is being loaded…"
+    return "The published atlas" if desk.is_published_atlas else atlas.name
+
+
+def _source(desk: Workbench) -> str:
+    if desk.is_published_atlas:
+        return "Distances published by Usevitch et al. 2021"
+    return "Fitted here" if desk.animals is not None else "An atlas file"
+
+
+def _made_from(desk: Workbench) -> str:
+    atlas = desk.atlas
+    assert atlas is not None
+    sides = f"{atlas.n_samples} side{'' if atlas.n_samples == 1 else 's'}"
+    if desk.is_published_atlas:
+        return f"11 animals, {sides}"
+    n = len(atlas.specimens)
+    return f"{n} animal{'' if n == 1 else 's'}, {sides}" if n else sides
+
+
+class OwnCard(_AskingCard):
+    """Fitting an atlas to labelled animals, and what was read for it."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__("Fit to labelled animals")
+        self._desk = workbench
+        hint = "Specimens saved here, or landmarks exported from here or from 3D Slicer."
+        self.add(text_label(hint, "hint", wrap=True))
+        row = QHBoxLayout()
+        row.setSpacing(6)
+        self.files = self._button(row, "atlas.fit_files", "From files…", "Choose all of them at once")
+        self.folder = self._button(
+            row, "atlas.fit_folder", "From a folder…", "It is searched, and the folders in it"
+        )
+        self.add(row)
+        self._add_progress()
+        self.findings = QVBoxLayout()
+        self.findings.setSpacing(5)
+        self.add(self.findings)
+        follow(self, workbench.atlas_changed, self.refresh)
+        for signal in (workbench.jobs.started, workbench.jobs.progressed):
+            follow(self, signal, self._on_progress)
+        for signal in (workbench.jobs.done, workbench.jobs.failed, workbench.jobs.cancelled):
+            follow(self, signal, self._on_end)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show what was read."""
+        emptied(self.findings)
+        animals = self._desk.animals
+        if animals is None:
+            return
+        self.findings.addWidget(Notice("good", f"{animals.text} were read."))
+        findings = _findings(animals)
+        for words, remedy in findings[:_N_NOTICES]:
+            self.findings.addWidget(Notice("warning", words, remedy))
+        if len(findings) > _N_NOTICES:
+            rest = text_label(f"and {len(findings) - _N_NOTICES} more", "hint")
+            rest.setToolTip("\n".join(" ".join(finding) for finding in findings[_N_NOTICES:]))
+            self.findings.addWidget(rest)
+
+    def _add_progress(self) -> None:
+        self.progress, self.stop = QProgressBar(), QPushButton("Stop")
+        self.progress.setRange(0, 100)
+        self.progress.setTextVisible(False)
+        self.progress.setFixedHeight(8)
+        self.stop.clicked.connect(self._stop)
+        self._work = QWidget()
+        line = QHBoxLayout(self._work)
+        line.setContentsMargins(0, 0, 0, 0)
+        line.addWidget(text_label("Reading and checking", "hint"))
+        line.addWidget(self.progress, 1)
+        line.addWidget(self.stop)
+        self._work.hide()
+        self.add(self._work)
+
+    def _on_progress(self, task: Task[Any]) -> None:
+        if isinstance(task.job, FitAtlas):
+            self._work.show()
+            self.progress.setValue(round(100 * task.fraction))
+
+    def _on_end(self, _: Task[Any]) -> None:
+        self._work.setVisible(any(isinstance(task.job, FitAtlas) for task in self._desk.jobs.running))
+
+    def _stop(self) -> None:
+        for task in self._desk.jobs.running:
+            if isinstance(task.job, FitAtlas):
+                task.cancel()
+
+
+def _findings(animals: Animals) -> list[tuple[str, str]]:
+    """Return what was skipped, and what should be looked at."""
+    skipped = [(f"Skipped {each.what}", f"{each.why}.") for each in animals.skipped]
+    doubts = [
+        (f"{each.specimen} {each.side.word} {' '.join(each.landmarks[:2])}", f"{each.text}: look again.")
+        for each in animals.doubts
+    ]
+    return skipped + doubts
+
+
+class LabelsCard(Card):
+    """How much each feature varies, and how well the labels of this specimen fit."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__("Features")
+        self._desk = workbench
+        self.verdict = text_label("", "hint", wrap=True)
+        self.table = AtlasTable(workbench)
+        self.add(self.verdict)
+        self.add(self.table)
+        for signal in (
+            workbench.atlas_changed,
+            workbench.doubts_changed,
+            workbench.landmarks_changed,
+            workbench.session_replaced,
+        ):
+            follow(self, signal, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Say in a sentence what the table shows."""
+        rows = self.table.rows
+        if not rows.n_judged:
+            words = "Once five points of a side are placed, this shows how well they fit the atlas."
+        elif rows.n_doubtful:
+            words = f"{rows.n_doubtful} of {rows.n_judged} labels should be looked at again."
+        else:
+            words = f"All {rows.n_judged} labels that can be checked fit the atlas."
+        self.verdict.setText(words)
+
+
+class TrialCard(_AskingCard):
+    """Leave-one-out: how well each animal's cochlea is found from the others."""
+
+    def __init__(self, workbench: Workbench) -> None:
+        super().__init__("Leave-one-out")
+        self._desk = workbench
+        self.words = text_label("", "hint", wrap=True)
+        self.add(self.words)
+        self._table = QWidget()
+        self._grid = QGridLayout(self._table)
+        self._grid.setContentsMargins(0, 2, 0, 2)
+        self._grid.setHorizontalSpacing(8)
+        self._grid.setVerticalSpacing(3)
+        self.add(self._table)
+        self.findings = QVBoxLayout()
+        self.add(self.findings)
+        row = QHBoxLayout()
+        self.run = self._button(
+            row, "atlas.try", "Run leave-one-out", "On the animals the atlas is fitted to"
+        )
+        self.add(row)
+        for signal in (workbench.atlas_changed, workbench.atlas_details_changed):
+            follow(self, signal, self.refresh)
+        for signal in (
+            workbench.jobs.started,
+            workbench.jobs.done,
+            workbench.jobs.failed,
+            workbench.jobs.cancelled,
+        ):
+            follow(self, signal, self._on_jobs)
+        self.refresh()
+
+    @property
+    def figures(self) -> list[list[str]]:
+        """What the table shows, a list for each method."""
+        trial = self._desk.trial
+        if trial is None:
+            return []
+        return [
+            [_METHODS[method], f"{co:.2f}", f"{co_max:.2f}", f"{axis:.1f}", f"{axis_max:.1f}"]
+            for method, (co, co_max, axis, axis_max) in trial.figures.items()
+        ]
+
+    def refresh(self, *_: object) -> None:
+        """Show the errors, or what it takes to find them."""
+        trial = self._desk.trial
+        emptied(self._grid)
+        emptied(self.findings)
+        self._table.setVisible(trial is not None)
+        self.words.setText(self._sentence())
+        self._on_jobs()
+        if trial is None:
+            return
+        for column, words in enumerate(("", "CO mm", "max", "axis °", "max")):
+            self._grid.addWidget(_figure(words, "hint"), 0, column)
+        for row, texts in enumerate(self.figures, 1):
+            for column, words in enumerate(texts):
+                self._grid.addWidget(_figure(words, "" if column else "heading"), row, column)
+        for column in range(5):
+            self._grid.setColumnStretch(column, 1)
+        for skipped in trial.skipped[:_N_NOTICES]:
+            self.findings.addWidget(Notice("warning", f"Left out: {skipped.text}"))
+        if len(trial.skipped) > _N_NOTICES:
+            rest = text_label(f"and {len(trial.skipped) - _N_NOTICES} more", "hint")
+            rest.setToolTip("\n".join(skipped.text for skipped in trial.skipped[_N_NOTICES:]))
+            self.findings.addWidget(rest)
+
+    def _sentence(self) -> str:
+        desk, trial = self._desk, self._desk.trial
+        if not desk.can_try_atlas:
+            least = f"Fit to {FEWEST_ANIMALS} labelled animals or more"
+            return f"{least} to see how well each is found from the rest."
+        if trial is None:
+            return "Estimates each animal's cochlea from the touchable points and the other animals."
+        report = trial.reports[0]
+        return (
+            f"{trial.n_sides} sides of {trial.n_animals} animals, each estimated from the others; "
+            f"{len(report.training)} training and {len(report.probe)} probe features."
+        )
+
+    def _on_jobs(self, *_: object) -> None:
+        running = any(task.key == "atlas trial" for task in self._desk.jobs.running)
+        self.run.setEnabled(self._desk.can_try_atlas and not running)
+        self.run.setText("Running…" if running else "Run leave-one-out")
+
+
+def _figure(words: str, role: str) -> QWidget:
+    label = text_label(words, role)
+    side = Qt.AlignmentFlag.AlignLeft if role == "heading" else Qt.AlignmentFlag.AlignRight
+    label.setAlignment(side | Qt.AlignmentFlag.AlignVCenter)
+    return label

@@ -1,0 +1,246 @@
+"""The table of the atlas: how much each feature varies, and how well the labels of the specimen fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QRectF, QSize, Qt
+from PySide6.QtGui import QColor, QFont, QFontMetrics, QPainter
+from PySide6.QtWidgets import (
+    QAbstractItemView,
+    QHeaderView,
+    QStyle,
+    QStyledItemDelegate,
+    QStyleOptionViewItem,
+    QTableView,
+    QWidget,
+)
+
+from gp_core.landmarks.features import Side, feature
+from gp_labeler.session.ghosts import Departure
+from gp_labeler.views.bind import NONE, attempt, follow
+from gp_labeler.views.chips import draw_chip
+from gp_labeler.views.theme import FONT_PX, theme_of
+from gp_labeler.workbench import Workbench
+
+__all__ = ["AtlasModel", "AtlasTable"]
+
+_SIDES = (Side.LEFT, Side.RIGHT)
+_HEADINGS = ("Feature", "SD mm", "Left mm · SD", "Right mm · SD")
+_HINTS = (
+    "",
+    "How much the feature varies between animals: standard deviation of a coordinate, mm",
+    "How far the label is from where the others make the atlas expect it: mm, and in standard deviations",
+)
+_ROW_PX, _CODE_PX, _CHIP = 22, 39, 11
+_WIDTHS = (54, 92, 96)
+_FEWEST_PX = 80
+DOUBTFUL_ROLE = int(Qt.ItemDataRole.UserRole) + 1
+
+Index = QModelIndex | QPersistentModelIndex
+
+
+class AtlasModel(QAbstractTableModel):
+    """A row for each feature of the atlas in use.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose atlas and labels it shows.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
+        super().__init__(parent)
+        self._desk = workbench
+        self.codes: tuple[str, ...] = ()
+        self._sd: dict[str, float] = {}
+        self._away: dict[Side, Mapping[str, Departure]] = {}
+        self.refresh_atlas()
+
+    def refresh_atlas(self) -> None:
+        """Ask for the atlas anew."""
+        atlas = self._desk.atlas
+        self.beginResetModel()
+        self.codes = () if atlas is None else atlas.codes
+        spread = () if atlas is None else np.sqrt(atlas.variances(atlas.codes)).tolist()
+        self._sd = dict(zip(self.codes, spread, strict=True))
+        self.endResetModel()
+        self.refresh_labels()
+
+    def refresh_labels(self) -> None:
+        """Ask how well the labels fit."""
+        self._away = {side: self._desk.departures(side) or {} for side in _SIDES}
+        if self.codes:
+            self.dataChanged.emit(self.index(0, 2), self.index(len(self.codes) - 1, 3))
+
+    @property
+    def n_judged(self) -> int:
+        """Labels of both sides that were held against the atlas."""
+        return sum(len(away) for away in self._away.values())
+
+    @property
+    def n_doubtful(self) -> int:
+        """Those of them that should be looked at again."""
+        return sum(found.is_doubtful for away in self._away.values() for found in away.values())
+
+    def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's
+        return 0 if parent.isValid() else len(self.codes)
+
+    def columnCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's
+        return len(_HEADINGS)
+
+    def headerData(  # noqa: D102, N802 - Qt's name
+        self, section: int, orientation: Qt.Orientation, role: int = Qt.ItemDataRole.DisplayRole
+    ) -> Any:
+        if orientation is not Qt.Orientation.Horizontal:
+            return None
+        if role == Qt.ItemDataRole.DisplayRole:
+            return _HEADINGS[section]
+        if role == Qt.ItemDataRole.ToolTipRole:
+            return _HINTS[min(section, 2)]
+        if role == Qt.ItemDataRole.TextAlignmentRole and section:
+            return int(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        return None
+
+    def data(self, index: Index, role: int = Qt.ItemDataRole.DisplayRole) -> Any:  # noqa: D102
+        code = self.codes[index.row()]
+        found = self._found(index)
+        if role == Qt.ItemDataRole.DisplayRole:
+            return (code, f"{self._sd[code]:.2f}", "", "")[index.column()] or _words(found)
+        if role == DOUBTFUL_ROLE:
+            return found is not None and found.is_doubtful
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
+            return self._sentence(code, index, found)
+        return None
+
+    def _found(self, index: Index) -> Departure | None:
+        if index.column() < 2:
+            return None
+        return self._away[_SIDES[index.column() - 2]].get(self.codes[index.row()])
+
+    def _sentence(self, code: str, index: Index, found: Departure | None) -> str:
+        name = f"{code}, {feature(code).name}"
+        if index.column() == 0:
+            return name
+        if index.column() == 1:
+            return f"{name}: {self._sd[code]:.2f} mm between animals"
+        side = _SIDES[index.column() - 2].word
+        if found is None:
+            return f"{name}, {side}: not placed, or too few others are"
+        return f"{name}, {side}: {found.text} ({found.n_sd:.1f} SD)"
+
+
+def _words(found: Departure | None) -> str:
+    if found is None:
+        return NONE
+    return f"{found.word.removesuffix(' mm')} · {found.n_sd:.1f}"
+
+
+class AtlasTable(QTableView):
+    """The table; a click on a label goes to it.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose atlas and labels it shows.
+    """
+
+    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._desk = workbench
+        self.rows = AtlasModel(workbench, self)
+        self.setModel(self.rows)
+        self.setItemDelegate(_Cells(self))
+        self.setAccessibleName("Features of the atlas")
+        self.setShowGrid(False)
+        self.setMouseTracking(True)
+        self.setTabKeyNavigation(False)
+        self.setSelectionMode(QAbstractItemView.SelectionMode.NoSelection)
+        for policy in (self.setHorizontalScrollBarPolicy, self.setVerticalScrollBarPolicy):
+            policy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self._arrange()
+        self.clicked.connect(self._go_to)
+        follow(self, workbench.atlas_changed, self._on_atlas)
+        for signal in (workbench.doubts_changed, workbench.landmarks_changed, workbench.session_replaced):
+            follow(self, signal, self._on_labels)
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(330, 30 + _ROW_PX * max(len(self.rows.codes), 1))
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return self.sizeHint()
+
+    def _arrange(self) -> None:
+        self.verticalHeader().hide()
+        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        self.verticalHeader().setDefaultSectionSize(_ROW_PX)
+        header = self.horizontalHeader()
+        header.setFixedHeight(28)
+        header.setHighlightSections(False)
+        header.setSectionsClickable(False)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        for column, width in enumerate(_WIDTHS, 1):
+            self.setColumnWidth(column, width)
+
+    def _on_atlas(self, *_: object) -> None:
+        self.rows.refresh_atlas()
+        self.updateGeometry()
+
+    def _on_labels(self, *_: object) -> None:
+        self.rows.refresh_labels()
+
+    def _go_to(self, index: QModelIndex) -> None:
+        if index.column() >= 2:
+            side, code = _SIDES[index.column() - 2], self.rows.codes[index.row()]
+            attempt(self._desk, lambda: self._desk.go_to(side, code))
+
+
+class _Cells(QStyledItemDelegate):
+    """Paints code and name, numbers on the right, and a shape before what is doubtful."""
+
+    def paint(self, painter: QPainter, option: QStyleOptionViewItem, index: Index) -> None:
+        view = self.parent()
+        assert isinstance(view, QTableView)
+        theme, box = theme_of(view), QRectF(option.rect)
+        painter.save()
+        if option.state & QStyle.StateFlag.State_MouseOver:
+            painter.fillRect(box, QColor(theme.hover))
+        font = QFont(view.font())
+        font.setPixelSize(FONT_PX)
+        words, middle = str(index.data()), Qt.AlignmentFlag.AlignVCenter
+        if index.column() == 0:
+            self._name(painter, font, box.adjusted(8, 0, -2, 0), words, theme.text, theme.muted)
+        else:
+            doubtful = bool(index.data(DOUBTFUL_ROLE))
+            painter.setFont(font)
+            painter.setPen(theme.state("doubtful") if doubtful else QColor(theme.text))
+            if words == NONE:
+                painter.setPen(QColor(theme.faint))
+            painter.drawText(box.adjusted(0, 0, -7, 0), middle | Qt.AlignmentFlag.AlignRight, words)
+            if doubtful:
+                width = QFontMetrics(font).horizontalAdvance(words)
+                left = box.right() - 7 - width - _CHIP - 5
+                draw_chip(
+                    painter, "doubtful", QRectF(left, box.center().y() - _CHIP / 2, _CHIP, _CHIP), theme
+                )
+        painter.restore()
+
+    def _name(self, painter: QPainter, font: QFont, box: QRectF, code: str, bright: str, dim: str) -> None:
+        bold = QFont(font)
+        bold.setBold(True)
+        painter.setFont(bold)
+        painter.setPen(QColor(bright))
+        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, code)
+        painter.setFont(font)
+        painter.setPen(QColor(dim))
+        rest = box.adjusted(_CODE_PX, 0, 0, 0)
+        if rest.width() < _FEWEST_PX:
+            return
+        name = QFontMetrics(font).elidedText(
+            feature(code).name, Qt.TextElideMode.ElideRight, round(rest.width())
+        )
+        painter.drawText(rest, Qt.AlignmentFlag.AlignVCenter, name)

@@ -1,0 +1,183 @@
+"""The step Atlas by real clicks: the atlas in use, how labels fit it, fitting one, leave-one-out, drops."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from animal_cases import drawn_animals, write_animals, write_side
+from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
+from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtGui import QDropEvent
+from PySide6.QtWidgets import QApplication
+from window_cases import settle
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.landmarks.features import Side
+from gp_labeler.session import labelling
+from gp_labeler.views.panels.atlas_panel import AtlasPanel
+from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
+from gp_labeler.views.panels.parts import Notice
+from gp_labeler.views.theme import DARK, LIGHT, apply_theme
+from gp_labeler.workbench import Workbench
+
+CLICK = Qt.MouseButton.LeftButton
+L, R = Side.LEFT, Side.RIGHT
+
+
+@pytest.fixture
+def desk() -> Iterator[Workbench]:
+    desk = desk_with_scan()
+    deliver(desk)
+    yield desk
+    desk.close(discard=True)
+
+
+@pytest.fixture
+def panel(desk, qtbot) -> AtlasPanel:
+    panel = AtlasPanel(desk)
+    apply_theme(panel, DARK)
+    qtbot.addWidget(panel)
+    panel.resize(panel.width(), 900)
+    panel.show()
+    qtbot.waitExposed(panel)
+    return panel
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return write_animals(tmp_path / "animals", drawn_animals(3))
+
+
+def cell(panel, code: str, column: int, role: int = Qt.ItemDataRole.DisplayRole):
+    rows = panel.labels.table.rows
+    return rows.data(rows.index(rows.codes.index(code), column), role)
+
+
+def drop(window, *paths) -> None:
+    mime = QMimeData()
+    mime.setUrls([QUrl.fromLocalFile(str(path)) for path in paths])
+    action, no_keys = Qt.DropAction.CopyAction, Qt.KeyboardModifier.NoModifier
+    window.dropEvent(QDropEvent(QPointF(300, 300), action, mime, CLICK, no_keys))
+
+
+def test_the_published_atlas_is_described(panel) -> None:
+    assert panel.which.name.toolTip() == "The published atlas"
+    assert panel.which.facts.values["Made from"].text() == "11 animals, 22 sides"
+    assert not panel.which.published.isEnabled()
+    assert panel.which.save.isEnabled()
+    assert not panel.trial.run.isEnabled()
+    assert panel.labels.table.rows.rowCount() == 19
+    assert float(cell(panel, "RWA", 1)) < float(cell(panel, "ZL", 1))
+    assert cell(panel, "RWA", 2) == "–"  # noqa: RUF001
+
+
+def test_labels_are_held_against_it_and_doubts_flagged(desk, panel, qtbot) -> None:
+    place(desk, "CA", "CB", "RWA", "RWP", "OS", "LLI")
+    labelling.place(desk.session, np.add(in_scan("OI"), [0, 0, 3.0]), side=L, code="OI")
+    deliver(desk)
+    distance, n_sd = cell(panel, "OI", 2).split(" · ")
+    assert float(distance) == pytest.approx(3, abs=0.5)
+    assert float(n_sd) > 5
+    assert cell(panel, "OI", 2, DOUBTFUL_ROLE)
+    assert not cell(panel, "CA", 2, DOUBTFUL_ROLE)
+    assert cell(panel, "CA", 3) == "–"  # noqa: RUF001
+    assert panel.labels.verdict.text() == "1 of 7 labels should be looked at again."
+    table = panel.labels.table
+    index = table.rows.index(table.rows.codes.index("OI"), 2)
+    qtbot.mouseClick(table.viewport(), CLICK, pos=table.visualRect(index).center())
+    assert (desk.session.active.side, desk.session.active.code) == (L, "OI")
+
+
+def test_an_atlas_is_fitted_and_tried_out(desk, panel, folder, qtbot) -> None:
+    asked = []
+    panel.asked.connect(asked.append)
+    for button in (panel.own.files, panel.own.folder, panel.which.open, panel.which.save):
+        qtbot.mouseClick(button, CLICK)
+    assert asked == ["atlas.fit_files", "atlas.fit_folder", "atlas.open", "atlas.save"]
+    animal = drawn_animals(1)[0]
+    write_side(folder, "torn", animal.side(L))
+    (folder / "torn_L.mrk.json").write_text("{")
+    desk.fit_atlas([folder])
+    assert desk.jobs.running
+    deliver(desk)
+    assert panel.which.name.toolTip() == "3 animals, 6 sides"
+    QApplication.processEvents()
+    words = [notice.words for notice in panel.own.findChildren(Notice) if notice.isVisibleTo(panel)]
+    assert words == ["3 animals, 6 sides were read.", "Skipped torn_L.mrk.json"]
+    assert panel.trial.run.isEnabled()
+    desk.try_atlas()
+    assert not panel.trial.run.isEnabled()
+    deliver(desk)
+    assert [row[0] for row in panel.trial.figures] == ["Robust", "JRMPC"]
+    assert all(float(mean) <= float(most) for _, mean, most, *_ in panel.trial.figures)
+    assert "6 sides of 3 animals" in panel.trial.words.text()
+
+
+def test_fitting_can_be_stopped(desk, panel, folder, qtbot) -> None:
+    desk.fit_atlas([folder])
+    assert panel.own.stop.isVisibleTo(panel)
+    qtbot.mouseClick(panel.own.stop, CLICK)
+    deliver(desk)
+    assert desk.is_published_atlas
+    assert not panel.own.stop.isVisibleTo(panel)
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT])
+@pytest.mark.parametrize("wide", [False, True])
+def test_no_word_is_cut(desk, panel, folder, theme, wide) -> None:
+    desk.fit_atlas([folder])
+    deliver(desk)
+    desk.try_atlas()
+    deliver(desk)
+    apply_theme(panel, theme)
+    panel.set_wide(wide)
+    panel.resize(1100 if wide else panel.width(), 900)
+    assert list(cut_words(panel)) == []
+
+
+def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qtbot) -> None:
+    window = make_window(atlas=True)
+    settle(qtbot, window)
+    assert not window.rail.buttons["label"].isEnabled()
+    qtbot.mouseClick(window.rail.buttons["atlas"], CLICK)
+    assert window.panels.currentWidget().isVisible()
+    assert not window.grid.isVisible()
+    drop(window, folder)
+    settle(qtbot, window)
+    desk = window.workbench
+    assert desk.atlas.n_samples == 6
+    window.ui.prompts.files = [tmp_path / "own.json"]
+    window.commands.run("atlas.save")
+    assert Atlas.load(tmp_path / "own.json").n_samples == 6
+    window.commands.run("atlas.published")
+    settle(qtbot, window)
+    assert desk.is_published_atlas
+    assert not window.commands.actions["atlas.published"].isEnabled()
+    qtbot.mouseClick(window.rail.buttons["scan"], CLICK)
+    assert window.welcome.isVisible()
+    drop(window, tmp_path / "own.json")
+    settle(qtbot, window)
+    assert desk.atlas.n_samples == 6
+    assert desk.volume is None
+    window.commands.run("atlas.show")
+    assert window.rail.step == "atlas"
+    window.ui.prompts.files = [folder]
+    window.commands.run("atlas.fit_folder")
+    settle(qtbot, window)
+    assert len(desk.atlas_specimens) == 3
+    window.commands.run("atlas.try")
+    settle(qtbot, window)
+    assert desk.trial.n_sides == 6
+
+
+def test_a_damaged_atlas_dropped_on_the_window_is_named(make_window, tmp_path, qtbot) -> None:
+    window = make_window(atlas=True)
+    settle(qtbot, window)
+    file = tmp_path / "half.json"
+    file.write_text('{"gpAtlas": 1,')
+    drop(window, file)
+    settle(qtbot, window)
+    assert "half.json" in window.status.next_click.text()
+    assert window.workbench.is_published_atlas
