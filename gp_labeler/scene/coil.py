@@ -97,7 +97,8 @@ def section(tube: Tube, pose: DrawnPose, axis: int, position: float) -> list[Flo
         return []
     edges = np.sort(np.stack([cut, np.roll(cut, -1, axis=1)], axis=2), axis=2)  # (T, 3 edges, 2 ends)
     crossing = edges[ahead[edges[..., 0]] != ahead[edges[..., 1]]].reshape(-1, 2)
-    ends, number = np.unique(crossing, axis=0, return_inverse=True)
+    keys, number = np.unique(crossing @ [len(depth), 1], return_inverse=True)
+    ends = np.stack(np.divmod(keys, len(depth)), axis=1)
     first, last = depth[ends[:, 0]], depth[ends[:, 1]]
     share = (first / (first - last))[:, None]
     points = pose.at((1 - share) * tube.points[ends[:, 0]] + share * tube.points[ends[:, 1]])

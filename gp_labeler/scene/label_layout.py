@@ -58,7 +58,7 @@ def place_labels(
     taken = np.concatenate([marks[inside] - half, marks[inside] + half], axis=1)
     weights = np.full(len(taken), _MARK_WEIGHT)
     for n in np.lexsort((np.arange(len(marks)), -rank)):
-        if not inside[n]:
+        if not (inside[n] and size[n].all()):  # what has no size only keeps its place free
             continue
         boxes = _candidates(marks[n], size[n], gap[n])
         bad = (_covered(boxes, taken) @ weights + _outside(boxes, view)) / size[n].prod()

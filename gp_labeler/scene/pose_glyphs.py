@@ -1,4 +1,4 @@
-"""Many small solids as one actor a layer, each with its own place, direction, size and colour."""
+"""Many small solids as one mesh, each with its own place, direction, size and colour."""
 
 from __future__ import annotations
 
@@ -7,17 +7,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkPolyData
-from vtkmodules.vtkFiltersSources import (
-    vtkConeSource,
-    vtkCubeSource,
-    vtkCylinderSource,
-    vtkPlatonicSolidSource,
-    vtkSphereSource,
-)
-from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer
+from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.vtk_arrays import points_of, to_numpy, to_vtk
+from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_vtk
+from gp_labeler.scene.pose_solids import SHAPES
 from gp_labeler.scene.stage import Stage, release
 
 __all__ = ["SolidActor"]
@@ -25,6 +19,9 @@ __all__ = ["SolidActor"]
 
 class SolidActor:
     """Draws solids: full where they are seen, fainter where bone hides them.
+
+    They are laid out anew as one mesh whenever they change: for a hundred solids of a few corners that is
+    several times faster than VTK's own glyphs.
 
     Parameters
     ----------
@@ -36,9 +33,11 @@ class SolidActor:
 
     def __init__(self, stage: Stage, through: float = 0.5) -> None:
         self._data = vtkPolyData()
+        layers = ((stage.base, 1.0), (stage.overlay, through))
         self._layers = [
             (renderer, _actor(self._data, renderer), opacity)
-            for renderer, opacity in ((stage.base, 1.0), (stage.overlay, through))
+            for renderer, opacity in layers
+            if through < 1.0 or renderer is stage.overlay
         ]
 
     def set(
@@ -61,7 +60,7 @@ class SolidActor:
         colours : (N, 3) uint8 array
             Red, green, blue.
         shapes : (N,) int array
-            Which solids, in the order of `pose_rows`.
+            Which of `SHAPES`.
         opacity : float
             From 0 to 1.
         """
@@ -70,10 +69,15 @@ class SolidActor:
             actor.GetProperty().SetOpacity(full * opacity)
         if not len(places):
             return
-        self._data.SetPoints(points_of(places))
-        data = self._data.GetPointData()
-        for name, values in (("along", along), ("size", sizes), ("colour", colours), ("shape", shapes)):
-            data.AddArray(to_vtk(values, name))
+        turns = _turns(along)
+        parts = [self._part(shape, shapes == shape, places, turns, sizes, colours) for shape in set(shapes)]
+        starts = np.cumsum([0, *(len(part[0]) for part in parts[:-1])])
+        points, normals, paint = (np.concatenate([part[k] for part in parts]) for k in range(3))
+        corners = np.concatenate([part[3] + start for part, start in zip(parts, starts, strict=True)])
+        self._data.SetPoints(points_of(points))
+        self._data.SetPolys(cells_of(corners))
+        self._data.GetPointData().SetNormals(to_vtk(normals.astype(np.float32), "Normals"))
+        self._data.GetPointData().SetScalars(to_vtk(paint, "colour"))
 
     def close(self) -> None:
         """Let go of the actors."""
@@ -81,65 +85,47 @@ class SolidActor:
             release(renderer, actor)
         self._layers = []
 
+    @staticmethod
+    def _part(
+        shape: int,
+        chosen: NDArray[np.bool_],
+        places: FloatArray,
+        turns: FloatArray,
+        sizes: FloatArray,
+        colours: NDArray[np.uint8],
+    ) -> tuple[Any, Any, Any, Any]:
+        """Return points, normals, colours and triangles of all solids of one shape."""
+        solid, size, turn = SHAPES[shape], sizes[chosen][:, None], turns[chosen].transpose(0, 2, 1)
+        points = (solid.points * size) @ turn + places[chosen][:, None]
+        normals = solid.normals / size
+        normals /= np.linalg.norm(normals, axis=2, keepdims=True)
+        normals = normals @ turn
+        n, k = points.shape[:2]
+        triangles = solid.triangles[None] + k * np.arange(n)[:, None, None]
+        paint = np.repeat(colours[chosen], k, axis=0)
+        return points.reshape(-1, 3), normals.reshape(-1, 3), paint, triangles.reshape(-1, 3)
+
+
+def _turns(along: FloatArray) -> FloatArray:
+    """Return (N, 3, 3) rotations that bring x onto unit vectors (N, 3)."""
+    aside = np.eye(3)[np.abs(along).argmin(axis=1)]
+    second = np.cross(along, aside)
+    second /= np.linalg.norm(second, axis=1, keepdims=True)
+    return np.stack([along, second, np.cross(along, second)], axis=2)
+
 
 def _actor(data: vtkPolyData, renderer: vtkRenderer) -> vtkActor:
-    mapper = vtkGlyph3DMapper()
+    mapper = vtkPolyDataMapper()
     mapper.SetInputData(data)
-    for n, solid in enumerate(_solids()):
-        mapper.SetSourceData(n, solid)
-    mapper.SourceIndexingOn()
-    mapper.SetSourceIndexArray("shape")
-    mapper.SetScaleArray("size")
-    mapper.SetScaleModeToScaleByVectorComponents()
-    mapper.SetScaleFactor(1.0)
-    mapper.SetOrientationArray("along")
-    mapper.SetOrientationModeToDirection()
-    mapper.SetScalarModeToUsePointFieldData()
-    mapper.SelectColorArray("colour")
     actor = vtkActor()
     actor.SetMapper(mapper)
     actor.PickableOff()
     look = actor.GetProperty()
-    look.SetAmbient(0.35)
-    look.SetDiffuse(0.7)
+    look.BackfaceCullingOn()
+    look.SetAmbient(0.5)
+    look.SetDiffuse(0.6)
     look.SetSpecular(0.2)
     look.SetSpecularPower(30.0)
     actor.VisibilityOff()
     renderer.AddActor(actor)
     return actor
-
-
-def _solids() -> list[vtkPolyData]:
-    """Solids of length and thickness 1 along x, in the order of `pose_rows`."""
-    rod, head, ball = vtkCylinderSource(), vtkConeSource(), vtkSphereSource()
-    rod.SetResolution(14)
-    rod.SetRadius(0.5)
-    head.SetResolution(24)
-    head.SetRadius(0.5)
-    head.SetHeight(1.0)
-    ball.SetRadius(0.5)
-    ball.SetThetaResolution(24)
-    ball.SetPhiResolution(16)
-    diamond = vtkPlatonicSolidSource()
-    diamond.SetSolidTypeToOctahedron()
-    return [
-        _turned(rod, np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]), 0.5),  # y along x
-        _turned(head, np.eye(3), -0.5),
-        _turned(ball, np.eye(3)),
-        _turned(diamond, 0.5 * np.eye(3)),
-        _turned(vtkCubeSource(), np.eye(3)),
-    ]
-
-
-def _turned(source: Any, turn: FloatArray, shift: float = 0.0) -> vtkPolyData:
-    """Turn a solid, and shift it along x."""
-    source.Update()
-    solid: vtkPolyData = source.GetOutput()
-    flat = to_numpy(solid.GetPoints().GetData())
-    solid.SetPoints(points_of(flat @ turn.T + np.array([shift, 0.0, 0.0])))
-    normals = solid.GetPointData().GetNormals()
-    if normals is not None:
-        turned = to_vtk((to_numpy(normals) @ turn.T).astype(np.float32), "Normals")
-        solid.GetPointData().SetNormals(turned)
-    solid.GetCellData().Initialize()
-    return solid

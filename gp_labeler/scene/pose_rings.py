@@ -16,7 +16,7 @@ from gp_labeler.scene.pose_data import DrawnPose
 
 __all__ = ["coil_edges", "outline_of", "ring"]
 
-_PER_TURN = 96
+_PER_TURN = 72
 """So many that an edge stays smooth where the duct runs towards the eye."""
 
 
@@ -46,10 +46,11 @@ def coil_edges(pose: DrawnPose, view: Viewpoint) -> list[FloatArray]:
     away = view.ray(x, y)[1] @ pose.T_scan_cochlea[:3, :3]
     across = np.cross(along, away)
     across *= (radii / np.maximum(np.linalg.norm(across, axis=1), 1e-6))[:, None]
-    edges = []
-    for edge in (line + across, line - across):
+    edges, both = [], np.stack([line + across, line - across])
+    hidden = _is_hidden(both.reshape(-1, 3), line[::3], radii[::3], away).reshape(2, -1)
+    for edge, behind in zip(both, hidden, strict=True):
         pixels = view.display(pose.at(edge))[:, :2]
-        seen = np.flatnonzero(~_is_hidden(edge, line[::3], radii[::3], away))
+        seen = np.flatnonzero(~behind)
         runs = np.split(seen, np.flatnonzero(np.diff(seen) > 1) + 1)
         edges += [pixels[run] for run in runs if len(run) > 1]
     return edges
@@ -62,8 +63,8 @@ def _is_hidden(
     depth, line_depth = points @ away, line @ away
     flat = points - depth[:, None] * away
     middle = line - line_depth[:, None] * away
-    gap = (flat**2).sum(axis=1)[:, None] - 2 * flat @ middle.T + (middle**2).sum(axis=1)
-    covers = gap < (0.96 * radii) ** 2
+    gap = (flat**2).sum(axis=1)[:, None] - 2 * flat @ middle.T  # squared, but for the middles' own squares
+    covers = gap < (0.96 * radii) ** 2 - (middle**2).sum(axis=1)
     hidden: NDArray[np.bool_] = (covers & (line_depth < depth[:, None] - 0.25 * radii)).any(axis=1)
     return hidden
 

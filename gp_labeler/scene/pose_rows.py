@@ -19,6 +19,7 @@ from gp_labeler.scene.pose_data import (
     DrawnVector,
     PoseScene,
 )
+from gp_labeler.scene.pose_solids import BALL, CUBE, DIAMOND, HEAD, ROD
 
 __all__ = [
     "BALL",
@@ -33,8 +34,6 @@ __all__ = [
     "marks_of",
     "sizes_of",
 ]
-
-ROD, HEAD, BALL, DIAMOND, CUBE = range(5)
 
 DASHES = {"solid": (np.inf, 0.0), "dashed": (0.7, 0.3), "dotted": (0.18, 0.22)}
 """Length of a dash and of the gap after it, mm, by style."""
@@ -138,9 +137,9 @@ def _touch(touch: DrawnTouch) -> Solid:
 def _tip(tip: DrawnTip) -> list[Solid]:
     role = "touch" if tip.visible else "unseen"
     trail = tip.trail[-_TRAIL_AT_MOST:]
-    sizes = np.linspace(1.6, 4.5, len(trail))
+    sizes = np.linspace(2.5, 6.0, len(trail))
     found = [
-        Solid(BALL, place, _UP, role, (0.0, float(size)), (0.0, float(size)))
+        Solid(DIAMOND, place, _UP, role, (0.0, float(size)), (0.0, float(size)))
         for place, size in zip(trail, sizes, strict=True)
     ]
     if tip.handle is None:

@@ -62,6 +62,8 @@ def text_image(text: Text, height: float, halo: str) -> NDArray[np.float32]:
     halo : str
         Colour of the edge, ``#RRGGBB``.
     """
+    if not text.text:
+        return np.zeros((0, 0, 4), dtype=np.float32)
     from scipy.ndimage import gaussian_filter
 
     radius = _HALO_PIXELS * height / 13
@@ -119,6 +121,7 @@ class SpriteSheet:
         renderer.AddViewProp(self._actor)
         self._boxes = np.empty((0, 4))
         self._shape = (1, 1)
+        self._images: dict[tuple[Text, float, str], NDArray[np.float32]] = {}
 
     def close(self) -> None:
         """Let go of the texture and the actor."""
@@ -132,9 +135,11 @@ class SpriteSheet:
 
     def write(self, texts: Sequence[Text], height: float, halo: str) -> None:
         """Draw the texts into the texture, once full and once faint beside it."""
-        images = [text_image(text, height, halo) for text in texts]
+        keys = [(text, height, halo) for text in texts]
+        self._images = {key: self._images[key] if key in self._images else text_image(*key) for key in keys}
+        images = [self._images[key] for key in keys]
         self._boxes = np.zeros((len(images), 4))
-        if not images:
+        if not any(image.size for image in images):
             self._actor.VisibilityOff()
             return
         width = max(image.shape[1] for image in images)

@@ -102,7 +102,7 @@ class SlicePen:
         if not self._scene.shows("cochlea"):
             return
         self._fade(1.0)
-        for tube, alpha, width in zip(cochlea_tubes(pose.side), (60, 30), (1.3, 0.8), strict=True):
+        for tube, alpha, width in zip(cochlea_tubes(pose.side), (60, 40), (1.3, 0.0), strict=True):
             loops = section(tube, pose, self._shown.plane.axis, self._shown.position)
             outlines = [self._shown.scan_to_pixel(loop) + 0.5 for loop in loops]
             area(self._painter, outlines, colour_of(pose.role), alpha, width * self._ratio)

@@ -11,7 +11,7 @@ from gp_labeler.scene.colours import DARK
 
 __all__ = ["area", "arrow", "colour_of", "hull", "line", "marker", "polygon"]
 
-_HALO = QColor(11, 15, 20, 170)
+_HALO = QColor(DARK.halo)
 _DASHES = {"solid": None, "dashed": [4.0, 2.2], "dotted": [1.2, 1.7]}
 _CORNERS = {
     "diamond": ((0.0, -1.25), (1.1, 0.0), (0.0, 1.25), (-1.1, 0.0)),
@@ -34,11 +34,11 @@ def line(
     pen = QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.FlatCap, Qt.PenJoinStyle.RoundJoin)
     halo = QPen(pen)
     halo.setColor(_HALO)
-    halo.setWidthF(1.9 * width)
+    halo.setWidthF(1.7 * width)
     dashes = _DASHES[style]
     if dashes is not None:
         pen.setDashPattern(dashes)
-        halo.setDashPattern([n / 1.9 for n in dashes])
+        halo.setDashPattern([n / 1.7 for n in dashes])
     painter.strokePath(path, halo)
     painter.strokePath(path, pen)
 
@@ -53,7 +53,7 @@ def area(painter: QPainter, outlines: list[FloatArray], colour: QColor, alpha: i
     fill.setAlpha(alpha)
     painter.fillPath(path, fill)
     if width > 0:
-        painter.strokePath(path, QPen(_HALO, 2.0 * width))
+        painter.strokePath(path, QPen(_HALO, 1.8 * width))
         painter.strokePath(path, QPen(colour, width))
 
 

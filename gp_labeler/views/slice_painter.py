@@ -294,7 +294,7 @@ def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int]
     high = metrics.capHeight() + 4 * ratio
     corners, shown = place_labels(
         [name.pixel for name in names],
-        [(max(metrics.horizontalAdvance(name.text), 1.0), high if name.text else 1.0) for name in names],
+        [(metrics.horizontalAdvance(name.text), high) for name in names],
         size,
         gaps=[name.gap * ratio for name in names],
         ranks=[name.rank for name in names],
