@@ -10,7 +10,6 @@ from gp_labeler.action import MENUS, Action, Ui
 from gp_labeler.action_rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
 from gp_labeler.action_rows_atlas import atlas_rows
 from gp_labeler.action_rows_pose import pose_rows
-from gp_labeler.action_rows_view import cut_rows
 from gp_labeler.workbench import Workbench
 
 __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
@@ -18,7 +17,7 @@ __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
 ACTIONS: Mapping[str, Action] = MappingProxyType(
     {
         row.id: row
-        for rows in (file_rows, edit_rows, view_rows, cut_rows, landmark_rows, atlas_rows, pose_rows, help_rows)
+        for rows in (file_rows, edit_rows, view_rows, landmark_rows, atlas_rows, pose_rows, help_rows)
         for row in rows()
     }
 )
