@@ -18,6 +18,7 @@ class Ui(Protocol):
     """What actions need of the window: to ask, to show, and what belongs to the screen alone."""
 
     def open_path(self, path: Path) -> None: ...  # noqa: D102
+    def begin(self) -> None: ...  # noqa: D102
     def ask_open_file(self) -> None: ...  # noqa: D102
     def ask_open_folder(self) -> None: ...  # noqa: D102
     def ask_find_scan(self) -> None: ...  # noqa: D102
@@ -31,6 +32,13 @@ class Ui(Protocol):
     def judge_pose(self, verdict: str) -> None: ...  # noqa: D102
     def look_along_axis(self) -> None: ...  # noqa: D102
     def look_through_window(self) -> None: ...  # noqa: D102
+    def ask_export_pose(self) -> None: ...  # noqa: D102
+    def ask_report(self) -> None: ...  # noqa: D102
+    def ask_path(self) -> None: ...  # noqa: D102
+    def ask_save_path(self) -> None: ...  # noqa: D102
+    def show_tracker(self) -> None: ...  # noqa: D102
+    def show_guide(self) -> None: ...  # noqa: D102
+    def show_physical(self) -> None: ...  # noqa: D102
     def ask_open_atlas(self) -> None: ...  # noqa: D102
     def ask_fit_atlas(self, *, folder: bool = False) -> None: ...  # noqa: D102
     def ask_save_atlas(self) -> None: ...  # noqa: D102
@@ -41,6 +49,7 @@ class Ui(Protocol):
     def reset_views(self) -> None: ...  # noqa: D102
     def zoom_to_point(self) -> None: ...  # noqa: D102
     def look_from(self, letter: str) -> None: ...  # noqa: D102
+    def cut(self, plane: str) -> None: ...  # noqa: D102
     def toggle_theme(self) -> None: ...  # noqa: D102
     def toggle_projection(self) -> None: ...  # noqa: D102
     def show_shortcuts(self) -> None: ...  # noqa: D102

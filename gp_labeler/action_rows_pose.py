@@ -34,6 +34,10 @@ def _has_pose(desk: Workbench) -> bool:
     return estimate is not None and estimate.pose is not None
 
 
+def _is_tracked(desk: Workbench) -> bool:
+    return desk.tracker.on and desk.pose.target is not None
+
+
 def _in_scan(desk: Workbench) -> bool:
     estimate = desk.pose.estimate
     return desk.volume is not None and estimate is not None and estimate.in_scan() is not None
@@ -89,6 +93,25 @@ def pose_rows() -> Iterator[Action]:
               hint="From without the apex, the round window up", group="look")
     yield row("through_window", "Look through the round window", ("Shift+A",),
               lambda d, ui: ui.look_through_window(), _in_scan, group="look")
+    yield row("tracker", "Tracked probe…", (), lambda d, ui: ui.show_tracker(), group="tracker",
+              hint="Connect a tracker over OpenIGTLink, find the probe's tip, send the pose back")
+    yield row("record", "Record a touch", ("B",), lambda d, ui: d.tracker.press(), _is_tracked,
+              hint="With the tip held still on the feature asked for", group="tracker")
+    yield row("guide", "Guided touching", ("F9",), lambda d, ui: ui.show_guide(), group="tracker",
+              hint="One feature after the other, in large letters", icon="play")
+    yield row("export", "Export the pose…", ("Ctrl+Shift+E",), lambda d, ui: ui.ask_export_pose(), _has_pose,
+              hint="JSON, ITK and Slicer transform, 4 x 4 table, markups", group="out", icon="export")
+    yield row("report", "Report…", (), lambda d, ui: ui.ask_report(), _has_pose,
+              hint="One page with touches, estimate, errors and pictures, PDF or HTML", group="out")
+    yield row("path", "Insertion path…", (), lambda d, ui: ui.ask_path(),
+              hint="A curve in the cochlea frame, carried to the estimate", group="out")
+    yield row("save_path", "Save the carried path…", (), lambda d, ui: ui.ask_save_path(),
+              lambda d: _has_pose(d) and d.pose.path is not None,
+              hint="In the frame of the touches, for a robot", group="out")
+    yield row("physical", "Test against the scan…", (), lambda d, ui: ui.show_physical(),
+              lambda d: _has_pose(d) and bool(d.session.state.skull),
+              hint="The paper's physical test: a touched skull held against its own labelled scan",
+              group="out")
     yield row("accept", "Accept the estimate", (), _judge("accept"), _has_pose,
               hint="Keeps the verdict in the specimen", group="verdict", icon="check")
     yield row("reject", "Reject the estimate", (), _judge("reject"), _has_pose, group="verdict")

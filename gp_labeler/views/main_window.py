@@ -30,11 +30,14 @@ from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.panels.scan_panel import ScanPanel
+from gp_labeler.views.panels.tracker_card import TrackerCard
 from gp_labeler.views.panels.welcome import Welcome
+from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.top_bar import TopBar
+from gp_labeler.views.tracker_display import TrackerDisplay
 from gp_labeler.views.view_grid import ViewGrid
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.views.window_ui import WindowUi
@@ -88,6 +91,9 @@ class MainWindow(QMainWindow):
         self.theme_name = self.memory.get("theme", str, "dark")
         apply_theme(self, THEMES.get(self.theme_name, THEMES["dark"]))
         self.grid = ViewGrid(workbench)
+        self.pose_display = PoseDisplay(workbench, self.grid)
+        self.tracker_display = TrackerDisplay(workbench, self.pose_display)
+        self.tracker_display.audible = self.memory.get("audible", bool, False)
         self.commands = Commands(workbench, self.ui, self, self.grid)
         self.commands.fill(self.menuBar())
         self.rail, self.panels = Rail(workbench), QStackedWidget()
@@ -107,6 +113,8 @@ class MainWindow(QMainWindow):
     def set_step(self, step: str) -> None:
         """Show the panel of a step: ``scan``, ``label``, ``atlas`` or ``pose``."""
         self.rail.set_step(step)
+        if step in ("label", "pose"):  # who labels shall not see where an estimate wants the cochlea
+            self.workbench.pose.draw(visible=step == "pose")
         self.panels.setCurrentWidget(self.steps[step])
         self._arrange()
 
@@ -122,6 +130,9 @@ class MainWindow(QMainWindow):
         self._scan, self._label = ScanPanel(self.workbench), LabelPanel(self.workbench)
         self._atlas = AtlasPanel(self.workbench)
         self._pose = PosePanel(self.workbench, self.commands.actions)
+        probe = TrackerCard(self.workbench)
+        probe.settings_asked.connect(self.ui.show_tracker)
+        self._pose.add_card(probe)
         self.steps: dict[str, QWidget] = {
             "scan": self._scan,
             "label": self._label,
@@ -162,15 +173,24 @@ class MainWindow(QMainWindow):
         card.open_asked.connect(self.ui.ask_open_file)
         card.export_asked.connect(partial(self.commands.run, "file.export"))
         self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
+        self._scan.mesh.action_asked.connect(self.commands.run)
         self._atlas.asked.connect(self.commands.run)
         self._pose.touch_file_asked.connect(partial(self.commands.run, "pose.open_touches"))
         self._pose.skull_file_asked.connect(partial(self.commands.run, "pose.open_skull"))
+        for asked, action in (
+            (self._pose.tracker_asked, "pose.tracker"),
+            (self._pose.guide_asked, "pose.guide"),
+            (self._pose.export_asked, "pose.export"),
+            (self._pose.report_asked, "pose.report"),
+        ):
+            asked.connect(partial(self.commands.run, action))
+        self._pose.new_asked.connect(partial(self.commands.run, "file.new"))
         self._pose.atlas_asked.connect(partial(self.rail.buttons["atlas"].click))
         follow(self, desk.volume_opened, self._show_page)
         follow(self, desk.session_replaced, self._show_page)
         follow(self, desk.import_asked, self._on_import_asked)
         follow(self, desk.scan_differs, self._on_scan_differs)
-        for signal in (desk.session_replaced, desk.details_changed, desk.dirty_changed):
+        for signal in (desk.session_replaced, desk.details_changed, desk.dirty_changed, desk.touches_changed):
             follow(self, signal, self._show_title)
 
     def _show_page(self, *_: object) -> None:
@@ -208,7 +228,7 @@ class MainWindow(QMainWindow):
 
     def _show_title(self, *_: object) -> None:
         session = self.workbench.session
-        name = session.state.specimen if session.state.volume else ""
+        name = session.state.specimen if self.workbench.in_use else ""
         self.setWindowTitle(f"{name}[*] – gp-labeler" if name else "gp-labeler[*]")  # noqa: RUF001
         self.setWindowModified(session.dirty)
 

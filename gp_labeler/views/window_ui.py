@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,9 +10,6 @@ from gp_core.landmarks.features import FEATURES, feature
 from gp_labeler.atlas_desk import is_atlas_file
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
-from gp_labeler.scene.pose_data import DrawnPose
-from gp_labeler.session import touching
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.edits import SwapPoints
 from gp_labeler.session.lock import InUseError
@@ -25,6 +21,7 @@ from gp_labeler.views.panels.export_dialog import ExportDialog
 from gp_labeler.views.panels.import_dialog import ImportDialog
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.recover_dialog import RecoverDialog
+from gp_labeler.views.pose_ui import PoseUi
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_about, export_asking, import_asking
 from gp_labeler.views.recorder import Recorder
@@ -41,12 +38,11 @@ _SCANS = (
     "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
-_TOUCHES = "Touches (*.dat *.csv *.mrk.json *.fcsv *.json *.txt);;All files (*)"
 _CLOSE_MM = 12.0
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
 
 
-class WindowUi(AtlasUi):
+class WindowUi(AtlasUi, PoseUi):
     """The answers that a main window gives to actions.
 
     Parameters
@@ -66,7 +62,8 @@ class WindowUi(AtlasUi):
 
     def open_path(self, path: Path) -> None:
         """Open a scan or specimen, once unsaved edits are settled; an atlas at once."""
-        if not is_atlas_file(path) and not self.settle():
+        goes_on = is_atlas_file(path) or (self._desk.lacks_scan and not path.name.endswith(SUFFIX))
+        if not goes_on and not self.settle():
             return
         self._remember_folder(path)
         try:
@@ -80,6 +77,12 @@ class WindowUi(AtlasUi):
                 self._desk.open_specimen(path, as_copy=True)
         except GpError as error:
             self._desk.say(str(error), "error")
+
+    def begin(self) -> None:
+        """Begin a new specimen without a scan, once unsaved edits are settled."""
+        if self.settle():
+            self._desk.begin()
+            self._window.set_step("pose")
 
     def ask_open_file(self) -> None:
         """Ask for a scan or specimen file, and open it."""
@@ -156,24 +159,6 @@ class WindowUi(AtlasUi):
         folder = self.prompts.folder("Export landmarks into this folder", self._folder)
         if folder is not None:
             export_asking(self._desk, folder, self.prompts)
-
-    def ask_open_touches(self) -> None:
-        """Ask for a file of touches, and take them."""
-        self._window.set_step("pose")
-        for path in self.prompts.open_files("Open touches", self._folder, _TOUCHES):
-            self._remember_folder(path)
-            self._window.take_touches(path)
-
-    def ask_open_skull(self) -> None:
-        """Ask for a landmark file that says where the skull features are on the scan."""
-        for path in self.prompts.open_files("Skull features on the scan", self._folder, _POINTS):
-            self._remember_folder(path)
-            names = touching.load_skull(self._desk.session, path)
-            self._desk.say(f"Took {' '.join(names)} from {path.name}")
-
-    def judge_pose(self, verdict: str) -> None:
-        """Keep a verdict on the estimate, with the initials and the note of the panel."""
-        self._window.judge_pose(verdict)
 
     def ask_save_mesh(self) -> None:
         """Ask where, and write the bone surface."""
@@ -269,22 +254,9 @@ class WindowUi(AtlasUi):
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
         self._window.grid.scene_view.view_from(letter)
 
-    def look_along_axis(self) -> None:
-        """Look at the estimated cochlea along its axis, the apex first."""
-        self._look_at_pose(along_axis)
-
-    def look_through_window(self) -> None:
-        """Look at the estimated cochlea through its round window."""
-        self._look_at_pose(through_round_window)
-
-    def _look_at_pose(self, placement: Callable[[DrawnPose], Placement]) -> None:
-        estimate = self._desk.pose.estimate
-        if estimate is None or estimate.pose is None or estimate.registered is None:
-            raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")
-        view = self._window.grid.scene_view
-        pose = DrawnPose.of(estimate.pose, estimate.registered.T_scan_touches, label="")
-        place_camera(view.scene.camera, placement(pose))
-        view.redraw()
+    def cut(self, plane: str) -> None:
+        """Cut the bone open by a plane through the crosshair."""
+        self._window.grid.scene_view.cut(plane)
 
     def toggle_theme(self) -> None:
         """Change between dark and light."""

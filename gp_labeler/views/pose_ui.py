@@ -1,0 +1,142 @@
+"""What actions of the menu Estimate ask of the window: files, dialogs, the guide, where the camera looks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from gp_core.atlas.insertion import UNITS
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
+from gp_labeler.scene.pose_data import DrawnPose
+from gp_labeler.session import touching
+from gp_labeler.session.pose_exports import FORMATS, InsertionPath
+from gp_labeler.views.guide import GuideWindow
+from gp_labeler.views.panels.physical_dialog import PhysicalDialog
+from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.report_file import report_of, save_report
+from gp_labeler.workbench import Workbench
+
+if TYPE_CHECKING:
+    from gp_labeler.views.main_window import MainWindow
+
+__all__ = ["PoseUi"]
+
+_TOUCHES = "Touches (*.dat *.csv *.mrk.json *.fcsv *.json *.txt);;All files (*)"
+_POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
+_PATHS = "Insertion path (*.csv *.txt);;All files (*)"
+
+
+class PoseUi:
+    """The part of `WindowUi` that concerns the pose."""
+
+    _window: MainWindow
+    _desk: Workbench
+    prompts: Prompts
+
+    if TYPE_CHECKING:
+
+        @property
+        def _folder(self) -> str: ...
+
+        def _remember_folder(self, path: Path) -> None: ...
+
+    def ask_open_touches(self) -> None:
+        """Ask for a file of touches, and take them."""
+        self._window.set_step("pose")
+        for path in self.prompts.open_files("Open touches", self._folder, _TOUCHES):
+            self._remember_folder(path)
+            self._window.take_touches(path)
+
+    def ask_open_skull(self) -> None:
+        """Ask for a landmark file that says where the skull features are on the scan."""
+        for path in self.prompts.open_files("Skull features on the scan", self._folder, _POINTS):
+            self._remember_folder(path)
+            names = touching.load_skull(self._desk.session, path)
+            self._desk.say(f"Took {' '.join(names)} from {path.name}")
+
+    def judge_pose(self, verdict: str) -> None:
+        """Keep a verdict on the estimate, with the initials and the note of the panel."""
+        self._window.judge_pose(verdict)
+
+    def ask_export_pose(self) -> None:
+        """Ask where, and write the pose in the format that the name asks for."""
+        kinds = ";;".join(f"{what} (*{suffix})" for suffix, what in FORMATS.items())
+        path = self.prompts.save_file("Export the pose", self._proposed("pose.json"), kinds)
+        if path is not None:
+            self._remember_folder(path)
+            self._desk.pose.export(path)
+
+    def ask_report(self) -> None:
+        """Ask where, and write the one-page report."""
+        report = report_of(self._window)
+        kinds = "PDF (*.pdf);;HTML (*.html)"
+        path = self.prompts.save_file("Save the report", self._proposed("report.pdf"), kinds)
+        if path is not None:
+            self._remember_folder(path)
+            self._desk.say(f"Wrote {save_report(report, path).name}")
+
+    def ask_path(self) -> None:
+        """Ask for an insertion path with its units and side, and carry it to the estimate."""
+        for path in self.prompts.open_files("Insertion path in the cochlea frame", self._folder, _PATHS):
+            units = self.prompts.item("Insertion path", "Its numbers are in", list(UNITS))
+            side = self.prompts.item("Insertion path", "It was drawn for", [s.word for s in Side])
+            if units and side:
+                self._remember_folder(path)
+                carried = InsertionPath.read(path, Side.parse(side[0].upper()), units=units)
+                self._desk.pose.carry(carried)
+                self._desk.say(f"Carried {path.name}, {len(carried.points)} points")
+
+    def ask_save_path(self) -> None:
+        """Ask where, and write the carried path in the frame of the touches."""
+        path, estimate = self._desk.pose.path, self._desk.pose.estimate
+        file = self.prompts.save_file(
+            "Save the path for the robot", self._proposed("path.csv"), "CSV (*.csv)"
+        )
+        if file is not None and path is not None and estimate is not None:
+            self._desk.say(f"Wrote {path.save_carried(estimate, file).name}")
+
+    def show_tracker(self) -> None:
+        """Show the settings of the tracked probe."""
+        dialog = TrackerDialog(self._desk, self._window.memory, self._window)
+        dialog.audible.setChecked(self._window.tracker_display.audible)
+        dialog.audible.toggled.connect(self._set_audible)
+        dialog.show()
+
+    def show_guide(self) -> None:
+        """Lead through the features to touch, on the whole screen."""
+        guide = GuideWindow(self._desk, self._window)
+        guide.settings_asked.connect(self.show_tracker)
+        guide.showFullScreen()
+
+    def show_physical(self) -> None:
+        """Hold touches against the scan of the same skull."""
+        PhysicalDialog(self._desk, self.prompts, self._window).open()
+
+    def look_along_axis(self) -> None:
+        """Look at the estimated cochlea along its axis, the apex first."""
+        self._look_at_pose(along_axis)
+
+    def look_through_window(self) -> None:
+        """Look at the estimated cochlea through its round window."""
+        self._look_at_pose(through_round_window)
+
+    def _look_at_pose(self, placement: Callable[[DrawnPose], Placement]) -> None:
+        estimate = self._desk.pose.estimate
+        if estimate is None or estimate.pose is None or estimate.registered is None:
+            raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")
+        view = self._window.grid.scene_view
+        pose = DrawnPose.of(estimate.pose, estimate.registered.T_scan_touches, label="")
+        place_camera(view.scene.camera, placement(pose))
+        view.redraw()
+
+    def _set_audible(self, audible: bool) -> None:
+        self._window.tracker_display.audible = audible
+        self._window.memory.set(audible=audible)
+
+    def _proposed(self, name: str) -> str:
+        state, side = self._desk.session.state, self._desk.pose.side
+        return str(Path(self._folder) / f"{state.specimen}_{side.value}_{name}")

@@ -1,0 +1,126 @@
+"""The one-page report as a file, HTML or PDF, with pictures of the estimate over bone and slices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from PySide6.QtCore import QBuffer, QIODevice, QMarginsF, QSizeF, QUrl
+from PySide6.QtGui import QImage, QPageLayout, QPageSize, QPdfWriter, QTextDocument
+
+from gp_core.errors import GpError
+from gp_core.landmarks.files import write_text
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
+from gp_labeler.scene.pose_data import DrawnPose
+from gp_labeler.session.pose_report import PoseReport
+from gp_labeler.views.drawn_pose import pose_scene
+from gp_labeler.views.pictures import picture
+
+if TYPE_CHECKING:
+    from gp_labeler.views.main_window import MainWindow
+
+__all__ = ["report_of", "report_pictures", "save_report"]
+
+_PICTURE_SIZE = (720, 520)
+_SLICE_MM = 24.0
+_LOOKS: Mapping[str, Callable[[DrawnPose], Placement]] = {
+    "Along the axis": along_axis,
+    "Through the round window": through_round_window,
+}
+_DPI = 96
+_MARGINS_MM = (14.0, 12.0, 14.0, 12.0)
+
+
+def report_of(window: MainWindow) -> PoseReport:
+    """Make the report of the estimate a window shows; raises `GpError` where there is none."""
+    desk = window.workbench
+    estimate = desk.pose.estimate
+    if estimate is None or estimate.pose is None:
+        raise GpError("there is no estimate to report", remedy=desk.pose.estimating.waiting_text or None)
+    session = desk.session
+    return PoseReport(session.state, estimate, report_pictures(window), session.now())
+
+
+def report_pictures(window: MainWindow) -> dict[str, bytes]:
+    """Take pictures of the estimate, PNG by caption; none where it does not lie in a scan.
+
+    The window looks as before afterwards.
+    """
+    poses = pose_scene(window.workbench).poses
+    if not poses or window.workbench.volume is None:
+        return {}
+    return {**_bone_pictures(window, poses[0]), **_slice_pictures(window, poses[0])}
+
+
+def save_report(report: PoseReport, path: Path) -> Path:
+    """Write a report as ``.html`` or ``.pdf``, by the file's name.
+
+    Raises
+    ------
+    GpError
+        Another ending, or the file cannot be written.
+    """
+    suffix = path.suffix.lower()
+    if suffix in (".html", ".htm"):
+        write_text(path, report.html())
+    elif suffix == ".pdf":
+        _save_pdf(report, path)
+    else:
+        raise GpError("has no ending of a report", file=path, remedy="End it with .html or .pdf.")
+    return path
+
+
+def _save_pdf(report: PoseReport, path: Path) -> None:
+    try:
+        path.open("ab").close()
+    except OSError as error:  # Qt would say nothing
+        raise GpError(f"cannot be written: {error.strerror}", file=path) from None
+    document, writer = QTextDocument(), QPdfWriter(str(path))
+    writer.setTitle(f"{report.state.specimen}: pose of the {report.estimate.side.word} cochlea")
+    writer.setResolution(_DPI)
+    writer.setPageSize(QPageSize(QPageSize.PageSizeId.A4))
+    writer.setPageMargins(QMarginsF(*_MARGINS_MM), QPageLayout.Unit.Millimeter)
+    for n, png in enumerate(report.pictures.values()):
+        image = QImage.fromData(png)
+        document.addResource(QTextDocument.ResourceType.ImageResource, QUrl(f"picture-{n}.png"), image)
+    document.documentLayout().setPaintDevice(writer)
+    document.setDocumentMargin(0)
+    document.setHtml(report.html(embed=False))
+    document.setPageSize(QSizeF(writer.width(), writer.height()))
+    document.print_(writer)
+
+
+def _bone_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
+    view = window.grid.scene_view
+    camera, before, found = view.scene.camera, view.scene.camera.state(), {}
+    found["As in the window"] = _png(picture(window, "3d", _PICTURE_SIZE))
+    for caption, placement in _LOOKS.items():
+        place_camera(camera, placement(pose))
+        found[caption] = _png(picture(window, "3d", _PICTURE_SIZE))
+    camera.restore(before)
+    view.redraw()
+    return found
+
+
+def _slice_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
+    session, found = window.workbench.session, {}
+    crosshair, views = session.crosshair, window.grid.slice_views
+    before = {plane: views[plane].shown for plane in Plane}
+    session.set_crosshair(pose.origin)
+    for plane in Plane:
+        views[plane].zoom_to(pose.origin, _SLICE_MM)
+        found[plane.value.capitalize()] = _png(picture(window, plane.value, _PICTURE_SIZE))
+    session.set_crosshair(crosshair)
+    for plane in Plane:
+        views[plane].shown = before[plane]
+        views[plane].update()
+    return found
+
+
+def _png(image: QImage) -> bytes:
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    image.save(buffer, "PNG")  # type: ignore[call-overload]  # the stubs know no buffers
+    return bytes(buffer.data().data())
