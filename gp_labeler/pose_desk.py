@@ -21,6 +21,7 @@ from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.estimating import Estimating
 from gp_labeler.session.pose_exports import InsertionPath, save_pose
+from gp_labeler.session.touch_edits import RemoveTouches, TakeTouches
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.work import WarmJoint
 
@@ -184,6 +185,22 @@ class PoseDesk:
         self.recorded.emit(wanted)
         if wanted == self._target:
             self._aim(self._first_untouched(after=wanted))
+
+    def change_side(self) -> None:
+        """Say that the touches are those of the other side, and go on there.
+
+        Raises
+        ------
+        GpError
+            The other side was touched too.
+        """
+        session, wrong, right = self._desk.session, self.side, self.side.other
+        touches = {name: touch for (side, name), touch in session.state.touches.items() if side is wrong}
+        if any(side is right for side, _ in session.state.touches):
+            raise GpError(f"the {right.word} side was touched too", remedy="Clear its touches first.")
+        session.do(TakeTouches(right, touches))
+        session.do(RemoveTouches(wrong))
+        self.choose(side=right)
 
     def show(self, name: str) -> None:
         """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from gp_core.atlas.pose import CochleaPose
 
-__all__ = ["Confidence", "confidence"]
+__all__ = ["Confidence", "confidence", "is_other_side"]
 
 _GOOD_MM, _GOOD_DEG = 0.75, 14.0
 """What six careful touches of an ordinary animal give, with some room."""
@@ -16,7 +16,8 @@ _GOOD_MM, _GOOD_DEG = 0.75, 14.0
 _POOR_MM, _POOR_DEG = 1.5, 25.0
 """Beyond this, an opening drilled for the round window may well miss it."""
 
-_AGAINST = ("check the side", "look swapped")
+_WRONG_SIDE = "check the side"
+_AGAINST = (_WRONG_SIDE, "look swapped")
 """Ends of warnings that say that the pose itself is wrong, not only less sure."""
 
 
@@ -37,6 +38,11 @@ class Confidence:
     level: str
     word: str
     reason: str
+
+
+def is_other_side(pose: CochleaPose) -> bool:
+    """Return whether the touches are clearly those of the other side."""
+    return any(warning.endswith(_WRONG_SIDE) for warning in pose.warnings)
 
 
 def confidence(pose: CochleaPose) -> Confidence:

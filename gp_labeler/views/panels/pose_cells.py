@@ -14,10 +14,10 @@ from gp_labeler.views.theme import Theme
 
 __all__ = ["COLUMN_WIDTHS", "paint_cell", "paint_ground"]
 
-COLUMN_WIDTHS = {XYZ: 170, MISFIT: 68, USE: 34, CLEAR: 16}
+COLUMN_WIDTHS = {XYZ: 174, MISFIT: 66, USE: 32, CLEAR: 16}
 """Logical pixels; the name gets the rest."""
 
-_PAD, _CHIP, _CODE, _NUMBER = 8, 12, 34, 56
+_PAD, _CHIP, _CODE = 8, 12, 34
 _MISFIT = 36
 _MIDDLE = Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | _MIDDLE
@@ -88,8 +88,9 @@ def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme)
     font = QFont(painter.font())
     font.setStrikeOut(_is_out(row))
     painter.setFont(font)
+    width = box.width() / 3
     for n, value in enumerate(row.touch.position):
-        cell = QRectF(box.left() + n * _NUMBER, box.top(), _NUMBER, box.height())
+        cell = QRectF(box.left() + n * width, box.top(), width, box.height())
         painter.drawText(cell, _RIGHT, f"{value:.2f}".replace("-", _MINUS))
 
 

@@ -24,7 +24,7 @@ from gp_labeler.workbench import Workbench
 __all__ = ["PosePanel", "holds_touches"]
 
 _TOUCH_FILES = (".dat", ".csv", ".mrk.json", ".fcsv", ".txt")
-_WIDE, _WIDEST = 760, 1120
+_WIDE, _WIDEST = 760, 1280
 """From which width on, logical pixels, cards stand in two columns, and how wide these become."""
 
 
@@ -90,6 +90,8 @@ class PosePanel(QWidget):
         """Take all the width there is, where there is no scan beside; else that of the other panels."""
         self.setMinimumWidth(PANEL_WIDTH)
         self.setMaximumWidth(_ANY if wide else PANEL_WIDTH)
+        self.result.set_large(wide)
+        self.overlay.setVisible(not wide)  # there is nothing to draw over
 
     def add_card(self, card: QWidget) -> None:
         """Put a card under the others, before the verdict."""

@@ -9,8 +9,9 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gp_core.atlas.pose import CochleaPose
-from gp_labeler.session.confidence import confidence
+from gp_labeler.session.confidence import confidence, is_other_side
 from gp_labeler.session.estimate import Estimate
+from gp_labeler.views.bind import attempt
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import Notices, Verdict, link, numbers
 from gp_labeler.views.panels.pose_words import (
@@ -45,16 +46,18 @@ class ResultCard(Card):
         self.waiting = text_label("", "title", wrap=True)
         self.one, self.two = _OnePose(), _TwoPoses()
         self.next = link("", "Make it the next to touch")
-        self.frame = text_label("", "hint")
+        self.other_side = link("", "Move all touches to the other side; undo brings them back")
         self.add_to_heading(self.verdict)
         for what in (self.waiting, self.one, self.two, self.notices):
             self.add(what)
         row = QHBoxLayout()
         row.setSpacing(4)
+        row.addWidget(self.other_side)
         row.addWidget(self.next)
         row.addStretch(1)
         self.add(row)
         self.next.clicked.connect(self._aim)
+        self.other_side.clicked.connect(lambda: attempt(workbench, workbench.pose.change_side))
 
     def refresh(self, *_: object) -> None:
         """Show the estimate as it stands."""
@@ -76,8 +79,15 @@ class ResultCard(Card):
         if pose is not None:
             trust = confidence(pose)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
+        wrong = pose is not None and is_other_side(pose)
+        self.other_side.setVisible(wrong)
+        self.other_side.setText(f"They are of the {desk.side.other.word} side")
         self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
         self._show_gain()
+
+    def set_large(self, large: bool) -> None:
+        """Show the estimate in large type, where there is room."""
+        self.one.set_large(large)
 
     def _show_gain(self) -> None:
         gains = self._desk.pose.gains()
@@ -100,12 +110,20 @@ class _OnePose(QWidget):
         grid.setContentsMargins(0, 2, 0, 2)
         grid.setHorizontalSpacing(10)
         grid.setVerticalSpacing(3)
-        self.origin, self.axis, self.region = numbers(17, bold=True), numbers(13), numbers(15, bold=True)
+        self.origin, self.axis, self.region = numbers(), numbers(), numbers()
+        self.set_large(False)
         for row, (caption, label) in enumerate((("CO", self.origin), ("Axis", self.axis))):
             grid.addWidget(text_label(caption, "hint"), row, 0, Qt.AlignmentFlag.AlignBaseline)
             grid.addWidget(label, row, 1, Qt.AlignmentFlag.AlignBaseline)
         grid.addWidget(self.region, 2, 0, 1, 2)
         grid.setColumnStretch(1, 1)
+
+    def set_large(self, large: bool) -> None:
+        """Show it in type that is read from further away."""
+        for label, pixels, weight in ((self.origin, 17, 600), (self.axis, 13, 400), (self.region, 15, 600)):
+            label.setStyleSheet(
+                f"font-size: {round(pixels * (1.5 if large else 1))}px; font-weight: {weight}"
+            )
 
     def show_pose(self, pose: CochleaPose) -> None:
         self.origin.setText(f"{triple(pose.origin)}  mm")

@@ -311,8 +311,17 @@ def test_the_wrong_side_is_called_out_and_right_on_the_other(desk, panel, qtbot)
     assert "left side fits these points better than the right" in notices(panel)
     assert "check the side" in notices(panel).lower()
     assert panel.result.verdict.label.text() == "Do not use"
-    qtbot.mouseClick(panel.head.side.buttons["L"], CLICK)
-    assert panel.result.waiting.isVisible()
+    wrong = touches(desk, Side.RIGHT)
+    qtbot.mouseClick(panel.result.other_side, CLICK)
+    assert desk.pose.side is LEFT
+    assert panel.head.side.value == "L"
+    assert touches(desk) == wrong
+    assert touches(desk, Side.RIGHT) == {}
+    assert panel.result.verdict.label.text() == "Good"
+    assert not panel.result.other_side.isVisible()
+    desk.session.undo()
+    desk.session.undo()
+    assert touches(desk, Side.RIGHT) == wrong
 
 
 def test_swapped_names_are_called_out(desk, panel):
