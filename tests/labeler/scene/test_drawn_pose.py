@@ -9,8 +9,22 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from pose_cases import ALL, DATA, FEATURES, PATH, POSE, SECOND, TIP, TOUCHES, TRUTH, VECTORS, pose, without
-from scene_cases import MIDDLE, scan_of
+from pose_cases import (
+    ALL,
+    DATA,
+    FEATURES,
+    MIDDLE,
+    PATH,
+    POSE,
+    SECOND,
+    TIP,
+    TOUCHES,
+    TRUTH,
+    VECTORS,
+    pose,
+    without,
+)
+from scene_cases import scan_of
 
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.surface import extract_isosurface

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scene_cases import MIDDLE
 
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
@@ -19,6 +18,7 @@ from gp_labeler.scene.pose_data import (
     PoseScene,
 )
 
+MIDDLE = np.array([14.0, -8.0, 5.0])
 TURN = np.array([[0.6, 0.0, -0.8], [0.0, 1.0, 0.0], [0.8, 0.0, 0.6]])
 SPREAD = np.diag([0.03, 0.02, 0.01, 0.005, 0.005, 0.005])
 
