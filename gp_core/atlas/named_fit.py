@@ -12,8 +12,10 @@ sigma from the expected squared errors, then the pose by weighted Procrustes wit
 Correlations between features are left out of the weights on purpose: learned from some twenty sides, they
 made the estimates of held-out animals worse (docs/method.md). They do enter the error bars, `robust_pose`.
 
-Several readings of the same touches (the other side, names exchanged, another start) are fitted at once, as
-rows of one batch: NumPy then takes hardly longer than for one.
+The iterations run in `gp_core.atlas.settling`: compiled, once `gp_core.atlas.settling_compiled` has been
+imported, and until then as plain Python, to the same numbers. A process that estimates once, such as the
+shell command, would wait longer for the compiled code than it saves, so the second estimate loads it
+(`compile_if_repeated`). A window or a tracker that must not wait imports that module beforehand, in a thread.
 
 References
 ----------
@@ -23,27 +25,41 @@ https://doi.org/10.1080/01621459.1989.10478852
 
 from __future__ import annotations
 
+import importlib
+import math
+import sys
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
+from gp_core.atlas import settling
+from gp_core.atlas.settling import NU, POSE_SIZE, PRIOR_WEIGHT, TOLERANCE, TYPICAL_NOISE_MM
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
-from gp_core.registration.procrustes import weighted_procrustes
+from gp_core.registration.procrustes import surely_no_line, weighted_procrustes
 
-__all__ = ["NamedFit", "TouchModel", "careful_misfit", "fit_named_points", "fit_readings", "motion_jacobian"]
+__all__ = [
+    "NamedFit",
+    "TouchModel",
+    "best_exchange",
+    "careful_misfit",
+    "compile_if_repeated",
+    "fit_named_points",
+    "motion_jacobian",
+]
 
-TYPICAL_NOISE_MM = 0.05
-"""Scale of a careful touch, mm a coordinate, to which the estimate of sigma is drawn."""
+_NO_TURN = (1.0, 0.0, 0.0, 0.0)
 
-_PRIOR_WEIGHT = 2.0
-_NU = 4.0
-_MAX_ITERATIONS = 100
-_SCREENING_ITERATIONS = 12
-_WEIGHT_TOLERANCE = 3e-3
+_COMPILED = "gp_core.atlas.settling_compiled"
+_ESTIMATES = count()
+
+_MAX_ITERATIONS = 500
 _DOUBTFUL_WEIGHT = 0.5
 _LEFT_OUT = 1e-3
-_OVER_RELAXATION = 2.0  # sigma alone would creep: twice its step halves the iterations, same fixed point
 
 
 @dataclass(frozen=True)
@@ -73,6 +89,8 @@ class NamedFit:
 
     Attributes
     ----------
+    turn : (4,) array
+        `rotation` as a unit quaternion, w first.
     rotation, translation : (3, 3), (3,) arrays
         The atlas in the frame of the touches, ``y = rotation @ x + translation``, mm.
     points : (n, 3) array, mm
@@ -93,6 +111,7 @@ class NamedFit:
         False where the iterations ran out first.
     """
 
+    turn: FloatArray
     rotation: FloatArray
     translation: FloatArray
     points: FloatArray
@@ -114,25 +133,53 @@ class NamedFit:
         """Whether the touches fit worse than careful ones do."""
         return self.doubtful or self.noise > 3 * TYPICAL_NOISE_MM
 
-    @property
+    @cached_property
+    def squared_residuals(self) -> FloatArray:
+        """(n,) squared distance of each touch from the mean, mm^2."""
+        squared: FloatArray = (self.residual**2).reshape(-1, 3).sum(axis=1)
+        return squared
+
+    @cached_property
     def jacobian(self) -> FloatArray:
         """(3 n, 6) `motion_jacobian` of the touches."""
         return motion_jacobian(self.points)
 
-    @property
+    @cached_property
     def touch_variances(self) -> FloatArray:
         """(n,) variance of each touch, mm^2 a coordinate.
 
         A Student-t varies more than its scale says, and a scale found from few touches is itself unsure.
         """
-        freedom = 3 * len(self.weights) - 6 + _PRIOR_WEIGHT
+        freedom = 3 * len(self.weights) - 6 + PRIOR_WEIGHT
         unsure = freedom / (freedom - 2) if self.noise_estimated else 1.0
-        variances: FloatArray = unsure * _NU / (_NU - 2) * self.noise**2 / self.weights
+        variances: FloatArray = unsure * NU / (NU - 2) * self.noise**2 / self.weights
         return variances
+
+
+def compile_if_repeated() -> None:
+    """Load the compiled kernels if this is the second estimate of the process, and no thread is at it yet."""
+    if next(_ESTIMATES) == 1 and _COMPILED not in sys.modules:
+        with suppress(ImportError):  # then plain Python has to do
+            importlib.import_module(_COMPILED)
+
+
+class _Settled(NamedTuple):
+    """What `gp_core.atlas.settling.settle` makes of one reading of the touches."""
+
+    sigma2: float
+    change: float
+    misfit: float
+    weights: FloatArray
+    precision: FloatArray
+    points: FloatArray
+    pose: FloatArray
 
 
 def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     """Fit the atlas to touched points.
+
+    A mistouch can hold a fit in a wrong place, so where one touch is doubted, the fit is also started
+    without each touch in turn, and the best of these stands.
 
     Parameters
     ----------
@@ -145,41 +192,46 @@ def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     GeometryError
         Fewer than three touches, touches on one line, or touches that no pose brings near the atlas.
     """
-    return fit_readings(model, touches[None])[0]
+    if not (surely_no_line(model.mean) and surely_no_line(touches)):
+        weighted_procrustes(model.mean, touches, names=model.codes)  # for its guards
+    settled = _settle(model, touches, model.noise)
+    if not math.isfinite(settled.misfit):
+        weighted_procrustes(model.mean, touches, names=model.codes)
+        raise GeometryError(
+            "no pose brings these points near the atlas", remedy="Check units, names and coordinates."
+        )
+    n = len(touches)
+    if n > 3 and settled.weights.min() < _DOUBTFUL_WEIGHT:
+        starts = np.where(np.eye(n, dtype=bool), _LEFT_OUT, 1.0)
+        others = (_settle(model, touches, model.noise, weights=start, turn=settled.pose) for start in starts)
+        settled = min((settled, *others), key=lambda other: other.misfit)
+    return _as_fit(model, settled)
 
 
-def fit_readings(model: TouchModel, readings: FloatArray, *, screen: bool = False) -> list[NamedFit]:
-    """Fit the atlas to several readings of the same touches.
-
-    A mistouch can hold a fit in a wrong place, so where one touch is doubted, the fit is also started
-    without each touch in turn, and the best of these stands.
+def best_exchange(
+    model: TouchModel, touches: FloatArray, fit: NamedFit, below: float
+) -> tuple[int, int, float]:
+    """Find the two touches whose names, exchanged, make the best fit.
 
     Parameters
     ----------
     model : TouchModel
-    readings : (B, n, 3) array, mm
-    screen : bool
-        Only tell good readings from bad ones: few iterations, and no second start.
+    touches : (n, 3) array, mm
+    fit : NamedFit
+        Of the touches as they are named.
+    below : float
+        Misfit below which an exchange is of interest.
 
-    Raises
-    ------
-    GeometryError
-        As `fit_named_points`.
+    Returns
+    -------
+    i, j : int
+        Their rows.
+    misfit : float
+        Of the fit to the touches so read; infinite where no exchange comes near `below`.
     """
-    weighted_procrustes(model.mean, readings[0], names=model.codes)  # for its guards
-    n = readings.shape[1]
-    fits = _fit_batch(
-        model, readings, np.ones((len(readings), n)), _SCREENING_ITERATIONS if screen else _MAX_ITERATIONS
-    )
-    doubted = [i for i, fit in enumerate(fits) if fit.doubtful and n > 3 and not screen]
-    if doubted:
-        starts = np.where(np.eye(n, dtype=bool), _LEFT_OUT, 1.0)
-        others = _fit_batch(
-            model, np.repeat(readings[doubted], n, axis=0), np.tile(starts, (len(doubted), 1))
-        )
-        for row, i in enumerate(doubted):
-            fits[i] = min([fits[i], *others[row * n : row * n + n]], key=lambda fit: fit.misfit)
-    return fits
+    buffers = _buffers(model, touches, None, fit.turn)
+    i, j, misfit = _run("best_exchange", *buffers, model.noise or 0.0, _MAX_ITERATIONS, below)
+    return int(i), int(j), misfit
 
 
 def careful_misfit(model: TouchModel, reading: FloatArray, noise: float) -> float:
@@ -187,106 +239,75 @@ def careful_misfit(model: TouchModel, reading: FloatArray, noise: float) -> floa
 
     Cheap; tells the readings of careful touches apart, which one rough touch already upsets.
     """
-    precision = 1 / (model.variances + noise**2)
-    rotations, translations = _align(model.mean, reading[None], precision[None])
-    residual = (reading - translations[0]) @ rotations[0] - model.mean
-    return float(np.sum(precision[:, None] * residual**2))
+    settled = _settle(model, reading, noise, n_iterations=0)
+    squared = ((settled.points.reshape(-1, 3) - model.mean) ** 2).sum(axis=1)
+    return float(settled.precision @ squared)
 
 
-def _fit_batch(
-    model: TouchModel, readings: FloatArray, weights: FloatArray, n_iterations: int = _MAX_ITERATIONS
-) -> list[NamedFit]:
-    sigma2 = np.full((len(readings), 1), (model.noise or TYPICAL_NOISE_MM) ** 2)
-    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
-        for iteration in range(n_iterations + 1):
-            noise = sigma2 / weights
-            precision = 1 / (model.variances + noise)
-            rotations, translations = _align(model.mean, readings, precision)
-            points = (readings - translations[:, None]) @ rotations
-            residuals = points - model.mean
-            error = noise**2 * precision**2 * (residuals**2).sum(axis=2)
-            spread = 3 * noise - noise**2 * (3 * precision - _leverage(points, precision))
-            updated = (_NU + 3) / (_NU + (error + spread) / sigma2)
-            still = np.abs(updated - weights).max(axis=1) < _WEIGHT_TOLERANCE
-            if still.all() or iteration == n_iterations:
-                break
-            weights = updated
-            if model.noise is None:
-                sigma2 = sigma2 * (_noise_variance(weights, error + spread) / sigma2) ** _OVER_RELAXATION
-        misfits = _misfits(model, precision, residuals, error, sigma2)
-    if not np.isfinite(misfits).all():
-        raise GeometryError(
-            "no pose brings these points near the atlas", remedy="Check units, names and coordinates."
-        )
-    return [
-        NamedFit(
-            rotation=rotations[i],
-            translation=translations[i],
-            points=points[i],
-            residual=residuals[i].ravel(),
-            weights=weights[i],
-            noise=float(sigma2[i, 0]) ** 0.5,
-            noise_estimated=model.noise is None,
-            precision=np.repeat(precision[i], 3),
-            misfit=float(misfits[i]),
-            converged=bool(still[i]),
-        )
-        for i in range(len(readings))
-    ]
+def _settle(
+    model: TouchModel,
+    touches: FloatArray,
+    noise: float | None,
+    *,
+    weights: FloatArray | None = None,
+    turn: FloatArray | None = None,
+    n_iterations: int = _MAX_ITERATIONS,
+) -> _Settled:
+    """Settle one reading from given weights and a given turn, by default ordinary ones and none."""
+    buffers = _buffers(model, touches, weights, turn)
+    _, _, _, weights, precision, points, _, pose = buffers
+    return _Settled(*_run("settle", *buffers, noise or 0.0, n_iterations), weights, precision, points, pose)
 
 
-def _align(mean: FloatArray, readings: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted Procrustes of the mean (n, 3) to each reading (B, n, 3); det +1."""
-    shares = weights / weights.sum(axis=1, keepdims=True)
-    mean_centres, centres = shares @ mean, (shares[:, None] @ readings)[:, 0]
-    covariance = (readings - centres[:, None]).transpose(0, 2, 1) @ (
-        shares[..., None] * (mean - mean_centres[:, None])
+def _buffers(
+    model: TouchModel, touches: FloatArray, weights: FloatArray | None, turn: FloatArray | None
+) -> tuple[FloatArray, ...]:
+    """Return the buffers that the kernels work on, in their order."""
+    n = len(touches)
+    pose = np.zeros(POSE_SIZE)
+    pose[:4] = _NO_TURN if turn is None else turn[:4]
+    return (
+        np.ascontiguousarray(model.mean).reshape(-1),
+        np.ascontiguousarray(model.variances),
+        np.array(touches).reshape(-1),  # a copy: the exchanges write into it
+        np.ones(n) if weights is None else weights,
+        np.empty(n),
+        np.empty(3 * n),
+        np.empty(n),
+        pose,
     )
-    if not np.isfinite(covariance).all():
-        raise GeometryError("the coordinates are too large to fit", remedy="Check units and coordinates.")
-    left, _, right = np.linalg.svd(covariance)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    rotations = left @ right
-    return rotations, centres - (rotations @ mean_centres[..., None])[..., 0]
 
 
-def _leverage(points: FloatArray, precision: FloatArray) -> FloatArray:
-    """Return (B, n): how much of each touch's precision the pose uses up, summed over its coordinates.
+def _run(kernel: str, *arguments: FloatArray | float) -> tuple[float, float, float]:
+    """Run a kernel: compiled, if the compiled ones are there."""
+    compiled = getattr(sys.modules.get(_COMPILED), kernel, None)  # none yet while another thread imports it
+    result: tuple[float, float, float]
+    if compiled is not None:
+        result = compiled(*arguments)
+        return result
+    views = [a.data if isinstance(a, np.ndarray) else a for a in arguments]
+    try:
+        result = getattr(settling, kernel)(*views)
+    except (ZeroDivisionError, OverflowError, ValueError):  # compiled code goes on with inf and nan
+        return 0.0, math.inf, math.inf
+    return result
 
-    With the pose taken about the weighted centre, translation and rotation separate, and the rotation's
-    information is the inertia tensor of the points.
-    """
-    total = precision.sum(axis=1, keepdims=True)
-    arms = points - (precision[:, None] @ points) / total[..., None]
-    square = (arms * arms).sum(axis=2)
-    inertia = (precision * square).sum(axis=1)[:, None, None] * np.eye(3) - arms.transpose(0, 2, 1) @ (
-        precision[..., None] * arms
+
+def _as_fit(model: TouchModel, settled: _Settled) -> NamedFit:
+    points = settled.points.reshape(-1, 3)
+    return NamedFit(
+        turn=settled.pose[:4],
+        rotation=settled.pose[7:].reshape(3, 3),
+        translation=settled.pose[4:7],
+        points=points,
+        residual=(points - model.mean).ravel(),
+        weights=settled.weights,
+        noise=settled.sigma2**0.5,
+        noise_estimated=model.noise is None,
+        precision=np.repeat(settled.precision, 3),
+        misfit=settled.misfit,
+        converged=settled.change < TOLERANCE,
     )
-    turn = np.linalg.inv(inertia)
-    through_turn = square * np.trace(turn, axis1=1, axis2=2)[:, None] - ((arms @ turn) * arms).sum(axis=2)
-    used: FloatArray = precision**2 * (3 / total + through_turn)
-    return used
-
-
-def _noise_variance(weights: FloatArray, squared_errors: FloatArray) -> FloatArray:
-    prior = _PRIOR_WEIGHT * TYPICAL_NOISE_MM**2
-    total = prior + (weights * squared_errors).sum(axis=1, keepdims=True)
-    variance: FloatArray = total / (_PRIOR_WEIGHT + 3 * weights.shape[1])
-    return variance
-
-
-def _misfits(
-    model: TouchModel, precision: FloatArray, residuals: FloatArray, error: FloatArray, sigma2: FloatArray
-) -> FloatArray:
-    """Return (B,): shape and touch errors, each by its own law, and the scale of the touches."""
-    shape = (model.variances * precision**2 * (residuals**2).sum(axis=2)).sum(axis=1) / 2
-    touches = (_NU + 3) / 2 * np.log1p(error / (_NU * sigma2)).sum(axis=1)
-    misfits: FloatArray = shape + touches
-    if model.noise is None:
-        scale = sigma2[:, 0]
-        misfits = misfits + (_PRIOR_WEIGHT + 3 * error.shape[1]) / 2 * np.log(scale)
-        misfits = misfits + _PRIOR_WEIGHT * TYPICAL_NOISE_MM**2 / (2 * scale)
-    return misfits
 
 
 def motion_jacobian(points: FloatArray) -> FloatArray:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import compress
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import DEFINING, Atlas
 from gp_core.atlas.named_fit import (
     NamedFit,
     TouchModel,
+    best_exchange,
     careful_misfit,
+    compile_if_repeated,
     fit_named_points,
-    fit_readings,
     motion_jacobian,
 )
 from gp_core.atlas.pose import CochleaPose
@@ -38,7 +40,7 @@ _AGAINST_THE_USER = 12.0
 """The same for saying that the user named the wrong side, or exchanged two names: odds of 400 to 1."""
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
-_MIRROR_POSE = np.diag([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the other sign
+_MIRROR_POSE = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the other sign
 
 
 def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = None) -> CochleaPose:
@@ -59,9 +61,11 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
     GeometryError
         The touches lie on one line.
     """
+    compile_if_repeated()
     model = touch_model(touches, atlas, probe_noise)
     points = _leftwards(touches.array(model.codes), touches.side)
     fit = fit_named_points(model, points)
+    suspects = _suspects(model, fit)
     defining = _defining_points(atlas, model, fit)
     frame = _cochlea_in_touches(defining, fit, touches)
     return CochleaPose(
@@ -71,8 +75,8 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
         transform_to_touches=frame,
         covariance=_pose_covariance(atlas, model, fit, defining, touches.side),
         residuals=_residuals(model, fit),
-        suspects=_suspects(model, fit),
-        warnings=tuple(_warnings(model, points, fit, touches.side)),
+        suspects=suspects,
+        warnings=tuple(_warnings(model, points, fit, touches.side, suspects)),
         probe_noise=fit.noise,
         T_touches_atlas=_atlas_in_touches(fit, touches),
     )
@@ -86,6 +90,7 @@ def locate_robust(touches: LandmarkSet, atlas: Atlas) -> RigidTransform:
     FeatureError, GeometryError
         As `estimate_robust` does.
     """
+    compile_if_repeated()
     model = touch_model(touches, atlas, None)
     fit = fit_named_points(model, _leftwards(touches.array(model.codes), touches.side))
     return _cochlea_in_touches(_defining_points(atlas, model, fit), fit, touches)
@@ -126,11 +131,11 @@ def _defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArr
 def _shape_of_residual(model: TouchModel, fit: NamedFit) -> FloatArray:
     """Return (12, 3 n): the part of each residual taken as the animal's own shape, at the defining points."""
     gain = np.zeros((len(DEFINING), 3, len(model.codes), 3))
-    share = model.variances * fit.precision[::3]
     for row, code in enumerate(DEFINING):
         if code in model.codes:
             column = model.codes.index(code)
-            gain[row, :, column] = share[column] * np.eye(3)
+            share = model.variances[column] * fit.precision[3 * column]
+            gain[row, (0, 1, 2), column, (0, 1, 2)] = share
     return gain.reshape(3 * len(DEFINING), -1)
 
 
@@ -157,59 +162,56 @@ def _pose_covariance(
     shape and of the touch errors. The shape enters with all its correlations as measured: features taken one
     by one, which is what gives the estimate its weights, would promise too much.
     """
-    pull = fit.precision[:, None] * fit.jacobian
-    pose_of_residual = np.linalg.solve(fit.jacobian.T @ pull, pull.T)
+    jacobian = fit.jacobian
+    pull = (fit.precision[:, None] * jacobian).T
+    pose_of_residual = np.linalg.solve(pull @ jacobian, pull)
     shape_of_residual = _shape_of_residual(model, fit)
-    points_of_residual = (
-        shape_of_residual + (motion_jacobian(defining) - shape_of_residual @ fit.jacobian) @ pose_of_residual
-    )
-    to_frame = cochlea_jacobian(*defining)
+    lever = motion_jacobian(defining) - shape_of_residual @ jacobian
+    points_of_residual = shape_of_residual + lever @ pose_of_residual
+    to_frame = (fit.rotation @ cochlea_jacobian(*defining).reshape(2, 3, -1)).reshape(6, -1)
+    if side is Side.RIGHT:
+        to_frame *= _MIRROR_POSE[:, None]
     of_touches = to_frame @ points_of_residual
-    of_shape = np.zeros((6, len(atlas.covariance)))
+    of_shape = np.zeros((6, len(atlas.scatter)))
     of_shape[:, atlas.coordinates(DEFINING)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
-    covariance = (
-        of_shape @ atlas.scatter @ of_shape.T + (of_touches * _touch_variances(model, fit)) @ of_touches.T
-    )
-    turn = _pose_rotation(fit, side)
-    in_touches: FloatArray = turn @ covariance @ turn.T
-    return (in_touches + in_touches.T) / 2
+    covariance = of_shape @ atlas.scatter @ of_shape.T
+    covariance += (of_touches * _touch_variances(model, fit)) @ of_touches.T
+    symmetric: FloatArray = (covariance + covariance.T) / 2
+    return symmetric
 
 
 def _touch_variances(model: TouchModel, fit: NamedFit) -> FloatArray:
     """Return (3 n,) variances of the touched coordinates; a suspect one is as wrong as it looks."""
-    seen = (fit.residual**2).reshape(-1, 3).mean(axis=1) - model.variances
-    suspect = np.isin(model.codes, _suspects(model, fit))
-    return np.repeat(np.where(suspect, np.maximum(seen, fit.touch_variances), fit.touch_variances), 3)
-
-
-def _pose_rotation(fit: NamedFit, side: Side) -> FloatArray:
-    turn = np.zeros((6, 6))
-    turn[:3, :3] = turn[3:, 3:] = fit.rotation
-    return turn if side is Side.LEFT else _MIRROR_POSE @ turn
+    ordinary = fit.touch_variances
+    seen = fit.squared_residuals / 3 - model.variances
+    return np.repeat(np.where(_suspicious(model, fit), np.maximum(seen, ordinary), ordinary), 3)
 
 
 def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
-    lengths = np.linalg.norm(fit.residual.reshape(-1, 3), axis=1)
+    lengths = np.sqrt(fit.squared_residuals)
     return dict(zip(model.codes, lengths.tolist(), strict=True))
 
 
+def _suspicious(model: TouchModel, fit: NamedFit) -> NDArray[np.bool_]:
+    """Mark touches (n,) that the fit set aside, or that only a most unusual animal would explain."""
+    unusual = fit.squared_residuals > _SUSPECT_SQUARED * (model.variances + fit.noise**2)
+    marks: NDArray[np.bool_] = unusual | (fit.weights < _SUSPECT_WEIGHT)
+    return marks
+
+
 def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
-    """Name touches that the fit set aside, or that only a most unusual animal would explain."""
-    spread = model.variances + fit.noise**2
-    squared = (fit.residual**2).reshape(-1, 3).sum(axis=1) / spread
-    doubtful = (fit.weights < _SUSPECT_WEIGHT) | (squared > _SUSPECT_SQUARED)
-    return tuple(code for code, is_suspect in zip(model.codes, doubtful, strict=True) if is_suspect)
+    return tuple(compress(model.codes, _suspicious(model, fit).tolist()))
 
 
-def _warnings(model: TouchModel, points: FloatArray, fit: NamedFit, side: Side) -> Iterator[str]:
+def _warnings(
+    model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, suspects: tuple[str, ...]
+) -> Iterator[str]:
     worse = _other_side_worse(model, points, fit)
-    swap, gain = _best_swap(model, points, fit) if fit.rough else ("", 0.0)
-    suspects = _suspects(model, fit)
-    if gain > max(_AGAINST_THE_USER, -worse):
+    swap = _swap(model, points, fit, max(_AGAINST_THE_USER, -worse)) if fit.rough else ""
+    if swap:
         yield f"{swap} look swapped"
     else:
-        swap = ""
         yield from _side_warning(worse, side)
     if suspects and not swap:
         names = " and ".join(suspects)
@@ -240,13 +242,8 @@ def _side_warning(worse: float, side: Side) -> Iterator[str]:
         )
 
 
-def _best_swap(model: TouchModel, points: FloatArray, fit: NamedFit) -> tuple[str, float]:
-    """Return the two features whose exchange explains the touches best, and its gain in -2 log posterior."""
-    pairs = list(combinations(range(len(points)), 2))
-    readings = np.repeat(points[None], len(pairs), axis=0)
-    for row, (i, j) in enumerate(pairs):
-        readings[row, [i, j]] = points[[j, i]]
-    fits = fit_readings(model, readings, screen=True)
-    best = min(range(len(pairs)), key=lambda row: fits[row].misfit)
-    i, j = pairs[best]
-    return f"{model.codes[i]} and {model.codes[j]}", 2 * (fit.misfit - fits[best].misfit)
+def _swap(model: TouchModel, points: FloatArray, fit: NamedFit, least: float) -> str:
+    """Name the two features whose exchange gains more than `least` in -2 log posterior, if there are such."""
+    below = fit.misfit - least / 2
+    i, j, misfit = best_exchange(model, points, fit, below)
+    return f"{model.codes[i]} and {model.codes[j]}" if misfit < below else ""

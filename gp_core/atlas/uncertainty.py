@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from gp_core.checks import FloatArray
@@ -63,22 +65,22 @@ def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: Float
     (6, 12) array
         d (CO in mm, rotation vector in rad) / d (CA, CB, RWA, RWP in mm).
     """
-    eye = np.eye(3)
-    length = float(np.linalg.norm(ca - cb))
-    x = (ca - cb) / length
-    middle = (rwa + rwp) / 2
-    along = float((middle - cb) @ x)
-    to_window = middle - cb - along * x
-    distance = float(np.linalg.norm(to_window))
-    z = cross_matrix(x) @ to_window / distance
-    axis_of_ca = (eye - np.outer(x, x)) / length
-    origin_of_ca = (np.outer(x, to_window) + along * eye) @ axis_of_ca
-    origin_of_window = np.outer(x, x) / 2
-    origin = np.hstack(
-        [origin_of_ca, eye - 2 * origin_of_window - origin_of_ca, origin_of_window, origin_of_window]
-    )
-    nothing = np.zeros((3, 3))
-    axis = np.hstack([axis_of_ca, -axis_of_ca, nothing, nothing])
-    window = np.hstack([nothing, nothing, eye / 2, eye / 2]) - origin
-    turn = cross_matrix(x) @ axis + np.outer(x, z) @ window / distance
-    return np.vstack([origin, turn])
+    spiral, middle = ca - cb, (rwa + rwp) / 2 - cb
+    squared = float(spiral @ spiral)
+    length = math.sqrt(squared)
+    x = spiral / length
+    share = float(spiral @ middle) / squared  # of the way from CB to CA at which CO lies
+    to_window = middle - share * spiral
+    along, turn_x = x[:, None] * x, cross_matrix(x)
+    across = np.eye(3) - along
+    origin_of_ca = x[:, None] * (to_window / length) + share * across
+    turn_of_ca = turn_x / length
+    lean = x[:, None] * (turn_x @ (to_window / float(to_window @ to_window)))
+    jacobian = np.empty((2, 3, 4, 3))  # of what, its coordinate, by which point, its coordinate
+    jacobian[0, :, 0] = origin_of_ca
+    jacobian[0, :, 1] = across - origin_of_ca
+    jacobian[0, :, 2] = jacobian[0, :, 3] = along / 2
+    jacobian[1, :, 0] = turn_of_ca - share * lean
+    jacobian[1, :, 1] = (share - 1) * lean - turn_of_ca
+    jacobian[1, :, 2] = jacobian[1, :, 3] = lean / 2
+    return jacobian.reshape(6, 12)

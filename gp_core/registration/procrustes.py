@@ -12,7 +12,7 @@ from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 
-__all__ = ["RigidFit", "align", "fit_rigid", "weighted_procrustes"]
+__all__ = ["RigidFit", "align", "fit_rigid", "surely_no_line", "weighted_procrustes"]
 
 COLLINEAR = 1e-3
 """Width over length below which points count as one line: 1 µm a mm, finer than any touch or voxel."""
@@ -171,6 +171,22 @@ def _is_line(points: FloatArray, weights: FloatArray) -> bool:
     # Coincident points leave rounding only, as wide as long: hold them against the coordinates too.
     rounding = 1e-13 * float(np.sqrt(weights.sum())) * float(np.abs(points).max())
     return bool(width <= max(COLLINEAR * length, rounding))
+
+
+def surely_no_line(points: FloatArray) -> bool:
+    """Return whether points (N, 3) span a plane at least; cheap, and false where it takes a closer look.
+
+    With the squared lengths of the three principal axes as a, b, c, it compares ab + ac + bc to the square of
+    their sum: on a line b and c are 0, and up to `COLLINEAR` not above its square.
+    """
+    if len(points) < 3:
+        return False
+    centred = points - points.mean(axis=0)
+    moments = centred.T @ centred
+    total = float(moments[0, 0] + moments[1, 1] + moments[2, 2])
+    pairs = (total * total - float((moments * moments).sum())) / 2
+    rounding = 1e-12 * float(np.abs(points).max()) ** 2
+    return pairs > 10 * COLLINEAR**2 * total**2 and total > rounding
 
 
 def _as_weights(weights: ArrayLike | None, n: int) -> FloatArray:

@@ -9,7 +9,6 @@ from gp_core.atlas.named_fit import (
     TouchModel,
     careful_misfit,
     fit_named_points,
-    fit_readings,
     motion_jacobian,
 )
 from gp_core.errors import GeometryError
@@ -84,19 +83,8 @@ def test_a_mirrored_ear_fits_worse_at_careful_and_at_rough_touches() -> None:
     assert careful_misfit(model, mirror_x(model.mean), 0.05) > 20
     for noise in (0.0, 0.4):
         touches = model.mean + noise * rng.normal(size=model.mean.shape)
-        own, mirrored = fit_readings(model, np.array([touches, mirror_x(touches)]))
+        own, mirrored = fit_named_points(model, touches), fit_named_points(model, mirror_x(touches))
         assert mirrored.misfit > own.misfit + 10
-
-
-def test_readings_fitted_together_are_as_alone() -> None:
-    rng = np.random.default_rng(6)
-    model = _model()
-    readings = model.mean + 0.3 * rng.normal(size=(5, *model.mean.shape))
-    readings[3, 2] += 3
-    for fit, reading in zip(fit_readings(model, readings), readings, strict=True):
-        alone = fit_named_points(model, reading)
-        np.testing.assert_allclose(fit.translation, alone.translation, atol=5e-3)
-        np.testing.assert_allclose(fit.weights, alone.weights, atol=2e-2)
 
 
 @pytest.mark.parametrize("scale", [1 / 25.4, 1 / 3, 1 / 2.54, 3, 25.4])

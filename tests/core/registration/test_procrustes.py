@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import mirror_x
-from gp_core.registration.procrustes import fit_rigid, weighted_procrustes
+from gp_core.registration.procrustes import fit_rigid, surely_no_line, weighted_procrustes
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -150,3 +150,12 @@ def test_input_is_left_alone() -> None:
     fit_rigid(source, target, weights=weights, dst="scan", src="tracker")
     for now, then in zip((source, target, weights), before, strict=True):
         np.testing.assert_array_equal(now, then)
+
+
+@pytest.mark.parametrize(("width", "sure"), [(0.0, False), (2e-3, False), (1e-2, True), (1.0, True)])
+def test_a_line_is_never_surely_none(width: float, sure: bool) -> None:
+    line = 7 * np.arange(5.0)[:, None] * np.array([1.0, 2, 2]) / 3 + 100
+    bent = line + 10 * width * np.array([0, 1, 0, -1, 0])[:, None] * np.array([2.0, 1, -2]) / 3
+    assert surely_no_line(bent) is sure
+    assert not surely_no_line(np.full((4, 3), 123.456))
+    assert not surely_no_line(bent[:2])
