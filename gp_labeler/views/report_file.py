@@ -29,6 +29,9 @@ _LOOKS: Mapping[str, Callable[[DrawnPose], Placement]] = {
     "Along the axis": along_axis,
     "Through the round window": through_round_window,
 }
+_BARE = {"labels_visible": False, "mesh_opacity": 0.45}
+"""In a small picture the estimate must be seen through the bone, and names of forty points hide it."""
+
 _DPI = 96
 _MARGINS_MM = (14.0, 12.0, 14.0, 12.0)
 
@@ -51,7 +54,12 @@ def report_pictures(window: MainWindow) -> dict[str, bytes]:
     poses = pose_scene(window.workbench).poses
     if not poses or window.workbench.volume is None:
         return {}
-    return {**_bone_pictures(window, poses[0]), **_slice_pictures(window, poses[0])}
+    view = window.workbench.session.view
+    before = {name: getattr(view.state, name) for name in _BARE}
+    view.update(**_BARE)
+    found = {**_bone_pictures(window, poses[0]), **_slice_pictures(window, poses[0])}
+    view.update(**before)
+    return found
 
 
 def save_report(report: PoseReport, path: Path) -> Path:
@@ -95,7 +103,9 @@ def _save_pdf(report: PoseReport, path: Path) -> None:
 def _bone_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
     view = window.grid.scene_view
     camera, before, found = view.scene.camera, view.scene.camera.state(), {}
-    found["As in the window"] = _png(picture(window, "3d", _PICTURE_SIZE))
+    camera.view_from(pose.side.value)
+    view.scene.fit()
+    found[f"From the {pose.side.word}"] = _png(picture(window, "3d", _PICTURE_SIZE))
     for caption, placement in _LOOKS.items():
         place_camera(camera, placement(pose))
         found[caption] = _png(picture(window, "3d", _PICTURE_SIZE))
