@@ -114,8 +114,47 @@ def test_what_is_drawn_can_be_chosen(desk):
 
 def test_nothing_is_exported_before_there_is_an_estimate(desk, animal, tmp_path):
     assert desk.pose.path is None
-    with pytest.raises(GpError, match="there is no estimate yet.*3 more touches"):
+    with pytest.raises(GpError, match=r"there is no estimate yet.*3 more touches"):
         desk.pose.export(tmp_path / "pose.json")
     for code in PROBE:
         desk.pose.record(animal[code], TouchHow.TYPED)
     assert desk.pose.export(tmp_path / "pose.json").exists()
+
+
+def test_skull_features_stand_after_the_features_in_their_order(desk, animal):
+    assert desk.pose.names == ORDER
+    assert desk.pose.next_skull == "S1"
+    touching.mark_skull(desk.session, "S10", (1, 2, 3))
+    desk.pose.aim("S1")
+    desk.pose.record((4, 5, 6), TouchHow.TYPED)
+    touching.record_touch(desk.session, "L", "S2", (7, 8, 9))
+    assert desk.pose.names == (*ORDER, "S1", "S2", "S10")
+    assert desk.pose.next_skull == "S3"
+
+
+def test_a_touch_is_shown_where_it_lies_in_the_scan(desk, animal):
+    shown = []
+    desk.point_shown.connect(shown.append)
+    desk.pose.record(animal["CL"], TouchHow.SCAN, name="CL")
+    desk.pose.show("CL")
+    np.testing.assert_allclose(shown[-1], animal["CL"])
+    touching.clear_touches(desk.session, "L")
+    desk.pose.record(animal["CL"], TouchHow.TYPED, name="CL")
+    desk.pose.show("CL")
+    desk.pose.show("MN")
+    assert len(shown) == 1, "a tracker's position is nowhere in the scan before it is registered"
+
+
+def test_touches_of_the_wrong_side_change_sides(desk, animal):
+    for code in PROBE:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    desk.pose.choose(side=Side.RIGHT)
+    desk.pose.record(animal["MN"], TouchHow.TYPED, name="MN")
+    with pytest.raises(GpError, match="left side was touched too"):
+        desk.pose.change_side()
+    desk.session.undo()
+    desk.pose.choose(side=Side.LEFT)
+    desk.pose.change_side()
+    assert desk.pose.side is Side.RIGHT
+    assert {side for side, _ in desk.session.state.touches} == {Side.RIGHT}
+    assert len(desk.session.state.touches) == 6

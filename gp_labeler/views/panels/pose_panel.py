@@ -6,7 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from PySide6.QtCore import QSize, Qt, Signal
-from PySide6.QtGui import QAction, QDragEnterEvent, QDropEvent, QHideEvent, QResizeEvent, QShowEvent
+from PySide6.QtGui import (
+    QAction,
+    QDragEnterEvent,
+    QDragLeaveEvent,
+    QDropEvent,
+    QHideEvent,
+    QResizeEvent,
+    QShowEvent,
+)
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from gp_labeler.views.bind import follow
@@ -173,9 +181,15 @@ class PosePanel(QWidget):
         path = dropped_path(event)
         if path is not None and holds_touches(path):
             event.acceptProposedAction()
+            self.touches.offer(path)
+
+    def dragLeaveEvent(self, event: QDragLeaveEvent) -> None:  # noqa: D102, N802 - Qt's name
+        self.touches.offer(None)
+        super().dragLeaveEvent(event)
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802 - Qt's name
         path = dropped_path(event)
+        self.touches.offer(None)
         if path is not None:
             event.acceptProposedAction()
             self.take_file(path)

@@ -83,14 +83,14 @@ class ResultCard(Card):
         self.other_side.setVisible(wrong)
         self.other_side.setText(f"They are of the {desk.side.other.word} side")
         self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
-        self._show_gain()
+        self._show_gain(wanted=not wrong)
 
     def set_large(self, large: bool) -> None:
         """Show the estimate in large type, where there is room."""
         self.one.set_large(large)
 
-    def _show_gain(self) -> None:
-        gains = self._desk.pose.gains()
+    def _show_gain(self, *, wanted: bool) -> None:
+        gains = self._desk.pose.gains() if wanted else ()
         self.next.setVisible(bool(gains))
         if gains:
             self.next.setText(gain_text(gains[0]))

@@ -27,7 +27,7 @@ _HINTS = {
     "skull": "By the skull's registration features, S1 and so on",
 }
 _FOUND = {
-    "features": "by features touched and labelled",
+    "features": "by labelled features",
     "skull": "by skull features",
     "placed": "placed on the scan itself",
     "known": "known from elsewhere",
@@ -50,6 +50,7 @@ class InScanCard(Card):
         self._desk = workbench
         self.way = Segments(_WAYS, _HINTS)
         self.facts = {name: numbers() for name in ("Laid in", "CO", "FRE", "TRE at CO", "From the labels")}
+        self.facts["From the labels"].setStyleSheet("font-size: 13px; font-weight: 600")
         self.notices, self.waiting = Notices(), text_label("", "hint", wrap=True)
         self.skull = text_label("", "hint", wrap=True)
         self.file = link("Load…", "Where the skull features are on the scan: a landmark file that names them")
@@ -145,7 +146,7 @@ def _facts(estimate: Estimate | None) -> dict[str, str]:
     if placed is not None and fiducials is not None:
         bound = float(fiducials.tre_95_mm(placed.origin[None])[0])
         tre = f"{fine_mm(registered.tre_mm(placed.origin))}  (95 %: {fine_mm(bound)})"
-    n = "" if fiducials is None else f", {len(fiducials.fiducials)} of {len(fiducials.names)} points"
+    n = "" if fiducials is None else f", {len(fiducials.fiducials)} of {len(fiducials.names)}"
     return {
         "Laid in": _FOUND[registered.way] + n,
         "CO": NONE,

@@ -11,7 +11,7 @@ from PySide6.QtWidgets import QHBoxLayout, QMenu, QSizePolicy, QToolButton, QWid
 from gp_core.errors import GpError
 from gp_labeler.session import touching
 from gp_labeler.session.touches import Touch
-from gp_labeler.views.bind import blocked, follow
+from gp_labeler.views.bind import blocked, follow, set_role
 from gp_labeler.views.panels.parts import Card, ElidedLabel
 from gp_labeler.views.panels.pose_model import TouchModel
 from gp_labeler.views.panels.pose_parts import Notices, link
@@ -82,6 +82,14 @@ class TouchesCard(Card):
             plain = str(error).removesuffix(error.remedy or "").rstrip()
             notices = [("error", _short_path(plain, error.file), error.remedy or "")]
         self.notices.show_notices(notices)
+
+    def offer(self, path: Path | None) -> None:
+        """Say that a file that is dragged over the panel would be taken; None: it went away."""
+        set_role(self.change, "hint" if path is None else "good")
+        if path is None:
+            self._show_change()
+        else:
+            self.change.set_words(f"Let go to take the touches of {path.name}")
 
     def take_file(self, path: Path) -> bool:
         """Take the touches of a file; return whether it could be read."""

@@ -101,6 +101,8 @@ def drop(widget, path: Path) -> None:
     entering = QDragEnterEvent(where.toPoint(), action, data, CLICK, none)
     QApplication.sendEvent(widget, entering)
     assert entering.isAccepted()
+    if isinstance(widget, PosePanel):
+        assert path.name in widget.touches.change.toolTip()
     QApplication.sendEvent(widget, QDropEvent(where, action, data, CLICK, none))
 
 
@@ -392,7 +394,7 @@ def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
     mm, deg = estimate.errors()
     assert facts["From the labels"].text() == f"CO {mm:.2f} mm, axis {deg:.1f}°"
     assert facts["FRE"].text() == f"{estimate.registered.fre_mm:.2f} mm"
-    assert "6 of 6 points" in facts["Laid in"].text()
+    assert facts["Laid in"].text() == "by labelled features, 6 of 6"
     qtbot.mouseClick(panel.in_scan.way.buttons["skull"], CLICK)
     assert desk.pose.estimate.registered is None
     assert "at least 3 points" in " ".join(panel.in_scan.notices.shown[0])

@@ -1,0 +1,41 @@
+"""One plain word for how far a pose can be trusted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from gp_core import PROBE, Atlas, estimate_pose
+from gp_core.atlas.draw import draw_animal
+from gp_labeler.session.confidence import confidence, is_other_side
+
+ATLAS = Atlas.published()
+ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L").as_mapping(PROBE)
+
+
+def test_six_touches_that_agree_are_good():
+    found = confidence(estimate_pose(ANIMAL, "L", ATLAS))
+    assert (found.level, found.word) == ("good", "Good")
+
+
+def test_a_wrong_side_and_swapped_names_are_not_to_be_used():
+    wrong = estimate_pose(ANIMAL, "R", ATLAS)
+    swapped = estimate_pose({**ANIMAL, "MN": ANIMAL["OS"], "OS": ANIMAL["MN"]}, "L", ATLAS)
+    assert (confidence(wrong).level, confidence(swapped).level) == ("danger", "danger")
+    assert is_other_side(wrong)
+    assert not is_other_side(swapped)
+
+
+def test_few_touches_and_a_mistouch_ask_for_a_second_look():
+    few = estimate_pose({code: ANIMAL[code] for code in ("CL", "MN", "OS")}, "L", ATLAS)
+    off = estimate_pose({**ANIMAL, "MN": ANIMAL["MN"] + [3, 0, 0]}, "L", ATLAS)
+    assert confidence(few).word == confidence(off).word == "Look twice"
+    assert confidence(few).level == "warning"
+
+
+@pytest.mark.parametrize(("scale", "word"), [(1, "Good"), (4, "Fair"), (16, "Poor")])
+def test_a_large_region_is_said_to_be_one(scale, word):
+    pose = estimate_pose(ANIMAL, "L", ATLAS)
+    assert confidence(replace(pose, covariance=scale * pose.covariance)).word == word
