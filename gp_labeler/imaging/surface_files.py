@@ -14,7 +14,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 from gp_core.errors import FileFormatError, GpError
 
-__all__ = ["write_mesh"]
+__all__ = ["check_mesh_name", "write_mesh"]
 
 _SPACE = "SPACE=LPS"
 
@@ -50,6 +50,14 @@ def _vtp(mesh: vtkPolyData) -> Any:
 _WRITERS = {".ply": _ply, ".stl": _stl, ".vtp": _vtp}
 
 
+def check_mesh_name(path: Path) -> None:
+    """Raise `FileFormatError` unless a file's name ends as a mesh that can be written."""
+    if path.suffix.lower() not in _WRITERS:
+        raise FileFormatError(
+            f"meshes are written as {', '.join(_WRITERS)}, got {path.suffix or 'no suffix'!r}", file=path
+        )
+
+
 def write_mesh(mesh: vtkPolyData, path: Path) -> None:
     """Write a mesh whole or not at all.
 
@@ -65,15 +73,11 @@ def write_mesh(mesh: vtkPolyData, path: Path) -> None:
     GpError
         Another suffix, or the file cannot be written.
     """
-    make = _WRITERS.get(path.suffix.lower())
-    if make is None:
-        raise FileFormatError(
-            f"meshes are written as {', '.join(_WRITERS)}, got {path.suffix or 'no suffix'!r}", file=path
-        )
+    check_mesh_name(path)
     try:
         with tempfile.TemporaryDirectory(dir=path.parent, prefix=".mesh-") as folder:
             part = Path(folder, f"mesh{path.suffix.lower()}")
-            writer = make(mesh)
+            writer = _WRITERS[path.suffix.lower()](mesh)
             writer.SetFileName(str(part))
             if not writer.Write() or not part.is_file():
                 raise OSError("VTK could not write it")

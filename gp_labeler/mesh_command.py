@@ -1,0 +1,134 @@
+"""The command ``gp-labeler mesh``: the bone surface of a scan, without a window."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from gp_core.errors import GpError
+
+__all__ = ["make_mesh_parser", "run_mesh"]
+
+_EXAMPLE = """examples:
+  gp-labeler mesh head.nrrd -o head.ply
+  gp-labeler mesh slices_tif/ -o head.stl --spacing 0.035 --reverse
+  gp-labeler mesh dicom/ -o head.vtp --series bone --accept gap --threshold 1200
+
+Where a scan does not say all that is needed, the error names the option that settles it.
+"""
+
+
+def make_mesh_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``gp-labeler mesh``."""
+    parser = argparse.ArgumentParser(
+        prog="gp-labeler mesh",
+        description="Write the bone surface of a scan, LPS mm.",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("volume", type=Path, metavar="VOLUME", help="file, or folder of slices")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MESH", help=".ply, .stl or .vtp")
+    _add_surface(parser.add_argument_group("the surface"))
+    _add_import(parser.add_argument_group("how the scan is read"))
+    return parser
+
+
+def _add_surface(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--threshold", type=float, metavar="T", help="grey value where bone begins; by default proposed"
+    )
+    group.add_argument(
+        "--smallest", type=float, metavar="MM", help="leave out parts smaller than this across, by default 1"
+    )
+    group.add_argument("--largest", type=int, metavar="N", help="keep only so many parts, the largest")
+
+
+def _add_import(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--spacing", type=float, nargs="+", metavar="MM", help="voxel size: one number, or x y z"
+    )
+    group.add_argument(
+        "--series", metavar="NAME", help="which series or stack of a folder: its name, or part of it"
+    )
+    group.add_argument(
+        "--channel", type=int, metavar="N", help="which colour channel, from 0; else luminance"
+    )
+    group.add_argument(
+        "--reverse", action="store_true", help="the slices run the other way; mirrors the head"
+    )
+    group.add_argument(
+        "--accept",
+        action="append",
+        default=[],
+        metavar="CODE",
+        help="go on in spite of a problem, such as gap; may be given several times",
+    )
+    group.add_argument(
+        "--stride", type=int, default=1, metavar="N", help="read every N-th voxel along each axis"
+    )
+    group.add_argument(
+        "--region",
+        type=int,
+        nargs=6,
+        metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
+        help="read these voxels only",
+    )
+
+
+def run_mesh(arguments: Sequence[str]) -> int:
+    """Read, mesh, write, and say what was written.
+
+    Raises
+    ------
+    GpError
+        The scan cannot be read like this, has no surface at this threshold, or the file cannot be written.
+    """
+    args = make_mesh_parser().parse_args(arguments)
+    options = _import_options(args)
+    surface_options = {
+        name: value
+        for name, value in (("smallest_mm", args.smallest), ("largest", args.largest))
+        if value is not None
+    }
+    _check_surface(args)
+    from gp_labeler.imaging.readers import read_volume  # here: `--help` need not wait for VTK
+    from gp_labeler.imaging.surface import extract_isosurface
+    from gp_labeler.imaging.surface_files import check_mesh_name
+    from gp_labeler.imaging.threshold import propose_threshold
+
+    check_mesh_name(args.output)
+    volume = read_volume(args.volume, **options)
+    threshold = propose_threshold(volume) if args.threshold is None else args.threshold
+    surface = extract_isosurface(volume, threshold, **surface_options)
+    surface.save(args.output)
+    for note in volume.notes:
+        sys.stderr.write(f"gp-labeler: {volume.name}: {note}\n")
+    sys.stdout.write(
+        f"{args.output}: {surface.n_triangles} triangles, threshold {threshold:g}, {volume.name} "
+        f"({' x '.join(f'{s:g}' for s in volume.spacing)} mm)\n"
+    )
+    return 0
+
+
+def _import_options(args: argparse.Namespace) -> dict[str, Any]:
+    options: dict[str, Any] = {"accept": args.accept, "reverse": args.reverse, "stride": args.stride}
+    if args.spacing is not None:
+        if len(args.spacing) not in (1, 3):
+            raise GpError(f"--spacing must be one number or three, got {len(args.spacing)}")
+        options["spacing"] = args.spacing[0] if len(args.spacing) == 1 else args.spacing
+    if args.region is not None:
+        options["region"] = [args.region[0:2], args.region[2:4], args.region[4:6]]
+    for name in ("series", "channel"):
+        if getattr(args, name) is not None:
+            options[name] = getattr(args, name)
+    return options
+
+
+def _check_surface(args: argparse.Namespace) -> None:
+    if args.smallest is not None and not args.smallest >= 0:
+        raise GpError(f"--smallest must be a length in mm from 0, got {args.smallest:g}")
+    if args.largest is not None and args.largest < 1:
+        raise GpError(f"--largest must be a whole number from 1, got {args.largest}")
