@@ -20,6 +20,7 @@ _EXAMPLE = """examples:
   gp-labeler --demo                   the window with a synthetic head
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
+  gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
 """
 
 
@@ -58,6 +59,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         if given[:1] == ["mesh"]:
             return run_mesh(given[1:])
+        if given[:1] == ["simulate-tracker"]:
+            from gp_labeler.tracker.simulator import main as simulate  # here: nothing else needs a server
+
+            return simulate(given[1:], prog="gp-labeler simulate-tracker")
         return _window(make_parser().parse_args(given))
     except GpError as error:
         sys.stderr.write(f"gp-labeler: {error}\n")

@@ -98,3 +98,10 @@ def test_the_window_opens_from_the_command_line_and_says_what_is_wrong(ball_file
     assert "Traceback" not in done.stderr
     assert (tmp_path / "state" / "window.json").exists()
     assert (tmp_path / "state" / "recent.json").read_text().count("ball.nrrd") == 1
+
+
+def test_a_simulated_tracker_is_one_command_away(capsys) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate-tracker", "--help"])
+    assert ended.value.code == 0
+    assert "gp-labeler simulate-tracker" in capsys.readouterr().out
