@@ -47,6 +47,8 @@ class DeskSignals:
     stepped = Signal(str)
     exported = Signal(object)
     """The `ExportReport` of landmark files that were written."""
+    wrote = Signal(str, object)
+    """What of an estimate was written, ``pose`` or ``report``, and its file."""
     pictured = Signal(object)
     """The file of a picture of the window."""
     view_changed = Signal(frozenset)

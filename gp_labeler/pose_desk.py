@@ -227,6 +227,7 @@ class PoseDesk:
         """Write the pose in the format that the file's name asks for; see `pose_exports.save_pose`."""
         file = save_pose(self._pose(), path)
         self._desk.say(f"Wrote {file.name}")
+        self._desk.wrote.emit("pose", file)
         return file
 
     def carry(self, path: InsertionPath | None) -> None:

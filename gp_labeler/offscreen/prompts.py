@@ -13,12 +13,15 @@ class ScriptPrompts:
 
     def __init__(self) -> None:
         self.files: list[Path] = []
+        self.saves: list[Path] = []
         self.answers: tuple[str, ...] = ()
         self.unanswered: list[str] = []
 
-    def prepare(self, files: Sequence[Path] = (), answers: Sequence[str] = ()) -> None:
+    def prepare(
+        self, files: Sequence[Path] = (), answers: Sequence[str] = (), saves: Sequence[Path] = ()
+    ) -> None:
         """Take the answers that the next step gives, and forget those of the last."""
-        self.files, self.answers = list(files), tuple(answers)
+        self.files, self.answers, self.saves = list(files), tuple(answers), list(saves)
         self.unanswered = []
 
     def choose(
@@ -46,8 +49,10 @@ class ScriptPrompts:
         return next(iter(self.open_files(title, folder, "")), None)
 
     def save_file(self, title: str, suggestion: str, filters: str) -> Path | None:
-        """Return the file of the step."""
-        return next(iter(self.open_files(title, suggestion, filters)), None)
+        """Return the file of the step, to be written."""
+        if not self.saves:
+            self.unanswered.append(title)
+        return next(iter(self.saves), None)
 
     def item(self, title: str, text: str, items: Sequence[str]) -> str:
         """Return the item that the step names."""

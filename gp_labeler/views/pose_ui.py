@@ -78,6 +78,7 @@ class PoseUi:
         if path is not None:
             self._remember_folder(path)
             self._desk.say(f"Wrote {save_report(report, path).name}")
+            self._desk.wrote.emit("report", path)
 
     def ask_path(self) -> None:
         """Ask for an insertion path with its units and side, and carry it to the estimate."""

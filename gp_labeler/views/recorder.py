@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject
 
 from gp_core.landmarks.files import write_text
+from gp_labeler.atlas_work import FitAtlas, ReadAtlas
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import PARTS
@@ -26,7 +27,7 @@ from gp_labeler.session.state import SpecimenState
 from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.recorded_edits import Table, step, steps_of
-from gp_labeler.work import SaveMesh
+from gp_labeler.work import LoadAtlas, SaveMesh
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -35,7 +36,10 @@ __all__ = ["LOOKS", "Recorder", "script_text"]
 
 _PHANTOM = "phantom-"
 
-LOOKS = ("view.reset", "view.projection", "view.from_", "pose.along_axis", "pose.through_window")
+LOOKS = (
+    *("view.reset", "view.projection", "view.from_", "view.cut_", "view.slices_visible"),
+    *("pose.along_axis", "pose.through_window"),
+)
 """Commands, or beginnings of their names, that change only what is seen: taken down as they are."""
 
 _VIEW_KEYS = {
@@ -79,6 +83,7 @@ class Recorder(QObject):
             (desk.saved, self._on_saved),
             (desk.exported, self._on_exported),
             (desk.pictured, self._on_pictured),
+            (desk.wrote, self._on_wrote),
             (desk.jobs.done, self._on_job),
             (desk.view_changed, self._on_view_changed),
             (desk.tool_changed, self._on_tool),
@@ -108,12 +113,15 @@ class Recorder(QObject):
         """Write how to come to where the specimen stands now."""
         desk = self._window.workbench
         self._replayed = History(desk.session.state)
-        if desk.volume is None:
+        state, volume = desk.session.state, desk.volume
+        fresh = SpecimenState() if volume is None else SpecimenState(tidy_name(volume.name))
+        is_fresh = replace(state, volume=None, import_choices={}) == fresh
+        if volume is None and is_fresh and not self.tables:
             return
-        table = step("open", **_scan(desk.volume), discard=bool(self.tables))
-        state = desk.session.state
-        if replace(state, volume=None, import_choices={}) != SpecimenState(tidy_name(desk.volume.name)):
-            self._starts.append((table, state))  # what is labelled already goes into a file
+        scan = {"empty": True} if volume is None else _scan(volume)
+        table = step("open", **scan, discard=bool(self.tables))
+        if not is_fresh:
+            self._starts.append((table, state))  # what is done already goes into a file
         self.tables.append(table)
         self._show_as_here()
 
@@ -140,20 +148,20 @@ class Recorder(QObject):
             return
         self._replayed.push(edit.text, now, merge=merge)
         if isinstance(edit, RecordPoseCheck):
-            self.tables += self._estimated()
+            self.tables += self._estimated([])
         if merge and self.tables and _is_continued(self.tables[-1], tables[0]):
             self.tables[-1] |= {key: value for key, value in tables[0].items() if key in ("at", "notes")}
         else:
             self.tables += tables
 
-    def _estimated(self) -> list[Table]:
-        """Return the steps that lead to the estimate that is judged, as it was set up here."""
+    def _estimated(self, files: list[str]) -> list[Table]:
+        """Return the steps that lead to the estimate as it is set up here, and write it into files."""
         pose = self._window.workbench.pose
         settings, side = pose.estimating.settings, pose.side.value
         how = step("estimate", side=side, method=list(settings.methods), probe_noise=settings.probe_noise)
         is_fitted = pose.estimate is not None and pose.estimate.registered is not None
         register = [step("register", side=side, by=settings.registration)] if is_fitted else []
-        return [*register, {**how, "path": []}]
+        return [*register, {**how, "path": files}]
 
     def _on_stepped(self, kind: str) -> None:
         now, replayed = _untimed(self._window.workbench.session.state), self._replayed
@@ -167,7 +175,9 @@ class Recorder(QObject):
         self.tables.append(step("undo") if kind == "undo" else step("action", id="edit.redo"))
 
     def _on_command(self, id: str) -> None:
-        if id.startswith(LOOKS):
+        if id == "file.new":
+            self._begin()
+        elif id.startswith(LOOKS):
             self.tables.append(step("action", id=id))
         elif id == "view.zoom_to_point":
             active = self._window.workbench.session.active
@@ -220,7 +230,20 @@ class Recorder(QObject):
     def _on_pictured(self, file: Path) -> None:
         self.tables.append(step("screenshot", path=file.name))
 
+    def _on_wrote(self, what: str, file: Path) -> None:
+        self.tables += self._estimated([file.name] if what == "pose" else [])
+        if what == "report":
+            side = self._window.workbench.pose.side.value
+            self.tables.append(step("report", side=side, path=file.name))
+
     def _on_job(self, task: Task[Any]) -> None:
+        if isinstance(task.job, ReadAtlas):
+            self.tables.append(step("atlas", path=str(task.job.path.absolute())))
+        elif isinstance(task.job, FitAtlas):
+            files = [str(path.absolute()) for path in task.job.paths]
+            self.tables.append(step("atlas", specimens=files))
+        elif isinstance(task.job, LoadAtlas):
+            self.tables.append(step("atlas", path="published"))
         if isinstance(task.job, SaveMesh):
             self.tables.append(step("mesh", save=Path(task.job.path).name))
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from gp_labeler.offscreen.step import Step
-from gp_labeler.offscreen.steps.atlas import Check, Fit
+from gp_labeler.offscreen.steps.atlas import Check, Fit, UseAtlas
 from gp_labeler.offscreen.steps.expecting import Expect
 from gp_labeler.offscreen.steps.files import Details, Export, Import, Save
 from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
@@ -19,7 +19,7 @@ __all__ = ["STEPS"]
 
 _ALL: tuple[type[Step], ...] = (
     *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Put, Drag, Key, Act, Undo),
-    *(Details, Import, Export, Fit, Touches, Skull, Register, Estimate, Overlay, Verdict, Report),
+    *(Details, Import, Export, Fit, UseAtlas, Touches, Skull, Register, Estimate, Overlay, Verdict, Report),
     *(Check, Screenshot, Save, Expect),
 )
 

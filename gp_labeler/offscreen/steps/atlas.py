@@ -14,7 +14,7 @@ from gp_core.landmarks.files import write_text
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 
-__all__ = ["Check", "Fit"]
+__all__ = ["Check", "Fit", "UseAtlas"]
 
 _HARMLESS = ("missing", "unseen")
 
@@ -43,6 +43,36 @@ class Fit(Step):
 
 
 @dataclass(frozen=True)
+class UseAtlas(Step):
+    """Take another atlas: for where features are expected, for doubts and for poses.
+
+    Parameters
+    ----------
+    path : str, optional
+        An atlas file, or ``published``.
+    specimens : text or texts
+        Instead: labelled animals, files or folders of them, to fit one to.
+    """
+
+    do: ClassVar[str] = "atlas"
+    path: str | None = None
+    specimens: tuple[str, ...] = ()
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        desk = rig.desk
+        if (self.path is None) == (not self.specimens):
+            raise GpError("atlas needs path or specimens, one of them")
+        if self.specimens:
+            desk.fit_atlas([rig.to_read(each) for each in self.specimens])
+        elif self.path == "published":
+            desk.use_published_atlas()
+        else:
+            desk.open_atlas(rig.to_read(self.path or ""))
+        rig.settle()
+        return f"{len(desk.atlas_specimens)} animals" if desk.atlas_specimens else self.path or ""
+
+
+@dataclass(frozen=True)
 class Check(Step):
     """Report labels that are missing, doubtful or exchanged.
 
@@ -61,7 +91,7 @@ class Check(Step):
     def run(self, rig: Rig) -> str:  # noqa: D102
         state = rig.desk.session.state
         sides = {side: state.side(side) for side in Side if state.side(side).placed}
-        findings = check_specimen(Specimen(state.specimen, sides), Atlas.published())
+        findings = check_specimen(Specimen(state.specimen, sides), rig.desk.atlas or Atlas.published())
         doubtful = [finding for finding in findings if finding.kind not in _HARMLESS]
         if self.path is not None:
             file, rows = rig.to_write(self.path), [_row(finding) for finding in findings]

@@ -240,7 +240,8 @@ class Act(Step):
     answers : text or texts
         What to answer where it asks for one of several, such as ``RWP`` for ``edit.swap``.
     files : text or texts
-        What to answer where it asks for files or a folder, relative to the script.
+        What to answer where it asks for files or a folder; those to read are relative to the script, those to
+        write to the output folder.
     """
 
     do: ClassVar[str] = "action"
@@ -252,11 +253,13 @@ class Act(Step):
     def run(self, rig: Rig) -> None:  # noqa: D102
         if not action(self.id).enabled(rig.desk):
             raise GpError(f"{self.id} cannot be done now: {rig.desk.session.click_text}")
-        rig.prompts.prepare([rig.to_read(file) for file in self.files], self.answers)
+        saves = [rig.to_write(file) for file in self.files]
+        rig.prompts.prepare([rig.to_read(file) for file in self.files], self.answers, saves)
         since = len(rig.messages)
         if not rig.window.commands.run(self.id):
             raise GpError(" ".join(rig.warnings(since)) or f"{self.id} was not done")
         rig.settle()
+        rig.wrote(*(file for file in saves if file.is_file()))
 
 
 @dataclass(frozen=True)

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from PySide6.QtCore import QBuffer, QIODevice
 
 from gp_core import PROBE, Atlas, CochleaPose, fit_atlas, load_specimens
 from gp_core.checks import FloatArray
@@ -15,16 +13,13 @@ from gp_core.errors import GpError
 from gp_core.frames import angle_between_deg
 from gp_core.landmarks.anatomy import modiolar_axis
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import write_text
 from gp_labeler.offscreen.events import leave
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 from gp_labeler.offscreen.steps.touching import Points, Touches, current_estimate
 from gp_labeler.scene.pose_data import PARTS
 from gp_labeler.session.estimate import Estimate as SideEstimate
-from gp_labeler.session.pose_report import PoseReport
-from gp_labeler.views.pictures import PICTURES, picture
-from gp_labeler.views.pose_display import PoseDisplay
+from gp_labeler.views.report_file import report_of, save_report
 
 __all__ = ["Estimate", "Estimated", "Overlay", "Report", "Verdict"]
 
@@ -184,9 +179,6 @@ class Overlay(Step):
         desk, options = rig.desk, self._options()
         if self.visible:
             self._find(rig)
-        grid = rig.window.grid
-        if rig.window.findChild(PoseDisplay) is None:
-            PoseDisplay(desk, grid)
         desk.pose.draw(visible=self.visible, **options)
         rig.app.processEvents()
 
@@ -248,37 +240,20 @@ class Report(Step):
     side : L or R
         Side of the head.
     path : str
-        An HTML file.
-    pictures : text or texts
-        What it shows, of those that ``screenshot`` writes.
+        The file, .html or .pdf.
     """
 
     do: ClassVar[str] = "report"
     says: ClassVar[tuple[str, ...]] = ("side",)
     side: Side
     path: str = "pose.html"
-    pictures: tuple[str, ...] = ("3d", "axial", "sagittal", "coronal")
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        for what in self.pictures:
-            if what not in PICTURES:
-                raise GpError(f"pictures must be of {', '.join(PICTURES)}, got {what!r}")
-        estimate, session = current_estimate(rig, self.side), rig.desk.session
+        current_estimate(rig, self.side)
         for view in rig.window.grid.views:
             leave(view)
-        shown = {_CAPTIONS.get(what, what): _png(rig, what) for what in self.pictures}
-        page = PoseReport(session.state, estimate, shown, session.now())
-        file = rig.to_write(self.path)
-        write_text(file, page.html())
+        pose, was_drawn = rig.desk.pose, rig.desk.pose.overlay.visible
+        pose.draw(visible=True)  # its pictures show it
+        file = save_report(report_of(rig.window), rig.to_write(self.path))
+        pose.draw(visible=was_drawn)
         return rig.wrote(file)
-
-
-_CAPTIONS: Mapping[str, str] = {"3d": "3D", "axial": "Axial", "sagittal": "Sagittal", "coronal": "Coronal"}
-_PICTURE_SIZE = (640, 480)
-
-
-def _png(rig: Rig, what: str) -> bytes:
-    buffer = QBuffer()
-    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    picture(rig.window, what, _PICTURE_SIZE).save(buffer, "PNG")  # type: ignore[call-overload]  # stubs know bytes only
-    return bytes(buffer.data().data())

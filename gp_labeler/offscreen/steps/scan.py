@@ -26,6 +26,8 @@ class Open(Step):
         The file or folder.
     phantom : int, optional
         Seed of the phantom to open instead.
+    empty : bool
+        Begin a specimen without a scan instead, such as one that is only touched.
     spacing : float or three, optional
         Voxel size, mm: of the scan where its file does not say, or of the phantom.
     series : str, optional
@@ -50,6 +52,7 @@ class Open(Step):
     says: ClassVar[tuple[str, ...]] = ("path", "phantom")
     path: str | None = None
     phantom: int | None = None
+    empty: bool = False
     spacing: float | Triple | None = None
     series: str | None = None
     channel: int | None = None
@@ -61,14 +64,16 @@ class Open(Step):
     discard: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        if (self.path is None) == (self.phantom is None):
-            raise GpError("open needs a path or phantom = a seed, one of them")
+        if [self.path is not None, self.phantom is not None, self.empty].count(True) != 1:
+            raise GpError("open needs a path, phantom = a seed, or empty = true: one of them")
         if rig.desk.session.dirty and not self.discard:
             raise GpError(
                 "what is open has edits that are not saved",
                 remedy="Let a save step come first, or give discard = true.",
             )
         rig.desk.abandon()
+        if self.empty:
+            return self._begin(rig)
         if self.phantom is not None:
             rig.desk.open_demo(self.phantom, self.spacing if isinstance(self.spacing, float) else 0.2)
         else:
@@ -80,6 +85,14 @@ class Open(Step):
         if self.labels is not None:
             _take_labels(rig, rig.to_read(self.labels))
         return f"{volume.name}, {' x '.join(str(n) for n in volume.size)} voxels"
+
+    def _begin(self, rig: Rig) -> str:
+        if self.labels is None:
+            rig.desk.begin()
+        else:
+            rig.desk.open_specimen(rig.to_read(self.labels))
+        rig.settle()
+        return f"{rig.desk.session.state.specimen}, without a scan"
 
     def _open(self, rig: Rig, path: Path) -> None:
         if not path.exists():

@@ -76,10 +76,11 @@ def test_a_skull_registers_what_its_features_say(tmp_path, labels) -> None:
         {"do": "estimate", "side": "L"},
         {"do": "verdict", "side": "L", "verdict": "accept", "by": "AB", "note": "fits"},
         {"do": "report", "side": "L"},
+        {"do": "report", "side": "L", "path": "pose.pdf"},
         {"do": "save", "path": "a.gpspecimen.json"},
         {"do": "register", "side": "L", "by": "features", "within": 0.001},
     )
-    assert report.error.startswith("step 10: register left: fiducial registration error")
+    assert report.error.startswith("step 11: register left: fiducial registration error")
     registration = content(tmp_path / "out" / "registration.json")
     assert 0.05 < registration["fre_mm"] < 2.5 * noise
     off = np.array(registration["transform"])[:3, :3] - T_TRACKER_SCAN.inverse().rotation
@@ -93,7 +94,8 @@ def test_a_skull_registers_what_its_features_say(tmp_path, labels) -> None:
     assert set(saved["touches"]["L"]) == {*PROBE, *SKULL}
     page = (tmp_path / "out" / "pose.html").read_text()
     assert "Accepted" in page
-    assert page.count("data:image/png") == 4
+    assert page.count("data:image/png") >= 4
+    assert (tmp_path / "out" / "pose.pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_touch_is_left_out_taken_in_and_forgotten(tmp_path, labels) -> None:

@@ -120,7 +120,7 @@ def test_a_failing_step_stops_and_keeps_what_was_done(tmp_path) -> None:
 
 IMPOSSIBLE = (
     ({"do": "open", "path": "none.nrrd"}, "does not exist"),
-    ({"do": "open"}, "a path or phantom"),
+    ({"do": "open"}, "a path, phantom"),
     ({"do": "place", "feature": "CO", "side": "L", "at": [0, 0, 0]}, "CO left cannot be chosen"),
     ({"do": "place", "feature": "XX", "side": "L", "at": [0, 0, 0]}, "unknown feature"),
     ({"do": "place", "feature": "CA", "side": "L", "at": "truth"}, "known of a phantom only"),
@@ -151,7 +151,9 @@ IMPOSSIBLE = (
     ({"do": "skull", "points": "none.csv"}, "none.csv"),
     ({"do": "register", "side": "R"}, "3 more touches"),
     ({"do": "verdict", "side": "R", "verdict": "accept"}, "3 more touches"),
-    ({"do": "report", "side": "R", "pictures": "moon"}, "pictures must be of"),
+    ({"do": "report", "side": "R"}, "3 more touches"),
+    ({"do": "atlas"}, "path or specimens"),
+    ({"do": "atlas", "path": "none.json"}, "none.json"),
     ({"do": "put", "feature": "CA", "side": "L", "at": [0, 0, 0], "how": "by eye"}, "how must be one of"),
     ({"do": "put", "feature": "CO", "side": "L", "at": [0, 0, 0]}, "CO left cannot be chosen"),
     ({"do": "specimen"}, "needs name or notes"),

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from dataclasses import fields
+from pathlib import Path
 
 import pytest
 
@@ -114,10 +116,16 @@ def test_the_demo_labels_everything_and_uses_every_kind_of_file() -> None:
     assert {"export", "check", "save", "estimate", "overlay", "screenshot"} <= set(does)
 
 
+def test_the_manual_has_every_step_and_key() -> None:
+    lines = (Path(__file__).resolve().parents[3] / "docs" / "offscreen.md").read_text().splitlines()
+    rows = {line.split("`")[1]: line.split(" | ")[1] for line in lines if line.startswith("| `")}
+    assert rows.keys() == STEPS.keys()
+    for do, kind in STEPS.items():
+        assert [field.name for field in fields(kind) if f"`{field.name}`" not in rows[do]] == [], do
+
+
 @pytest.mark.parametrize("kind", STEPS.values(), ids=list(STEPS))
 def test_every_step_explains_its_keys(kind) -> None:
-    from dataclasses import fields
-
     manual = kind.__doc__ or ""
     assert "Parameters" in manual
     assert all(field.name in manual for field in fields(kind))
