@@ -18,6 +18,7 @@ from vtkmodules.vtkFiltersCore import vtkProbeFilter
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
+from gp_labeler.imaging.cutting import crossing, joined, part_outside
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_numpy, to_vtk, triangles_of, triple
 
 __all__ = ["Surface", "SurfaceHit"]
@@ -157,17 +158,21 @@ class Surface:
         return self._hit(nearest, int(triangle))
 
     def outside(self, region: FloatArray) -> Surface:
-        """Return the surface without the triangles inside a region of voxels, such as a finer surface's.
+        """Return the surface without what lies inside a region of voxels, such as a finer surface's.
+
+        Triangles that pass through the faces of the region are cut there: whole ones would stand into the
+        finer surface, or leave gaps beside it.
 
         Parameters
         ----------
         region : (2, 3) float array
             First and last voxel index.
         """
-        centres = self.points[self.triangles].mean(axis=1, dtype=np.float64)
-        index = centres @ self.T_voxel_scan[:3, :3].T + self.T_voxel_scan[:3, 3]
-        inside = ((index > region[0]) & (index < region[1])).all(axis=1)
-        return self.only(~inside)
+        index = self.points @ self.T_voxel_scan[:3, :3].T + self.T_voxel_scan[:3, 3]
+        within, through = crossing(index, self.triangles, region)
+        kept, cut = _subset(self.mesh, ~(within | through)), _subset(self.mesh, through)
+        mesh = joined(kept, part_outside(cut, self.T_voxel_scan, region)) if through.any() else kept
+        return Surface(mesh, self.level, self.T_voxel_scan, self.region, self.stride)
 
     def only(self, kept: NDArray[np.bool_]) -> Surface:
         """Return the surface of some of the triangles, (T,) bool, and of the points they use."""

@@ -172,6 +172,28 @@ def test_a_box_is_the_same_surface_cut_out(mouse: Volume) -> None:
     assert rest.n_triangles + fine.n_triangles == whole.n_triangles
 
 
+@pytest.mark.parametrize("name", DIRECTIONS)
+def test_an_overview_ends_at_the_face_of_a_box_without_teeth(name: str) -> None:
+    scan = ball(DIRECTIONS[name])
+    whole = extract_isosurface(scan, 0.0, stride=3, smallest_mm=0)
+    rest = whole.outside(np.array([[20.0, -9.0, -9.0], [99.0, 99.0, 99.0]]))
+    index = rest.points @ scan.T_voxel_scan[:3, :3].T + scan.T_voxel_scan[:3, 3]
+    assert index[:, 0].max() < 20.0 + 1e-3
+    a, b, c = (rest.points[rest.triangles[:, k]].astype(float) for k in range(3))
+    facing = np.cross(b - a, c - a)
+    zone = 2 * np.pi * RADIUS * (RADIUS + (20.0 - 17.5) * 0.3)
+    assert np.linalg.norm(facing, axis=1).sum() / 2 == pytest.approx(zone, rel=0.04)
+    assert (np.einsum("ij,ij->i", facing, (a + b + c) / 3 - CENTRE) > -1e-9).all()
+    _, number = np.unique(np.round(rest.points, 4), axis=0, return_inverse=True)
+    edges = np.sort(np.concatenate([number[rest.triangles[:, k]] for k in ([0, 1], [1, 2], [2, 0])]), axis=1)
+    edges, count = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+    place = np.zeros(number.max() + 1)
+    place[number] = index[:, 0]
+    np.testing.assert_allclose(place[edges[count == 1]], 20.0, atol=2e-3)
+    normals = to_numpy(rest.mesh.GetPointData().GetNormals())
+    assert (np.einsum("ij,ij->i", normals, rest.points - CENTRE) > 0).all()
+
+
 def test_an_overview_is_coarser_and_near(mouse: Volume) -> None:
     assert overview_stride(mouse) == 1
     assert overview_stride(mouse, 64**3) == 3
