@@ -236,9 +236,8 @@ class MakeDemo:
         load_modules("scipy.ndimage", "scipy.interpolate", "gp_labeler.imaging.phantom")
         from gp_labeler.imaging.phantom import make_phantom
 
-        progress(0.05)
-        phantom = make_phantom(self.seed, spacing=self.spacing)
-        progress(1.0)
+        told: Told = lambda fraction: progress(0.98 * fraction)  # noqa: E731
+        phantom = make_phantom(self.seed, spacing=self.spacing, progress=told, cancel=progress.cancelled)
         _ = phantom.volume.intensity_range, phantom.volume.checksum
         return Demo(phantom.volume, phantom.specimen)
 

@@ -38,7 +38,18 @@ class Report:
         Cancelled
             `cancel` says so.
         """
-        if self.cancel is not None and self.cancel():
-            raise Cancelled
+        self.check()
         if self.progress is not None:
             self.progress(min(max(fraction, 0.0), 1.0))
+
+    def check(self) -> None:
+        """Stop where that was asked for, and tell nothing; from any thread."""
+        if self.cancel is not None and self.cancel():
+            raise Cancelled
+
+    def part(self, start: float, end: float) -> Report:
+        """Return a report of a part of the work, which is itself told from 0 to 1."""
+        tell = self.progress
+        if tell is None:
+            return self
+        return Report(lambda fraction: tell(start + (end - start) * fraction), self.cancel)

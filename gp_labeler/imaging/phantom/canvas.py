@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.phantom.solids import Grid, Solid, Values
+from gp_labeler.imaging.progress import Report
 
 __all__ = ["Canvas"]
 
+_SILENT = Report()
 _WORKERS = 2
 _EDGE = 1.7
 """Voxels over which the edge of a solid rises; narrower ones leave terraces on slopes."""
@@ -32,10 +34,24 @@ class Canvas:
         Voxel size, mm.
     background : float
         Grey value of what nothing is painted on.
+    report : Report
+        Told how many of `n_solids` are painted, and asked whether to stop.
+    n_solids : int
+        About how many solids will be painted.
     """
 
-    def __init__(self, low: ArrayLike, high: ArrayLike, spacing: float, background: float) -> None:
+    def __init__(
+        self,
+        low: ArrayLike,
+        high: ArrayLike,
+        spacing: float,
+        background: float,
+        *,
+        report: Report = _SILENT,
+        n_solids: int = 1,
+    ) -> None:
         self.spacing = spacing
+        self._report, self._n_solids, self._painted = report, n_solids, 0
         self.origin = np.asarray(low, dtype=np.float64)
         size = np.ceil((np.asarray(high) - self.origin) / spacing).astype(int) + 1
         self.axes = [self.origin[a] + spacing * np.arange(size[a]) for a in range(3)]
@@ -43,6 +59,8 @@ class Canvas:
 
     def paint(self, solid: Solid, grey: float) -> None:
         """Paint a solid over what is there; its edge voxels are mixed by the share of each."""
+        self._report(self._painted / self._n_solids)
+        self._painted += 1
         with ThreadPoolExecutor(_WORKERS) as pool:
             list(pool.map(lambda block: self._paint_block(block, solid, grey), self._blocks(solid)))
 
@@ -60,6 +78,7 @@ class Canvas:
             yield slice(z, min(z + layers, z1)), slice(y0, y1), slice(x0, x1)
 
     def _paint_block(self, block: tuple[slice, slice, slice], solid: Solid, grey: float) -> None:
+        self._report.check()
         z, y, x = block
         around = slice(
             max(z.start - 1, 0), min(z.stop + 1, len(self.axes[2]))
@@ -74,7 +93,9 @@ class Canvas:
         xs, ys, zs = (axis[part].astype(np.float32) for axis, part in zip(self.axes, (x, y, z), strict=True))
         return xs[None, None, :], ys[None, :, None], zs[:, None, None]
 
-    def scanned(self, rng: np.random.Generator, *, blur: float, noise: float) -> NDArray[np.uint16]:
+    def scanned(
+        self, rng: np.random.Generator, *, blur: float, noise: float, report: Report = _SILENT
+    ) -> NDArray[np.uint16]:
         """Return the voxels as a scanner would.
 
         Parameters
@@ -84,12 +105,15 @@ class Canvas:
             Standard deviation of the point spread, mm.
         noise : float
             Standard deviation of the noise, grey values.
+        report : Report
+            Told the fraction done, and asked whether to stop.
         """
         from scipy.ndimage import gaussian_filter
 
         grey: Values = gaussian_filter(self.grey, blur / self.spacing, mode="nearest", truncate=3.0)
         out = np.empty(grey.shape, np.uint16)
         for k, layer in enumerate(grey):
+            report((k + 1) / len(grey))
             noisy = layer + np.float32(noise) * rng.standard_normal(layer.shape, dtype=np.float32)
             out[k] = np.clip(np.rint(noisy), 0, 65535)
         return out

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -28,6 +29,7 @@ from gp_labeler.imaging.phantom.skull import (
     paint_skull,
     paint_upper_teeth,
 )
+from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["Phantom", "make_phantom", "write_phantom"]
@@ -36,6 +38,11 @@ _SPACINGS_MM = (0.08, 0.5)
 _TILT_DEG = 2.0
 _BLUR_MM = 0.08
 _AIR_MM = 1.5
+_N_SOLIDS = 122
+"""What a head is painted of; only the progress that is told depends on it."""
+
+_PAINTED = 0.85
+"""Share of the time that painting takes; the scanner's blur and noise take the rest."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +68,8 @@ def make_phantom(
     box: FloatArray | None = None,
     specimen: Specimen | None = None,
     noise: float = 900.0,
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
 ) -> Phantom:
     """Make the synthetic scan of a guinea pig drawn from the published atlas.
 
@@ -76,6 +85,8 @@ def make_phantom(
         Make this animal instead of a drawn one: all 20 features on both sides.
     noise : float
         Standard deviation of the noise in grey values; bone is 22000 above soft tissue.
+    progress, cancel : callable, optional
+        Told the fraction done; asked whether to stop.
 
     Returns
     -------
@@ -87,6 +98,8 @@ def make_phantom(
         `spacing` is not between 0.08 and 0.5 mm.
     FeatureError
         `specimen` lacks a feature.
+    Cancelled
+        `cancel` said so.
     """
     if not _SPACINGS_MM[0] <= spacing <= _SPACINGS_MM[1]:
         raise GpError(f"spacing must be {_SPACINGS_MM[0]} to {_SPACINGS_MM[1]} mm, got {spacing!r}")
@@ -95,9 +108,11 @@ def make_phantom(
     animal = specimen or draw_animal(atlas, rng=rng, tilt_deg=_TILT_DEG, name=f"phantom-{seed}")
     head = HeadLayout(animal, atlas)
     low, high = _head_box(head) if box is None else box
-    canvas = Canvas(low, high, spacing, grey.AIR)
+    report = Report(progress, cancel)
+    painting = report.part(0.0, _PAINTED)
+    canvas = Canvas(low, high, spacing, grey.AIR, report=painting, n_solids=_N_SOLIDS)
     _paint(canvas, head)
-    voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=noise)
+    voxels = canvas.scanned(rng, blur=_BLUR_MM, noise=noise, report=report.part(_PAINTED, 1.0))
     notes = (f"synthetic head, seed {seed}: no animal was scanned",)
     volume = Volume.from_parts(voxels, [spacing] * 3, canvas.origin, name=animal.name, notes=notes)
     return Phantom(volume, animal)

@@ -1,5 +1,7 @@
 """The phantom: every feature is there at its definition, and the truth beside it is the truth."""
 
+import time
+
 import numpy as np
 import pytest
 import SimpleITK
@@ -12,6 +14,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.files.markups import read_markups
 from gp_labeler.imaging.phantom import make_phantom, write_phantom
+from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.threshold import propose_threshold
 
 BONE = 21_000.0
@@ -275,3 +278,25 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
 def test_an_unfit_spacing_is_refused(spacing):
     with pytest.raises(GpError, match="spacing must be"):
         make_phantom(spacing=spacing)
+
+
+def test_it_tells_how_far_it_is_from_nothing_to_all():
+    told = []
+    make_phantom(spacing=0.5, progress=told.append)
+    assert told == sorted(told)
+    assert told[0] < 0.02
+    assert told[-1] == 1.0
+    assert max(np.diff(told)) < 0.1
+
+
+@pytest.mark.parametrize("after", [0, 7, 150])
+def test_it_stops_soon_when_asked_to(after):
+    asked = []
+
+    def cancel():
+        asked.append(time.monotonic())
+        return len(asked) > after
+
+    with pytest.raises(Cancelled):
+        make_phantom(spacing=0.5, cancel=cancel)
+    assert time.monotonic() - asked[after] < 1.0
