@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import csv
 import math
-from functools import cache
+from functools import cache, lru_cache
 from os import PathLike
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
@@ -16,6 +17,8 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.resources import resource_path
 
 __all__ = ["check_plausible_size"]
+
+IndexArray = NDArray[np.intp]
 
 _MIN_PAIRS = 3
 _TOLERANCE = 0.2  # of the decimal logarithm: animals differ by a tenth, mistaken units by ten times
@@ -33,6 +36,15 @@ def _published_mm() -> FloatArray:
             expected[a, b] = expected[b, a] = float(row["mean_mm"])
     expected.setflags(write=False)
     return expected
+
+
+@lru_cache(maxsize=64)
+def _pairs(codes: tuple[str, ...]) -> tuple[IndexArray, IndexArray, FloatArray]:
+    """Return rows of the first and the second feature of all pairs, and their mean distance, mm."""
+    rows = np.array([index_of(code) for code in codes], dtype=np.intp)
+    i, j = np.triu_indices(len(rows), k=1)
+    first, second = rows[i], rows[j]
+    return first, second, _published_mm()[first, second]
 
 
 def check_plausible_size(
@@ -58,13 +70,13 @@ def check_plausible_size(
     GeometryError
         The coordinates look like metres, micrometres or the like; the remedy names the factor.
     """
-    rows = [index_of(code) for code in landmarks.placed]
-    pairs = np.triu_indices(len(rows), k=1)
-    points = landmarks.points[rows]
+    first, second, published = _pairs(landmarks.placed)
+    if len(published) < _MIN_PAIRS:
+        return
     with np.errstate(over="ignore", invalid="ignore"):
-        measured = np.linalg.norm(points[pairs[0]] - points[pairs[1]], axis=1)
-    ratios = measured / _published_mm()[np.ix_(rows, rows)][pairs]
-    ratio = float(np.median(ratios)) if len(ratios) >= _MIN_PAIRS else 1.0
+        apart = landmarks.points[first] - landmarks.points[second]
+        ratios = np.sort(np.sqrt((apart * apart).sum(axis=1)) / published)
+    ratio = float(ratios[(len(ratios) - 1) // 2] + ratios[len(ratios) // 2]) / 2
     if not (math.isfinite(ratio) and ratio > 0):
         return
     power = round(math.log10(ratio))
