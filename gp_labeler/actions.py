@@ -10,6 +10,7 @@ from gp_labeler.action import MENUS, Action, Ui
 from gp_labeler.action_rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
 from gp_labeler.action_rows_atlas import atlas_rows
 from gp_labeler.action_rows_pose import pose_rows
+from gp_labeler.action_rows_view import cut_rows
 from gp_labeler.workbench import Workbench
 
 __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
@@ -17,7 +18,7 @@ __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
 ACTIONS: Mapping[str, Action] = MappingProxyType(
     {
         row.id: row
-        for rows in (file_rows, edit_rows, view_rows, landmark_rows, atlas_rows, pose_rows, help_rows)
+        for rows in (file_rows, edit_rows, view_rows, cut_rows, landmark_rows, atlas_rows, pose_rows, help_rows)
         for row in rows()
     }
 )
@@ -77,7 +78,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
             "On a slice",
             (
                 ("Click", "place the point"),
-                ("Drag a point", "move it"),
+                ("Drag a point", "move it, on bone if placed there (Alt: freely)"),
                 ("Arrow keys", "move the point a voxel"),
                 ("Wheel, F and B", "next and previous slice"),
                 ("Right drag, Ctrl+wheel", "zoom"),

@@ -378,6 +378,6 @@ class Workbench(AtlasDesk):
 def _kept(state: Any) -> dict[str, Any]:
     """Return how the user likes to look at things; grey window and camera belong to one specimen."""
     fields = dict(vars(state))
-    for name in ("level", "width", "camera"):
+    for name in ("level", "width", "cut", "camera"):
         fields.pop(name)
     return fields

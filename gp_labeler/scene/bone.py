@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,8 +22,9 @@ __all__ = ["BoneActor"]
 _BARELY_THERE = 0.05
 """Below this opacity the mesh is not seen, so a click must not land on it."""
 
-_INSIDE = 0.62
-"""How bright the inner side of the surface is against the outer: a cut shows as such."""
+_INSIDE = (0.66, 0.50, 0.42)
+"""The colour of the inner side of the surface, as parts of the outer's. All in one tone, it looks like bone
+that is cut through: it is seen just where the cut lies in bone."""
 
 
 class BoneActor:
@@ -148,11 +150,14 @@ class BoneActor:
         """Return what draws pieces, invisible yet."""
         made = [piece.actor(self._stage.bone, self._look, self._plane) for piece in pieces]
         for actor in made:
-            actor.SetBackfaceProperty(self._inside)
+            actor.SetBackfaceProperty(cast(Any, self._inside if self._opacity == 1 else None))
         return made
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> SurfaceHit | None:
-        """Return the first point of the drawn surfaces along a ray, or None; what is cut away is gone."""
+        """Return the first point of the drawn surfaces along a ray, or None.
+
+        What is cut away is not there; and a ray that meets the cut within bone ends there, on no surface.
+        """
         if not self._seen:
             return None
         start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
@@ -163,9 +168,10 @@ class BoneActor:
             start = start + there * along
         hits = [hit for surface in self._surfaces if (hit := surface.pick(start, along)) is not None]
         nearest = min(hits, key=lambda hit: float(np.linalg.norm(hit.point - start)), default=None)
-        if nearest is None or self._cut is None or float(self._cut.depth(nearest.point)) >= -_ON_PLANE_MM:
+        if nearest is None or self._cut is None:
             return nearest
-        return None
+        from_within = float(nearest.normal @ along) > 0
+        return None if from_within or self._cut.depth(nearest.point) < -_ON_PLANE_MM else nearest
 
     def blocks(self, start: ArrayLike, end: ArrayLike) -> bool:
         """Whether drawn bone lies between two scan positions."""
@@ -184,14 +190,17 @@ class BoneActor:
         return self._visible and self._opacity > _BARELY_THERE
 
     def _apply(self) -> None:
-        colour = np.array(rgb(self._stage.colours.bone))
-        for look, brightness in ((self._look, 1.0), (self._inside, _INSIDE)):
-            look.SetColor(*(brightness * colour).tolist())
-            look.SetOpacity(self._opacity)
-            look.SetAmbient(0.10)
-            look.SetDiffuse(0.90)
-            look.SetSpecular(0.18 * brightness)
-            look.SetSpecularPower(18.0)
+        colour = rgb(self._stage.colours.bone)
+        self._look.SetColor(*colour)
+        self._look.SetOpacity(self._opacity)
+        self._look.SetAmbient(0.10)
+        self._look.SetDiffuse(0.90)
+        self._look.SetSpecular(0.18)
+        self._look.SetSpecularPower(18.0)
+        self._inside.SetColor(*(np.array(colour) * _INSIDE).tolist())
+        self._inside.SetAmbient(1.0)
+        self._inside.SetDiffuse(0.0)
+        self._inside.SetSpecular(0.0)
 
     def _drop(self) -> None:
         for piece in (*self._fine, *self._quick):

@@ -83,7 +83,7 @@ class Scene3D:
         self.cube = OrientationCube(self._stage)
         target.add(self.cube.renderer)
         self._backdrop = Backdrop(self._stage, target, self.bone, self.cube)
-        self._behind: tuple[Sight | None, dict[bytes, bool]] = (None, {})
+        self._behind: tuple[object, dict[bytes, bool]] = (None, {})
         self.set_colours(self._stage.colours)
         self.camera.view_from("A")
         self.camera.fit(_EMPTY_BOUNDS)
@@ -204,21 +204,31 @@ class Scene3D:
     def pick(self, x: float, y: float) -> SurfaceHit | None:
         """Return the point of the bone seen at a pixel, or None where there is none."""
         self._set_clipping()
-        return self.bone.pick(*self._viewpoint_ray(x, y))
+        ray = self._viewpoint_ray(x, y)
+        hit = self.bone.pick(*ray)
+        return None if hit is not None and self.slices.blocks(ray[0], hit.point) else hit
+
+    def pick_slice(self, x: float, y: float) -> FloatArray | None:
+        """Return the (3,) point of a slice's picture seen at a pixel, or None where there is none."""
+        self._set_clipping()
+        origin, direction = self._viewpoint_ray(x, y)
+        point, hit = self.slices.pick(origin, direction), self.bone.pick(origin, direction)
+        nearer = hit is None or point is None or (point - hit.point) @ direction < 0
+        return point if nearer else None
 
     def display_of(self, points: ArrayLike) -> FloatArray:
         """Return the (N, 2) pixels of (N, 3) scan positions, seen or not; `pick` there finds them again."""
         return self.camera.viewpoint().display(points)[:, :2]
 
     def hidden(self, points: ArrayLike) -> NDArray[np.bool_]:
-        """Return which of (N, 3) scan positions lie behind bone; those on its near surface do not."""
+        """Return which of (N, 3) scan positions lie behind bone or slices; those on a near surface do not."""
         scan = np.asarray(points, dtype=np.float64).reshape(-1, 3)
         slack = _HIDDEN_SLACK_VOXELS * max((s.voxel_mm for s in self.bone.surfaces), default=0.0)
         if not slack or not len(scan):
             return np.zeros(len(scan), dtype=bool)
-        sight = self._sight()
-        if self._behind[0] != sight:
-            self._behind = (sight, {})
+        seen = (self._sight(), self.slices.images)
+        if self._behind[0] != seen:
+            self._behind = (seen, {})
         known = self._behind[1]
         new = [n for n, point in enumerate(scan) if point.tobytes() not in known]
         known.update(zip((scan[n].tobytes() for n in new), self._behind_bone(scan[new], slack), strict=True))
@@ -231,7 +241,10 @@ class Scene3D:
         towards = near - scan
         distance = np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
         ends = scan + towards / distance * np.minimum(slack, distance)
-        return [self.bone.blocks(eye, end) for eye, end in zip(near, ends, strict=True)]
+        return [
+            self.bone.blocks(eye, end) or self.slices.blocks(eye, end)
+            for eye, end in zip(near, ends, strict=True)
+        ]
 
     def mark_at(self, x: float, y: float, within: float = 10.0) -> str | None:
         """Return the key of the mark nearest to a pixel, seen before hidden, within logical pixels."""

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFeatureEdges
 from vtkmodules.vtkFiltersSources import vtkPlaneSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkTexture
 
+from gp_core.checks import FloatArray
 from gp_labeler.imaging.vtk_arrays import to_vtk, triple
 from gp_labeler.scene.slices import SliceImage
 from gp_labeler.scene.stage import Stage, release, solid_actor
@@ -30,10 +32,12 @@ class SlicePlaneActor:
     def __init__(self, stage: Stage) -> None:
         self._stage = stage
         self._actors: list[vtkActor] = []
+        self._images: tuple[SliceImage, ...] = ()
 
     def show(self, images: Sequence[SliceImage], window: WindowLevel) -> None:
         """Draw these slices in place of those before."""
         self.close()
+        self._images = tuple(images)
         for image in images:
             plane = _rectangle(image)
             picture = solid_actor(plane.GetOutput(), "#FFFFFF")
@@ -49,11 +53,41 @@ class SlicePlaneActor:
                 self._stage.base.AddActor(actor)
                 self._actors.append(actor)
 
+    @property
+    def images(self) -> tuple[SliceImage, ...]:
+        """What is drawn."""
+        return self._images
+
+    def pick(self, origin: ArrayLike, direction: ArrayLike) -> FloatArray | None:
+        """Return the first (3,) point of the pictures along a ray, or None."""
+        start, along = np.asarray(origin, dtype=np.float64), np.asarray(direction, dtype=np.float64)
+        reached = [_crossing(image, start, along) for image in self._images]
+        nearest = min((r for r in reached if r is not None), default=None)
+        return None if nearest is None else start + nearest * along
+
+    def blocks(self, start: ArrayLike, end: ArrayLike) -> bool:
+        """Whether a picture lies between two scan positions."""
+        first, last = np.asarray(start, dtype=np.float64), np.asarray(end, dtype=np.float64)
+        reached = [_crossing(image, first, last - first) for image in self._images]
+        return any(r is not None and r < 1 for r in reached)
+
     def close(self) -> None:
         """Let go of the pictures."""
+        self._images = ()
         for actor in self._actors:
             release(self._stage.base, actor)
         self._actors = []
+
+
+def _crossing(image: SliceImage, start: FloatArray, along: FloatArray) -> float | None:
+    """Return where a ray meets a picture, in lengths of its direction, or None where it passes by."""
+    axis = image.plane.axis
+    if not along[axis]:
+        return None
+    there = float((image.position - start[axis]) / along[axis])
+    low, high = image.edges
+    at = image.plane.flat((start + there * along)[None])[0]
+    return there if there >= 0 and bool(((at >= low) & (at <= high)).all()) else None
 
 
 def _rectangle(image: SliceImage) -> vtkPlaneSource:

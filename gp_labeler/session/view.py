@@ -5,14 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import ArrayLike
 from psygnal import Signal
 
 from gp_core.checks import check_option
 from gp_core.errors import GpError
 
-__all__ = ["LAYOUTS", "Camera", "View", "ViewState"]
+__all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "View", "ViewState"]
 
 LAYOUTS = ("four-up", "3d", "axial", "sagittal", "coronal")
+
+CUTS = ("axial", "sagittal", "coronal", "view")
+"""By which planes bone can be cut open; ``view`` is across the line of sight."""
 
 
 @dataclass(frozen=True)
@@ -23,6 +28,42 @@ class Camera:
     focus: tuple[float, float, float]
     up: tuple[float, float, float]
     scale: float
+
+
+@dataclass(frozen=True)
+class Cut:
+    """A plane that cuts bone open in the 3D view.
+
+    Parameters
+    ----------
+    plane : str
+        One of `CUTS`.
+    origin : (3,) tuple of float
+        A point of it, scan frame, mm.
+    normal : (3,) tuple of float
+        Unit vector towards the side that stays.
+    """
+
+    plane: str
+    origin: tuple[float, float, float]
+    normal: tuple[float, float, float]
+
+    def __post_init__(self) -> None:
+        check_option(self.plane, "cut", CUTS)
+
+    def through(self, position: ArrayLike) -> Cut:
+        """Return the same cut through another (3,) scan position."""
+        x, y, z = np.asarray(position, dtype=np.float64).tolist()
+        return replace(self, origin=(x, y, z))
+
+    def moved(self, mm: float) -> Cut:
+        """Return the cut so much deeper."""
+        return self.through(np.asarray(self.origin) + mm * np.asarray(self.normal))
+
+    def flipped(self) -> Cut:
+        """Return the cut that leaves the other side."""
+        x, y, z = self.normal
+        return replace(self, normal=(-x, -y, -z))
 
 
 @dataclass(frozen=True)
@@ -43,6 +84,10 @@ class ViewState:
         Whether placing a point makes the next one active.
     follow_ghost : bool
         Whether the crosshair jumps to where the next point is expected.
+    cut : Cut, optional
+        What cuts bone open in the 3D view; None leaves it whole.
+    slices_visible : bool
+        Whether the slices stand in the 3D view.
     camera : Camera, optional
         None until the first picture.
     """
@@ -59,6 +104,8 @@ class ViewState:
     glyph_mm: float | None = None
     auto_advance: bool = True
     follow_ghost: bool = True
+    cut: Cut | None = None
+    slices_visible: bool = False
     camera: Camera | None = None
 
     def __post_init__(self) -> None:

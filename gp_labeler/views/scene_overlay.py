@@ -1,21 +1,23 @@
-"""What is painted over the 3D view's last frame: the crosshair, and where a click would land."""
+"""What is painted over the 3D view's last frame: the crosshair, the cut, and where a click would land."""
 
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QColor, QPainter, QPen
+from PySide6.QtCore import QRectF, Qt
+from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
 from PySide6.QtWidgets import QWidget
 
 from gp_core.checks import FloatArray
-from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.planes import Plane, letter_of, position_text
 from gp_labeler.scene.scene3d import Scene3D
+from gp_labeler.session.view import Cut
 from gp_labeler.views.mouse import painted
-from gp_labeler.views.theme import theme_of
+from gp_labeler.views.theme import base_font, theme_of
 
-__all__ = ["paint_crosshair", "paint_pointer"]
+__all__ = ["cut_text", "paint_crosshair", "paint_cut", "paint_pointer"]
 
 _GAP_MM, _ARM_MM = 0.8, 4.0
+_WORDS = {"R": "right", "L": "left", "A": "anterior", "P": "posterior", "S": "superior", "I": "inferior"}
 
 
 def paint_crosshair(painter: QPainter, view: QWidget, scene: Scene3D, middle: FloatArray) -> None:
@@ -26,6 +28,36 @@ def paint_crosshair(painter: QPainter, view: QWidget, scene: Scene3D, middle: Fl
         painter.setPen(QPen(QColor(colours[plane.value]), 1.4))
         near, far = (painted(view, *pixels[2 * n + k]) for k in range(2))
         painter.drawLine(near, far)
+
+
+def cut_text(cut: Cut) -> str:
+    """Say where bone is cut open, such as ``Cut axial at S 12.4 mm, inferior side stays``."""
+    if cut.plane == "view":
+        return "Cut across the view"
+    plane = Plane(cut.plane)
+    kept = letter_of(cut.normal)
+    return f"Cut {cut.plane} at {position_text(plane, cut.origin[plane.axis])}, {_WORDS[kept]} side stays"
+
+
+def paint_cut(painter: QPainter, view: QWidget, cut: Cut | None) -> None:
+    """Say in the upper left corner that bone is cut open, and where."""
+    if cut is None:
+        return
+    theme, font = theme_of(view), base_font()
+    font.setPixelSize(12)
+    painter.setFont(font)
+    text = cut_text(cut)
+    words = QFontMetricsF(font).boundingRect(text)
+    box = QRectF(10, 10, words.width() + 26, words.height() + 8)
+    painter.setPen(Qt.PenStyle.NoPen)
+    ground = QColor(theme.card)
+    ground.setAlpha(225)
+    painter.setBrush(ground)
+    painter.drawRoundedRect(box, 5, 5)
+    painter.setBrush(QColor(theme.views["3d" if cut.plane == "view" else cut.plane]))
+    painter.drawRoundedRect(QRectF(box.left() + 6, box.center().y() - 4, 8, 8), 2, 2)
+    painter.setPen(QColor(theme.text))
+    painter.drawText(box.adjusted(20, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, text)
 
 
 def paint_pointer(

@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QPointF, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QEnterEvent,
     QImage,
@@ -24,16 +24,21 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QWidget
 
 from gp_core.checks import FloatArray
+from gp_labeler.scene.cut import CutPlane
 from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize
+from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
+from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.target import RenderTarget
 from gp_labeler.session.state import How
+from gp_labeler.session.view import Cut
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments, key_of
+from gp_labeler.views.greys import greys_of
 from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
-from gp_labeler.views.scene_overlay import paint_crosshair, paint_pointer
+from gp_labeler.views.scene_overlay import paint_crosshair, paint_cut, paint_pointer
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Drag, Workbench
 
@@ -47,6 +52,9 @@ _FIRST_LOOK = (-0.45, 0.75, -0.48)
 """Direction of the first look: from the front, the left and above."""
 
 _MIDDLE = 0.6
+_NEAR_PIXELS = 8.0
+"""A mark is meant by a click within so many logical pixels."""
+
 _ARROWS = {
     Qt.Key.Key_Left: (-24.0, 0.0),
     Qt.Key.Key_Right: (24.0, 0.0),
@@ -81,11 +89,15 @@ class SceneView(QWidget):
         self._hand = Hand(workbench)
         self._frame: QImage | None = None
         self._finished = False
-        self._stale, self._fitted = True, False
+        self._stale, self._points_old, self._fitted = True, True, False
+        self._source: SliceSource | None = None
+        self._slices_old = False
         self._hover: FloatArray | None = None
         self._dragging = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
         self._fine_timer.timeout.connect(self._refine)
+        self._draw_timer = QTimer(self, interval=0, singleShot=True)
+        self._draw_timer.timeout.connect(self._draw)
         self.scene.camera.look(_FIRST_LOOK, (0, 0, 1))
         self._listen()
         self.take_theme()
@@ -125,6 +137,16 @@ class SceneView(QWidget):
         self.scene.camera.focus_on(position, across_mm=across_mm)
         self.redraw()
 
+    def cut(self, plane: str) -> None:
+        """Cut the bone open through the crosshair, by one of `session.view.CUTS`; the nearer side goes."""
+        normal = into = self.scene.camera.direction
+        if plane != "view":
+            axis = Plane(plane).normal
+            normal = axis if axis @ into >= 0 else -axis
+        x, y, z = normal.tolist()
+        cut = Cut(plane, (0.0, 0.0, 0.0), (x, y, z)).through(self._desk.session.crosshair)
+        self._desk.session.view.update(cut=cut)
+
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
         self.scene.set_colours(theme_of(self).scene)
@@ -147,7 +169,27 @@ class SceneView(QWidget):
         follow(self, desk.dragged, self._on_dragged)
         follow(self, desk.view_changed, self._on_view_changed)
 
+    def _show_slices(self, *_: object) -> None:
+        """Show the slices through the crosshair, or none, when the next frame is drawn."""
+        if self._desk.session.view.state.slices_visible or self.scene.slices.images:
+            self._slices_old = True
+            self.redraw()
+
+    def _take_slices(self) -> None:
+        if not self._slices_old:
+            return
+        self._slices_old = False
+        volume, shown = self._desk.volume, self._desk.session.view.state.slices_visible
+        if volume is None or not shown:
+            self._source = None
+        elif self._source is None or self._source.volume is not volume:
+            self._source = SliceSource(volume)
+        source, middle = self._source, self._desk.session.crosshair
+        images = [source.image(plane, float(middle[plane.axis])) for plane in Plane] if source else []
+        self.scene.slices.show(images, greys_of(self._desk))
+
     def _on_crosshair(self, position: FloatArray) -> None:
+        self._show_slices()
         volume = self._desk.volume
         inside = volume is not None and bool(volume.contains(position[None])[0])
         if self._fitted and inside and not self._shows(position, 1.0):
@@ -162,6 +204,7 @@ class SceneView(QWidget):
 
     def _on_session_replaced(self, _: object) -> None:
         self._fitted = False
+        self._on_view_changed(frozenset({"mesh_opacity", "cut", "slices_visible"}))
         self._show_points()
 
     def _show_bone(self) -> None:
@@ -172,21 +215,38 @@ class SceneView(QWidget):
         self.redraw()
 
     def _show_points(self, *_: object) -> None:
+        """Show points, lines and ghosts as they are when the next frame is drawn, however many changes on."""
         view = self._desk.session.view.state
         self.scene.marks.size = GlyphSize() if view.glyph_mm is None else GlyphSize(view.glyph_mm, "mm")
         self.scene.labels.visible = view.labels_visible
         self.scene.marks.show_hidden = view.hidden_visible
+        self._points_old = True
+        self.redraw()
+
+    def _take_points(self) -> None:
+        if not self._points_old:
+            return
+        self._points_old = False
         drag = self._desk.drag
         dragged = "" if drag is None else key_of(drag.side, drag.code)
         self.scene.marks.show([mark for mark in drawn_marks(self._desk) if mark.key != dragged])
         self.scene.ghosts.show(drawn_ghosts(self._desk))
         self.scene.lines.show(drawn_segments(self._desk, theme_of(self).scene))
-        self.redraw()
+
+    def _mark_at(self, x: float, y: float) -> str | None:
+        self._take_points()
+        return self.scene.mark_at(x, y, _NEAR_PIXELS)
 
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if "mesh_opacity" in changed:
             self.scene.bone.opacity = self._desk.session.view.state.mesh_opacity
-        if changed - {"level", "width", "layout", "camera"}:
+        if "cut" in changed:
+            cut = self._desk.session.view.state.cut
+            self.scene.bone.cut = None if cut is None else CutPlane(cut.origin, cut.normal)
+            self.redraw(quick=True)
+        if changed & {"slices_visible", "level", "width"}:
+            self._show_slices()
+        if changed - {"level", "width", "layout", "camera", "cut", "slices_visible"}:
             self._show_points()
 
     def _on_dragged(self, drag: Drag | None) -> None:
@@ -199,14 +259,18 @@ class SceneView(QWidget):
 
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
         painter = QPainter(self)
-        on_screen = self._is_screen(painter)
-        if self._stale or not (on_screen or self._finished):
-            self._draw_frame(quick=on_screen)
+        if not self._is_screen(painter):
+            self._finish()
+        elif self._stale and not self._has_frame:
+            self._draw_frame(quick=True)
+        elif self._stale:
+            self._draw_timer.start()  # by itself: the other views are painted in the same breath as this one
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is not None:
             painter.drawImage(QPointF(0, 0), self._frame)
         if self._desk.volume is not None:
             paint_crosshair(painter, self, self.scene, self._desk.session.crosshair)
+        paint_cut(painter, self, self._desk.session.view.state.cut)
         drag = self._desk.drag
         paint_pointer(
             painter, self, self.scene, self._hover if drag is None else drag.position, drag is not None
@@ -218,10 +282,31 @@ class SceneView(QWidget):
         store = self.window().backingStore()
         return store is not None and painter.paintEngine().paintDevice() is store.paintDevice()
 
+    @property
+    def _has_frame(self) -> bool:
+        return self._frame is not None and self._frame.size() == self._pixels
+
+    @property
+    def _pixels(self) -> QSize:
+        ratio = self.devicePixelRatioF()
+        return QSize(round(self.width() * ratio), round(self.height() * ratio))
+
+    def _finish(self) -> None:
+        """Draw all that is still to be drawn, at once."""
+        if self._stale or not self._finished:
+            self._draw_frame(quick=False)
+
+    def _draw(self) -> None:
+        if self._stale and self.isVisible():
+            self._draw_frame(quick=True)
+            self.update()
+
     def _draw_frame(self, *, quick: bool) -> None:
+        self._take_points()
+        self._take_slices()
         ratio = self.devicePixelRatioF()
         self.scene.scale = ratio
-        self.scene.target.resize(round(self.width() * ratio), round(self.height() * ratio))
+        self.scene.target.resize(self._pixels.width(), self._pixels.height())
         self.scene.render(quick=quick)
         pixels = self.scene.target.pixels()
         height, width, _ = pixels.shape
@@ -249,7 +334,7 @@ class SceneView(QWidget):
             return
         x, y = pixel_of(self, event.position())
         if button is Button.LEFT and held is Modifier.NONE:
-            self._hand.press(self.scene.mark_at(x, y, 8.0), x, y)
+            self._hand.press(self._mark_at(x, y), x, y)
         if not self._hand.holds:
             self.scene.control.press(button, x, y, held)
 
@@ -271,7 +356,7 @@ class SceneView(QWidget):
         if event.button() == Qt.MouseButton.LeftButton and clicked:
             self._click(x, y, mark)
         elif event.button() == Qt.MouseButton.RightButton and clicked:
-            self._hand.open_menu(self, self.scene.mark_at(x, y, 8.0), event.globalPosition().toPoint())
+            self._hand.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         self._look_at(x, y, Modifier.NONE)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
@@ -280,7 +365,11 @@ class SceneView(QWidget):
             self.maximise_asked.emit()
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
-        if self.scene.control.wheel(notches_of(event)):
+        view, volume = self._desk.session.view, self._desk.volume
+        if Modifier.ALT in modifiers_of(event):
+            if view.state.cut is not None and volume is not None:
+                view.update(cut=view.state.cut.moved(notches_of(event) * min(volume.spacing)))
+        elif self.scene.control.wheel(notches_of(event)):
             self.redraw(quick=True)
         event.accept()
 
@@ -303,8 +392,15 @@ class SceneView(QWidget):
         super().enterEvent(event)
 
     def _click(self, x: float, y: float, mark: str | None) -> None:
+        point, how = self._aim(x, y)
+        self._hand.click(point, how, mark)
+
+    def _aim(self, x: float, y: float) -> tuple[FloatArray | None, How]:
+        """Return what a pixel shows, bone or a slice's picture: the (3,) scan position, and which it is."""
         hit = self.scene.pick(x, y)
-        self._hand.click(None if hit is None else hit.point, How.MESH, mark)
+        if hit is not None:
+            return hit.point, How.MESH
+        return self.scene.pick_slice(x, y), How.SLICE
 
     def _drag_to(self, x: float, y: float) -> None:
         drag = self._desk.drag
@@ -319,11 +415,11 @@ class SceneView(QWidget):
             self._desk.drag_to(view.scan([[x, y, depth]])[0], drag.how)
 
     def _look_at(self, x: float, y: float, held: Modifier) -> None:
-        hit = self.scene.pick(x, y)
-        self._set_hover(None if hit is None else hit.point)
-        if hit is not None and Modifier.SHIFT in held:
-            self._desk.session.set_crosshair(hit.point)
-        self.setCursor(self._hand.cursor(hit is not None, self.scene.mark_at(x, y, 8.0)))
+        point, _ = self._aim(x, y)
+        self._set_hover(point)
+        if point is not None and Modifier.SHIFT in held:
+            self._desk.session.set_crosshair(point)
+        self.setCursor(self._hand.cursor(point is not None, self._mark_at(x, y)))
 
     def _set_hover(self, point: FloatArray | None) -> None:
         if point is not None or self._hover is not None:
@@ -346,4 +442,7 @@ class SceneView(QWidget):
         """Let go of the scene; the widget shows its last frame from then on."""
         self._stale, self._finished = False, True
         self._fine_timer.stop()
+        self._draw_timer.stop()
+        if self._source is not None:
+            self._source.close()
         self.scene.close()

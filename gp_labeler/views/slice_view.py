@@ -12,6 +12,7 @@ from PySide6.QtWidgets import QWidget
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.scene.bone_edge import BoneEdge
 from gp_labeler.scene.gestures import Button, Modifier, SliceControl
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slice_view import SliceView as Shown
@@ -19,7 +20,7 @@ from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import follow
-from gp_labeler.views.drawn import drawn_marks
+from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.greys import drag_greys, greys_of
 from gp_labeler.views.hand import Hand, nudge
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
@@ -35,6 +36,10 @@ _ARROWS = {
     Qt.Key.Key_Up: (0.0, -1.0),
     Qt.Key.Key_Down: (0.0, 1.0),
 }
+_FREES = Modifier.ALT | Modifier.SHIFT
+"""Held while a point is dragged, either lets it leave the bone."""
+
+_NEAR_EDGE_PIXELS = 48.0
 _STEPS = {Qt.Key.Key_F: 1, Qt.Key.Key_PageUp: 1, Qt.Key.Key_B: -1, Qt.Key.Key_PageDown: -1}
 
 
@@ -72,6 +77,7 @@ class SliceView(QWidget):
         self._painter = SlicePainter(workbench, self)
         self._greying: tuple[float, float] | None = None
         self._grip = np.zeros(3)
+        self._edge: BoneEdge | None = None
         self._listen()
 
     # What is shown
@@ -185,7 +191,8 @@ class SliceView(QWidget):
             return
         mark = self._mark_at(x, y)
         self._hand.press(mark, x, y)
-        if self._hand.holds:
+        if mark is not None and self._hand.holds:
+            self._edge = self._edge_for(mark)
             self._grip = self._position_of(mark) - self.shown.pixel_to_scan([[x, y]])[0]
         elif self._desk.tool == "grey":
             self._greying = (x, y)
@@ -208,7 +215,7 @@ class SliceView(QWidget):
             self.shown = view
             self.update()
         elif self._hand.move(x, y):
-            self._drag_to(here)
+            self._drag_to(here, free=bool(modifiers_of(event) & _FREES))
         elif self._greying is not None:
             self._change_greys(x, y)
         elif self._desk.tool == "look" and event.buttons() == Qt.MouseButton.LeftButton:
@@ -273,11 +280,25 @@ class SliceView(QWidget):
         step = np.array([self.source.step(plane) for plane in sorted(Plane, key=lambda p: p.axis)])
         nudge(self._desk, step * (right * self.plane.right + down * self.plane.down))
 
-    def _drag_to(self, here: FloatArray) -> None:
+    def _edge_for(self, mark: str) -> BoneEdge | None:
+        """Return the edge of bone, on which a point stays that was placed on bone; None for other points."""
+        provenance = self._desk.session.state.landmark(*point_of(mark)).provenance
+        on_bone = provenance is not None and provenance.how is How.MESH
+        threshold = self._desk.threshold
+        if not on_bone or self.source is None or threshold is None:
+            return None
+        return BoneEdge(self.source, self.plane, threshold)
+
+    def _drag_to(self, here: FloatArray, *, free: bool) -> None:
         drag, to = self._desk.drag, here + self._grip
         if drag is not None:
             to[self.plane.axis] = drag.position[self.plane.axis]  # the slice follows it: depth stays its own
-        if self._desk.volume is not None and bool(self._desk.volume.contains(to[None])[0]):
+        if self._edge is not None and self.shown is not None and not free:
+            within = _NEAR_EDGE_PIXELS * self.devicePixelRatioF() * self.shown.mm_per_pixel
+            edge = self._edge.nearest(to, within)
+            if edge is not None:  # far from bone it stays where it was, as in the 3D view
+                self._desk.drag_to(edge, How.MESH)
+        elif self._desk.volume is not None and bool(self._desk.volume.contains(to[None])[0]):
             self._desk.drag_to(to, How.SLICE)
 
     def _change_greys(self, x: float, y: float) -> None:

@@ -9,6 +9,7 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton,
 
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import blocked, follow, mm_text
+from gp_labeler.views.panels.cut_row import CutRow
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.workbench import Workbench
 
@@ -17,6 +18,7 @@ __all__ = ["MeshCard"]
 _SHOWN = {
     "outline_visible": ("Outline on slices", "The edge of bone, drawn on the slices"),
     "hidden_visible": ("Points behind bone", "Show points faintly where bone hides them"),
+    "slices_visible": ("Slices in the 3D view", "The three slices as pictures among the bone"),
 }
 
 
@@ -30,6 +32,8 @@ class MeshCard(Card):
     """
 
     save_asked = Signal()
+    action_asked = Signal(str)
+    """Id of an action to be done."""
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__("Bone surface", parent)
@@ -49,8 +53,14 @@ class MeshCard(Card):
         row.addWidget(self._percent)
         self.add(row)
         checks = QHBoxLayout()
-        self.checks = {name: self._check(name, checks) for name in _SHOWN}
+        self.checks = {name: self._check(name, checks) for name in _SHOWN if name != "slices_visible"}
         self.add(checks)
+        slices = QHBoxLayout()
+        self.checks["slices_visible"] = self._check("slices_visible", slices)
+        self.add(slices)
+        self.cut = CutRow(workbench)
+        self.cut.action_asked.connect(self.action_asked)
+        self.add(self.cut)
         self._add_buttons()
         self._listen()
         self.refresh()
@@ -75,7 +85,7 @@ class MeshCard(Card):
         finest, coarsest = (f(s.voxel_mm for s in surfaces) for f in (min, max))
         voxels = mm_text(coarsest) if finest == coarsest else f"{mm_text(coarsest)}, ears {mm_text(finest)}"
         count = f"{n / 1e6:.1f} million" if n >= 1e6 else f"{n / 1e3:.0f} thousand"
-        return f"{count} triangles; voxels of {voxels}. Parts below 1 mm across are left out."
+        return f"{count} triangles; voxels of {voxels}."
 
     def _check(self, name: str, row: QHBoxLayout) -> QCheckBox:
         text, hint = _SHOWN[name]
