@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -150,16 +151,26 @@ class Estimate:
 
     def in_scan(self, method: str | None = None) -> PoseInScan | None:
         """Return the estimate as it lies in the scan; None where there is no pose, or no registration."""
-        pose = self.pose if method is None else self.poses.get(method)
-        if pose is None or self.registered is None:
-            return None
+        told = next((m for m in self.settings.methods if m in self.poses), "")
+        return self._placed.get(told if method is None else method)
+
+    @cached_property
+    def _placed(self) -> dict[str, PoseInScan]:
+        """The poses in the scan, by method; panel, views and commands all ask for them."""
+        if self.registered is None:
+            return {}
         T_scan_touches = self.registered.T_scan_touches
+        return {method: self._place(pose, T_scan_touches) for method, pose in self.poses.items()}
+
+    def _place(self, pose: CochleaPose, T_scan_touches: RigidTransform) -> PoseInScan:
         turn = np.kron(np.eye(2), T_scan_touches.rotation)
+        expected = expected_features(pose, self.atlas)
+        moved = T_scan_touches.apply(list(expected.values())) if expected else ()
         return PoseInScan(
             pose,
             T_scan_touches @ pose.transform_to_touches,
             turn @ pose.covariance @ turn.T,
-            {c: T_scan_touches.apply([p])[0] for c, p in expected_features(pose, self.atlas).items()},
+            dict(zip(expected, moved, strict=True)),
         )
 
     def errors(self, method: str | None = None) -> tuple[float, float] | None:

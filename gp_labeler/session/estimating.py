@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,21 @@ __all__ = ["Estimating"]
 FEWEST_TOUCHES = 3
 
 
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """The estimate that was made last, and what it was made of."""
+
+    state: SpecimenState
+    chosen: EstimateSettings
+    side: Side
+    key: tuple[Any, ...]
+    estimate: Estimate | None
+
+    def is_of(self, state: SpecimenState, chosen: EstimateSettings, side: Side) -> bool:
+        """Whether nothing at all changed; asked dozens of times a touch."""
+        return self.state is state and self.chosen is chosen and self.side is side
+
+
 class Estimating:
     """Keeps the estimate of one side in step with a session.
 
@@ -47,8 +62,7 @@ class Estimating:
         self._atlas: Atlas | None = None
         self._specimens: tuple[Specimen, ...] = ()
         self._known: dict[Side, RigidTransform] = {}
-        self._made: tuple[tuple[Any, ...], Estimate | None] | None = None
-        self._revision = 0
+        self._made: _Made | None = None
         self.joint_ready = False
         session.touches_changed.connect(self._tell)
         session.landmarks_changed.connect(self._tell)
@@ -86,7 +100,7 @@ class Estimating:
     def set_joint_ready(self) -> None:
         """Say that JRMPC is compiled."""
         self.joint_ready = True
-        self.changed.emit()
+        self._renew()
 
     def know_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
         """Say how the tracker lies to the scan, where that is known otherwise than from points."""
@@ -114,13 +128,16 @@ class Estimating:
 
     def of_side(self, side: Side) -> Estimate | None:
         """Return the estimate of a side, as `current` does for the chosen one."""
-        state, settings = self._session.state, replace(self._settings, side=side)
+        state, chosen, made = self._session.state, self._settings, self._made
+        if made is not None and made.is_of(state, chosen, side):
+            return made.estimate
+        settings = replace(chosen, side=side)
         if not self.joint_ready:
             settings = replace(settings, methods=_without_joint(settings.methods))
-        key = (self._revision, state.touches, state.skull, state.landmarks, settings)
-        if self._made is None or self._made[0] != key:
-            self._made = (key, self._make(state, settings))
-        return self._made[1]
+        key = (state.touches, state.skull, state.landmarks, settings)
+        estimate = made.estimate if made is not None and made.key == key else self._make(state, settings)
+        self._made = _Made(state, chosen, side, key, estimate)
+        return estimate
 
     def _make(self, state: SpecimenState, settings: EstimateSettings) -> Estimate | None:
         if self._atlas is None or len(state.touched(settings.side).placed) < FEWEST_TOUCHES:
@@ -162,7 +179,7 @@ class Estimating:
         self._session.landmarks_changed.disconnect(self._tell)
 
     def _renew(self) -> None:
-        self._revision += 1
+        self._made = None
         self.changed.emit()
 
     def _tell(self, *_: object) -> None:
