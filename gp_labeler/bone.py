@@ -9,17 +9,20 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
-from gp_labeler.imaging.surface import box_around
+from gp_labeler.imaging.surface import SMALLEST_PART_MM, box_around
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.work import MeshEars, Meshes, MeshFirst, MeshOverview, ProposeThreshold
 
 if TYPE_CHECKING:
-    from gp_labeler.workbench import Workbench
+    from gp_labeler.bone_desk import BoneDesk
 
 __all__ = ["Bone"]
 
 EAR_HALF_MM = 7.0
 """All features of an ear but those of jaw, zygoma and incisors lie within this of its middle."""
+
+CUT_PART_MM = 0.3
+"""Parts that the walls of an ear's box cut off are kept from this size on."""
 
 _NEAR = ("CA", "CB", "RWA", "RWP", "RWL", "RWM", "FPA", "FPP", "OS", "OI", "LLI", "MH", "CC", "CO")
 _MOVED_MM = 2.0
@@ -30,12 +33,13 @@ class Bone:
 
     Parameters
     ----------
-    workbench : Workbench
+    desk : BoneDesk
         Whose scan and landmarks it follows.
     """
 
-    def __init__(self, workbench: Workbench) -> None:
-        self._desk = workbench
+    def __init__(self, desk: BoneDesk) -> None:
+        self._desk = desk
+        self.smallest_mm = SMALLEST_PART_MM
         self.proposed: float | None = None
         self.meshes = Meshes()
         self._overview = Meshes()
@@ -66,8 +70,12 @@ class Bone:
         if volume is None or threshold is None:
             return
         if not self.meshes.parts:
-            self._desk.jobs.submit(MeshFirst(volume, threshold), self._take_first, key="mesh first")
-        self._desk.jobs.submit(MeshOverview(volume, threshold), self._take_overview, key="mesh")
+            self._desk.jobs.submit(
+                MeshFirst(volume, threshold, self.smallest_mm), self._take_first, key="mesh first"
+            )
+        self._desk.jobs.submit(
+            MeshOverview(volume, threshold, self.smallest_mm), self._take_overview, key="mesh"
+        )
 
     def mesh_ears(self, *, half_mm: float | None = None, anew: bool = False) -> None:
         """Mesh around each ear at full resolution, once its place is known and where that adds anything."""
@@ -82,7 +90,9 @@ class Bone:
         self._ears = middles
         boxes = {side: box_around(place, self._half) for side, place in middles.items()}
         self._desk.jobs.submit(
-            MeshEars(volume, threshold, self._overview, boxes), self._take_ears, key="mesh ears"
+            MeshEars(volume, threshold, self._overview, boxes, min(self.smallest_mm, CUT_PART_MM)),
+            self._take_ears,
+            key="mesh ears",
         )
 
     def _is_news(self, side: Side, place: FloatArray) -> bool:

@@ -9,14 +9,14 @@ from dataclasses import dataclass, field
 from math import ceil, sqrt
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.progress import Progress as Told
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
-from gp_labeler.imaging.surface import Surface, extract_isosurface, overview_stride
+from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, extract_isosurface, overview_stride
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session.jobs import Progress
@@ -120,6 +120,7 @@ class MeshFirst:
 
     volume: Volume
     threshold: float
+    smallest_mm: float = SMALLEST_PART_MM
 
     @property
     def title(self) -> str:
@@ -129,7 +130,7 @@ class MeshFirst:
     def run(self, progress: Progress) -> Meshes:
         """Mesh few voxels."""
         stride = overview_stride(self.volume, FIRST_LOOK_VOXELS)
-        return Meshes((_mesh(self.volume, self.threshold, progress, stride=stride),))
+        return Meshes((_mesh(self, progress, stride=stride),))
 
 
 @dataclass(frozen=True)
@@ -138,6 +139,7 @@ class MeshOverview:
 
     volume: Volume
     threshold: float
+    smallest_mm: float = SMALLEST_PART_MM
 
     @property
     def title(self) -> str:
@@ -147,11 +149,11 @@ class MeshOverview:
     def run(self, progress: Progress) -> Meshes:
         """Mesh all of it, and a stand-in of few triangles."""
         stride = overview_stride(self.volume)
-        whole = _mesh(self.volume, self.threshold, progress, end=0.8, stride=stride)
+        whole = _mesh(self, progress, end=0.8, stride=stride)
         coarser = ceil(sqrt(whole.n_triangles / QUICK_TRIANGLES))
         if coarser < 2:
             return Meshes((whole,))
-        quick = _mesh(self.volume, self.threshold, progress, start=0.8, stride=stride * coarser)
+        quick = _mesh(self, progress, start=0.8, stride=stride * coarser)
         return Meshes((whole,), (quick,))
 
 
@@ -163,6 +165,7 @@ class MeshEars:
     threshold: float
     overview: Meshes
     boxes: Mapping[Side, FloatArray]
+    smallest_mm: float
 
     @property
     def title(self) -> str:
@@ -171,11 +174,11 @@ class MeshEars:
         return f"{ears.capitalize()} ear{'s' if len(self.boxes) > 1 else ''} at full resolution"
 
     def run(self, progress: Progress) -> Meshes:
-        """Mesh the boxes; parts cut off by a box's walls are kept, however small."""
+        """Mesh the boxes."""
         rest, ears = list(self.overview.parts), []
         for n, box in enumerate(self.boxes.values()):
             start, end = n / len(self.boxes), (n + 1) / len(self.boxes)
-            ear = _mesh(self.volume, self.threshold, progress, start=start, end=end, box=box, smallest_mm=0.3)
+            ear = _mesh(self, progress, start=start, end=end, box=box)
             rest = [part.outside(ear.region) for part in rest]
             ears.append(ear)
         parts = tuple(part.prepare() for part in (*rest, *ears) if part.n_triangles)
@@ -249,6 +252,7 @@ class SaveMesh:
     volume: Volume
     threshold: float
     path: Path
+    smallest_mm: float = SMALLEST_PART_MM
 
     @property
     def title(self) -> str:
@@ -257,20 +261,24 @@ class SaveMesh:
 
     def run(self, progress: Progress) -> Path:
         """Mesh and write."""
-        _mesh(self.volume, self.threshold, progress, end=0.9).save(self.path)
+        _mesh(self, progress, end=0.9).save(self.path)
         return self.path
 
 
-def _mesh(
-    volume: Volume,
-    threshold: float,
-    progress: Progress,
-    *,
-    start: float = 0.0,
-    end: float = 1.0,
-    **how: Any,
-) -> Surface:
+class _Meshing(Protocol):
+    """A job that meshes."""
+
+    @property
+    def volume(self) -> Volume: ...
+    @property
+    def threshold(self) -> float: ...
+    @property
+    def smallest_mm(self) -> float: ...
+
+
+def _mesh(job: _Meshing, progress: Progress, *, start: float = 0.0, end: float = 1.0, **how: Any) -> Surface:
     """Mesh as one part, from `start` to `end`, of a job."""
     load_modules("gp_labeler.imaging.islands")
     told: Told = lambda fraction: progress(start + (end - start) * fraction)  # noqa: E731
-    return extract_isosurface(volume, threshold, progress=told, cancel=progress.cancelled, **how)
+    how["smallest_mm"] = job.smallest_mm
+    return extract_isosurface(job.volume, job.threshold, progress=told, cancel=progress.cancelled, **how)

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.checks import FloatArray
@@ -19,9 +18,8 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
 from gp_labeler.atlas_desk import AtlasDesk, is_atlas_file
-from gp_labeler.bone import Bone
+from gp_labeler.bone_desk import BoneDesk
 from gp_labeler.imaging.readers import ImportPlan
-from gp_labeler.imaging.surface import Surface
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import PoseDesk
 from gp_labeler.session import labelling
@@ -31,18 +29,16 @@ from gp_labeler.session.opening import new_session, open_session, recover_sessio
 from gp_labeler.session.recent import RecentFiles
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.session import Session
-from gp_labeler.session.specimen_edits import RenameSpecimen, SetThreshold
+from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.session.specimen_file import SUFFIX
 from gp_labeler.session.state import How, SpecimenState
 from gp_labeler.tracker_desk import TrackerDesk
-from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, SaveMesh
+from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan
 
 __all__ = ["TOOLS", "Drag", "Workbench"]
 
 TOOLS = ("place", "look", "grey", "touch")
 """What a plain left click or drag over a slice does: place, move the crosshair, grey window, touch."""
-
-_NEAR_VOXELS = 3.0
 
 
 class Drag:
@@ -52,7 +48,7 @@ class Drag:
         self.side, self.code, self.position, self.how = side, code, position, how
 
 
-class Workbench(AtlasDesk):
+class Workbench(AtlasDesk, BoneDesk):
     """What one window works on; see the module.
 
     Its signals of the session's names repeat those of whatever session is open, so a listener connects once;
@@ -90,7 +86,6 @@ class Workbench(AtlasDesk):
         self._abandoned: Session | None = None
         super().__init__(atlas)
         self.session: Session = new_session(directory, predict=self._predict, author=author)
-        self._bone = Bone(self)
         self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
@@ -98,12 +93,6 @@ class Workbench(AtlasDesk):
         self.tracker = TrackerDesk(self)
 
     # What is there
-
-    @property
-    def volume(self) -> Volume | None:
-        """The scan, with its voxels; None before one is loaded."""
-        volume = self.session.volume
-        return volume if isinstance(volume, Volume) else None
 
     @property
     def in_use(self) -> bool:
@@ -115,22 +104,6 @@ class Workbench(AtlasDesk):
     def lacks_scan(self) -> bool:
         """Whether the specimen was touched, and has no scan yet: the next one that is opened is its own."""
         return self.in_use and self.session.state.volume is None
-
-    @property
-    def threshold(self) -> float | None:
-        """The grey value at which bone begins: what the user set, else what was proposed."""
-        chosen = self.session.state.threshold
-        return self._bone.proposed if chosen is None else chosen
-
-    @property
-    def surfaces(self) -> tuple[Surface, ...]:
-        """The bone: parts that do not overlap, the ears at full resolution once that is done."""
-        return self._bone.meshes.parts
-
-    @property
-    def quick_surfaces(self) -> tuple[Surface, ...]:
-        """A coarse stand-in to draw while the camera moves; may be empty."""
-        return self._bone.meshes.quick
 
     @property
     def title(self) -> str:
@@ -223,34 +196,6 @@ class Workbench(AtlasDesk):
         if last is not None and self.session.state.landmark(*last).position is not None:
             return last
         return None
-
-    def preview_threshold(self, value: float | None) -> None:
-        """Try a threshold out on the slices; None ends that."""
-        self.threshold_previewed.emit(value)
-
-    def set_threshold(self, value: float) -> None:
-        """Set the bone threshold, one undoable edit, and mesh anew."""
-        self.threshold_previewed.emit(None)
-        self.session.do(SetThreshold(float(value)))
-
-    def mesh_ears(self, half_mm: float | None = None) -> None:
-        """Mesh around the ears at full resolution now, wherever their place is known."""
-        self._bone.mesh_ears(half_mm=half_mm, anew=True)
-
-    def near_bone(self, points: FloatArray) -> NDArray[np.bool_]:
-        """Return which of (N, 3) scan positions lie within three voxels of bone; all, where there is none."""
-        if self.volume is None or self.threshold is None:
-            return np.ones(len(points), dtype=bool)
-        reach = _NEAR_VOXELS * min(self.volume.spacing)
-        around = reach * np.stack(np.meshgrid(*[np.linspace(-1, 1, 7)] * 3), axis=-1).reshape(-1, 3)
-        values = self.volume.values_at((points[:, None] + around).reshape(-1, 3)).reshape(len(points), -1)
-        return np.asarray((values >= self.threshold).any(axis=1))
-
-    def save_mesh(self, path: Path) -> None:
-        """Write the whole bone surface at full resolution, in the background."""
-        if self.volume is not None and self.threshold is not None:
-            job = SaveMesh(self.volume, self.threshold, Path(path))
-            self.jobs.submit(job, lambda file: self.say(f"Wrote {file.name}"))
 
     def begin_drag(self, side: Side, code: str) -> bool:
         """Take up a placed point; False where it cannot be moved."""

@@ -278,3 +278,26 @@ def test_an_atlas_in_use_stays_for_the_next_specimen_and_is_not_loaded_over(desk
     for code in ("CA", "CB", "RWA"):
         labelling.place(desk.session, own[code] + MIDDLE, How.SLICE, side=Side.LEFT, code=code)
     np.testing.assert_allclose(desk.session.ghosts(Side.LEFT)["RWP"].position, own["RWP"] + MIDDLE, atol=0.01)
+
+
+def test_small_parts_are_left_out_as_asked(desk) -> None:
+    array = ball_volume().array.copy()
+    array[60:62, 60:62, 60:62] = 1400  # half a millimetre across
+    volume = Volume.from_parts(array, [VOXEL_MM] * 3, [0, 0, 0], name="ball")
+    desk.open_volume(volume)
+    desk.wait()
+    corner = volume.voxel_to_scan(np.array([[61.0, 61, 61]]))[0]
+
+    def has_speck() -> bool:
+        points = np.concatenate([part.points for part in desk.surfaces])
+        return bool((np.linalg.norm(points - corner, axis=1) < 1).any())
+
+    assert desk.smallest_part_mm == 1.0
+    assert not has_speck()
+    desk.set_smallest_part(0)
+    desk.wait()
+    assert has_speck()
+    with pytest.raises(GpError, match=r"a length in mm from 0, got -1"):
+        desk.set_smallest_part(-1)
+    with pytest.raises(GpError, match=r"a length in mm from 0, got nan"):
+        desk.set_smallest_part(float("nan"))

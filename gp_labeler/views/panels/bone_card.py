@@ -41,6 +41,17 @@ class BoneCard(Card):
         row.addWidget(self.box, 1)
         row.addWidget(self.propose)
         self.add(row)
+        self.smallest = NumberField("Smallest part of the bone that is kept, mm")
+        self.smallest.step = 0.1
+        self.smallest.setFixedWidth(70)
+        self.smallest.setToolTip("Specks of noise are smaller than ossicles, which are more than 1 mm across")
+        self.smallest.value_chosen.connect(self._choose_smallest)
+        row = QHBoxLayout()
+        row.setSpacing(8)
+        row.addWidget(text_label("Leave out parts below", "hint"))
+        row.addWidget(self.smallest)
+        row.addWidget(text_label("mm", "hint"), 1)
+        self.add(row)
         self.add(
             text_label(
                 "Thin bone should be just closed. The slices show it while you drag.", "hint", wrap=True
@@ -54,10 +65,15 @@ class BoneCard(Card):
     def refresh(self, *_: object) -> None:
         """Show the threshold in effect."""
         threshold = self._workbench.threshold
-        for widget in (self.box, self.propose):
+        for widget in (self.box, self.propose, self.smallest):
             widget.setEnabled(self._workbench.volume is not None)
         self.slider.set_value(threshold)
         self.box.set_value(threshold)
+        self.smallest.set_value(self._workbench.smallest_part_mm)
+
+    def _choose_smallest(self, mm: float) -> None:
+        attempt(self._workbench, lambda: self._workbench.set_smallest_part(mm))
+        self.refresh()
 
     def _on_volume(self, *_: object) -> None:
         volume = self._workbench.volume
