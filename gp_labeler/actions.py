@@ -18,7 +18,16 @@ __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
 ACTIONS: Mapping[str, Action] = MappingProxyType(
     {
         row.id: row
-        for rows in (file_rows, edit_rows, view_rows, cut_rows, landmark_rows, atlas_rows, pose_rows, help_rows)
+        for rows in (
+            file_rows,
+            edit_rows,
+            view_rows,
+            cut_rows,
+            landmark_rows,
+            atlas_rows,
+            pose_rows,
+            help_rows,
+        )
         for row in rows()
     }
 )
