@@ -40,9 +40,16 @@ class PixelLines:
         self._actor.VisibilityOff()
         renderer.AddViewProp(self._actor)
 
-    def draw(self, lines: Sequence[FloatArray], colours: Sequence[str], widths: Sequence[float]) -> None:
+    def draw(
+        self,
+        lines: Sequence[FloatArray],
+        colours: Sequence[str],
+        widths: Sequence[float],
+        opacity: float = 1.0,
+    ) -> None:
         """Draw open lines of (N, 2) pixels (repeat the first point to close one)."""
         self._actor.SetVisibility(bool(lines))
+        self._actor.GetProperty().SetOpacity(opacity)
         if not lines:
             return
         height = self._renderer.GetSize()[1]

@@ -102,9 +102,9 @@ class PoseActor:
     def _draw_lines(self, view: Viewpoint) -> None:
         scene, states, scale = self._scene.seen, self._stage.colours.states, self._stage.scale
         lines: list[tuple[FloatArray, str, float]] = []
-        if scene.shows("region") and scene.opacity > 0:
+        if scene.shows("region"):
             lines += [(outline_of(pose, view), states[pose.role], 1.6) for pose in scene.poses]
-        if scene.shows("cochlea") and scene.opacity > 0:
+        if scene.shows("cochlea"):
             lines += [
                 (edge, states[pose.role], 1.3) for pose in scene.poses for edge in coil_edges(pose, view)
             ]
@@ -119,4 +119,5 @@ class PoseActor:
             [line for line, _, _ in lines],
             [colour for _, colour, _ in lines],
             [width * scale for _, _, width in lines],
+            scene.opacity,
         )

@@ -137,7 +137,7 @@ def _touch(touch: DrawnTouch) -> Solid:
 def _tip(tip: DrawnTip) -> list[Solid]:
     role = "touch" if tip.visible else "unseen"
     trail = tip.trail[-_TRAIL_AT_MOST:]
-    sizes = np.linspace(2.5, 6.0, len(trail))
+    sizes = np.linspace(3.5, 7.0, len(trail))
     found = [
         Solid(DIAMOND, place, _UP, role, (0.0, float(size)), (0.0, float(size)))
         for place, size in zip(trail, sizes, strict=True)

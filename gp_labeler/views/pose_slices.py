@@ -102,7 +102,7 @@ class SlicePen:
         if not self._scene.shows("cochlea"):
             return
         self._fade(1.0)
-        for tube, alpha, width in zip(cochlea_tubes(pose.side), (60, 40), (1.3, 0.0), strict=True):
+        for tube, alpha, width in zip(cochlea_tubes(pose.side), (60, 40), (1.0, 0.0), strict=True):
             loops = section(tube, pose, self._shown.plane.axis, self._shown.position)
             outlines = [self._shown.scan_to_pixel(loop) + 0.5 for loop in loops]
             area(self._painter, outlines, colour_of(pose.role), alpha, width * self._ratio)
@@ -168,7 +168,8 @@ class SlicePen:
         pixel, full = self._pixels(touch.position)[0], self._off(touch.position) < _NEAR_MM
         marker(self._painter, pixel, "tall", 4.6 * self._ratio, colour_of(role), full=full)
         if touch.suspect:
-            marker(self._painter, pixel, "ball", 11 * self._ratio, colour_of(role), full=False)
+            about = ellipse(pixel, (11 * self._ratio) ** 2 * np.eye(2), 1.0)
+            area(self._painter, [about], colour_of(role), 0, 1.6 * self._ratio)
 
     def _path(self, path: FloatArray) -> None:
         self._fade(1.0)

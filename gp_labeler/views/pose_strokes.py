@@ -51,9 +51,11 @@ def area(painter: QPainter, outlines: list[FloatArray], colour: QColor, alpha: i
         path.closeSubpath()
     fill = QColor(colour)
     fill.setAlpha(alpha)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, width == 0)  # else the stroke hides the steps
     painter.fillPath(path, fill)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     if width > 0:
-        painter.strokePath(path, QPen(_HALO, 1.8 * width))
+        painter.strokePath(path, QPen(_HALO, 2.0 * width))
         painter.strokePath(path, QPen(colour, width))
 
 
