@@ -33,6 +33,7 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "expect", "placed": 2 * len(FEATURES)}
     yield {"do": "export", "complete": True}
     yield {"do": "check", "path": "check.json", "strict": True}
+    yield {"do": "save"}
     yield {"do": "view", "go_to": "RWA L", "camera": [-0.75, 0.55, -0.38]}
     yield {"do": "view", "reset": True}
     yield {"do": "screenshot", "path": "window.png", "what": "window"}
