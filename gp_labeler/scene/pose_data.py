@@ -353,8 +353,8 @@ class PoseScene:
     def text_of(self, pose: DrawnPose) -> str:
         """Return what is written at an estimate: its label, and its error where the truth is labelled."""
         truth = next((truth for truth in self.truths if truth.side is pose.side), None)
-        words = [pose.label] if truth is None else [pose.label, error_text(*truth.errors(pose))]
-        return " ".join(word for word in words if word)
+        words = [pose.label] if truth is None else [pose.label, f"off {error_text(*truth.errors(pose))}"]
+        return " · ".join(word for word in words if word)
 
 
 def error_text(off_mm: float, angle: float) -> str:

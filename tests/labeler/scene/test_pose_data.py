@@ -81,7 +81,7 @@ def test_errors_are_written_at_the_estimates_of_that_side_only() -> None:
     np.testing.assert_allclose(truth.errors(POSE), (0.42, turn))
     assert error_text(0.42, turn) == "0.42 mm, 3.1°"
     scene = type(ALL)((POSE, pose(side=Side.RIGHT, label="other")), (truth,))
-    assert [scene.text_of(each) for each in scene.poses] == ["robust 0.42 mm, 3.1°", "other"]
+    assert [scene.text_of(each) for each in scene.poses] == ["robust · off 0.42 mm, 3.1°", "other"]
 
 
 def test_long_vectors_and_suspects_are_named() -> None:

@@ -158,7 +158,7 @@ def test_names_stand_beside_what_is_near(qtbot) -> None:
     overlay.show(ALL)
     near = {name.text for name in overlay.names(through(MIDDLE), 1.0)}
     far = {name.text for name in overlay.names(through(beside(0.0, 9.0, 0.0)), 1.0)}
-    assert {"robust 2.50 mm, 0.0°", "labelled", "MN ?"} <= near
+    assert {"robust · off 2.50 mm, 0.0°", "labelled", "MN ?"} <= near
     assert far == {""}
     desk.close(discard=True)
 
