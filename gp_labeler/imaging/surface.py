@@ -67,7 +67,8 @@ def extract_isosurface(
     box : (2, 3) array_like, mm, scan frame, optional
         Opposite corners; only the voxels around this box are meshed.
     stride : int
-        Take every so many voxels along each axis.
+        Mesh the means of cubes of so many voxels along each edge. Taking single voxels instead would leave
+        terraces on slopes.
     smallest_mm : float
         Drop parts smaller than this across; 0 keeps all.
     largest : int, optional
@@ -142,12 +143,17 @@ def _region(volume: Volume, box: ArrayLike | None) -> FloatArray:
 
 
 def _image(volume: Volume, region: FloatArray, stride: int) -> vtkImageData:
-    """Wrap (a part of) the voxels as VTK sees them; whole volumes are not copied."""
+    """Wrap (a part of) the voxels as VTK sees them; whole volumes are not copied at full resolution."""
     (i0, j0, k0), (i1, j1, k1) = region.astype(int)
-    part = volume.array[k0 : k1 + 1 : stride, j0 : j1 + 1 : stride, i0 : i1 + 1 : stride]
+    part = volume.array[k0 : k1 + 1, j0 : j1 + 1, i0 : i1 + 1]
+    first = region[:1]
+    if stride > 1:
+        from gp_labeler.imaging.coarse import means_of_cubes  # numba, as above
+
+        part, first = means_of_cubes(part, stride), first + (stride - 1) / 2
     image = vtkImageData()
     image.SetDimensions(part.shape[::-1])
-    image.SetOrigin(triple(volume.voxel_to_scan(region[:1])[0]))
+    image.SetOrigin(triple(volume.voxel_to_scan(first)[0]))
     image.SetSpacing(triple(np.array(volume.spacing) * stride))
     image.SetDirectionMatrix(volume.direction.ravel().tolist())
     image.GetPointData().SetScalars(to_vtk(vtk_ready(part).ravel(), share=True))
