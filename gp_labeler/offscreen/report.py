@@ -133,4 +133,5 @@ def pose_rows(rig: Rig) -> list[dict[str, Any]]:
 
 
 def _relative(file: Path, folder: Path) -> str:
+    file, folder = file.absolute(), folder.absolute()
     return file.relative_to(folder).as_posix() if file.is_relative_to(folder) else str(file)

@@ -94,6 +94,7 @@ def test_the_command_runs_where_there_is_no_display(folder) -> None:
     assert done.returncode == 1
     assert done.stderr.strip() == "gp-labeler: step 5: expect: 1 points are placed, expected were 2"
     assert "place CA left: axial" in done.stdout
+    assert done.stdout.endswith("is in out: GP-01_L.mrk.json, GP-01.gpspecimen.json\n")
     assert (folder / "out" / "GP-01_L.mrk.json").exists()
 
 
