@@ -20,7 +20,7 @@ from gp_labeler.actions import ACTIONS, MENUS, gestures
 __all__ = ["ShortcutsSheet", "keys_text"]
 
 _KEYS_WIDTH = 128
-_COLUMNS = (("In the 3D view", "On a slice"), ("View", "Estimate"), ("Landmarks", "File", "Edit", "Help"))
+_COLUMNS = (("In the 3D view", "On a slice", "Estimate"), ("View",), ("Landmarks", "File", "Edit", "Help"))
 
 
 def keys_text(keys: str) -> str:

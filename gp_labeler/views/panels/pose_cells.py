@@ -12,16 +12,22 @@ from gp_labeler.views.panels.pose_words import name_of
 from gp_labeler.views.strokes import round_pen
 from gp_labeler.views.theme import Theme
 
-__all__ = ["COLUMN_WIDTHS", "paint_cell", "paint_ground"]
+__all__ = ["column_widths", "paint_cell", "paint_ground"]
 
-COLUMN_WIDTHS = {XYZ: 174, MISFIT: 66, USE: 32, CLEAR: 16}
-"""Logical pixels; the name gets the rest."""
+_ROOMY = 520
 
 _PAD, _CHIP, _CODE = 8, 12, 34
 _MISFIT = 36
 _MIDDLE = Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | _MIDDLE
 _MINUS = "\N{MINUS SIGN}"
+
+
+def column_widths(width: int) -> dict[int, int]:
+    """Return the widths of the columns in a table so wide, logical pixels; the name gets the rest."""
+    if width < _ROOMY:
+        return {XYZ: 174, MISFIT: 66, USE: 32, CLEAR: 16}
+    return {XYZ: 196, MISFIT: 100, USE: 40, CLEAR: 20}
 
 
 def paint_ground(

@@ -45,6 +45,11 @@ class TouchRow:
     suspect: bool
     target: bool
 
+    @property
+    def is_skull(self) -> bool:
+        """Whether it is a skull feature, which serves the registration only."""
+        return self.name not in CODES
+
 
 class TouchModel(QAbstractTableModel):
     """Names, positions and misfits of the touches of the side in work.
@@ -63,11 +68,15 @@ class TouchModel(QAbstractTableModel):
         super().__init__(parent)
         self._desk, self._tell = workbench, tell
         self.rows: tuple[TouchRow, ...] = ()
+        self.n_skull = 0
+        self.skull_shown = False
         self.refresh()
 
     def refresh(self) -> None:
         """Ask the workbench anew."""
-        rows = tuple(self._row(name) for name in self._desk.pose.names)
+        known = [self._row(name) for name in self._desk.pose.names]
+        self.n_skull = sum(row.is_skull for row in known)
+        rows = tuple(row for row in known if not row.is_skull or self._is_worth_a_row(row))
         if [row.name for row in rows] != [row.name for row in self.rows]:
             self.beginResetModel()
             self.rows = rows
@@ -87,6 +96,11 @@ class TouchModel(QAbstractTableModel):
         """Return the number of a row by its name; -1 where there is none."""
         return next((n for n, row in enumerate(self.rows) if row.name == name), -1)
 
+    def show_skull(self, shown: bool) -> None:
+        """Show a row for every skull feature, or only for those that ask for attention."""
+        self.skull_shown = shown
+        self.refresh()
+
     def record(self, name: str, text: str) -> bool:
         """Take a typed position; return whether it could be taken."""
         pose = self._desk.pose
@@ -99,6 +113,9 @@ class TouchModel(QAbstractTableModel):
             return False
         self._tell(None)
         return True
+
+    def _is_worth_a_row(self, skull: TouchRow) -> bool:
+        return self.skull_shown or skull.target or skull.suspect
 
     def _row(self, name: str) -> TouchRow:
         pose = self._desk.pose

@@ -13,7 +13,17 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QKeySequence, QMouseEvent, QPainter, QPen
+from PySide6.QtGui import (
+    QColor,
+    QFont,
+    QFontMetrics,
+    QKeyEvent,
+    QKeySequence,
+    QMouseEvent,
+    QPainter,
+    QPen,
+    QResizeEvent,
+)
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QApplication,
@@ -25,7 +35,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.views.panels.pose_cells import COLUMN_WIDTHS, paint_cell, paint_ground
+from gp_labeler.views.panels.pose_cells import column_widths, paint_cell, paint_ground
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ, TouchModel
 from gp_labeler.views.theme import FONT_PX, theme_of
 
@@ -105,8 +115,11 @@ class TouchTable(QTableView):
         header.setMinimumSectionSize(16)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
-        for column, width in COLUMN_WIDTHS.items():
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        for column, width in column_widths(event.size().width()).items():
             self.setColumnWidth(column, width)
+        super().resizeEvent(event)
 
     def _fit(self) -> None:
         self.setFixedHeight(_HEADER + ROW_HEIGHT * self._model.rowCount() + 4)

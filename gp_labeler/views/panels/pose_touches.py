@@ -22,6 +22,7 @@ from gp_labeler.workbench import Workbench
 __all__ = ["TouchesCard"]
 
 _DELETE = Qt.WidgetAttribute.WA_DeleteOnClose
+_DOWN, _UP = "\N{BLACK DOWN-POINTING SMALL TRIANGLE}", "\N{BLACK UP-POINTING SMALL TRIANGLE}"
 _LOOK_MS = 90
 """The pointer may pass over rows; only one it rests on is worth an estimate without it."""
 
@@ -55,6 +56,7 @@ class TouchesCard(Card):
         self.notices, self.change = Notices(), ElidedLabel("", "hint")
         self.change.setAccessibleName("What leaving a point out changes")
         self.skull = link("+ S1", "Touch a feature of the skull that serves the registration to the scan")
+        self.more = link("", "Rows of the skull's registration features; those that do not fit always show")
         self.guide = link("Guide…", "One feature after the other in large type, with its picture")
         self.clear = link("Clear all", "Forget all touches of this side; undo brings them back")
         self.ways = {name: self._way(name) for name in _WAYS}
@@ -66,11 +68,16 @@ class TouchesCard(Card):
     def refresh(self, *_: object) -> None:
         """Show the touches as they stand."""
         self.model.refresh()
-        touched = [row for row in self.model.rows if row.touch is not None]
-        out = sum(row.touch is not None and row.touch.left_out for row in touched)
+        side = self._desk.pose.side
+        touched = [touch for (of, _), touch in self._desk.session.state.touches.items() if of is side]
+        out = sum(touch.left_out for touch in touched)
         words = f"Touches  {len(touched)}" + (f", {out} left out" if out else "")
         self.heading.setText(words if touched else "Touches")
         self.clear.setEnabled(bool(touched))
+        n, shown = self.model.n_skull, self.model.skull_shown
+        self.more.setText(f"Skull {n} {_UP if shown else _DOWN}")
+        self.more.setAccessibleName(f"{'Hide' if shown else 'Show'} {n} skull features")
+        self.more.setVisible(n > 0)
         self._timer.start()
         self.skull.setText(f"+ {self._desk.pose.next_skull}")
 
@@ -121,6 +128,7 @@ class TouchesCard(Card):
         foot = QHBoxLayout()
         foot.setContentsMargins(11, 0, 8, 0)
         foot.addWidget(self.change, 1)
+        foot.addWidget(self.more)
         foot.addWidget(self.skull)
         self.add(foot)
 
@@ -132,6 +140,7 @@ class TouchesCard(Card):
         self.ways["tracker"].clicked.connect(self.tracker_asked)
         self.guide.clicked.connect(self.guide_asked)
         self.clear.clicked.connect(lambda: self._do(lambda: self._clear(None)))
+        self.more.clicked.connect(self._toggle_skull)
         self.skull.clicked.connect(lambda: pose.aim(pose.next_skull))
         table.clear_asked.connect(lambda name: self._do(lambda: self._clear(name)))
         table.use_asked.connect(self._toggle_use)
@@ -150,6 +159,10 @@ class TouchesCard(Card):
         button.setEnabled(self._desk.volume is not None)
         with blocked(button):
             button.setChecked(self._desk.tool == "touch")
+
+    def _toggle_skull(self) -> None:
+        self.model.show_skull(not self.model.skull_shown)
+        self.refresh()
 
     def _type_next(self) -> None:
         target = self._desk.pose.target
@@ -210,7 +223,7 @@ class TouchesCard(Card):
         self.change.set_words(words)
 
     def _any_touch(self) -> bool:
-        return any(row.touch is not None for row in self.model.rows)
+        return any(side is self._desk.pose.side for side, _ in self._desk.session.state.touches)
 
     def _touch(self, name: str) -> Touch | None:
         return self._desk.session.state.touches.get((self._desk.pose.side, name))

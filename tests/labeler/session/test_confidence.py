@@ -20,10 +20,11 @@ def test_six_touches_that_agree_are_good():
     assert (found.level, found.word) == ("good", "Good")
 
 
-def test_a_wrong_side_and_swapped_names_are_not_to_be_used():
+def test_a_wrong_side_and_swapped_names_are_told_first():
     wrong = estimate_pose(ANIMAL, "R", ATLAS)
     swapped = estimate_pose({**ANIMAL, "MN": ANIMAL["OS"], "OS": ANIMAL["MN"]}, "L", ATLAS)
     assert (confidence(wrong).level, confidence(swapped).level) == ("danger", "danger")
+    assert (confidence(wrong).word, confidence(swapped).word) == ("Check the side", "Check the names")
     assert is_other_side(wrong)
     assert not is_other_side(swapped)
 

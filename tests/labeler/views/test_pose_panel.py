@@ -241,11 +241,14 @@ def test_only_files_of_touches_are_taken(tmp_path):
     assert not any(holds_touches(Path(name)) for name in ("a.nrrd", "b.gpspecimen.json", "c"))
 
 
-def test_undo_takes_a_file_back(desk, panel):
+def test_undo_takes_a_file_back(desk, panel, qtbot):
     touch(desk, "CL", "MN", "OS")
     drop(panel, find("SkullA_Left_new.dat"))
     assert "S1" in touches(desk)
-    assert panel.touches.model.row_of("S1") >= len(ORDER)
+    assert panel.touches.model.row_of("S1") == -1, "eight more rows are shown where they are wanted"
+    assert panel.touches.more.accessibleName() == "Show 8 skull features"
+    qtbot.mouseClick(panel.touches.more, CLICK)
+    assert panel.touches.model.row_of("S1") == len(ORDER)
     desk.session.undo()
     assert set(touches(desk)) == {"CL", "MN", "OS"}
     assert panel.touches.model.row_of("S1") == -1
@@ -312,7 +315,7 @@ def test_the_wrong_side_is_called_out_and_right_on_the_other(desk, panel, qtbot)
     touch(desk, *PROBE)
     assert "left side fits these points better than the right" in notices(panel)
     assert "check the side" in notices(panel).lower()
-    assert panel.result.verdict.label.text() == "Do not use"
+    assert panel.result.verdict.label.text() == "Check the side"
     wrong = touches(desk, Side.RIGHT)
     qtbot.mouseClick(panel.result.other_side, CLICK)
     assert desk.pose.side is LEFT
@@ -332,7 +335,7 @@ def test_swapped_names_are_called_out(desk, panel):
     desk.pose.record(at["MN"], TouchHow.TYPED, name="OS")
     desk.pose.record(at["OS"], TouchHow.TYPED, name="MN")
     assert "look swapped" in notices(panel)
-    assert panel.result.verdict.label.text() == "Do not use"
+    assert panel.result.verdict.label.text() == "Check the names"
 
 
 def test_two_methods_stand_side_by_side(desk, panel, qtbot):
@@ -404,6 +407,7 @@ def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
         assert panel.in_scan.mark.text() == f"Mark S{n} here"
         qtbot.mouseClick(panel.in_scan.mark, CLICK)
     assert desk.pose.estimate.registered.way == "skull"
+    qtbot.mouseClick(panel.touches.more, CLICK)
     shown_at = []
     desk.point_shown.connect(shown_at.append)
     click(qtbot, panel, "S2", NAME)
