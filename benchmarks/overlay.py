@@ -109,11 +109,18 @@ def main() -> None:
     def nothing(_: PoseScene) -> None:
         scene3d.render()
 
+    def usual(scene: PoseScene) -> None:
+        """One estimate as the window shows it at first, in all four views."""
+        first = PoseScene(scene.poses[:1], scene.truths, scene.touches)
+        draw(first)
+        paint(first)
+
     moved = _best(draw, scenes)
     rows = [
         ("3D: data and matrices alone", _best(show, scenes)),
         ("3D: moved, and drawn", moved),
         ("three slices painted", _best(paint, scenes)),
+        ("one estimate, 3D and three slices", _best(usual, scenes)),
         ("peer: made anew, and drawn", _best(anew, scenes)),
     ]
     scene3d.pose.show(PoseScene())

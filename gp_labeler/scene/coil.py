@@ -24,8 +24,8 @@ BASE_MM = -0.3
 _WINDOW = (0.0, 1.85, 0.0)
 """Where the duct begins: inside the round window, whose middle is at y = 2.35 mm."""
 
-_AROUND = 18
-_PER_TURN = 32
+_AROUND = 14
+_PER_TURN = 24
 _MODIOLUS = ((0.0, 0.62), (0.3, 0.45), (0.8, 0.2))
 """Height, as a share of CB-CA, and radius (mm) of the modiolus."""
 

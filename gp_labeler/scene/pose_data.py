@@ -57,7 +57,7 @@ PARTS: Mapping[str, str] = MappingProxyType(
 METHOD_ROLES: Mapping[str, str] = MappingProxyType({"robust": "pose", "jrmpc": "pose_2"})
 """Colour of an estimate (a state of the theme) by its method; `DrawnPose.style` goes with it."""
 
-_CORNERS = 48
+_CORNERS = 32
 _DEFINING = ("CA", "CB", "RWA", "RWP")
 _STYLES: Mapping[str, str] = MappingProxyType({"pose": "dashed", "pose_2": "dotted"})
 

@@ -51,7 +51,7 @@ def area(painter: QPainter, outlines: list[FloatArray], colour: QColor, alpha: i
         path.closeSubpath()
     fill = QColor(colour)
     fill.setAlpha(alpha)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing, width == 0)  # else the stroke hides the steps
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing, False)  # steps of so faint an edge are not seen
     painter.fillPath(path, fill)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     if width > 0:
