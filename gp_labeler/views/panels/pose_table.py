@@ -211,6 +211,11 @@ class _TouchDelegate(QStyledItemDelegate):
         editor.setAccessibleName(f"Position of {self._table.name_at(index)}, x y z in mm")
         return editor
 
+    def setEditorData(self, editor: QWidget, index: Index) -> None:  # noqa: N802
+        """Fill the field in, but leave alone what somebody is typing while other touches come in."""
+        if not (isinstance(editor, QLineEdit) and editor.isModified()):
+            super().setEditorData(editor, index)
+
     def updateEditorGeometry(self, editor: QWidget, option: QStyleOptionViewItem, index: Index) -> None:  # noqa: N802
         box = option.rect
         wide = QFontMetrics(editor.font()).horizontalAdvance("-1000.000 -1000.000 -1000.000") + 12

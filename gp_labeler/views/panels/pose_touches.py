@@ -183,9 +183,10 @@ class TouchesCard(Card):
         if len(lines) == 1 and not lines[0][0].isalpha():
             self.model.record(name or self._desk.pose.target or "", lines[0])
             return
-        for line in lines:
-            code, _, rest = line.replace(",", " ", 1).replace("\t", " ", 1).partition(" ")
-            if not self.model.record(code, rest):
+        for n, line in enumerate(lines):
+            code, *rest = line.replace(",", " ").replace("\t", " ").replace(";", " ").split()
+            is_heading = n == 0 and not any(character.isdigit() for character in "".join(rest))
+            if not is_heading and not self.model.record(code, " ".join(rest)):
                 return
 
     def _toggle_use(self, name: str) -> None:

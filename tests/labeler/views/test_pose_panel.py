@@ -192,6 +192,48 @@ def test_a_slip_while_typing_keeps_what_was_typed(desk, panel, qtbot):
     assert not panel.touches.notices.isVisible()
 
 
+def test_what_is_being_typed_outlives_a_touch_from_elsewhere(desk, panel, qtbot):
+    touch(desk, "CL", "LLI", "MN")
+    panel.touches.table.edit_position("OS")
+    qtbot.keyClicks(editor(panel), "1 2")
+    touch(desk, "RWA", "MN")
+    assert editor(panel).text() == "1 2"
+    qtbot.keyClicks(editor(panel), " 3")
+    qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
+    assert touches(desk)["OS"] == (1, 2, 3)
+
+
+def test_a_field_that_is_left_half_filled_in_says_so_and_changes_nothing(desk, panel, qtbot):
+    panel.touches.table.edit_position("CL")
+    qtbot.keyClicks(editor(panel), "1 2")
+    panel.verdict.note.setFocus()
+    assert touches(desk) == {}
+    assert "CL" in panel.touches.notices.shown[0][1]
+
+
+def test_random_clicks_and_keys_leave_it_whole(desk, panel, qtbot):
+    rng = np.random.default_rng(5)
+    touch(desk, *PROBE)
+    keys = [Qt.Key.Key_Return, Qt.Key.Key_Delete, Qt.Key.Key_Space, Qt.Key.Key_Escape, Qt.Key.Key_Down]
+    for _ in range(150):
+        what = rng.integers(6)
+        name = str(rng.choice(desk.pose.names))
+        if what < 3:
+            click(qtbot, panel, name, int(rng.integers(5)))
+        elif what == 3:
+            qtbot.keyClick(QApplication.focusWidget() or panel.touches.table, keys[rng.integers(len(keys))])
+        elif what == 4:
+            desk.session.undo() if rng.integers(2) else desk.session.redo()
+        else:
+            touch(
+                desk, str(rng.choice(ORDER)), noise=float(rng.choice([0.1, 3.0])), seed=int(rng.integers(99))
+            )
+    QApplication.processEvents()
+    made = desk.pose.estimate
+    assert panel.result.one.isVisible() is (made is not None and made.pose is not None)
+    assert {row.name for row in panel.touches.model.rows if row.touch is not None} == set(touches(desk))
+
+
 def test_a_touch_is_changed_by_a_double_click(desk, panel, qtbot):
     touch(desk, "CL", "MN", "OS", noise=0)
     where = cell(panel, "MN", XYZ)
@@ -205,8 +247,8 @@ def test_a_touch_is_changed_by_a_double_click(desk, panel, qtbot):
 
 
 def test_lines_with_names_are_pasted_at_once(desk, panel, qtbot):
-    lines = "\n".join(f"{code}, " + ", ".join(f"{x:.3f}" for x in ANIMAL[code]) for code in PROBE)
-    QGuiApplication.clipboard().setText(lines)
+    lines = [f"{code}, " + ", ".join(f"{x:.3f}" for x in ANIMAL[code]) for code in PROBE]
+    QGuiApplication.clipboard().setText("\n".join(["label, x, y, z", *lines, ""]))
     panel.touches.table.setFocus()
     qtbot.keyClick(panel.touches.table, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
     assert set(touches(desk)) == set(PROBE)
