@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
 from gp_core.checks import FloatArray
@@ -14,6 +15,7 @@ from gp_labeler.session.edits import point_text
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import follow
 from gp_labeler.views.icons import icon
+from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
@@ -21,6 +23,10 @@ __all__ = ["StatusLine", "where_text"]
 
 _SHOWN_AFTER_MS = 150
 """Work that is done sooner does not flicker by."""
+
+_HEIGHT, _MARGIN, _MOST_LINES = 30, 12, 3
+_MESSAGES = ("good", "warning", "danger")
+"""Looks of what was said, not of what comes next."""
 
 _MESSAGE_MS = {"info": 5000, "warning": 12000, "error": 0}
 
@@ -43,14 +49,15 @@ class StatusLine(QWidget):
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk = workbench
-        self.setFixedHeight(30)
+        self.setFixedHeight(_HEIGHT)
+        self._role = "hint"
         self.where, self.next_click = QLabel(), QLabel()
         self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.work = _Work(workbench)
         row = QHBoxLayout(self)
-        row.setContentsMargins(12, 0, 8, 0)
-        row.setSpacing(12)
+        row.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
+        row.setSpacing(_MARGIN)
         row.addWidget(self.where, 3)
         row.addWidget(self.next_click, 4)
         row.addWidget(self.work, 3)
@@ -88,7 +95,7 @@ class StatusLine(QWidget):
 
     def say(self, text: str, level: str = "info") -> None:
         """Show a message in the middle for a while; an error until the next edit."""
-        self._show(text, {"info": "good"}.get(level, "danger" if level == "error" else level))
+        self._show(breakable(text), {"info": "good"}.get(level, "danger" if level == "error" else level))
         if _MESSAGE_MS[level]:
             self._message_timer.start(_MESSAGE_MS[level])
         else:
@@ -129,6 +136,24 @@ class StatusLine(QWidget):
         }
         self.next_click.setStyleSheet(f"color: {colours[role]}")
         self._role = role
+        self._make_room()
+
+    def _make_room(self) -> None:
+        """Give a long message the whole width, and more lines where that is not enough."""
+        text, whole = self.next_click, self.width() - 2 * _MARGIN
+        need = text.fontMetrics().horizontalAdvance(text.text()) + 8
+        is_long = self._role in _MESSAGES and need > 0.4 * (whole - 2 * _MARGIN)
+        self.where.setVisible(not is_long)
+        self.work.setVisible(not is_long or self.work.is_busy)
+        text.setWordWrap(is_long)
+        room = whole - (self.work.sizeHint().width() + _MARGIN if self.work.is_busy else 0)
+        lines = min(-(-need // max(room - 40, 200)), _MOST_LINES) if is_long else 1
+        self.setFixedHeight(_HEIGHT + (lines - 1) * text.fontMetrics().lineSpacing())
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
+        super().resizeEvent(event)
+        if event.size().width() != event.oldSize().width():
+            self._make_room()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         if event.type() == QEvent.Type.StyleChange:
@@ -164,6 +189,11 @@ class _Work(QWidget):
             follow(self, signal, self._on_task)
         self.stop.setIcon(icon("close", theme_of(self).muted, size=12))
         self._refresh()
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether there is work to show."""
+        return self._task is not None
 
     @property
     def _task(self) -> Task[Any] | None:

@@ -191,11 +191,12 @@ def _numbering_problems(group: SliceGroup, numbering: Numbering) -> list[Problem
     found = []
     if numbering.missing:
         gap = names([str(number) for number in numbering.missing], 6)
-        where = f"{group.files[0].name} to {group.files[-1].name}"
+        where, n = f"{group.files[0].name} and {group.files[-1].name}", len(numbering.missing)
+        missing = f"the numbers {gap} are missing ({n} slices)" if n > 1 else f"the number {gap} is missing"
         found.append(
             Problem(
                 "gap",
-                f"between {where} the numbers {gap} are missing ({len(numbering.missing)} slices)",
+                f"between {where} {missing}",
                 remedy="Put the files back, or accept copies of the neighbouring slices (--accept gap).",
                 resolved_by=("accept",),
             )

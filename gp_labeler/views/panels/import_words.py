@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 
 from gp_labeler.imaging.preview import PreviewPlane, preview_planes
@@ -13,6 +14,7 @@ from gp_labeler.views.bind import TIMES, size_text, spacing_text
 __all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "sentence", "why_not"]
 
 MB = 2**20
+_OPTION = re.compile(r" \(--[^)]*\)")
 
 
 @dataclass(frozen=True)
@@ -54,7 +56,7 @@ def remedy(problem: Problem) -> str:
     """Return what to do in this window; the remedies of `Problem` are for the command as well."""
     if "spacing" in problem.resolved_by:
         return "Type the true voxel size below. It stands in the scanner's log, or ask who made the scan."
-    return problem.remedy
+    return _OPTION.sub("", problem.remedy)
 
 
 def why_not(errors: tuple[Problem, ...]) -> str:

@@ -36,6 +36,7 @@ _STEPS = (
         "CA, RWP and OS. From then on the atlas shows where the others should be.",
     ),
     ("export", "Export both sides", "Landmark files that open in 3D Slicer and feed the atlas."),
+    ("pose", "Estimate a cochlea", "From a few touched points of another animal, with or without a scan."),
 )
 _N_RECENT = 7
 
@@ -64,7 +65,7 @@ class Welcome(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.setAcceptDrops(True)
-        self._drop = _text("Drop a scan, a folder or a specimen file anywhere on this page", "hint")
+        self._drop = _text("Drop a scan, a folder, a specimen or an atlas anywhere on this page", "hint")
         self._lay_out()
         self.refresh()
 

@@ -27,6 +27,21 @@ from gp_labeler.views.application import make_window as make_plain
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 
 
+def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbot) -> None:
+    status, words = window.status, "the file is truncated after three gigabytes and cannot be read. " * 3
+    height = status.height()
+    status.say(f"/some/where/far/away/in_a_folder_of_the_lab/head_2026.nrrd: {words}", "error")
+    qtbot.wait(10)
+    text = status.next_click
+    assert not status.where.isVisible()
+    assert text.width() > 0.7 * status.width()
+    assert height < status.height() >= text.heightForWidth(text.width())
+    status.say("Saved", "info")
+    qtbot.wait(10)
+    assert status.where.isVisible()
+    assert status.height() == height
+
+
 def test_the_first_page_gives_way_to_the_scan(qtbot, make_window, ball) -> None:
     window = make_window()
     assert window.pages.currentIndex() == 0
