@@ -43,6 +43,7 @@ from gp_core.errors import GeometryError
 from gp_core.registration.procrustes import surely_no_line, weighted_procrustes
 
 __all__ = [
+    "AgainstOthers",
     "NamedFit",
     "TouchModel",
     "best_exchange",
@@ -60,6 +61,8 @@ _ESTIMATES = count()
 _MAX_ITERATIONS = 500
 _DOUBTFUL_WEIGHT = 0.5
 _LEFT_OUT = 1e-3
+_NEWTON_STEPS = 6
+_TINY = 1e-300
 
 
 @dataclass(frozen=True)
@@ -81,6 +84,45 @@ class TouchModel:
     mean: FloatArray
     variances: FloatArray
     noise: float | None = None
+
+
+@dataclass(frozen=True)
+class AgainstOthers:
+    """Touches held against where the others alone would put them, along the principal axes of that spread.
+
+    Attributes
+    ----------
+    deviations : (n, 3) array
+        Squared deviations, mm^2.
+    variances : (n, 3) array
+        Of pose and shape, to which each touch adds its own error, mm^2.
+    noise : float
+        Scale of an ordinary touch error, mm.
+    """
+
+    deviations: FloatArray
+    variances: FloatArray
+    noise: float
+
+    @cached_property
+    def squared(self) -> FloatArray:
+        """(n,) squared deviation over its variance: of ordinary touches, chi-square of 3 degrees."""
+        squared: FloatArray = (self.deviations / (self.variances + self.noise**2)).sum(axis=1)
+        return squared
+
+    @property
+    def error_variance(self) -> FloatArray:
+        """(n,) variance of its own error that would make each deviation an average one, mm^2 a coordinate.
+
+        Newton's method on the inverse of `squared`, which is nearly linear in that variance.
+        """
+        variance = np.full(len(self.deviations), self.noise**2)
+        for _ in range(_NEWTON_STEPS):
+            spread = self.variances + variance[:, None]
+            squared = (self.deviations / spread).sum(axis=1)
+            slope = (self.deviations / spread**2).sum(axis=1)
+            variance += np.maximum(squared - 3, 0) * squared / (3 * np.maximum(slope, _TINY))
+        return variance
 
 
 @dataclass(frozen=True)
@@ -143,6 +185,25 @@ class NamedFit:
     def jacobian(self) -> FloatArray:
         """(3 n, 6) `motion_jacobian` of the touches."""
         return motion_jacobian(self.points)
+
+    @cached_property
+    def against_others(self) -> AgainstOthers:
+        """Each touch held against where the others alone would put it.
+
+        Without a touch that pulls the pose after it, such as a far one, its error would show in full: the
+        residual is brought to what it would be without the touch, by the linear algebra of leaving one out.
+        """
+        jacobian = self.jacobian.reshape(-1, 3, 6)
+        precision = self.precision[::3]
+        variances = 1 / precision - self.noise**2 / self.weights
+        covariance = np.linalg.inv((self.precision[:, None] * self.jacobian).T @ self.jacobian)
+        of_pose = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
+        # where a touch alone holds the pose, hardly anything is left to be inverted, and all is possible
+        release = np.linalg.inv((1 + 1e-9) * np.eye(3) - precision[:, None, None] * of_pose)
+        away = release @ self.residual.reshape(-1, 3, 1)
+        spread, axes = np.linalg.eigh(of_pose @ release)
+        deviations = (axes.transpose(0, 2, 1) @ away)[..., 0] ** 2
+        return AgainstOthers(deviations, spread + variances[:, None], self.noise)
 
     @cached_property
     def touch_variances(self) -> FloatArray:

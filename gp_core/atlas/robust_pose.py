@@ -31,7 +31,13 @@ __all__ = ["estimate_robust", "locate_robust"]
 
 _SUSPECT_WEIGHT = 0.2
 _SUSPECT_SQUARED = 20.0
-"""Squared deviation over its variance; three coordinates exceed it once in 6000 ordinary touches."""
+"""Squared deviation from where the others put a touch, over its variance; 1 ordinary one of 6000 is above."""
+
+_ODD_SQUARED = 7.814727903251179
+"""The same, with 1 of 20 above: from there on a touch counts as uncertain as it looks."""
+
+_ENOUGH_TO_TELL = 5
+"""Touches from which a mistouch can be told from an unusual animal."""
 
 _CLEAR_MISFIT = 6.0
 """Difference in -2 log posterior, odds of 20 to 1, from which one side is told from the other."""
@@ -176,16 +182,20 @@ def _pose_covariance(
     of_shape[:, atlas.coordinates(DEFINING)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
     covariance = of_shape @ atlas.scatter @ of_shape.T
-    covariance += (of_touches * _touch_variances(model, fit)) @ of_touches.T
+    covariance += (of_touches * _touch_variances(fit)) @ of_touches.T
     symmetric: FloatArray = (covariance + covariance.T) / 2
     return symmetric
 
 
-def _touch_variances(model: TouchModel, fit: NamedFit) -> FloatArray:
-    """Return (3 n,) variances of the touched coordinates; a suspect one is as wrong as it looks."""
-    ordinary = fit.touch_variances
-    seen = fit.squared_residuals / 3 - model.variances
-    return np.repeat(np.where(_suspicious(model, fit), np.maximum(seen, ordinary), ordinary), 3)
+def _touch_variances(fit: NamedFit) -> FloatArray:
+    """Return (3 n,) variances of the touched coordinates; suspect and odd ones are as wrong as they look."""
+    variances = fit.touch_variances
+    odd = _suspicious(fit)
+    if len(odd) >= _ENOUGH_TO_TELL:
+        odd |= fit.against_others.squared > _ODD_SQUARED
+    if odd.any():
+        variances = np.where(odd, np.maximum(fit.against_others.error_variance, variances), variances)
+    return np.repeat(variances, 3)
 
 
 def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
@@ -193,15 +203,14 @@ def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
     return dict(zip(model.codes, lengths.tolist(), strict=True))
 
 
-def _suspicious(model: TouchModel, fit: NamedFit) -> NDArray[np.bool_]:
+def _suspicious(fit: NamedFit) -> NDArray[np.bool_]:
     """Mark touches (n,) that the fit set aside, or that only a most unusual animal would explain."""
-    unusual = fit.squared_residuals > _SUSPECT_SQUARED * (model.variances + fit.noise**2)
-    marks: NDArray[np.bool_] = unusual | (fit.weights < _SUSPECT_WEIGHT)
-    return marks
+    marks: NDArray[np.bool_] = fit.against_others.squared > _SUSPECT_SQUARED
+    return marks | (fit.weights < _SUSPECT_WEIGHT)
 
 
 def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
-    return tuple(compress(model.codes, _suspicious(model, fit).tolist()))
+    return tuple(compress(model.codes, _suspicious(fit).tolist()))
 
 
 def _warnings(
@@ -217,7 +226,7 @@ def _warnings(
         names = " and ".join(suspects)
         verb, it = ("does", "it") if len(suspects) == 1 else ("do", "them")
         yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
-    if len(model.codes) < 5 and not suspects:
+    if len(model.codes) < _ENOUGH_TO_TELL and not suspects:
         yield f"only {len(model.codes)} points: a mistouch cannot be told from an unusual animal"
     if not fit.converged:
         yield "the fit did not settle; check the touches"

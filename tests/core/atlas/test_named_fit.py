@@ -13,6 +13,7 @@ from gp_core.atlas.named_fit import (
 )
 from gp_core.errors import GeometryError
 from gp_core.frames import mirror_x
+from gp_core.registration.procrustes import weighted_procrustes
 
 
 def _model(codes: tuple[str, ...] = PROBE, noise: float | None = None) -> TouchModel:
@@ -85,6 +86,45 @@ def test_a_mirrored_ear_fits_worse_at_careful_and_at_rough_touches() -> None:
         touches = model.mean + noise * rng.normal(size=model.mean.shape)
         own, mirrored = fit_named_points(model, touches), fit_named_points(model, mirror_x(touches))
         assert mirrored.misfit > own.misfit + 10
+
+
+def test_a_touch_is_held_against_the_others_as_if_it_had_been_left_out() -> None:
+    rng = np.random.default_rng(6)
+    model = _model(noise=0.1)
+    touches = model.mean + 0.01 * rng.normal(size=model.mean.shape)
+    touches[2] += (0.0, 0.05, -0.05)
+    fit = fit_named_points(model, touches)
+    for j in range(len(touches)):
+        keep = np.arange(len(touches)) != j
+        precision = fit.precision[::3][keep]
+        rotation, translation = weighted_procrustes(model.mean[keep], touches[keep], precision)
+        away = (touches[j] - translation) @ rotation - model.mean[j]
+        jacobian = motion_jacobian(model.mean[keep])
+        information = jacobian.T @ (np.repeat(precision, 3)[:, None] * jacobian)
+        lever = motion_jacobian(model.mean[[j]])
+        of_pose = lever @ np.linalg.solve(information, lever.T)
+        spread = of_pose + (model.variances[j] + 0.1**2) * np.eye(3)
+        found = fit.against_others
+        assert found.squared[j] == pytest.approx(away @ np.linalg.solve(spread, away), rel=0.05)
+
+
+def test_an_odd_touch_is_as_wrong_as_makes_its_deviation_an_average_one() -> None:
+    model = _model()
+    touches = model.mean.copy()
+    touches[2] += (0.0, 2.5, -2.5)
+    others = fit_named_points(model, touches).against_others
+    j = int(others.squared.argmax())
+    spread = others.variances[j] + others.error_variance[j]
+    assert others.squared[j] > 8
+    assert (others.deviations[j] / spread).sum() == pytest.approx(3, rel=1e-6)
+    ordinary = others.squared < 3
+    np.testing.assert_allclose(others.error_variance[ordinary], others.noise**2)
+
+
+def test_three_touches_say_nothing_against_each_other() -> None:
+    model = _model(("CL", "OS", "RWA"))
+    fit = fit_named_points(model, model.mean * 1.02)
+    assert (fit.against_others.squared < 2).all()
 
 
 @pytest.mark.parametrize("scale", [1 / 25.4, 1 / 3, 1 / 2.54, 3, 25.4])

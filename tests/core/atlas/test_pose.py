@@ -158,6 +158,21 @@ def test_a_mistouch_is_named_and_does_little_harm(published: Atlas) -> None:
     assert np.mean(harm) < 0.35
 
 
+def test_a_mistouch_that_pulls_the_pose_after_it_widens_the_region(real_specimens: list[Specimen]) -> None:
+    rng = np.random.default_rng(12)
+    inside, named = [], 0
+    for atlas, truth in _held_out(real_specimens) * 8:
+        touches = {code: noisy(p, 0.1, rng) for code, p in _touched(truth).items()}
+        step = rng.normal(size=3)
+        touches["MN"] = touches["MN"] + 3 * step / np.linalg.norm(step)
+        pose = estimate_pose(touches, truth.side, atlas)
+        distance, angle = errors(pose, truth)
+        inside.append((distance < pose.radius_95, angle < pose.cone_95))
+        named += "MN" in pose.suspects
+    assert (np.mean(inside, axis=0) > 0.85).all()
+    assert named > 0.55 * len(inside)
+
+
 def test_the_wrong_side_is_called_out(published: Atlas) -> None:
     rng = np.random.default_rng(7)
     for _ in range(20):
