@@ -99,11 +99,12 @@ class PosePanel(QWidget):
         self.setMinimumWidth(PANEL_WIDTH)
         self.setMaximumWidth(_ANY if wide else PANEL_WIDTH)
         self.result.set_large(wide)
+        self.touches.table.set_roomy(wide)
         self.overlay.setVisible(not wide)  # there is nothing to draw over
 
     def add_card(self, card: QWidget) -> None:
-        """Put a card under the others, before the verdict."""
-        self.right.insertWidget(self.right.indexOf(self.verdict), card)
+        """Put a card under the estimate."""
+        self.right.insertWidget(self.right.indexOf(self.in_scan), card)
 
     def take_file(self, path: Path) -> bool:
         """Take the touches of a file; return whether it could be read."""

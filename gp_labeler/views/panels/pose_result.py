@@ -27,7 +27,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["ResultCard"]
 
-_FRAMES = {"tracker": "in the tracker's frame", "scan": "in the scan, LPS"}
+_FRAMES = {"tracker": "tracker frame", "scan": "in the scan, LPS"}
 
 
 class ResultCard(Card):
@@ -144,7 +144,7 @@ class _TwoPoses(QWidget):
         self._grid.setVerticalSpacing(2)
         self._grid.setColumnStretch(3, 1)
         self.apart = numbers(13, bold=True)
-        self.cells = [[numbers(13) for _ in range(3)] for _ in range(9)]
+        self.cells = [[numbers(13, bold=row > 6) for _ in range(3)] for row in range(9)]
         for row, cells in enumerate(self.cells):
             for column, cell in enumerate(cells):
                 side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft

@@ -39,9 +39,9 @@ from gp_labeler.views.panels.pose_cells import column_widths, paint_cell, paint_
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ, TouchModel
 from gp_labeler.views.theme import FONT_PX, theme_of
 
-__all__ = ["ROW_HEIGHT", "TouchTable"]
+__all__ = ["TouchTable"]
 
-ROW_HEIGHT, _HEADER = 22, 24
+_ROW, _ROOMY_ROW, _HEADER = 20, 24, 24
 _BEGINS_NUMBER = "0123456789-+."
 Index = QModelIndex | QPersistentModelIndex
 
@@ -85,6 +85,11 @@ class TouchTable(QTableView):
         """Return the point that a cell is about."""
         return self._model.rows[index.row()].name if index.isValid() else ""
 
+    def set_roomy(self, roomy: bool) -> None:
+        """Make the rows higher, where there is room."""
+        self.verticalHeader().setDefaultSectionSize(_ROOMY_ROW if roomy else _ROW)
+        self._fit()
+
     def edit_position(self, name: str) -> None:
         """Let a position be typed."""
         index = self._model.index(self._model.row_of(name), XYZ)
@@ -105,8 +110,8 @@ class TouchTable(QTableView):
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setMinimumSectionSize(ROW_HEIGHT)
-        self.verticalHeader().setDefaultSectionSize(ROW_HEIGHT)
+        self.verticalHeader().setMinimumSectionSize(_ROW)
+        self.verticalHeader().setDefaultSectionSize(_ROW)
         header = self.horizontalHeader()
         header.setFixedHeight(_HEADER)
         header.setHighlightSections(False)
@@ -122,7 +127,8 @@ class TouchTable(QTableView):
         super().resizeEvent(event)
 
     def _fit(self) -> None:
-        self.setFixedHeight(_HEADER + ROW_HEIGHT * self._model.rowCount() + 4)
+        height = self.verticalHeader().defaultSectionSize()
+        self.setFixedHeight(_HEADER + height * self._model.rowCount() + 4)
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
         return QSize(340, self.height())
