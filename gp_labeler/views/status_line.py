@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, Qt, QTimer
+from PySide6.QtCore import QEvent, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
@@ -55,6 +55,7 @@ class StatusLine(QWidget):
         self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.work = _Work(workbench)
+        self.work.changed.connect(self._make_room)
         row = QHBoxLayout(self)
         row.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
         row.setSpacing(_MARGIN)
@@ -164,9 +165,12 @@ class StatusLine(QWidget):
 class _Work(QWidget):
     """The oldest running task that matters to the user, how far it is, and a button that stops it."""
 
+    changed = Signal()
+    """There is work to show, or none any more."""
+
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
-        self._desk = workbench
+        self._desk, self._was_busy = workbench, False
         self.text, self.bar, self.stop = QLabel(), QProgressBar(), QToolButton()
         self.text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.bar.setTextVisible(False)
@@ -210,6 +214,9 @@ class _Work(QWidget):
         task = self._task
         for widget in (self.text, self.bar, self.stop):
             widget.setVisible(task is not None)
+        if self._was_busy != self.is_busy:
+            self._was_busy = self.is_busy
+            self.changed.emit()
         if task is not None:
             self.text.setText(task.text or task.job.title)
             self.bar.setRange(0, 100 if task.fraction > 0 else 0)
