@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,13 +14,41 @@ from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.sprites import Text
 from gp_labeler.scene.stage import Stage
 
-__all__ = ["Name", "Spot", "names_of", "spots_of", "texts_of"]
+__all__ = ["REACH_MM", "Name", "Spot", "names_of", "spots_of", "texts_of"]
 
 Spot = tuple[FloatArray, float]
 """A (3,) scan position that labels leave free, and how far about it, logical pixels."""
 
-Name = tuple[str, FloatArray, str, float, float]
-"""Text, the (3,) scan position it belongs to, its colour (a state), gap (logical pixels), and rank."""
+REACH_MM = 1.5
+"""Points farther off a slice are not drawn on it, and so not named."""
+
+
+class Name(NamedTuple):
+    """Something written in a scene.
+
+    Parameters
+    ----------
+    text : str
+        What it says.
+    place : (3,) float array
+        What it belongs to, scan frame, mm.
+    role : str
+        Colour: a state of the theme.
+    gap : float
+        How far from there it begins, logical pixels.
+    rank : float
+        As in `place_labels`.
+    reach_mm : float
+        How far off a slice it is still written.
+    """
+
+    text: str
+    place: FloatArray
+    role: str
+    gap: float
+    rank: float
+    reach_mm: float = 4.0
+
 
 _ALONG = 16
 
@@ -31,21 +60,23 @@ def texts_of(scene: PoseScene) -> Iterator[Name]:
     seen = scene.seen
     if scene.shows("estimate"):
         for pose in seen.poses:
-            yield scene.text_of(pose), pose.tip, pose.role, 15.0, 1.5
+            yield Name(scene.text_of(pose), pose.tip, pose.role, 15.0, 1.5)
     for truth in seen.truths:
         if truth.label:
-            yield truth.label, truth.tail, "truth", 7.0, 1.0
+            yield Name(truth.label, truth.tail, "truth", 7.0, 1.0)
     for touch in seen.touches:
         if touch.suspect:
-            yield f"{touch.code} ?", touch.position, "doubtful", 15.0, 1.2
+            yield Name(f"{touch.code} ?", touch.position, "doubtful", 15.0, 1.2, REACH_MM)
         elif not seen.truths:  # beside labels of the same names, more of them would only crowd
-            yield touch.code, touch.position, "touch" if touch.used else "unseen", 8.0, -0.5
+            role = "touch" if touch.used else "unseen"
+            yield Name(touch.code, touch.position, role, 8.0, -0.5, REACH_MM)
     for vector in seen.vectors:
         if vector.is_long:
-            yield f"{vector.code} {vector.length:.1f} mm".strip(), vector.end, vector.role, 7.0, 0.5
+            text = f"{vector.code} {vector.length:.1f} mm".strip()
+            yield Name(text, vector.end, vector.role, 7.0, 0.5, REACH_MM)
     if seen.tip is not None and seen.tip.label:
         role = "touch" if seen.tip.visible else "unseen"
-        yield seen.tip.label, seen.tip.position, role, 10.0, 1.8
+        yield Name(seen.tip.label, seen.tip.position, role, 10.0, 1.8)
 
 
 def spots_of(scene: PoseScene) -> Iterator[Spot]:
@@ -63,14 +94,14 @@ def spots_of(scene: PoseScene) -> Iterator[Spot]:
 def names_of(scene: PoseScene, view: Viewpoint, stage: Stage) -> list[Label]:
     """Return the labels of the 3D view; spots to leave free are labels without a text."""
     names, spots = list(texts_of(scene)), list(spots_of(scene))
-    places = [name[1] for name in names] + [place for place, _ in spots]
+    places = [name.place for name in names] + [place for place, _ in spots]
     if not places:
         return []
     pixels = view.display(np.array(places))[:, :2]
     states, scale = stage.colours.states, stage.scale
     labels = [
-        Label(Text(text, states[role]), pixel, gap * scale, rank)
-        for (text, _, role, gap, rank), pixel in zip(names, pixels[: len(names)], strict=True)
+        Label(Text(name.text, states[name.role]), pixel, name.gap * scale, name.rank)
+        for name, pixel in zip(names, pixels[: len(names)], strict=True)
     ]
     free = [
         Label(Text("", stage.colours.text), pixel, gap * scale, -2.0)

@@ -16,9 +16,6 @@ from gp_labeler.views.slice_view import SliceView
 
 __all__ = ["PoseOverlay"]
 
-_NAMED_MM = 4.0
-"""What lies farther off a slice is not named on it."""
-
 
 class PoseOverlay(QObject):
     """A layer of a slice view, between its picture and its points.
@@ -53,14 +50,12 @@ class PoseOverlay(QObject):
     def names(self, shown: Shown, ratio: float) -> list[SliceName]:
         """Return what is written beside it, and what names leave free."""
         names, spots = list(texts_of(self._scene)), list(spots_of(self._scene))
-        places = np.array([name[1] for name in names] + [place for place, _ in spots]).reshape(-1, 3)
+        places = np.array([name.place for name in names] + [place for place, _ in spots]).reshape(-1, 3)
         pixels, off = shown.scan_to_pixel(places) + 0.5, np.abs(shown.off_slice(places))
         written = [
-            SliceName(text, pixel, DARK.states[role], gap, rank)
-            for (text, _, role, gap, rank), pixel, away in zip(
-                names, pixels[: len(names)], off[: len(names)], strict=True
-            )
-            if away < _NAMED_MM
+            SliceName(name.text, pixel, DARK.states[name.role], name.gap, name.rank)
+            for name, pixel, away in zip(names, pixels[: len(names)], off[: len(names)], strict=True)
+            if away <= name.reach_mm
         ]
         free = [
             SliceName("", pixel, DARK.text, gap, -2.0)

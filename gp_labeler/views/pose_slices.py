@@ -17,6 +17,7 @@ from gp_labeler.scene.pose_data import (
     DrawnVector,
     PoseScene,
 )
+from gp_labeler.scene.pose_names import REACH_MM
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.views.pose_strokes import area, arrow, colour_of, hull, line, marker
 
@@ -26,7 +27,6 @@ _FADE_MM = 4.0
 """An axis whose origin lies farther off the slice is drawn faintly: it says where to scroll."""
 
 _NEAR_MM = 0.5
-_REACH_MM = 1.5
 _FAINT = 0.35
 _MARKERS = {"pose": "ball", "pose_2": "diamond"}
 _TRAIL_AT_MOST = 48
@@ -141,7 +141,7 @@ class SlicePen:
         line(self._painter, np.stack([tail, tip]), colour, 1.7 * self._ratio)
         marker(self._painter, origin, "square", 4.2 * self._ratio, colour, full=off < _NEAR_MM)
 
-    def _near(self, point: FloatArray, reach: float = _REACH_MM) -> bool:
+    def _near(self, point: FloatArray, reach: float = REACH_MM) -> bool:
         """Whether a point is drawn; sets how strongly."""
         off = self._off(point)
         self._fade(1.0 if off < _NEAR_MM else 1.0 - 0.6 * min(off / reach, 1.0))
@@ -185,7 +185,7 @@ class SlicePen:
     def _tip(self, tip: DrawnTip) -> None:
         colour = colour_of("touch" if tip.visible else "unseen")
         for n, place in enumerate(tip.trail[-_TRAIL_AT_MOST:]):
-            if self._near(place, 2 * _REACH_MM):
+            if self._near(place, 2 * REACH_MM):
                 size = 0.8 + 1.4 * n / _TRAIL_AT_MOST
                 marker(self._painter, self._pixels(place)[0], "ball", size * self._ratio, colour)
         off = self._off(tip.position)

@@ -85,7 +85,7 @@ def test_errors_are_written_at_the_estimates_of_that_side_only() -> None:
 
 
 def test_long_vectors_and_suspects_are_named() -> None:
-    words = [name[0] for name in texts_of(ALL)]
+    words = [name.text for name in texts_of(ALL)]
     assert "CL 2.0 mm" in words
     assert "MN ?" in words
     assert "labelled" in words

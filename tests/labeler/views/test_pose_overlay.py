@@ -157,6 +157,9 @@ def test_names_stand_beside_what_is_near(qtbot) -> None:
     assert view.layers == [overlay]
     overlay.show(ALL)
     near = {name.text for name in overlay.names(through(MIDDLE), 1.0)}
+    beyond = {name.text for name in overlay.names(through(beside(0.0, 2.0, 0.0)), 1.0)}
+    assert "labelled" in beyond  # an axis is drawn there, faintly; a point is not
+    assert "MN ?" not in beyond
     far = {name.text for name in overlay.names(through(beside(0.0, 9.0, 0.0)), 1.0)}
     assert {"robust · off 2.50 mm, 0.0°", "labelled", "MN ?"} <= near
     assert far == {""}
