@@ -80,6 +80,7 @@ class Backdrop:
         self._work: Iterator[None] | None = None
         self._work_for: Sight | None = None
         self._coarseness = 1
+        self._warm = -1
         self.n_drawn = 0
         """How often bone has been drawn, a frame in pieces once."""
 
@@ -99,12 +100,7 @@ class Backdrop:
         (width, height), n = sight.size, self._coarseness
         part = (max(1, width // n), max(1, height // n))
         start = time.perf_counter()
-        renderer = self._stage.bone
-        renderer.SetViewport(0.0, 0.0, part[0] / width, part[1] / height)
-        renderer.EraseOn()
-        for group in self._bone.groups(direction, quick=True) or [[]]:
-            self._draw(group)
-        renderer.SetViewport(0.0, 0.0, 1.0, 1.0)
+        self._draw_stand_in(part, sight.size, direction)
         self._target.keep(self._kept, part=part)
         self._target.restore(self._kept)
         self._add_cube(self._kept)
@@ -154,6 +150,10 @@ class Backdrop:
 
     def _steps(self, sight: Sight, direction: FloatArray) -> Iterator[None]:
         """Draw a fine picture, stopping after each piece and each strip."""
+        if self._bone.has_quick and self._warm != sight.mesh:
+            self._draw_stand_in((1, 1), sight.size, direction)  # so that the first turn does not wait for it
+            self._warm = sight.mesh
+            yield
         groups = self._bone.groups(direction, at_once=bool(self._stage.bone.GetUseSSAO()))
         for n, group in enumerate(groups or [[]]):
             self._stage.bone.SetErase(n == 0)
@@ -164,6 +164,15 @@ class Backdrop:
             self._smoother.SetViewport(0.0, n / n_strips, 1.0, (n + 1) / n_strips)
             self._target.draw(self._smoother)
             yield
+
+    def _draw_stand_in(self, part: tuple[int, int], whole: tuple[int, int], direction: FloatArray) -> None:
+        """Draw the stand-in into the lower left part of the picture."""
+        renderer = self._stage.bone
+        renderer.SetViewport(0.0, 0.0, part[0] / whole[0], part[1] / whole[1])
+        renderer.EraseOn()
+        for group in self._bone.groups(direction, quick=True) or [[]]:
+            self._draw(group)
+        renderer.SetViewport(0.0, 0.0, 1.0, 1.0)
 
     def _draw(self, pieces: list[Piece]) -> None:
         actors = self._bone.actors(pieces)

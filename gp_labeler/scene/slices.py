@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
-from vtkmodules.vtkFiltersCore import vtkFlyingEdges2D
 from vtkmodules.vtkImagingCore import vtkImageReslice
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
+from gp_labeler.scene.contour import level_segments
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.window_level import WindowLevel
 
@@ -79,23 +79,8 @@ class SliceImage:
 
         It is where the isosurface of the same threshold cuts this slice.
         """
-        height, width = self.values.shape
-        image = vtkImageData()
-        image.SetDimensions(width, height, 1)
-        image.SetOrigin((*self.origin.tolist(), 0.0))
-        image.SetSpacing((*self.step.tolist(), 1.0))
-        values = vtk_ready(self.values)
-        image.GetPointData().SetScalars(to_vtk(values.ravel(), share=True))
-        edges = vtkFlyingEdges2D()
-        edges.SetInputData(image)
-        edges.SetValue(0, surface_level(threshold, values))
-        edges.ComputeScalarsOff()
-        edges.Update()
-        lines = edges.GetOutput()
-        if not lines.GetNumberOfLines():
-            return np.empty((0, 2, 2))
-        points = to_numpy(lines.GetPoints().GetData())[:, :2].astype(np.float64)
-        segments: FloatArray = points[to_numpy(lines.GetLines().GetConnectivityArray()).reshape(-1, 2)]
+        pixels = level_segments(self.values, surface_level(threshold, self.values[None]))
+        segments: FloatArray = self.origin + self.step * pixels
         return segments
 
 
