@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cache
 from types import MappingProxyType
 from typing import Any
 
@@ -129,6 +130,7 @@ class PoseCheck:
         object.__setattr__(self, "pose", freeze(self.pose, "pose"))
 
 
+@cache  # asked some hundred times a click, of a few dozen points
 def point_key(side: Side | str, code: str) -> PointKey:
     """Return the key under which a state keeps a point.
 
