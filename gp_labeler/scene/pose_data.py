@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core import Atlas, CochleaPose, LandmarkSet, RigidTransform
+from gp_core import CochleaPose, RigidTransform
 from gp_core.checks import FloatArray
-from gp_core.frames import mirror_x
-from gp_core.landmarks.anatomy import cochlea_frame
 from gp_core.landmarks.features import Side
 
 __all__ = [
@@ -29,7 +27,6 @@ __all__ = [
     "DrawnVector",
     "PoseScene",
     "error_text",
-    "features_in_scan",
 ]
 
 AXIS_MM, BEHIND_MM = 5.0, 1.5
@@ -58,7 +55,6 @@ METHOD_ROLES: Mapping[str, str] = MappingProxyType({"robust": "pose", "jrmpc": "
 """Colour of an estimate (a state of the theme) by its method; `DrawnPose.style` goes with it."""
 
 _CORNERS = 32
-_DEFINING = ("CA", "CB", "RWA", "RWP")
 _STYLES: Mapping[str, str] = MappingProxyType({"pose": "dashed", "pose_2": "dotted"})
 
 
@@ -360,37 +356,3 @@ class PoseScene:
 def error_text(off_mm: float, angle: float) -> str:
     """Say an error, such as ``"0.42 mm, 3.1°"``; the angle given in rad."""
     return f"{off_mm:.2f} mm, {np.degrees(angle):.1f}°"
-
-
-def features_in_scan(
-    pose: CochleaPose, atlas: Atlas, T_scan_touches: RigidTransform, codes: Sequence[str] | None = None
-) -> dict[str, FloatArray]:
-    """Return where the atlas's mean features lie in the scan by an estimate.
-
-    As the estimate registered the atlas, so that a touch is as far off as its residual says; by a method that
-    registers none, with the mean cochlea laid on the estimated one.
-
-    Parameters
-    ----------
-    pose : CochleaPose
-        From touches.
-    atlas : Atlas
-        Stored left; has CA, CB, RWA and RWP.
-    T_scan_touches : RigidTransform
-        From the frame of the touches into the scan.
-    codes : sequence of str, optional
-        Which features; by default all that the atlas has.
-
-    Returns
-    -------
-    dict of str to (3,) float array, mm
-    """
-    wanted = list(atlas.codes if codes is None else codes)
-    means = np.array([atlas[code] for code in wanted])
-    if pose.T_touches_atlas is not None:
-        touched = pose.T_touches_atlas.apply(means if pose.side is Side.LEFT else mirror_x(means))
-    else:
-        defining = LandmarkSet.from_mapping({code: atlas[code] for code in _DEFINING}, "L", frame="atlas")
-        local = cochlea_frame(defining).inverse().apply(means)
-        touched = pose.transform_to_touches.apply(local * (1, 1, 1 if pose.side is Side.LEFT else -1))
-    return dict(zip(wanted, T_scan_touches.apply(touched), strict=True))

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from PySide6.QtCore import QObject
 
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.pose_data import DrawnTip
+from gp_labeler.scene.pose_data import DrawnTip, PoseScene
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.pose_overlay import PoseOverlay
@@ -31,20 +33,27 @@ class PoseDisplay(QObject):
         self._desk, self._grid = workbench, grid
         self._overlays = [PoseOverlay(grid.slice_views[plane]) for plane in Plane]
         self._tip: DrawnTip | None = None
+        self._drawn = PoseScene()
         follow(self, workbench.pose.changed, self.show)
         follow(self, workbench.pose.overlay_changed, self.show)
         self.show()
 
     def set_tip(self, tip: DrawnTip | None) -> None:
-        """Draw a tracked probe there, or none."""
+        """Draw a tracked probe there, or none; all else stays as it is."""
+        if tip is None and self._tip is None:
+            return
         self._tip = tip
-        self.show()
+        self._drawn = replace(self._drawn, tip=tip if self._desk.pose.overlay.visible else None)
+        self._grid.scene_view.scene.pose.show_tip(self._drawn.tip)
+        self._paint()
 
     def show(self, *_: object) -> None:
         """Draw everything as it is now."""
-        drawn = pose_scene(self._desk, tip=self._tip)
-        view = self._grid.scene_view
-        view.scene.pose.show(drawn)
-        view.redraw()
+        self._drawn = pose_scene(self._desk, tip=self._tip)
+        self._grid.scene_view.scene.pose.show(self._drawn)
+        self._paint()
+
+    def _paint(self) -> None:
+        self._grid.scene_view.redraw()
         for overlay in self._overlays:
-            overlay.show(drawn)
+            overlay.show(self._drawn)

@@ -16,7 +16,6 @@ from gp_labeler.scene.pose_data import (
     DrawnTruth,
     DrawnVector,
     error_text,
-    features_in_scan,
 )
 from gp_labeler.scene.pose_names import texts_of
 from gp_labeler.scene.pose_rows import axes_of, dashes
@@ -43,27 +42,6 @@ def test_an_estimate_is_brought_into_the_scan(side) -> None:
     np.testing.assert_allclose(drawn.covariance[:3, :3], turn @ found.covariance[:3, :3] @ turn.T)
     np.testing.assert_allclose(drawn.covariance[:3, 3:], turn @ found.covariance[:3, 3:] @ turn.T)
     assert (drawn.side, drawn.role, drawn.style) == (side, "pose", "dashed")
-
-
-@pytest.mark.parametrize("side", list(Side))
-def test_atlas_features_are_as_far_from_the_touches_as_the_residuals_say(side) -> None:
-    found, T_scan_touches, touched, atlas = estimated(side)
-    features = features_in_scan(found, atlas, T_scan_touches, PROBE)
-    for code in PROBE:
-        off = np.linalg.norm(features[code] - T_scan_touches.apply(touched[code][None])[0])
-        np.testing.assert_allclose(off, found.residuals[code], atol=1e-9)
-
-
-@pytest.mark.parametrize("side", list(Side))
-def test_a_method_without_an_atlas_lays_the_mean_cochlea_on_the_estimated_one(side) -> None:
-    from dataclasses import replace
-
-    found, T_scan_touches, _, atlas = estimated(side, noise=0.01)
-    with_atlas = features_in_scan(found, atlas, T_scan_touches)
-    laid = features_in_scan(replace(found, T_touches_atlas=None), atlas, T_scan_touches)
-    drawn = DrawnPose.of(found, T_scan_touches)
-    np.testing.assert_allclose(np.cross(laid["CA"] - laid["CB"], drawn.axis), 0.0, atol=1e-6)
-    assert max(np.linalg.norm(laid[code] - with_atlas[code]) for code in laid) < 0.1
 
 
 def test_shape() -> None:
