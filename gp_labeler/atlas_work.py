@@ -183,7 +183,7 @@ def _all_have(animals: list[Specimen], code: str) -> bool:
 
 def _with_reasons(error: GpError, animals: Animals) -> GpError:
     """Return the error with what was skipped, and why."""
-    reasons = [skipped.text for skipped in animals.skipped[:_N_REASONS]]
+    reasons = [f"Skipped {skipped.text}" for skipped in animals.skipped[:_N_REASONS]]
     if len(animals.skipped) > _N_REASONS:
         reasons.append(f"And {len(animals.skipped) - _N_REASONS} more were skipped.")
     remedy = " ".join([error.remedy or "Label more animals, or choose more files.", *reasons])

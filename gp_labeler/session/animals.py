@@ -146,7 +146,7 @@ class _Reading:
         return Specimen(name, {s: marks for s, marks in animal.sides.items() if s not in exchanged})
 
     def _take(self, name: str, landmarks: LandmarkSet, file: Path) -> None:
-        side, what = landmarks.side, f"{name} {landmarks.side.word} in {file.name}"
+        side, what = landmarks.side, f"{name} {landmarks.side.word} ({file.name})"
         n_placed = sum(code != "CO" for code in landmarks.placed)
         if n_placed < FEWEST_PLACED:
             self.skipped.append(Skipped(what, f"{n_placed} placed, {FEWEST_PLACED} or more are needed"))

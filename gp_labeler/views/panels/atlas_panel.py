@@ -20,6 +20,7 @@ from gp_labeler.session.animals import Animals
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.atlas_table import AtlasTable
+from gp_labeler.views.panels.import_words import sentence
 from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.workbench import Workbench
@@ -249,9 +250,12 @@ class OwnCard(_AskingCard):
 
 def _findings(animals: Animals) -> list[tuple[str, str]]:
     """Return what was skipped, and what should be looked at."""
-    skipped = [(f"Skipped {each.what}", f"{each.why}.") for each in animals.skipped]
+    skipped = [(f"Skipped {each.what}", sentence(each.why)) for each in animals.skipped]
     doubts = [
-        (f"{each.specimen} {each.side.word} {' '.join(each.landmarks[:2])}", f"{each.text}: look again.")
+        (
+            f"{each.specimen} {each.side.word} {' '.join(each.landmarks[:2])}",
+            sentence(f"{each.text}: look again"),
+        )
         for each in animals.doubts
     ]
     return skipped + doubts

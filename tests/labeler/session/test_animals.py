@@ -57,10 +57,10 @@ def test_what_cannot_be_used_is_skipped_with_its_reason(tmp_path) -> None:
     animals = read_animals([tmp_path, other])
     assert [animal.name for animal in animals.specimens] == ["GP03"]
     reasons = {skipped.what: skipped.why for skipped in animals.skipped}
-    assert reasons["few left in few_L.mrk.json"] == "2 placed, 4 or more are needed"
+    assert reasons["few left (few_L.mrk.json)"] == "2 placed, 4 or more are needed"
     assert "left and right are exchanged" in reasons["turned right"]
     assert "torn.mrk.json" in reasons
-    assert "in GP03_R.mrk.json too, with other labels" in reasons["GP03 right in GP03_R.mrk.json"]
+    assert "in GP03_R.mrk.json too, with other labels" in reasons["GP03 right (GP03_R.mrk.json)"]
     assert len(reasons) == 4
 
 
