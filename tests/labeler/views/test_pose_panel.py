@@ -193,10 +193,11 @@ def test_a_slip_while_typing_keeps_what_was_typed(desk, panel, qtbot):
 
 
 def test_what_is_being_typed_outlives_a_touch_from_elsewhere(desk, panel, qtbot):
-    touch(desk, "CL", "LLI", "MN")
+    touch(desk, "CL", "LLI", "MN", "OS")
     panel.touches.table.edit_position("OS")
+    editor(panel).selectAll()
     qtbot.keyClicks(editor(panel), "1 2")
-    touch(desk, "RWA", "MN")
+    touch(desk, "RWA", "MN", seed=2)  # the misfit of OS changes, and so does its row
     assert editor(panel).text() == "1 2"
     qtbot.keyClicks(editor(panel), " 3")
     qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
