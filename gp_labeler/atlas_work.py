@@ -146,7 +146,7 @@ class TryAtlas:
             progress(0.9 * n / len(animals), f"Leave-one-out: {animal.name}")
             report = leave_one_out(animals, method="robust", training=training, held_out=[animal.name])
             robust += report.rows
-        progress(0.9, "Leave-one-out: JRMPC")
+        progress(0.9, "Leave-one-out: JRMPC, compiled on its first use")
         jrmpc = leave_one_out(animals, method="jrmpc", training=training)
         reports = (LeaveOneOutReport("robust", training, PROBE, None, tuple(robust)), jrmpc)
         return Trial(reports, len(animals), skipped)

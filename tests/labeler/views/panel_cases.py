@@ -39,7 +39,7 @@ def deliver(desk: Workbench) -> None:
     """Let the jobs of a workbench come to their end."""
     dispatcher = desk.jobs._dispatch
     assert isinstance(dispatcher, QueueDispatcher)
-    dispatcher.deliver_until_idle(desk.jobs, timeout=30)
+    dispatcher.deliver_until_idle(desk.jobs, timeout=180)  # compiling may be part of it
 
 
 def in_scan(code: str, side: Side = Side.LEFT) -> np.ndarray:
