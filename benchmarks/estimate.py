@@ -82,6 +82,8 @@ def main() -> None:
     gp_core.estimate_pose(touches, "L", method="jrmpc", specimens=animals)
     joint = _best(lambda: gp_core.estimate_pose(touches, "L", method="jrmpc", specimens=animals), 50)
     plain = _best(lambda: reference_jrmpc(sets, max_iterations=60, gamma=0.05, epsilon=1e-9), 3)
+    touched = gp_core.LandmarkSet.from_mapping(dict(list(touches.items())[:3]), "L", frame="tracker")
+    gain = _best(lambda: gp_core.gains(touched, atlas), 50)
     words = [sys.executable, "-m", "gp_core.cli", "estimate", "docs/example/touches.csv", "--side", "L"]
     shell = _best(lambda: subprocess.run(words, capture_output=True, check=True, cwd=_ROOT), 3)
     nothing = _best(lambda: subprocess.run([sys.executable, "-c", "import numpy"], check=True), 3)
@@ -91,6 +93,7 @@ def main() -> None:
     print(f"{'estimate_pose, jrmpc':<34}{joint:9.2f}{joint / plain:9.3f}")
     for label, time_ms in robust.items():
         print(f"{label:<34}{time_ms:9.2f}{time_ms / plain:9.3f}")
+    print(f"{'gains, eight features':<34}{gain:9.2f}{gain / plain:9.3f}")
     print(f"{'python -c import numpy':<34}{nothing:9.0f}{1:9.2f}")
     print(f"{'gp-core estimate from the shell':<34}{shell:9.0f}{shell / nothing:9.2f}")
 

@@ -23,7 +23,7 @@ from gp_labeler.session.estimating import Estimating
 from gp_labeler.session.pose_exports import InsertionPath, save_pose
 from gp_labeler.session.touch_edits import RemoveTouches, TakeTouches
 from gp_labeler.session.touches import TouchHow
-from gp_labeler.work import WarmJoint
+from gp_labeler.work import WarmFit, WarmJoint
 
 if TYPE_CHECKING:
     from gp_labeler.workbench import Workbench
@@ -89,6 +89,7 @@ class PoseDesk:
         self._skipped: frozenset[tuple[Side, str]] = frozenset()
         self._gains: tuple[Estimate, tuple[TouchGain, ...]] | None = None
         self._path: InsertionPath | None = None
+        self._prepared = False
         self.estimating = self._begin()
         desk.session_replaced.connect(self._on_session_replaced)
         desk.atlas_changed.connect(self._on_atlas_changed)
@@ -125,6 +126,12 @@ class PoseDesk:
             found = gains(touches, estimate.atlas, probe_noise=estimate.settings.probe_noise)
             self._gains = (estimate, found)
         return self._gains[1]
+
+    def prepare(self) -> None:
+        """Load what makes estimates quick, in the background, once; the first touch does this too."""
+        if not self._prepared:
+            self._prepared = True
+            self._desk.jobs.submit(WarmFit(), key="fit")
 
     # Touching
 
@@ -286,6 +293,8 @@ class PoseDesk:
             self.estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
 
     def _on_changed(self) -> None:
+        if self._desk.session.state.touches:
+            self.prepare()
         if self._target is None:
             self._aim(self._first_untouched())
         self.changed.emit()

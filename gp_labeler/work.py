@@ -33,6 +33,7 @@ __all__ = [
     "ProposeThreshold",
     "ReadScan",
     "SaveMesh",
+    "WarmFit",
     "WarmJoint",
     "load_modules",
 ]
@@ -196,6 +197,18 @@ class LoadAtlas:
         load_modules("gp_core.atlas.shape", "gp_core.atlas.published")
         progress(0.0)
         return Atlas.published()
+
+
+@dataclass(frozen=True)
+class WarmFit:
+    """Make the robust fit ready: its compiled kernels are loaded, the first time on a machine compiled."""
+
+    title = "Preparing estimates"
+
+    def run(self, progress: Progress) -> None:
+        """Import them; estimates go on meanwhile, a little slower."""
+        progress(0.0)
+        load_modules("gp_core.atlas.settling_compiled")
 
 
 @dataclass(frozen=True)

@@ -115,6 +115,8 @@ class MainWindow(QMainWindow):
         self.rail.set_step(step)
         if step in ("label", "pose"):  # who labels shall not see where an estimate wants the cochlea
             self.workbench.pose.draw(visible=step == "pose")
+        if step == "pose":
+            self.workbench.pose.prepare()
         self.panels.setCurrentWidget(self.steps[step])
         self._arrange()
 
