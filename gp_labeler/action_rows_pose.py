@@ -95,7 +95,7 @@ def pose_rows() -> Iterator[Action]:
               lambda d, ui: ui.look_through_window(), _in_scan, group="look")
     yield row("tracker", "Tracked probe…", (), lambda d, ui: ui.show_tracker(), group="tracker",
               hint="Connect a tracker over OpenIGTLink, find the probe's tip, send the pose back")
-    yield row("record", "Record a touch", ("B",), lambda d, ui: d.tracker.press(), _is_tracked,
+    yield row("record", "Record a touch", ("J",), lambda d, ui: d.tracker.press(), _is_tracked,
               hint="With the tip held still on the feature asked for", group="tracker")
     yield row("guide", "Guided touching", ("F9",), lambda d, ui: ui.show_guide(), group="tracker",
               hint="One feature after the other, in large letters", icon="play")

@@ -271,7 +271,9 @@ class MainWindow(QMainWindow):
             event.acceptProposedAction()
 
     def dropEvent(self, event: QDropEvent) -> None:  # noqa: D102, N802
-        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls()]
+        paths = [Path(url.toLocalFile()) for url in event.mimeData().urls() if url.isLocalFile()]
+        if not paths:
+            return
         if self.rail.step == "atlas" and all(map(may_hold_labels, paths)):
             self.workbench.fit_atlas(paths)
         elif self.rail.step == "pose" and holds_touches(paths[0]):
