@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.checks import FloatArray
+from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.progress import Progress as Told
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
@@ -129,9 +130,9 @@ class MeshFirst:
         return "First look"
 
     def run(self, progress: Progress) -> Meshes:
-        """Mesh few voxels."""
+        """Mesh few voxels; nothing, where so coarse a look shows no bone."""
         stride = overview_stride(self.volume, FIRST_LOOK_VOXELS)
-        return Meshes((_mesh(self, progress, stride=stride),))
+        return Meshes(_mesh_if_any(self, progress, stride=stride))
 
 
 @dataclass(frozen=True)
@@ -154,8 +155,7 @@ class MeshOverview:
         coarser = ceil(sqrt(whole.n_triangles / QUICK_TRIANGLES))
         if coarser < 2:
             return Meshes((whole,))
-        quick = _mesh(self, progress, start=0.8, stride=stride * coarser)
-        return Meshes((whole,), (quick,))
+        return Meshes((whole,), _mesh_if_any(self, progress, start=0.8, stride=stride * coarser))
 
 
 @dataclass(frozen=True, eq=False)
@@ -295,3 +295,11 @@ def _mesh(job: _Meshing, progress: Progress, *, start: float = 0.0, end: float =
     told: Told = lambda fraction: progress(start + (end - start) * fraction)  # noqa: E731
     how["smallest_mm"] = job.smallest_mm
     return extract_isosurface(job.volume, job.threshold, progress=told, cancel=progress.cancelled, **how)
+
+
+def _mesh_if_any(job: _Meshing, progress: Progress, **how: Any) -> tuple[Surface, ...]:
+    """Mesh coarsely; where bone is too thin to be seen like that there is none."""
+    try:
+        return (_mesh(job, progress, **how),)
+    except GpError:
+        return ()

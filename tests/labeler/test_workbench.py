@@ -301,3 +301,16 @@ def test_small_parts_are_left_out_as_asked(desk) -> None:
         desk.set_smallest_part(-1)
     with pytest.raises(GpError, match=r"a length in mm from 0, got nan"):
         desk.set_smallest_part(float("nan"))
+
+
+def test_bone_too_thin_for_the_first_look_is_shown_by_the_second(desk) -> None:
+    array = np.zeros((200, 200, 200), np.uint8)
+    array[100, 20:180, 20:180] = 200  # one voxel thick
+    desk.open_volume(Volume.from_parts(array, [0.1] * 3, [0, 0, 0], name="sheet"))
+    desk.wait()
+    seen = []
+    desk.surfaces_changed.connect(lambda: seen.append(sum(part.n_triangles for part in desk.surfaces)))
+    desk.set_threshold(150)
+    desk.wait()
+    assert seen[-1] > 60_000
+    assert not [text for level, text in desk.said if level == "error"]
