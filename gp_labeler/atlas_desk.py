@@ -88,8 +88,13 @@ class AtlasDesk(DeskSignals):
 
     def load_atlas(self) -> None:
         """Get the published atlas ready in the background, where there is none; ghosts appear when it is."""
+
+        def take(atlas: Atlas) -> None:
+            if self._atlas is None:  # else another one came first
+                self.use_atlas(atlas)
+
         if self._atlas is None:
-            self.use_published_atlas()
+            self.jobs.submit(LoadAtlas(), take, key="first atlas")
 
     def use_published_atlas(self) -> None:
         """Take the published atlas, in the background."""

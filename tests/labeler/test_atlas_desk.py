@@ -10,8 +10,11 @@ from animal_cases import drawn_animals, write_animals, write_side
 from test_workbench import Desk
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.fitting import fit_atlas
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.files import load_specimens
+from gp_core.study.leave_one_out import leave_one_out
 from gp_labeler.atlas_desk import is_atlas_file
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen
@@ -79,8 +82,6 @@ def test_leave_one_out_of_the_animals_by_both_methods(desk, folder) -> None:
 
 
 def test_leave_one_out_is_what_the_core_says(desk, folder) -> None:
-    from gp_core import leave_one_out, load_specimens
-
     desk.fit_atlas([folder])
     desk.wait()
     desk.try_atlas()
@@ -142,3 +143,21 @@ def test_an_animal_is_held_against_an_atlas_that_does_not_know_it(desk, folder) 
     alone = {code: found.n_sd for code, found in desk.departures(L).items()}
     assert alone.keys() == known.keys()
     assert np.mean(list(alone.values())) > np.mean(list(known.values()))
+
+
+def test_a_damaged_atlas_opened_at_the_start_leaves_the_published_one(desk, tmp_path) -> None:
+    file = tmp_path / "broken.json"
+    file.write_text("{")
+    desk.load_atlas()
+    desk.open_atlas(file)
+    desk.wait()
+    assert desk.is_published_atlas
+
+
+def test_an_atlas_opened_at_the_start_is_not_replaced_by_the_published_one(desk, folder, tmp_path) -> None:
+    fit_atlas(load_specimens(folder)).save(tmp_path / "own.json")
+    desk.open_atlas(tmp_path / "own.json")
+    desk.load_atlas()
+    desk.wait()
+    assert desk.atlas_file == tmp_path / "own.json"
+    assert desk.atlas.n_samples == 8
