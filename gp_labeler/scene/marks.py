@@ -7,23 +7,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from vtkmodules.vtkCommonDataModel import vtkPolyData
-from vtkmodules.vtkFiltersSources import vtkPlatonicSolidSource, vtkSphereSource
-from vtkmodules.vtkRenderingCore import vtkActor, vtkGlyph3DMapper, vtkRenderer
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.vtk_arrays import points_of, to_vtk
 from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.labels import Label
 from gp_labeler.scene.lines2d import PixelLines
-from gp_labeler.scene.sprites import Text
-from gp_labeler.scene.stage import Stage, release
+from gp_labeler.scene.mark_images import mark_image
+from gp_labeler.scene.sprites import SpriteSheet, Text
+from gp_labeler.scene.stage import Stage
 
 __all__ = ["GlyphSize", "Mark", "MarkActor"]
 
-_SHAPES = {"computed": 1, "doubtful": 2}
-"""A state shows by shape as well as by colour: ball, octahedron, tetrahedron."""
+_SHAPES = {"computed": "diamond", "doubtful": "triangle"}
+"""A state shows by shape as well as by colour; others are balls."""
 
 _FAINT = 0.30
 _ACTIVE_GROWS = 1.35
@@ -85,8 +81,8 @@ class MarkActor:
         self._marks: tuple[Mark, ...] = ()
         self.size = GlyphSize()
         self.show_hidden = True
-        self._solid = _GlyphLayer(stage.base, 1.0)
-        self._faint = _GlyphLayer(stage.overlay, _FAINT)
+        self._sheet = SpriteSheet(stage.overlay)
+        self._images: list[NDArray[np.float32]] = []
         self._rings = PixelLines(stage.overlay)
 
     def show(self, marks: Sequence[Mark]) -> None:
@@ -126,21 +122,34 @@ class MarkActor:
         bone_opacity : float
             From 0 to 1; the fainter bone is, the clearer what lies behind it.
         """
-        sizes, pixels = self.diameters(view), view.display(self.positions)[:, :2]
-        colours = np.array([rgb(self._colour(mark)) for mark in self._marks]).reshape(-1, 3)
-        shapes = np.array([_SHAPES.get(mark.state, 0) for mark in self._marks], dtype=int)
-        seen = ~hidden | (bone_opacity == 1)  # solid bone hides by its depths, be it a part of a ball only
-        self._solid.set(self.positions[seen], sizes[seen], colours[seen], shapes[seen])
-        faint = hidden & self.show_hidden
-        self._faint.fade(1.0 - (1.0 - _FAINT) * bone_opacity)
-        self._faint.set(self.positions[faint], sizes[faint], colours[faint], shapes[faint])
+        display = view.display(self.positions)
+        sizes, pixels = self.diameters(view), display[:, :2]
         radii = 0.5 * sizes / view.pixel_sizes(self.positions)
+        through = 1.0 - (1.0 - _FAINT) * bone_opacity
+        clear = np.where(hidden, through * self.show_hidden, 1.0)
+        self._draw(pixels, radii, clear, np.argsort(-display[:, 2]))
         self._ring_active(pixels, radii)
         return [
             self._label(mark, pixel, float(radius), bool(behind))
             for mark, pixel, radius, behind in zip(self._marks, pixels, radii, hidden, strict=True)
             if mark.label and (self.show_hidden or not behind or mark.active)
         ]
+
+    def _draw(
+        self, pixels: FloatArray, radii: FloatArray, clear: FloatArray, order: NDArray[np.int_]
+    ) -> None:
+        """Draw the marks, the farthest first."""
+        drawn = [n for n in order.tolist() if clear[n] > 0]
+        images = [self._image(self._marks[n], float(radii[n]), float(clear[n])) for n in drawn]
+        if [id(image) for image in images] != [id(image) for image in self._images]:
+            self._sheet.take(images)
+            self._images = images
+        halves = np.array([image.shape[0] // 2 for image in images]).reshape(-1, 1)
+        self._sheet.draw(np.arange(len(drawn)), np.rint(pixels[drawn]) - halves)
+
+    def _image(self, mark: Mark, radius: float, clear: float) -> NDArray[np.float32]:
+        diameter = round(4 * radius) / 2
+        return mark_image(_SHAPES.get(mark.state, "ball"), self._colour(mark), diameter, round(clear, 2))
 
     def _colour(self, mark: Mark) -> str:
         colours = self._stage.colours
@@ -170,78 +179,5 @@ class MarkActor:
     def close(self) -> None:
         """Let go of the glyphs."""
         self._marks = ()
-        self._solid.close()
-        self._faint.close()
+        self._sheet.close()
         self._rings.close()
-
-
-class _GlyphLayer:
-    """Balls, octahedra and tetrahedra in one renderer."""
-
-    def __init__(self, renderer: vtkRenderer, opacity: float) -> None:
-        self._renderer = renderer
-        self._points = vtkPolyData()
-        mapper = vtkGlyph3DMapper()
-        mapper.SetInputData(self._points)
-        for n, solid in enumerate(_solids()):
-            mapper.SetSourceData(n, solid)
-        mapper.SourceIndexingOn()
-        mapper.SetSourceIndexArray("shape")
-        mapper.SetScaleArray("size")
-        mapper.SetScaleModeToScaleByMagnitude()
-        mapper.SetScaleFactor(1.0)
-        mapper.SetScalarModeToUsePointFieldData()
-        mapper.SelectColorArray("colour")
-        self._actor = vtkActor()
-        self._actor.SetMapper(mapper)
-        self._actor.PickableOff()
-        self._actor.GetProperty().SetOpacity(opacity)
-        self._actor.GetProperty().SetAmbient(0.25)
-        self._actor.GetProperty().SetDiffuse(0.75)
-        self._actor.GetProperty().SetSpecular(0.3)
-        self._actor.GetProperty().SetSpecularPower(30.0)
-        self._actor.VisibilityOff()
-        renderer.AddActor(self._actor)
-
-    def set(
-        self, points: FloatArray, sizes: FloatArray, colours: FloatArray, shapes: NDArray[np.int_]
-    ) -> None:
-        self._actor.SetVisibility(len(points) > 0)
-        if not len(points):
-            return
-        self._points.SetPoints(points_of(points))
-        data = self._points.GetPointData()
-        data.AddArray(to_vtk(sizes, "size"))
-        data.AddArray(to_vtk(shapes, "shape"))
-        data.AddArray(to_vtk((colours * 255).astype(np.uint8), "colour"))
-
-    def fade(self, opacity: float) -> None:
-        self._actor.GetProperty().SetOpacity(opacity)
-
-    def close(self) -> None:
-        release(self._renderer, self._actor)
-
-
-def _solids() -> list[vtkPolyData]:
-    """Solids of diameter 1."""
-    ball = vtkSphereSource()
-    ball.SetRadius(0.5)
-    ball.SetThetaResolution(24)
-    ball.SetPhiResolution(16)
-    ball.Update()
-    octahedron, tetrahedron = vtkPlatonicSolidSource(), vtkPlatonicSolidSource()
-    octahedron.SetSolidTypeToOctahedron()
-    tetrahedron.SetSolidTypeToTetrahedron()
-    return [ball.GetOutput(), *(_shrunk(source) for source in (octahedron, tetrahedron))]
-
-
-def _shrunk(source: vtkPlatonicSolidSource) -> vtkPolyData:
-    """Scale a solid to a circumscribed diameter a little above 1, so that it looks as large as the ball."""
-    source.Update()
-    solid: vtkPolyData = source.GetOutput()
-    points = solid.GetPoints()
-    for n in range(points.GetNumberOfPoints()):
-        corner = np.array(points.GetPoint(n))
-        points.SetPoint(n, 0.62 * corner / np.linalg.norm(corner))
-    solid.GetCellData().Initialize()
-    return solid

@@ -137,7 +137,10 @@ class SpriteSheet:
         """Draw the texts into the texture, once full and once faint beside it."""
         keys = [(text, height, halo) for text in texts]
         self._images = {key: self._images[key] if key in self._images else text_image(*key) for key in keys}
-        images = [self._images[key] for key in keys]
+        self.take([self._images[key] for key in keys])
+
+    def take(self, images: Sequence[NDArray[np.float32]]) -> None:
+        """Take (h, w, 4) pictures, from 0 to 1, in place of texts."""
         self._boxes = np.zeros((len(images), 4))
         if not any(image.size for image in images):
             self._actor.VisibilityOff()

@@ -76,11 +76,11 @@ def _blocks() -> dict[str, list[tuple[str, str]]]:
 def _add_block(column: QVBoxLayout, name: str, rows: list[tuple[str, str]]) -> None:
     heading = QLabel(name)
     heading.setProperty("role", "heading")
-    heading.setContentsMargins(0, 10, 0, 2)
+    heading.setContentsMargins(0, 8, 0, 2)
     column.addWidget(heading)
     grid = QGridLayout()
     grid.setHorizontalSpacing(14)
-    grid.setVerticalSpacing(3)
+    grid.setVerticalSpacing(1)
     grid.setColumnStretch(1, 1)
     grid.setColumnMinimumWidth(0, _KEYS_WIDTH)
     for n, (keys, text) in enumerate(rows):
