@@ -78,12 +78,14 @@ def test_help_needs_neither_qt_nor_vtk() -> None:
 @pytest.mark.slow
 def test_the_window_opens_from_the_command_line_and_says_what_is_wrong(ball_file, tmp_path) -> None:
     code = (
-        "import sys; from PySide6.QtCore import QTimer; from gp_labeler.views import application as a;"
-        "old = a.MainWindow.show;\n"
+        "import pathlib, sys; from PySide6.QtCore import QTimer; from gp_labeler.views import application as a\n"
+        "path, state = map(pathlib.Path, sys.argv[1:]); old = a.MainWindow.show\n"
+        "def close_once_open(self):\n"
+        "    there = (state / 'recent.json').exists()\n"
+        "    self.close() if there else QTimer.singleShot(200, lambda: close_once_open(self))\n"
         "def show(self):\n"
-        "    old(self); QTimer.singleShot(4000, self.close)\n"
+        "    old(self); close_once_open(self)\n"
         "a.MainWindow.show = show\n"
-        "import pathlib; path, state = map(pathlib.Path, sys.argv[1:]);"
         "sys.exit(a.run_window(path, directory=state))"
     )
     done = subprocess.run(

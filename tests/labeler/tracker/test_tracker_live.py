@@ -212,13 +212,11 @@ def test_a_marker_that_sends_nothing_is_silence(resting, plain) -> None:
 
 def test_a_cut_connection_is_lost_and_comes_back(resting, plain) -> None:
     resting.do("go MN 0.1")
-    plain.recorder.press()
-    resting.tell("cut 0.5")
+    resting.tell("cut 3")
     plain.until(lambda: plain.link.state.phase is LinkPhase.LOST, "the loss")
     assert "Trying again" in plain.link.state.words
     assert plain.link.latest is None
-    plain.until(lambda: bool(plain.outcomes), "the press to end")
-    assert isinstance(plain.outcomes[-1], RefusedTouch)
+    assert isinstance(plain.press(), RefusedTouch)
     plain.until(lambda: plain.link.state.phase is LinkPhase.CONNECTED, "the connection")
     plain.settle()
     assert _off(plain.touch(), "MN") < _CLOSE
