@@ -78,7 +78,8 @@ def test_help_needs_neither_qt_nor_vtk() -> None:
 @pytest.mark.slow
 def test_the_window_opens_from_the_command_line_and_says_what_is_wrong(ball_file, tmp_path) -> None:
     code = (
-        "import pathlib, sys; from PySide6.QtCore import QTimer; from gp_labeler.views import application as a\n"
+        "import pathlib, sys; from PySide6.QtCore import QTimer\n"
+        "from gp_labeler.views import application as a\n"
         "path, state = map(pathlib.Path, sys.argv[1:]); old = a.MainWindow.show\n"
         "def close_once_open(self):\n"
         "    there = (state / 'recent.json').exists()\n"
