@@ -6,7 +6,6 @@ import importlib
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import ceil, sqrt
 from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
@@ -17,6 +16,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.progress import Progress as Told
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
+from gp_labeler.imaging.stand_in import coarse_surface
 from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, extract_isosurface, overview_stride
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
@@ -42,7 +42,7 @@ __all__ = [
 FIRST_LOOK_VOXELS = 96**3
 """A mesh of so many voxels is there in a moment, and turns smoothly without a graphics card."""
 
-QUICK_TRIANGLES = 60_000
+QUICK_TRIANGLES = 45_000
 
 _LOADING = threading.Lock()
 
@@ -152,10 +152,10 @@ class MeshOverview:
         """Mesh all of it, and a stand-in of few triangles."""
         stride = overview_stride(self.volume)
         whole = _mesh(self, progress, end=0.8, stride=stride)
-        coarser = ceil(sqrt(whole.n_triangles / QUICK_TRIANGLES))
-        if coarser < 2:
+        if whole.n_triangles <= QUICK_TRIANGLES:
             return Meshes((whole,))
-        return Meshes((whole,), _mesh_if_any(self, progress, start=0.8, stride=stride * coarser))
+        progress(0.9)
+        return Meshes((whole,), (coarse_surface(whole, QUICK_TRIANGLES),))
 
 
 @dataclass(frozen=True, eq=False)

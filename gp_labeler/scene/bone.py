@@ -24,7 +24,7 @@ _BARELY_THERE = 0.05
 
 _INSIDE = (0.66, 0.50, 0.42)
 """The colour of the inner side of the surface, as parts of the outer's. All in one tone, it looks like bone
-that is cut through: it is seen just where the cut lies in bone."""
+that is cut through: behind a cut it is seen just where that lies in bone."""
 
 
 class BoneActor:
@@ -149,8 +149,9 @@ class BoneActor:
     def actors(self, pieces: Sequence[Piece]) -> list[vtkActor]:
         """Return what draws pieces, invisible yet."""
         made = [piece.actor(self._stage.bone, self._look, self._plane) for piece in pieces]
+        solid = self._cut is not None and self._opacity == 1
         for actor in made:
-            actor.SetBackfaceProperty(cast(Any, self._inside if self._opacity == 1 else None))
+            actor.SetBackfaceProperty(cast(Any, self._inside if solid else None))
         return made
 
     def pick(self, origin: ArrayLike, direction: ArrayLike) -> SurfaceHit | None:

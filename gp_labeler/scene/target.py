@@ -183,10 +183,14 @@ class RenderTarget:
         to.Bind(to.GetDrawMode())
         to.ActivateDrawBuffer(0)
         state.vtkglScissor(0, 0, *whole)  # the last renderer left its own corner
-        corners, everywhere = (0, part[0], 0, part[1]), (0, whole[0], 0, whole[1])
-        Framebuffer.Blit(corners, everywhere, _COLOUR, _NEAREST if part == whole else _LINEAR)
-        if depth:
-            Framebuffer.Blit(corners, everywhere, _DEPTH, _NEAREST)
+        what = _COLOUR | _DEPTH if depth else _COLOUR
+        Framebuffer.Blit((0, part[0], 0, part[1]), (0, whole[0], 0, whole[1]), what, _NEAREST)
+        if (
+            part != whole and min(part) > 2
+        ):  # smoothly, but at the edge, which would mix with what lies beside
+            inner = (1, part[0] - 1, 1, part[1] - 1)
+            enlarged = [round(n * whole[k // 2] / part[k // 2]) for k, n in enumerate(inner)]
+            Framebuffer.Blit(inner, enlarged, _COLOUR, _LINEAR)
         state.PopFramebufferBindings()
 
 
