@@ -41,7 +41,7 @@ class OverlayOptions:
     Parameters
     ----------
     visible : bool
-        Whether anything is.
+        Whether anything is; then landmarks go without their names, which would hide it.
     estimate, region, cochlea, truth, features, vectors, touches, tip, path, names : bool
         Origin and axis; where they are with 95 %; the outline of the cochlea; the labelled CO and axis; the
         atlas's features in this pose; from there to the labelled ones; the touched points; the tracked probe;
@@ -50,7 +50,7 @@ class OverlayOptions:
         From 0 to 1.
     """
 
-    visible: bool = True
+    visible: bool = False
     estimate: bool = True
     region: bool = True
     cochlea: bool = True
@@ -91,6 +91,7 @@ class PoseDesk:
         self._path: InsertionPath | None = None
         self._prepared = False
         self.estimating = self._begin()
+        self._seen = (self.side, self._touched())
         desk.session_replaced.connect(self._on_session_replaced)
         desk.atlas_changed.connect(self._on_atlas_changed)
 
@@ -223,10 +224,10 @@ class PoseDesk:
 
     def load(self, path: str | PathLike[str]) -> None:
         """Take the touches of a file for this side in place of those there are."""
-        for text in touching.load_touches(self._desk.session, path, self.side):
-            self._desk.say(text, "warning")
-        self._desk.say(f"Took {len(self._touched())} touches from {Path(path).name}")
+        doubts = touching.load_touches(self._desk.session, path, self.side)
         self._aim(self._first_untouched())
+        taken = f"Took {len(self._touched())} touches from {Path(path).name}"
+        self._desk.say(". ".join((taken, *doubts)), "warning" if doubts else "info")
 
     # What leaves
 
@@ -295,9 +296,19 @@ class PoseDesk:
     def _on_changed(self) -> None:
         if self._desk.session.state.touches:
             self.prepare()
-        if self._target is None:
-            self._aim(self._first_untouched())
+        self._follow_touches()
         self.changed.emit()
+
+    def _follow_touches(self) -> None:
+        """Ask again for what was undone or cleared, and go on where the target was touched."""
+        before, self._seen = self._seen, (self.side, self._touched())
+        if before[0] is not self.side:
+            return
+        lost, gained = before[1] - self._seen[1], self._seen[1] - before[1]
+        if lost:
+            self._aim(next(name for name in (*ORDER, *sorted(lost, key=_by_number)) if name in lost))
+        elif self._target is None or self._target in gained:
+            self._aim(self._first_untouched(after=self._target))
 
     def _touched(self) -> frozenset[str]:
         return frozenset(name for side, name in self._desk.session.state.touches if side is self.side)

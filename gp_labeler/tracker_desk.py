@@ -14,7 +14,9 @@ from psygnal import Signal
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
 from gp_core.registration.pivot import PivotCalibration
+from gp_labeler.session.session import Session
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import (
     LinkPhase,
@@ -35,6 +37,8 @@ if TYPE_CHECKING:
 __all__ = ["TrackerDesk"]
 
 _TRAIL = 90
+_IN = " in "
+"""Between probe and reference in the source of a touch."""
 
 
 class TrackerDesk:
@@ -66,6 +70,7 @@ class TrackerDesk:
         self._trail: deque[FloatArray] = deque(maxlen=_TRAIL)
         self.pivot: PivotCollector | None = None
         self.calibration: PivotCalibration | None = None
+        self._aim = self._aim_now()
         desk.pose.changed.connect(self._on_pose_changed)
 
     # The link
@@ -116,8 +121,9 @@ class TrackerDesk:
         if self.pivot is not None:
             self.pivot.update(samples)
         else:
+            self._keep_aim()
             for _ in range(self._link.take_presses()):
-                self._recorder.press()
+                self.press()
             for outcome in self._recorder.update(samples):
                 self._take(outcome)
         if self._words != self.words or self.pivot is not None:
@@ -135,6 +141,9 @@ class TrackerDesk:
         """Say where the tip is in the marker's frame, (3,) mm; raises `GpError` where that cannot be."""
         self._recorder.probe = Probe(offset)
         self._recorder.cancel()
+        found = self.calibration
+        if found is not None and not np.allclose(self.probe.tip_offset, found.tip_offset, atol=0.001):
+            self.calibration = None
         self.changed.emit()
 
     @property
@@ -198,6 +207,7 @@ class TrackerDesk:
         """
         if self._link is None:
             raise GpError("no tracker is connected", remedy="Connect one in the Pose panel.")
+        self._keep_aim()
         self._recorder.press()
 
     # Pivot calibration
@@ -251,11 +261,26 @@ class TrackerDesk:
 
     # Inside
 
+    def _aim_now(self) -> tuple[Session, Side, str | None]:
+        """Return what a press is for now."""
+        return self._desk.session, self._desk.pose.side, self._desk.pose.target
+
+    def _keep_aim(self) -> None:
+        """Drop what was begun for another feature, side or specimen: it is not a touch of this one."""
+        before, self._aim = self._aim, self._aim_now()
+        if before == self._aim:
+            return
+        was_recording = self._recorder.recording
+        self._recorder.cancel()
+        if was_recording:
+            self.refused.emit(f"{before[2] or 'Nothing'} is no longer asked for. Touch again.")
+
     def _take(self, outcome: RecordedTouch | RefusedTouch) -> None:
         if isinstance(outcome, RefusedTouch):
             self.refused.emit(outcome.reason)
             return
         try:
+            self._check_frame()
             self._desk.pose.record(
                 outcome.position,
                 TouchHow.TRACKED,
@@ -271,7 +296,19 @@ class TrackerDesk:
     def _source(self) -> str:
         assert self._link is not None
         reference = self._link.address.reference
-        return self._link.address.probe + (f" in {reference}" if reference else "")
+        return self._link.address.probe + (f"{_IN}{reference}" if reference else "")
+
+    def _check_frame(self) -> None:
+        """Refuse a touch whose frame is not that of the side's other tracked ones, which are called alike."""
+        side, mine = self._desk.pose.side, self._source().partition(_IN)[2]
+        for (of, name), touch in self._desk.session.state.touches.items():
+            theirs = touch.source.partition(_IN)[2]
+            if of is side and touch.how is TouchHow.TRACKED and theirs != mine:
+                raise GpError(
+                    f"{name} was touched in the frame of {theirs or 'the tracker'}, this is in that of "
+                    f"{mine or 'the tracker'}",
+                    remedy="Connect as before, or clear the touches of this side.",
+                )
 
     def _follow_tip(self, samples: list[Sample]) -> None:
         if not samples:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,15 @@ from gp_labeler.session.session import Session
 from gp_labeler.session.touch_edits import LeaveOutTouch, RecordTouch, RemoveTouches, SetSkull, TakeTouches
 from gp_labeler.session.touches import Touch, TouchHow
 
-__all__ = ["clear_touches", "leave_out", "load_skull", "load_touches", "mark_skull", "record_touch"]
+__all__ = [
+    "clear_touches",
+    "leave_out",
+    "load_skull",
+    "load_touches",
+    "mark_skull",
+    "named_side",
+    "record_touch",
+]
 
 
 def record_touch(
@@ -62,7 +71,7 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
     Returns
     -------
     tuple of str
-        What the user should know: what the tracker did not see.
+        What the user should know: what the tracker did not see, a file named for the other side.
 
     Raises
     ------
@@ -77,8 +86,18 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
     if not taken:
         raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
     session.do(TakeTouches(Side.parse(side), taken))
-    unseen = " ".join(sorted(touched.unseen))
-    return (f"Not seen by the tracker: {unseen}",) if unseen else ()
+    named, unseen = named_side(source), " ".join(sorted(touched.unseen))
+    doubts = [f"Not seen by the tracker: {unseen}"] if unseen else []
+    if named not in (None, Side.parse(side)):
+        doubts.append(f"By its name it is of the {named.word} side: check the side")
+    return tuple(doubts)
+
+
+def named_side(source: str) -> Side | None:
+    """Return the side that a file's name tells, such as ``SkullD_Right.dat``; None where it tells not one."""
+    words = {word for word in re.split(r"[^a-z0-9]+", Path(source).name.lower()) if word}
+    told = {side for side in Side if words & {side.word, side.value.lower()}}
+    return told.pop() if len(told) == 1 else None
 
 
 def leave_out(session: Session, side: Side | str, name: str, left_out: bool = True) -> bool:

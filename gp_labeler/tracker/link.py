@@ -199,7 +199,7 @@ class TrackerLink:
                 return f"{self._why[:1].upper()}{self._why[1:]}"
             case LinkPhase.SILENT:
                 quiet = max(round(self._clock() - self._heard), 1)
-                return f"Connected to {where}, but no {probe} for {quiet} s: {self._why_silent()}."
+                return f"Connected to {where}, but no {probe} for {quiet} s: {self._why_silent()}"
             case _:
                 often = f", {self._told_hz:.0f} a second" if self._told_hz else ""
                 return f"Receiving {probe}{often}."
@@ -208,10 +208,10 @@ class TrackerLink:
         probe = self.address.probe
         kind = self.devices.get(probe)
         if kind == "TRANSFORM":
-            return "its marker is out of sight, or the tracker is paused"
+            return "its marker is out of sight, or the tracker is paused."
         if kind is not None:
-            return f"it comes as {kind}; have the server send it as TRANSFORM"
+            return f"it comes as {kind}; have the server send it as TRANSFORM."
         others = [name for name, kind in self.devices.items() if kind == "TRANSFORM" and name]
         if others:
             return f"the server sends {', '.join(sorted(others)[:6])}; is the name right?"
-        return "its marker is out of sight, or it has another name there"
+        return "its marker is out of sight, or it has another name there."

@@ -22,6 +22,9 @@ _SECONDS_BETWEEN_LOOKS = 0.015
 _SETTLING = 0.2
 """The part of the window, at its beginning, in which a tip that comes to rest is not averaged yet."""
 
+_SPOILING = (Fault.JUMP, Fault.FROZEN)
+"""Faults that make the samples before them doubtful too: what is frozen is known only after a while."""
+
 _SECONDS_OF_GRACE = 0.3
 """How much longer than its window a press waits for samples."""
 
@@ -225,7 +228,7 @@ class TouchRecorder:
         window = [sample]
         for earlier in reversed(self._recent):
             since = window[-1].time - earlier.time  # below 0 where the tracker came back with another clock
-            if not 0 <= since <= self.settings.max_gap_s or earlier.fault is Fault.JUMP:
+            if not 0 <= since <= self.settings.max_gap_s or earlier.fault in _SPOILING:
                 break
             there = self.probe.tip(earlier) if earlier.usable else None
             if there is None or earlier is sample:
@@ -273,8 +276,9 @@ class TouchRecorder:
 
     def _too_little(self, window: Sequence[Sample], usable: Sequence[Sample]) -> RefusedTouch | None:
         faults = Counter(s.fault for s in window if not s.usable)
-        if faults[Fault.JUMP]:
-            return RefusedTouch(f"{_detail(window, Fault.JUMP)} Touch again.", Fault.JUMP)
+        for fault in _SPOILING:
+            if faults[fault]:
+                return RefusedTouch(f"{_detail(window, fault)} Touch again.", fault)
         settings = self.settings
         lacking = settings.window_s - _seconds(usable)
         gap = max([lacking / 2, *(b.time - a.time for a, b in pairwise(usable))])

@@ -20,6 +20,7 @@ from gp_core.landmarks.features import CODES, feature
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.panels.parts import text_label
+from gp_labeler.views.panels.pose_words import sentence
 from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
 from gp_labeler.workbench import Workbench
 
@@ -84,7 +85,7 @@ class GuideWindow(QWidget):
             self.warning.setText("")
             return
         self.result.setText(f"±{estimate.radius_95:.2f} mm · ±{degrees_text(estimate.cone_95)}")
-        self.warning.setText("\n".join(estimate.warnings[:2]))
+        self.warning.setText("\n".join(sentence(words) for words in estimate.warnings[:2]))
 
     def _show_tracker(self, *_: object) -> None:
         tracker = self._desk.tracker
@@ -155,7 +156,10 @@ class GuideWindow(QWidget):
         whole = QVBoxLayout(self)
         whole.setContentsMargins(32, 24, 32, 24)
         whole.setSpacing(16)
-        whole.addLayout(_row(self.counter, None, self.state, self.connect_button, self.leave))
+        head = _row(self.counter, self.state, self.connect_button, self.leave)
+        head.setStretchFactor(self.state, 1)
+        self.state.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
+        whole.addLayout(head)
         middle = QHBoxLayout()
         middle.setSpacing(32)
         middle.addWidget(self.picture, 5)
@@ -201,12 +205,9 @@ def _caption(words: str) -> QLabel:
     return text_label(words, "large-hint")
 
 
-def _row(*widgets: QWidget | None) -> QHBoxLayout:
+def _row(*widgets: QWidget) -> QHBoxLayout:
     row = QHBoxLayout()
     row.setSpacing(16)
     for widget in widgets:
-        if widget is None:
-            row.addStretch(1)
-        else:
-            row.addWidget(widget)
+        row.addWidget(widget)
     return row

@@ -67,6 +67,34 @@ def test_an_undone_touch_is_asked_for_again_when_all_were_touched(desk, animal):
     assert desk.pose.target == ORDER[-1]
 
 
+def test_what_is_undone_or_cleared_is_asked_for_next(desk, animal):
+    for code in ORDER[:3]:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    desk.session.undo()
+    assert desk.pose.target == ORDER[2]
+    desk.session.redo()
+    assert desk.pose.target == ORDER[3]
+    touching.clear_touches(desk.session, "L")
+    assert desk.pose.target == ORDER[0]
+    desk.pose.record(animal["ZL"], TouchHow.TYPED, name="ZL")
+    assert desk.pose.target == ORDER[0], "what was not asked for changes nothing"
+
+
+def test_what_a_file_lacks_or_is_named_stays_said(desk, animal, tmp_path):
+    rows = [f"{code},{','.join(map(str, animal[code]))}" for code in PROBE]
+    file = tmp_path / "GP-7_Right.csv"
+    file.write_text("\n".join(["label,x,y,z", *rows]) + "\n", encoding="utf-8")
+    said = []
+    desk.message.connect(lambda text, level: said.append((text, level)))
+    desk.pose.target_changed.connect(lambda _: said.append("next"))
+    desk.pose.load(file)
+    text = "Took 6 touches from GP-7_Right.csv. By its name it is of the right side: check the side"
+    assert said[-1] == (text, "warning"), "nothing is said after it that takes its place"
+    assert touching.named_side("Skull_Left_new.dat") is Side.LEFT
+    assert touching.named_side("left and right.dat") is None
+    assert touching.named_side("Leftover.dat") is None
+
+
 def test_the_estimate_follows_the_session_and_the_atlas(desk, animal):
     told = []
     desk.pose.changed.connect(lambda: told.append(1))

@@ -18,6 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
@@ -75,6 +76,8 @@ class TrackerDialog(QDialog):
         self.words.setText(tracker_words(self._desk))
         set_role(self.words, tracker_role(self._desk))
         self.connect_button.setText("Disconnect" if tracker.on else "Connect")
+        for set_it in (self.connect_button.setAutoDefault, self.connect_button.setDefault):
+            set_it(not tracker.on)  # Return in a field must not end a link
         collecting = tracker.pivot is not None
         self.pivot.setText("Stop" if collecting else "Find the tip by turning…")
         self.pivot.setEnabled(tracker.on)
@@ -134,6 +137,19 @@ class TrackerDialog(QDialog):
         except ValueError:
             raise GpError(f"the tip must be three numbers in mm, got {text!r}") from None
 
+    def _use_tip(self) -> None:
+        """Take a tip typed while the probe is tracked; otherwise connecting does."""
+        tracker, text = self._desk.tracker, self.fields["tip"].text()
+        if not tracker.on or text == _tip_text(tracker.probe.tip_offset):
+            return
+        try:
+            tracker.set_tip_offset(self._numbers(text))
+        except GpError as error:
+            self._complain(error)
+            return
+        self._remember()
+        self._complain(None)
+
     def _toggle_pivot(self) -> None:
         tracker = self._desk.tracker
         (tracker.start_pivot if tracker.pivot is None else tracker.cancel_pivot)()
@@ -144,7 +160,7 @@ class TrackerDialog(QDialog):
         except GpError as error:
             self._complain(error)
             return
-        self.fields["tip"].setText(" ".join(f"{v:.3f}" for v in found.tip_offset))
+        self.fields["tip"].setText(_tip_text(found.tip_offset))
         self._remember()
         self._complain(None)
 
@@ -180,7 +196,7 @@ class TrackerDialog(QDialog):
         for name, field in self.fields.items():
             field.setText(str(known.get(name, "")))
         if self._desk.tracker.probe.tip_offset.any():
-            self.fields["tip"].setText(" ".join(f"{v:.3f}" for v in self._desk.tracker.probe.tip_offset))
+            self.fields["tip"].setText(_tip_text(self._desk.tracker.probe.tip_offset))
 
     def _remember(self) -> None:
         self._memory.set(**{_MEMORY: {name: field.text() for name, field in self.fields.items()}})
@@ -212,6 +228,7 @@ class TrackerDialog(QDialog):
         for button in (self.connect_button, self.finish):
             button.setProperty("role", "primary")
         self.connect_button.clicked.connect(self._toggle_link)
+        self.fields["tip"].editingFinished.connect(self._use_tip)
         self.pivot.clicked.connect(self._toggle_pivot)
         self.finish.clicked.connect(self._finish_pivot)
         self.send.clicked.connect(self._toggle_sending)
@@ -271,6 +288,10 @@ class TrackerDialog(QDialog):
         card.add(self.send_words)
         card.add(row)
         return card
+
+
+def _tip_text(offset: FloatArray) -> str:
+    return " ".join(f"{v:.3f}" for v in offset)
 
 
 def _form() -> QFormLayout:

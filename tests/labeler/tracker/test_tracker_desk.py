@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pyigtl
 import pytest
 from tracker_cases import POINTS, TIP, SimulatorProcess, until
 
-from gp_core import Atlas
+from gp_core import Atlas, Side
 from gp_core.errors import GpError
 from gp_labeler.session import touching
 from gp_labeler.session.touches import TouchHow
@@ -122,3 +124,37 @@ def test_the_pose_is_sent_back_while_it_holds(desk):
         client.stop()
     desk.tracker.stop_sending()
     assert desk.tracker.sending == ""
+
+
+@pytest.mark.parametrize("change", ["skip", "side", "specimen"])
+def test_a_press_for_one_feature_is_never_recorded_as_another(desk, simulator, change):
+    connected(desk, simulator)
+    simulator.do("go RWA 0.2")
+    refusals = []
+    desk.tracker.refused.connect(refusals.append)
+    desk.pose.aim("RWA")
+    desk.tracker.press()
+    desk.tracker.poll()
+    if change == "skip":
+        desk.pose.skip()
+    elif change == "side":
+        desk.pose.choose(side=Side.RIGHT)
+    else:
+        desk.begin()
+    until(lambda: bool(refusals), desk.tracker.poll, "a refusal")
+    assert refusals[0].startswith("RWA is no longer asked for")
+    end = time.monotonic() + 0.8
+    until(lambda: time.monotonic() > end, desk.tracker.poll, "the end of a window")
+    assert not desk.session.state.touches
+
+
+def test_touches_in_two_frames_of_the_tracker_do_not_mix(desk, simulator):
+    source = "ProbeToTracker in ReferenceToTracker"
+    touching.record_touch(desk.session, "L", "ZL", (1, 2, 3), TouchHow.TRACKED, source=source)
+    connected(desk, simulator)
+    refusals = []
+    desk.tracker.refused.connect(refusals.append)
+    desk.tracker.refused.connect(lambda text: "frame" in text or desk.tracker.press())
+    desk.tracker.press()
+    until(lambda: any("in the frame of ReferenceToTracker" in t for t in refusals), desk.tracker.poll, "it")
+    assert list(desk.session.state.touches) == [(desk.pose.side, "ZL")]

@@ -80,6 +80,7 @@ def test_strays_are_not_averaged() -> None:
         (Fault.HIDDEN, 0.3),
         (Fault.LATE, 0.3),
         (Fault.FROZEN, 0.3),
+        (Fault.FROZEN, _STEP),
         (Fault.NO_REFERENCE, 0.3),
         (Fault.JUMP, _STEP),
     ],

@@ -87,6 +87,22 @@ def test_the_dialog_connects_remembers_and_finds_the_tip(qtbot, desk, top, simul
     dialog.close()
 
 
+def test_a_tip_typed_while_the_probe_is_tracked_counts_at_once(qtbot, desk, top, simulator):
+    dialog = TrackerDialog(desk, WindowState(), top)
+    dialog.show()
+    typed(qtbot, dialog.fields["port"], str(simulator.port))
+    qtbot.keyClick(dialog.fields["port"], Qt.Key.Key_Return)
+    assert desk.tracker.on, "Return connects"
+    going(qtbot, desk, lambda: desk.tracker.visible)
+    for text, complaint in (("1 2", "three finite numbers"), ("1 2 3", "")):
+        typed(qtbot, dialog.fields["tip"], text)
+        qtbot.keyClick(dialog.fields["tip"], Qt.Key.Key_Return)
+        assert complaint in dialog.problem.text()
+    np.testing.assert_array_equal(desk.tracker.probe.tip_offset, (1, 2, 3))
+    assert desk.tracker.on, "Return does not disconnect"
+    dialog.close()
+
+
 @pytest.mark.parametrize(
     ("field", "text", "complaint"),
     [("port", "99999", "1 to 65535"), ("host", "", "host is empty"), ("tip", "1 2", "three finite numbers"),
@@ -162,7 +178,7 @@ def test_the_guide_tells_the_estimate_and_why_nothing_was_recorded(qtbot, desk, 
     for code in ORDER[:4]:
         desk.pose.record(atlas[code], TouchHow.TYPED)
     assert "mm" in guide.result.text()
-    assert "only 4 points" in guide.warning.text()
+    assert "Only 4 points" in guide.warning.text()
     connected(qtbot, desk, simulator)
     simulator.do("hide")
     going(qtbot, desk, lambda: not desk.tracker.visible)
