@@ -164,6 +164,7 @@ class SceneView(QWidget):
         follow(self, desk.session_replaced, self._on_session_replaced)
         for signal in (desk.landmarks_changed, desk.active_changed, desk.ghosts_changed, desk.doubts_changed):
             follow(self, signal, self._show_points)
+        follow(self, desk.pose.overlay_changed, self._show_points)
         follow(self, desk.crosshair_changed, self._on_crosshair)
         follow(self, desk.point_shown, self.go_to)
         follow(self, desk.dragged, self._on_dragged)

@@ -1,0 +1,21 @@
+"""Landmarks give way to an estimate: under it they stand without their names."""
+
+from __future__ import annotations
+
+from gp_labeler.session.edits import PlacePoint
+from gp_labeler.session.state import How, Provenance
+from gp_labeler.session.workflow import Active
+from gp_labeler.views.drawn import drawn_marks
+from gp_labeler.workbench import Workbench
+
+
+def test_under_an_estimate_only_the_active_landmark_is_named() -> None:
+    desk = Workbench()
+    for n, code in enumerate(("MN", "CL", "OS")):
+        desk.session.do(PlacePoint("L", code, (n, 0, 0), Provenance(How.MESH)))
+    desk.session.set_active(Active(desk.session.active.side, "CL"))
+    assert [mark.label for mark in drawn_marks(desk)] == [mark.key[2:] for mark in drawn_marks(desk)]
+    desk.pose.draw(visible=True)
+    assert [mark.label for mark in drawn_marks(desk) if mark.label] == ["CL"]
+    assert len(drawn_marks(desk)) == 3
+    desk.close(discard=True)
