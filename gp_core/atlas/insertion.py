@@ -18,7 +18,7 @@ from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.table import delimiter_of
 from gp_core.landmarks.files.text import parse_position, shown, split_fields, split_lines
 
-__all__ = ["UNITS", "carry_path", "read_path", "winding_side", "write_path"]
+__all__ = ["UNITS", "carry_path", "read_path", "turn_about", "winding_side", "write_path"]
 
 UNITS = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3}
 """Units that a path may be in, and how many mm they are."""
@@ -121,7 +121,7 @@ def winding_side(path: ArrayLike) -> Side | None:
     path : (N, 3) array_like, mm, cochlea frame
         From the base to the apex. Points on the axis do not count.
     """
-    turn = _turn_about(as_points(path, "path"), 0)
+    turn = turn_about(as_points(path, "path"), 0)
     if abs(turn) < _TELLING_TURN:
         return None
     return Side.LEFT if turn < 0 else Side.RIGHT
@@ -202,7 +202,7 @@ def _is_plausible(points: FloatArray) -> bool:
 
 
 def _check_axis(points: FloatArray, file: str | PathLike[str]) -> None:
-    about_x, *others = (abs(_turn_about(points, axis)) for axis in range(3))
+    about_x, *others = (abs(turn_about(points, axis)) for axis in range(3))
     if max(others) > max(_TELLING_TURN, _CLEARLY * about_x):
         raise GpError(
             "the path winds about another axis than x, the modiolar axis of the cochlea frame",
@@ -212,8 +212,8 @@ def _check_axis(points: FloatArray, file: str | PathLike[str]) -> None:
         )
 
 
-def _turn_about(points: FloatArray, axis: int) -> float:
-    """Return the angle through which a path goes about an axis, rad, right-handed."""
+def turn_about(points: FloatArray, axis: int) -> float:
+    """Return the angle through which a path (N, 3), mm, goes about an axis (0 to 2), rad, right-handed."""
     first, second = points[:, (axis + 1) % 3], points[:, (axis + 2) % 3]
     off_axis = np.hypot(first, second) > _ON_AXIS_MM
     angles = np.arctan2(second[off_axis], first[off_axis])

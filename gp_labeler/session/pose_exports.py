@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import permutations, product
 from os import PathLike
 from pathlib import Path
 
-from gp_core.atlas.insertion import carry_path, read_path, write_path
+import numpy as np
+
+from gp_core.atlas.insertion import carry_path, read_path, turn_about, winding_side, write_path
 from gp_core.atlas.pose import CochleaPose
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
@@ -30,6 +33,15 @@ FORMATS: Mapping[str, str] = {
     ".mrk.json": "CO and axis for Slicer",
 }
 """Endings of the files that `save_pose` writes, and what each is."""
+
+_AXES = tuple(
+    ",".join(sign + letter for sign, letter in zip(signs, letters, strict=True))
+    for letters in permutations("xyz")
+    for signs in product(("", "-"), repeat=3)
+)
+"""Every naming of three axes, the left-handed ones too, which `read_path` refuses."""
+
+_CENTRE_MM = 1e-6
 
 
 def save_pose(pose: CochleaPose, path: str | PathLike[str]) -> Path:
@@ -77,6 +89,59 @@ class InsertionPath:
         """Read a path; see `gp_core.atlas.insertion.read_path` for what is asked and raised."""
         return cls(read_path(path, units=units, axes=axes), Side.parse(side), Path(path))
 
+    @classmethod
+    def readings(cls, path: str | PathLike[str], side: Side | str, *, units: str) -> dict[str, InsertionPath]:
+        """Read a path by every naming of its axes that fits a cochlea, the likeliest first.
+
+        Returns
+        -------
+        dict of str to InsertionPath
+            ``"x,y,z"`` alone where the file is in the cochlea frame as it is. Otherwise by axes, such as
+            ``"z,-y,x"``, which `gp_core.atlas.insertion.read_path` explains; what begins nearest to the
+            round window comes first.
+
+        Raises
+        ------
+        GpError
+            The file is no path of such an ear by any axes.
+        """
+        try:
+            return {"x,y,z": cls.read(path, side, units=units)}
+        except GpError:
+            side = Side.parse(side)
+            found = {axes: read for axes in _AXES if (read := _read_or_none(path, side, units, axes))}
+            most = max((abs(read.turn) for read in found.values()), default=0.0)
+            found = {axes: read for axes, read in found.items() if abs(read.turn) > 0.99 * most}
+            fitting = {axes: read for axes, read in found.items() if read.fits}
+            if any(replace(read, side=side.other).fits for read in found.values()) and not fitting:
+                raise GpError(
+                    f"winds as in a {side.other.word} ear", file=path, remedy="Check its side."
+                ) from None
+            if not fitting:
+                raise
+        return dict(sorted(fitting.items(), key=lambda item: -item[1].points[0, 1]))
+
+    @property
+    def turn(self) -> float:
+        """How far it turns about the modiolar axis, rad, right-handed."""
+        return turn_about(self.points[: self.n_before_centre], 0)
+
+    @property
+    def fits(self) -> bool:
+        """Whether it winds as in an ear of its side, and runs towards the apex."""
+        path = self.points[: self.n_before_centre]
+        return winding_side(path) in (None, self.side) and bool(path[-1, 0] > path[0, 0])
+
+    @property
+    def n_before_centre(self) -> int | None:
+        """How many points come before one that is CO itself, where no path can be; None without such."""
+        at_centre = np.flatnonzero(np.linalg.norm(self.points, axis=1) < _CENTRE_MM)
+        return int(at_centre[0]) if len(at_centre) and at_centre[0] > 1 else None
+
+    def first(self, n: int) -> InsertionPath:
+        """Return the path of the first points only."""
+        return replace(self, points=self.points[:n])
+
     def in_touches(self, estimate: Estimate) -> FloatArray | None:
         """Return the path (N, 3) in the frame of the touches, mm; None without a pose."""
         if estimate.pose is None:
@@ -103,3 +168,10 @@ class InsertionPath:
             raise GpError("there is no estimate to carry the path to")
         write_path(path, carried)
         return Path(path)
+
+
+def _read_or_none(path: str | PathLike[str], side: Side | str, units: str, axes: str) -> InsertionPath | None:
+    try:
+        return InsertionPath.read(path, side, units=units, axes=axes)
+    except GpError:
+        return None

@@ -6,6 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from PySide6.QtCore import Qt
+from PySide6.QtGui import QGuiApplication
+
 from gp_core.atlas.insertion import UNITS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -17,7 +20,7 @@ from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.panels.physical_dialog import PhysicalDialog
 from gp_labeler.views.panels.tracker_dialog import TrackerDialog
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.views.report_file import report_of, save_report
+from gp_labeler.views.report_file import report_of, reported_estimate, save_report
 from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -27,6 +30,7 @@ __all__ = ["PoseUi"]
 
 _TOUCHES = "Touches (*.dat *.csv *.mrk.json *.fcsv *.json *.txt);;All files (*)"
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
+_WHICH_AXES = "Which of its axes are x (modiolar axis, to the apex), y (to the round window), z"
 _PATHS = "Insertion path (*.csv *.txt);;All files (*)"
 
 
@@ -72,13 +76,19 @@ class PoseUi:
 
     def ask_report(self) -> None:
         """Ask where, and write the one-page report."""
-        report = report_of(self._window)
+        reported_estimate(self._desk)
         kinds = "PDF (*.pdf);;HTML (*.html)"
         path = self.prompts.save_file("Save the report", self._proposed("report.pdf"), kinds)
-        if path is not None:
-            self._remember_folder(path)
-            self._desk.say(f"Wrote {save_report(report, path).name}")
-            self._desk.wrote.emit("report", path)
+        if path is None:
+            return
+        self._remember_folder(path)
+        QGuiApplication.setOverrideCursor(Qt.CursorShape.WaitCursor)  # pictures take a second or more
+        try:
+            save_report(report_of(self._window), path)
+        finally:
+            QGuiApplication.restoreOverrideCursor()
+        self._desk.say(f"Wrote {path.name}")
+        self._desk.wrote.emit("report", path)
 
     def ask_path(self) -> None:
         """Ask for an insertion path with its units and side, and carry it to the estimate."""
@@ -87,9 +97,25 @@ class PoseUi:
             side = self.prompts.item("Insertion path", "It was drawn for", [s.word for s in Side])
             if units and side:
                 self._remember_folder(path)
-                carried = InsertionPath.read(path, Side.parse(side[0].upper()), units=units)
-                self._desk.pose.carry(carried)
-                self._desk.say(f"Carried {path.name}, {len(carried.points)} points")
+                carried = self._read_path(path, Side.parse(side[0].upper()), units)
+                if carried is not None:
+                    self._desk.pose.carry(carried)
+                    self._desk.say(f"Carried {path.name}, {len(carried.points)} points")
+
+    def _read_path(self, file: Path, side: Side, units: str) -> InsertionPath | None:
+        """Read a path; ask what its axes are, and whether all of it is path, where that is not clear."""
+        read = InsertionPath.readings(file, side, units=units)
+        axes = next(iter(read))
+        if len(read) > 1:
+            axes = self.prompts.item("Insertion path", _WHICH_AXES, list(read))
+        path = read.get(axes)
+        n = None if path is None else path.n_before_centre
+        if path is None or n is None:
+            return path
+        first, whole = f"The first {n}", f"All {len(path.points)}"
+        text = f"Row {n + 1} is CO itself, where no path can be. Which rows are the path?"
+        answer = self.prompts.choose("Insertion path", text, [first, whole])
+        return {first: path.first(n), whole: path}.get(answer)
 
     def ask_save_path(self) -> None:
         """Ask where, and write the carried path in the frame of the touches."""
@@ -131,6 +157,8 @@ class PoseUi:
             raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")
         view = self._window.grid.scene_view
         pose = DrawnPose.of(estimate.pose, estimate.registered.T_scan_touches, label="")
+        self._desk.session.set_crosshair(pose.origin)
+        self._desk.point_shown.emit(pose.origin)
         place_camera(view.scene.camera, placement(pose))
         view.redraw()
 

@@ -14,14 +14,16 @@ from gp_core.landmarks.files import write_text
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
+from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.pose_report import PoseReport
 from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.pictures import picture
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
+    from gp_labeler.workbench import Workbench
 
-__all__ = ["report_of", "report_pictures", "save_report"]
+__all__ = ["report_of", "report_pictures", "reported_estimate", "save_report"]
 
 _PICTURE_SIZE = (720, 520)
 _SLICE_MM = 24.0
@@ -38,12 +40,16 @@ _MARGINS_MM = (14.0, 12.0, 14.0, 12.0)
 
 def report_of(window: MainWindow) -> PoseReport:
     """Make the report of the estimate a window shows; raises `GpError` where there is none."""
-    desk = window.workbench
-    estimate = desk.pose.estimate
-    if estimate is None or estimate.pose is None:
-        raise GpError("there is no estimate to report", remedy=desk.pose.estimating.waiting_text or None)
-    session = desk.session
+    session, estimate = window.workbench.session, reported_estimate(window.workbench)
     return PoseReport(session.state, estimate, report_pictures(window), session.now())
+
+
+def reported_estimate(workbench: Workbench) -> Estimate:
+    """Return the estimate a report would be of; raises `GpError` where there is none."""
+    pose = workbench.pose
+    if pose.estimate is None or pose.estimate.pose is None:
+        raise GpError("there is no estimate to report", remedy=pose.estimating.waiting_text or None)
+    return pose.estimate
 
 
 def report_pictures(window: MainWindow) -> dict[str, bytes]:
@@ -54,11 +60,14 @@ def report_pictures(window: MainWindow) -> dict[str, bytes]:
     poses = pose_scene(window.workbench).poses
     if not poses or window.workbench.volume is None:
         return {}
-    view = window.workbench.session.view
+    view, scene_view = window.workbench.session.view, window.grid.scene_view
     before = {name: getattr(view.state, name) for name in _BARE}
+    looked = scene_view.scene.camera.state()
     view.update(**_BARE)
     found = {**_bone_pictures(window, poses[0]), **_slice_pictures(window, poses[0])}
     view.update(**before)
+    scene_view.scene.camera.restore(looked)  # last: a crosshair that goes out of sight takes the camera along
+    scene_view.redraw()
     return found
 
 
@@ -102,15 +111,13 @@ def _save_pdf(report: PoseReport, path: Path) -> None:
 
 def _bone_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
     view = window.grid.scene_view
-    camera, before, found = view.scene.camera, view.scene.camera.state(), {}
+    camera, found = view.scene.camera, {}
     camera.view_from(pose.side.value)
     view.scene.fit()
     found[f"From the {pose.side.word}"] = _png(picture(window, "3d", _PICTURE_SIZE))
     for caption, placement in _LOOKS.items():
         place_camera(camera, placement(pose))
         found[caption] = _png(picture(window, "3d", _PICTURE_SIZE))
-    camera.restore(before)
-    view.redraw()
     return found
 
 

@@ -1,0 +1,65 @@
+"""What the menu Estimate asks of the window: insertion paths with their axes, reports that leave no trace."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtWidgets import QApplication
+
+from gp_core import PROBE, Atlas
+from gp_core.atlas.draw import draw_animal
+from gp_core.errors import GpError
+from gp_labeler.session.touches import TouchHow
+
+ATLAS = Atlas.published()
+ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
+
+
+def touch(window, animal=ANIMAL, how=TouchHow.TYPED) -> None:
+    window.workbench.use_atlas(ATLAS)
+    for code in PROBE:
+        window.workbench.pose.record(animal[code], how, name=code)
+
+
+def test_the_authors_path_is_carried_once_its_axes_are_told(make_window, shared_data):
+    window = make_window()
+    touch(window)
+    window.ui.prompts.files = [shared_data / "usevitch2021" / "Curve_Points.csv"]
+    window.ui.prompts.answers = ["m", "left", "z,-y,x", "The first 20"]
+    window.ui.ask_path()
+    carried = window.workbench.pose.path
+    assert len(carried.points) == 20
+    assert carried.points[0, 1] > 1.5, "it begins at the round window"
+    assert next(iter(carried.readings(carried.source, "L", units="m"))) == "z,-y,x", "likeliest first"
+    window.ui.prompts.answers = ["m", "right"]
+    with pytest.raises(GpError, match="winds as in a left ear"):
+        window.ui.ask_path()
+    window.ui.prompts.answers = ["mm", "left"]
+    with pytest.raises(GpError, match="look like m"):
+        window.ui.ask_path()
+
+
+def test_a_path_in_the_cochlea_frame_asks_for_no_axes(make_window, tmp_path):
+    window = make_window()
+    touch(window)
+    table = tmp_path / "path.csv"
+    table.write_text("-0.5,2,0\n0,1.5,0.2\n0.4,1,0.5\n")
+    window.ui.prompts.files, window.ui.prompts.answers = [table], ["mm", "left"]
+    window.ui.ask_path()
+    assert len(window.workbench.pose.path.points) == 3
+
+
+def test_a_report_leaves_the_camera_where_it_was(window, tmp_path):
+    from window_cases import MIDDLE
+
+    shift = MIDDLE - ANIMAL["CO"]
+    touch(window, {code: ANIMAL[code] + shift for code in PROBE}, TouchHow.SCAN)
+    camera = window.grid.scene_view.scene.camera
+    window.workbench.session.set_crosshair(MIDDLE + 5.0)
+    camera.focus_on(MIDDLE - 3.0, across_mm=3.0)
+    before = camera.state()
+    window.ui.prompts.files = [tmp_path / "report.pdf"]
+    window.ui.ask_report()
+    assert (tmp_path / "report.pdf").stat().st_size > 10_000
+    assert camera.state() == before
+    assert QApplication.overrideCursor() is None
