@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache, cached_property
@@ -111,7 +112,8 @@ class Atlas:
     @staticmethod
     def published() -> Atlas:
         """Return the atlas rebuilt from the published distance table (Figure 2 of the paper)."""
-        return _published()
+        with _building:  # else two threads that ask at once get two of it
+            return _published()
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Atlas:
@@ -226,6 +228,9 @@ def _names(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
         raise GpError("its specimens are not a list of names")
     return tuple(value)
+
+
+_building = threading.Lock()
 
 
 @cache

@@ -147,7 +147,7 @@ class Expectations:
 
     def known_departures(self, landmarks: LandmarkSet) -> Mapping[str, Departure] | None:
         """Return `departures` where they were found before, else None; at once."""
-        return self._known.get(("departures", _fingerprint(landmarks)))
+        return self._recalled(("departures", _fingerprint(landmarks)))
 
     def doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt]:
         """Return those of the `departures` that are doubtful."""
@@ -159,14 +159,21 @@ class Expectations:
         return None if known is None else _doubtful(known)
 
     def _remembered(self, key: tuple[object, ...], make: Callable[[], dict[str, T]]) -> Mapping[str, T]:
-        if key not in self._known:
-            made = MappingProxyType(make())
+        found = self._recalled(key)
+        if found is None:
+            found = MappingProxyType(make())
             with self._lock:
-                self._known[key] = made
+                self._known[key] = found
                 while len(self._known) > N_REMEMBERED:
                     del self._known[next(iter(self._known))]
-            return made
-        found: Mapping[str, T] = self._known[key]
+        return found
+
+    def _recalled(self, key: tuple[object, ...]) -> Mapping[str, Any] | None:
+        """Return what is remembered, which is then forgotten last: a side at rest stays known."""
+        with self._lock:
+            found = self._known.pop(key, None)
+            if found is not None:
+                self._known[key] = found
         return found
 
     def _ghosts(self, landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost]:

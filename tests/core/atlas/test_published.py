@@ -1,8 +1,14 @@
 from __future__ import annotations
 
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cache
+
 import numpy as np
 
 from gp_core import Atlas, Specimen, fit_atlas
+from gp_core.atlas.atlas import _published
 from gp_core.atlas.published import published_distances
 from gp_core.landmarks.features import CODES, FEATURES
 
@@ -22,6 +28,23 @@ def test_it_gives_its_table_back() -> None:
         for b in near:
             distance = float(np.linalg.norm(atlas[a] - atlas[b]))
             assert abs(distance - mean[CODES.index(a), CODES.index(b)]) < 0.16, (a, b)
+
+
+def test_all_who_ask_at_once_get_the_same(monkeypatch) -> None:
+    built, both = [], threading.Barrier(2, timeout=0.2)
+
+    def build():
+        built.append(1)
+        with suppress(threading.BrokenBarrierError):
+            both.wait()  # passes only if a second one is let in
+        return object()
+
+    monkeypatch.setattr("gp_core.atlas.published.build_published_atlas", build)
+    monkeypatch.setattr("gp_core.atlas.atlas._published", cache(_published.__wrapped__))
+    with ThreadPoolExecutor(2) as pool:
+        first, second = (future.result() for future in [pool.submit(Atlas.published) for _ in range(2)])
+    assert first is second
+    assert len(built) == 1
 
 
 def test_it_is_a_left_side_in_its_own_cochlea_frame() -> None:

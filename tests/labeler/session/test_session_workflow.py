@@ -189,6 +189,17 @@ def test_ghosts_need_three_points_and_an_atlas():
     assert "ZL" not in session.ghosts(L)
 
 
+def test_a_side_at_rest_stays_judged_while_the_other_is_labelled():
+    session = Session(predict=predict)
+    session.do(ImportLandmarks((shape(L),), MARK))
+    session.judging(L).run(lambda _: None)
+    for code in set(PLACEABLE) - {"IN"}:  # which is the left side's as well
+        labelling.place(session, shape(R)[code], side=R, code=code)
+        session.judging(R).run(lambda _: None)
+        session.ghosts(L), session.ghosts(R)  # as the views ask
+        assert session.judging(L).known is not None
+
+
 def test_an_atlas_that_cannot_say_expects_nothing():
     def refuse(landmarks):
         raise GeometryError("on a line")
