@@ -255,10 +255,21 @@ def _pose(
     specimens: Sequence[Specimen],
     method: str,
 ) -> CochleaPose:
+    if method == "jrmpc":
+        _check_joint(touches, specimens)
     noise = settings.probe_noise if method == "robust" else None
     probe = replace(touches, extra={})
     animals = specimens if method == "jrmpc" else None
     return estimate_pose(probe, settings.side, atlas, method=method, specimens=animals, probe_noise=noise)
+
+
+def _check_joint(touches: LandmarkSet, specimens: Sequence[Specimen]) -> None:
+    """Refuse what JRMPC cannot do, with what is to be done about it here rather than in the shell."""
+    if not specimens:
+        raise GpError("it needs the labelled animals", remedy="Fit the atlas from them in step 3 Atlas.")
+    lacking = [code for code in ("RWA", "RWP", "LLI") if code not in touches.placed]
+    if lacking:
+        raise GpError(f"it begins at the round window and needs {' '.join(lacking)}", remedy="Touch it too.")
 
 
 def _registered(

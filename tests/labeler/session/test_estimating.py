@@ -167,8 +167,11 @@ def test_both_methods_once_jrmpc_is_ready(session, estimating, atlas):
     assert set(estimating.current.poses) == {"robust"}
     estimating.set_joint_ready()
     assert set(estimating.current.poses) == {"robust", "jrmpc"}
+    touching.clear_touches(session, "L", "RWP")
+    assert "begins at the round window and needs RWP" in estimating.current.problems["jrmpc"]
     estimating.use_atlas(atlas)
     assert "labelled" in estimating.current.problems["jrmpc"]
+    assert "--" not in estimating.current.problems["jrmpc"], "no options of a command in the window"
 
 
 def test_a_verdict_is_kept_with_what_was_judged(tmp_path, session, estimating, atlas):
