@@ -52,7 +52,7 @@ def _set_method(methods: tuple[str, ...]) -> Run:
 
 
 def _toggle_touching(desk: Workbench, ui: Ui) -> None:
-    desk.set_tool("place" if desk.tool == "touch" else "touch")
+    desk.set_tool("look" if desk.tool == "touch" else "touch")
 
 
 def _toggle_overlay(desk: Workbench, ui: Ui) -> None:

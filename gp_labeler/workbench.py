@@ -33,7 +33,7 @@ from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.session.specimen_file import SUFFIX
 from gp_labeler.session.state import How, SpecimenState
 from gp_labeler.tracker_desk import TrackerDesk
-from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan
+from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, phantom_seed
 
 __all__ = ["TOOLS", "Drag", "Workbench"]
 
@@ -181,6 +181,19 @@ class Workbench(AtlasDesk, BoneDesk):
             self.tool = tool
             self.tool_changed.emit(tool)
 
+    def begin_labelling(self) -> None:
+        """Let a click place points; who labels shall not see where an estimate wants the cochlea."""
+        self.pose.draw(visible=False)
+        if self.tool != "grey":
+            self.set_tool("place")
+
+    def begin_judging(self) -> None:
+        """Show the estimate, and let no click that is meant to look at it move a landmark."""
+        self.pose.prepare()
+        self.pose.draw(visible=True)
+        if self.tool == "place" and self.volume is not None:
+            self.set_tool("look")
+
     def go_to(self, side: Side, code: str) -> None:
         """Choose a point, and bring it, or where it is expected, into sight in every view."""
         labelling.go_to(self.session, side, code)
@@ -280,12 +293,20 @@ class Workbench(AtlasDesk, BoneDesk):
         reference = self.session.state.volume
         if reference is None or self.volume is not None:
             return
+        seed = phantom_seed(reference.name) if reference.path is None else None
+        if seed is not None:
+            self.jobs.submit(MakeDemo(seed, min(reference.spacing)), self._attach_demo, key="open")
+            return
         if reference.path is None or self.session.volume_is_lost:
-            where = f" at {reference.path}" if reference.path else ""
-            self.say(f"The scan {reference.name} is not{where} any more. Use File > Find scan.", "warning")
+            where = f"is not at {reference.path} any more" if reference.path else "was never in a file"
+            self.say(f"The scan {reference.name} {where}. Use File > Find scan.", "warning")
             return
         job = InspectScan(reference.path, dict(self.session.state.import_choices))
         self.jobs.submit(job, self._read_known, key="open")
+
+    def _attach_demo(self, demo: Demo) -> None:
+        self._attach(demo.volume)
+        self.truth = demo.specimen
 
     def _read_known(self, plan: ImportPlan) -> None:
         self.jobs.submit(ReadScan(plan), self._attach, key="open")

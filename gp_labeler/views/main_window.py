@@ -113,10 +113,10 @@ class MainWindow(QMainWindow):
     def set_step(self, step: str) -> None:
         """Show the panel of a step: ``scan``, ``label``, ``atlas`` or ``pose``."""
         self.rail.set_step(step)
-        if step in ("label", "pose"):  # who labels shall not see where an estimate wants the cochlea
-            self.workbench.pose.draw(visible=step == "pose")
-        if step == "pose":
-            self.workbench.pose.prepare()
+        if step == "label":
+            self.workbench.begin_labelling()
+        elif step == "pose":
+            self.workbench.begin_judging()
         self.panels.setCurrentWidget(self.steps[step])
         self._arrange()
 
@@ -173,6 +173,7 @@ class MainWindow(QMainWindow):
         self._label.addAction(self.commands.actions["point.accept_ghost"])  # Enter means it there too
         card = self._label.card
         card.open_asked.connect(self.ui.ask_open_file)
+        card.find_asked.connect(self.ui.ask_find_scan)
         card.export_asked.connect(partial(self.commands.run, "file.export"))
         self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
         self._scan.mesh.action_asked.connect(self.commands.run)

@@ -186,3 +186,16 @@ def test_touches_of_the_wrong_side_change_sides(desk, animal):
     assert desk.pose.side is Side.RIGHT
     assert {side for side, _ in desk.session.state.touches} == {Side.RIGHT}
     assert len(desk.session.state.touches) == 6
+
+
+def test_in_the_step_pose_no_click_moves_a_landmark(desk, ball):
+    desk.open_volume(ball)
+    desk.begin_labelling()
+    assert (desk.tool, desk.pose.overlay.visible) == ("place", False)
+    desk.begin_judging()
+    assert (desk.tool, desk.pose.overlay.visible) == ("look", True)
+    desk.set_tool("touch")
+    desk.begin_judging()
+    assert desk.tool == "touch"
+    desk.begin_labelling()
+    assert desk.tool == "place"

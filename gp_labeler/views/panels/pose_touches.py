@@ -136,7 +136,7 @@ class TouchesCard(Card):
         table, pose = self.table, self._desk.pose
         self.ways["file"].clicked.connect(self.file_asked)
         self.ways["type"].clicked.connect(self._type_next)
-        self.ways["scan"].clicked.connect(lambda on: self._desk.set_tool("touch" if on else "place"))
+        self.ways["scan"].clicked.connect(lambda on: self._desk.set_tool("touch" if on else "look"))
         self.ways["tracker"].clicked.connect(self.tracker_asked)
         self.guide.clicked.connect(self.guide_asked)
         self.clear.clicked.connect(lambda: self._do(lambda: self._clear(None)))

@@ -488,6 +488,7 @@ def test_a_verdict_is_kept_with_initials_and_note(desk, panel, qtbot):
 
 
 def test_what_is_drawn_is_chosen(desk, panel, qtbot):
+    desk.begin_judging()
     panel.overlay.parts["vectors"].click()
     assert desk.pose.overlay.vectors
     panel.overlay.opacity.setValue(40)
