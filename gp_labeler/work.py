@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -37,6 +38,7 @@ __all__ = [
     "WarmFit",
     "WarmJoint",
     "load_modules",
+    "phantom_seed",
 ]
 
 FIRST_LOOK_VOXELS = 96**3
@@ -233,6 +235,12 @@ class Demo:
 
     volume: Volume
     specimen: Any
+
+
+def phantom_seed(name: str) -> int | None:
+    """Return the seed of a phantom by the name of its scan, which is in no file: it can be made anew."""
+    found = re.fullmatch(r"phantom-(\d+)", name)
+    return int(found[1]) if found else None
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,8 @@ class StatusLine(QWidget):
             point = point_text(desk.drag.side, desk.drag.code)
             self._show(f"Let go to leave {point} here, or press Esc to take it back", "next")
         elif desk.volume is None:
-            self._show(self.without_scan or "Open a scan, or try the demo", "hint")
+            its_own = "File > Find scan says where the scan is now" if desk.session.volume_is_lost else ""
+            self._show(self.without_scan or its_own or "Open a scan, or try the demo", "hint")
         elif desk.tool == "touch":
             target = desk.pose.target
             where = f"where {point_text(desk.pose.side, target)} is" if target else "in vain: all are touched"

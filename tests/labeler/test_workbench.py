@@ -182,6 +182,21 @@ def test_a_scan_that_moved_is_named_and_found_again(desk, ball_file, tmp_path) -
     assert desk.volume is not None
 
 
+def test_a_phantom_which_is_in_no_file_is_made_anew(desk, tmp_path) -> None:
+    desk.open_demo(seed=3, spacing=0.5)
+    desk.wait()
+    labelling.place(desk.session, desk.truth.side("L")["CA"], side=Side.LEFT, code="CA")
+    saved = desk.session.save(tmp_path / "one")
+    desk.open_volume(ball_volume())
+    desk.wait()
+    desk.open(saved)
+    desk.wait()
+    assert desk.volume is not None
+    assert desk.volume.name == "phantom-3"
+    assert desk.truth is not None
+    assert [text for level, text in desk.said if level != "info"] == []
+
+
 def test_a_scan_that_changed_is_noticed(desk, ball_file, tmp_path) -> None:
     import SimpleITK as sitk  # noqa: N813
 

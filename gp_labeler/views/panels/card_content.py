@@ -9,6 +9,7 @@ from gp_labeler.session.edits import point_text
 from gp_labeler.session.session import Session
 from gp_labeler.session.workflow import OPENING, PointState
 from gp_labeler.views.bind import mm_text
+from gp_labeler.views.panels.parts import breakable
 
 __all__ = ["CardContent", "content_of"]
 
@@ -71,7 +72,7 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     """
     active = session.active
     if not has_scan:
-        return _without_scan()
+        return _without_its_scan(session) if session.volume_is_lost else _without_scan()
     if active.code is None:
         return _between(session)
     side, row = active.side, feature(active.code)
@@ -168,6 +169,21 @@ def _without_scan() -> CardContent:
         definition="The features are placed on the bone surface, or on slices of the scan.",
         action="open",
         action_text="Open scan…",
+        can_skip=False,
+        can_unsee=False,
+    )
+
+
+def _without_its_scan(session: Session) -> CardContent:
+    reference = session.state.volume
+    assert reference is not None
+    there = breakable(str(reference.path))
+    return CardContent(
+        session.state.specimen,
+        name="Its scan is not found",
+        definition=f"It was at {there}. The labels are kept: say where the scan is now.",
+        action="find",
+        action_text="Find scan…",
         can_skip=False,
         can_unsee=False,
     )

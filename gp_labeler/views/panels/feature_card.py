@@ -48,6 +48,7 @@ class FeatureCard(QWidget):
     """
 
     open_asked = Signal()
+    find_asked = Signal()
     export_asked = Signal()
 
     def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
@@ -187,6 +188,8 @@ class FeatureCard(QWidget):
         action = self._content.action
         if action == "open":
             self.open_asked.emit()
+        elif action == "find":
+            self.find_asked.emit()
         elif action == "export":
             self.export_asked.emit()
         else:

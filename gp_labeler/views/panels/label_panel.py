@@ -14,6 +14,9 @@ __all__ = ["PANEL_WIDTH", "LabelPanel"]
 PANEL_WIDTH = 372
 """Logical pixels; all names and states of the table fit into it."""
 
+_TALLEST_CARD = 540
+"""Logical pixels; a picture that is much taller than wide shows nothing more."""
+
 
 class LabelPanel(QWidget):
     """Card and table; the card gets what the table leaves.
@@ -36,8 +39,10 @@ class LabelPanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(4, 8, 8, 8)
         layout.setSpacing(6)
+        self.card.setMaximumHeight(_TALLEST_CARD)
         layout.addWidget(self.card, 1)
         layout.addWidget(self.table, 2)
+        layout.addStretch(0)
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
         return QSize(PANEL_WIDTH, super().sizeHint().height())

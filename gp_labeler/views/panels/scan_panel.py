@@ -18,6 +18,8 @@ from gp_labeler.workbench import Workbench
 __all__ = ["ScanPanel", "facts_of"]
 
 _N_NOTES = 6
+_NONE = "Open a scan: a file, a folder of slices or a DICOM folder."
+_LOST = "The scan is not where it was: File > Find scan says where it is now."
 
 
 class ScanPanel(QWidget):
@@ -40,9 +42,7 @@ class ScanPanel(QWidget):
         self.facts = Facts()
         self._notes = QVBoxLayout()
         self._notes.setSpacing(6)
-        self._empty = text_label(
-            "Open a scan: a file, a folder of slices or a DICOM folder.", "hint", wrap=True
-        )
+        self._empty = text_label("", "hint", wrap=True)
         about = Card("Scan")
         about.add(self._empty)
         about.add(self.facts)
@@ -70,6 +70,10 @@ class ScanPanel(QWidget):
     def _refresh(self, *_: object) -> None:
         volume = self._workbench.volume
         self._empty.setVisible(volume is None)
+        lost = self._workbench.session.volume_is_lost
+        self._empty.setText(
+            "Its scan is not found: File > Find scan says where it is now." if lost else _NONE
+        )
         self.facts.setVisible(volume is not None)
         self.facts.show_facts({} if volume is None else facts_of(volume))
         emptied(self._notes)

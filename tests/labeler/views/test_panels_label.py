@@ -263,6 +263,13 @@ def test_without_a_scan_the_card_offers_to_open_one(qtbot):
     desk.close(discard=True)
 
 
+def test_on_a_very_high_screen_the_picture_is_no_tower(panel, qtbot):
+    panel.resize(PANEL_WIDTH, 2000)
+    qtbot.waitUntil(lambda: panel.card.picture.width() > 200)
+    assert panel.card.picture.height() <= panel.card.picture.width()
+    assert panel.table.geometry().top() - panel.card.geometry().bottom() < 12  # nor is there a gap
+
+
 @pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
 def test_no_word_of_any_feature_is_cut_off_at_1280_by_800(desk, panel, qtbot, theme):
     place(desk, "CA", "RWP", "OS")

@@ -344,6 +344,31 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
     assert [w for w in QApplication.topLevelWidgets() if w.isVisible()] == []
 
 
+def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make_window, tmp_path) -> None:
+    import SimpleITK as sitk  # noqa: N813
+
+    window, file = make_window(), tmp_path / "ball.mha"
+    sitk.WriteImage(sitk.GetImageFromArray(ball_volume().array), str(file))
+    window.workbench.open_scan(file, spacing=0.25)
+    settle(qtbot, window)
+    labelling.place(window.workbench.session, np.array([8.0, 8.0, 8.0]), side=Side.LEFT, code="CA")
+    saved = window.workbench.session.save(tmp_path / "one")
+    window.workbench.open_volume(ball_volume())
+    moved = file.rename(tmp_path / "elsewhere.mha")
+    window.ui.open_path(saved)
+    settle(qtbot, window)
+    window.set_step("label")
+    card = window.steps["label"].card
+    assert (card.content.name, card.primary.accessibleName()) == ("Its scan is not found", "Find scan…")
+    window.status.set_without_scan("")  # as once the message has gone
+    assert "Find scan" in window.status.next_click.text()
+    window.ui.prompts.files = [moved]
+    QTest.mouseClick(card.primary, Qt.MouseButton.LeftButton)
+    settle(qtbot, window)
+    assert window.workbench.volume is not None
+    assert "CA" in window.workbench.session.landmarks(Side.LEFT)
+
+
 def test_high_dpi_pictures_have_as_many_pixels(window) -> None:
     """The scene is drawn in device pixels, whatever they are; here they are logical ones."""
     view = window.grid.scene_view
