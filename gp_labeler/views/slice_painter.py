@@ -23,6 +23,7 @@ from gp_labeler.views.qt_paths import segments_path
 from gp_labeler.views.slice_layers import SliceName
 from gp_labeler.views.slice_lines import paint_lines
 from gp_labeler.views.theme import Theme, base_font, theme_of
+from gp_labeler.views.word_pictures import word_picture
 from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -300,6 +301,5 @@ def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int]
         ranks=[name.rank for name in names],
     )
     for n in np.flatnonzero(shown):
-        text = _outlined(names[n].text, font)
-        text.translate(corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)
-        _draw_text(painter, text, names[n].colour, ratio)
+        word = word_picture(names[n].text, font.pixelSize(), names[n].colour, ratio)
+        word.draw(painter, corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)
