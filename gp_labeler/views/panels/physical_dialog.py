@@ -92,7 +92,8 @@ class PhysicalDialog(QDialog):
             for column, text in enumerate(cells):
                 self.rows.addWidget(text_label(text), n, column)
         for text in result.report.warnings:
-            self.findings.addWidget(Notice("warning", text))
+            method, colon, words = text.partition(": ")
+            self.findings.addWidget(Notice("warning", f"{_METHODS.get(method, method)}{colon}{words}"))
         if len({row.method for row in result.report.rows}) == 1:
             hint = "JRMPC takes part where the atlas was fitted from labelled animals (step Atlas)."
             self.findings.addWidget(Notice("info", hint))

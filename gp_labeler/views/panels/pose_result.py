@@ -9,8 +9,10 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gp_core.atlas.pose import CochleaPose
+from gp_labeler.session import touching
 from gp_labeler.session.confidence import confidence, is_other_side
 from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.bind import attempt
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import Notices, Verdict, link, numbers
@@ -79,7 +81,7 @@ class ResultCard(Card):
         if pose is not None:
             trust = confidence(pose)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
-        wrong = pose is not None and is_other_side(pose)
+        wrong = pose is not None and (is_other_side(pose) or bool(_misnamed(self._desk)))
         self.other_side.setVisible(wrong)
         self.other_side.setText(f"They are of the {desk.side.other.word} side")
         self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
@@ -180,12 +182,22 @@ def _waiting(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def _misnamed(desk: Workbench) -> list[str]:
+    """Return the files that touches of this side are from, and whose names tell the other one."""
+    side = desk.pose.side
+    touches = [touch for (of, _), touch in desk.session.state.touches.items() if of is side]
+    files = {touch.source for touch in touches if touch.how is TouchHow.FILE}
+    return sorted(file for file in files if touching.named_side(file) is side.other)
+
+
 def _notices(desk: Workbench, estimate: Estimate) -> Iterator[tuple[str, ...]]:
     for method in estimate.settings.methods:
         if method in estimate.problems:
             yield ("error", f"{METHOD_WORDS[method]}: {estimate.problems[method]}")
     if "jrmpc" in desk.pose.estimating.settings.methods and not desk.pose.estimating.joint_ready:
         yield ("info", "JRMPC is being made ready; that takes some seconds once.")
+    for file in _misnamed(desk):
+        yield ("warning", f"By its name {file} is of the {estimate.side.other.word} side.", "Check the side.")
     said: set[str] = set()
     for pose in estimate.poses.values():
         for warning in pose.warnings:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QApplication, QLabel
 
-from gp_core import PROBE, Atlas
+from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.draw import draw_animal
 from gp_core.errors import GpError
 from gp_labeler.session.touches import TouchHow
@@ -63,3 +64,16 @@ def test_a_report_leaves_the_camera_where_it_was(window, tmp_path):
     assert (tmp_path / "report.pdf").stat().st_size > 10_000
     assert camera.state() == before
     assert QApplication.overrideCursor() is None
+
+
+def test_a_file_named_for_the_other_side_is_told_and_moved_by_a_click(qtbot, make_window, shared_data):
+    window = make_window()
+    window.workbench.use_atlas(ATLAS)
+    window.set_step("pose")
+    panel = window.steps["pose"]
+    assert panel.take_file(shared_data / "probe" / "SkullD_Right.dat")
+    said = [label.text().replace("\u200b", "") for label in panel.result.notices.findChildren(QLabel)]
+    assert "By its name SkullD_Right.dat is of the right side." in said
+    qtbot.mouseClick(panel.result.other_side, Qt.MouseButton.LeftButton)
+    assert window.workbench.pose.side is Side.RIGHT
+    assert not panel.result.other_side.isVisible()
