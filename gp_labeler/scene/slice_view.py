@@ -95,6 +95,10 @@ class SliceView:
         """Return the view at another size, with the same middle and zoom."""
         return replace(self, size=(int(width), int(height)))
 
+    def looks_like(self, other: SliceView) -> bool:
+        """Whether it has the middle and the zoom of another view, of whatever slice and size."""
+        return self.mm_per_pixel == other.mm_per_pixel and bool((self.centre == other.centre).all())
+
     def at(self, position: float) -> SliceView:
         """Return the view of the slice at another position, mm."""
         return replace(self, position=float(position))

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
@@ -72,6 +70,7 @@ class SliceView(QWidget):
         self._desk = workbench
         self.source: SliceSource | None = None
         self.shown: Shown | None = None
+        self._whole: Shown | None = None
         self.layers: list[SliceLayer] = []
         self._control, self._hand = SliceControl(), Hand(workbench)
         self._painter = SlicePainter(workbench, self)
@@ -85,8 +84,8 @@ class SliceView(QWidget):
     def reset(self) -> None:
         """Show the whole slice."""
         if self.source is not None:
-            fitted = Shown.fitted(self.source, self.plane, self._size())
-            self.shown = fitted.at(self._position())
+            self._whole = Shown.fitted(self.source, self.plane, self._size())
+            self.shown = self._whole.at(self._position())
             self.update()
 
     def go_to(self, position: FloatArray) -> None:
@@ -168,14 +167,21 @@ class SliceView(QWidget):
             crosshair[self.plane.axis] = self.source.snap(self.plane, position)
             self._desk.session.set_crosshair(crosshair)
 
+    def _resized(self, shown: Shown) -> Shown:
+        """Return the view at the widget's size: the whole slice if it was whole, else the same, larger."""
+        whole = self._whole
+        if self.source is not None and whole is not None and shown.looks_like(whole):
+            self._whole = Shown.fitted(self.source, self.plane, self._size())
+            return self._whole.at(shown.position)
+        return shown.resized(*self._size()).zoomed(min(self._size()) / min(shown.size))
+
     def _size(self) -> tuple[int, int]:
         ratio = self.devicePixelRatioF()
         return max(round(self.width() * ratio), 1), max(round(self.height() * ratio), 1)
 
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
         if self.shown is not None and self.shown.size != self._size():
-            growth = min(self._size()) / min(self.shown.size)  # a maximised view shows the same, larger
-            self.shown = self.shown.resized(*self._size()).zoomed(growth)
+            self.shown = self._resized(self.shown)
         painter = QPainter(self)
         self._painter.paint(painter)
         painter.end()
@@ -326,12 +332,6 @@ class SliceView(QWidget):
         away[np.abs(self.shown.off_slice(positions)) > reach_of(self.source, self.plane)] = np.inf
         nearest = int(away.argmin())
         return marks[nearest].key if away[nearest] <= 8.0 * self.devicePixelRatioF() else None
-
-    def resizeEvent(self, event: Any) -> None:  # noqa: N802
-        """Keep middle and zoom; a view that was never seen shows the whole slice."""
-        if self.shown is not None and event.oldSize().width() <= 1:
-            self.reset()
-        super().resizeEvent(event)
 
     def release(self) -> None:
         """Let go of the voxels."""

@@ -21,6 +21,7 @@ from window_cases import MIDDLE, ball_volume, close, settle
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import ACTIONS
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.views.application import make_window as make_plain
@@ -342,6 +343,30 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
     gc.collect()
     assert [ref() for ref in remains if ref() is not None] == []
     assert [w for w in QApplication.topLevelWidgets() if w.isVisible()] == []
+
+
+def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:
+    long = Volume.from_parts(ball_volume().array[:, 12:52, 24:40], [0.25] * 3, [0, 0, 0], name="long")
+    window.workbench.open_volume(long)
+    settle(qtbot, window)
+    view = window.grid.slice_views[Plane.AXIAL]
+
+    def visit(*layouts: str) -> None:
+        for layout in layouts:
+            window.workbench.session.view.update(layout=layout)
+            qtbot.wait(30)
+
+    whole = view.shown
+    visit("axial")
+    assert view.shown.scan_to_pixel(long.extent).min() > 0  # the whole of it, as large as can be
+    assert (view.shown.scan_to_pixel(long.extent) < view.shown.size).all()
+    assert view.shown.mm_per_pixel < whole.mm_per_pixel
+    visit("four-up", "3d", "axial", "sagittal", "four-up")
+    assert view.shown.looks_like(whole)
+    view.shown = close = view.shown.zoomed(3.0).panned(5.0, -4.0)
+    visit("3d", "axial", "four-up")
+    assert view.shown.mm_per_pixel == pytest.approx(close.mm_per_pixel)
+    np.testing.assert_allclose(view.shown.centre, close.centre)
 
 
 def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make_window, tmp_path) -> None:
