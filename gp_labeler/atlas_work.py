@@ -138,7 +138,7 @@ class TryAtlas:
         GpError
             Fewer than three animals have the features that it takes.
         """
-        load_modules("gp_core.registration.kernels", "gp_core.registration.turns")
+        load_modules("gp_core.registration.kernels", "gp_core.registration.turning_compiled")
         animals, skipped = _complete(self.specimens)
         training = tuple(code for code in TRAINING if code == "CO" or _all_have(animals, code))
         robust: list[Row] = []

@@ -15,7 +15,7 @@ import math
 from collections.abc import MutableSequence
 from typing import TypeAlias
 
-from gp_core.atlas.turning import TURNS, as_matrix, best_turn
+from gp_core.registration.turning import as_matrix, best_turn
 
 __all__ = [
     "KERNELS",
@@ -361,7 +361,6 @@ def _misfit(
 
 
 KERNELS = (
-    *TURNS,
     _turn,
     _weigh,
     _mean_of,
@@ -376,4 +375,4 @@ KERNELS = (
     _exchange,
     best_exchange,
 )
-"""All functions of this module and of `turning`, each after those it calls."""
+"""All functions of this module, each after those of it that it calls."""

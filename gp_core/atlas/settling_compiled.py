@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from types import FunctionType
-from typing import Any
-
-from gp_core.atlas import settling, turning
-from gp_core.registration.compiling import compiled
+from gp_core.atlas import settling
+from gp_core.registration.compiling import compiled_together
+from gp_core.registration.turning_compiled import as_matrix, best_turn
 
 __all__ = ["best_exchange", "settle"]
 
@@ -16,18 +14,7 @@ _SIGNATURES = {
     "best_exchange": f"UniTuple(float64, 3)({_BUFFERS}, float64, int64, float64)",
 }
 
-
-def _compile() -> dict[str, Any]:
-    """Compile the kernels such that they call each other compiled; return them by name."""
-    names = {**vars(turning), **vars(settling)}
-    for kernel in settling.KERNELS:
-        copy = FunctionType(kernel.__code__, names, kernel.__name__)
-        copy.__module__ = settling.__name__
-        signature = _SIGNATURES.get(kernel.__name__)
-        names[kernel.__name__] = (compiled(signature, cache=True) if signature else compiled())(copy)
-    return names
-
-
-_KERNELS = _compile()
+_NAMES = {**vars(settling), "as_matrix": as_matrix, "best_turn": best_turn}
+_KERNELS = compiled_together(settling.KERNELS, _NAMES, _SIGNATURES)
 settle = _KERNELS["settle"]
 best_exchange = _KERNELS["best_exchange"]

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
 from gp_core.registration.compiling import compiled
-from gp_core.registration.turns import best_turn, product, write_rotation
+from gp_core.registration.turning import Matrix3, Quaternion
+from gp_core.registration.turning_compiled import as_matrix, least_turn, product
 
 __all__ = ["expect", "maximise", "move", "run_batch"]
 
@@ -210,10 +211,9 @@ def maximise(
     if piece_sets.size > n_sets:
         _gather(moments, piece_sets)
     motion, sums = np.empty((3, 4)), np.zeros((5, centres.shape[1]))
-    h, turned = np.empty((3, 3)), np.empty((3, 3))
     change = 0.0
     for j in range(n_sets):
-        change = max(change, _pose_step(moments, j, centres, poses, motion, h, turned, size))
+        change = max(change, _pose_step(moments, j, centres, poses, motion, size))
         _add_set(moments, j, motion, centres, sums)
     return max(change, _centre_step(sums, centres, prior, epsilon, size))
 
@@ -236,18 +236,15 @@ def _pose_step(
     centres: FloatArray,
     poses: FloatArray,
     motion: FloatArray,
-    h: FloatArray,
-    turned: FloatArray,
     size: float,
 ) -> float:
     """Take the weighted means of one set's points to the centres (weighted Procrustes).
 
-    `motion` receives the step (3, 4) in common coordinates; `h` and `turned` are scratch.
+    `motion` receives the step (3, 4) in common coordinates.
     """
     x, y, z, dx, dy, dz = _weighted_means(moments, j, centres)
-    _covariance(moments, j, centres, x, y, z, h)
-    qw, qx, qy, qz = best_turn(h, turned)
-    write_rotation(qw, qx, qy, qz, motion)
+    turn = least_turn(_covariance(moments, j, centres, x, y, z))
+    _write_rotation(turn, motion)
     for a in range(3):
         motion[a, 3] = -(motion[a, 0] * (x + dx) + motion[a, 1] * (y + dy) + motion[a, 2] * (z + dz))
     motion[0, 3] += x
@@ -256,10 +253,9 @@ def _pose_step(
     tx, ty, tz = poses[j, 4], poses[j, 5], poses[j, 6]
     for a in range(3):
         poses[j, 4 + a] = motion[a, 0] * tx + motion[a, 1] * ty + motion[a, 2] * tz + motion[a, 3]
-    poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3] = product(
-        qw, qx, qy, qz, poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3]
-    )
-    angle = 2.0 * math.sqrt(qx * qx + qy * qy + qz * qz)
+    before = (poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3])
+    poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3] = product(turn, before)
+    angle = 2.0 * math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
     return max(angle, math.sqrt(dx * dx + dy * dy + dz * dz) / size)
 
 
@@ -285,10 +281,8 @@ def _weighted_means(
 
 
 @compiled(fastmath=_SUMS)
-def _covariance(
-    moments: FloatArray, j: int, centres: FloatArray, x: float, y: float, z: float, h: FloatArray
-) -> None:
-    """Write the sum of w (x_k - mean) m_k^T, where the weighted mean w m_k is q (a x_k + sum of a d)."""
+def _covariance(moments: FloatArray, j: int, centres: FloatArray, x: float, y: float, z: float) -> Matrix3:
+    """Return the sum of w (x_k - mean) m_k^T, where the weighted mean w m_k is q (a x_k + sum of a d)."""
     xx = xy = xz = yx = yy = yz = zx = zy = zz = 0.0
     for k in range(centres.shape[1]):
         q = centres[3, k]
@@ -308,9 +302,15 @@ def _covariance(
         zx += ez * mx
         zy += ez * my
         zz += ez * mz
-    h[0, 0], h[0, 1], h[0, 2] = xx, xy, xz
-    h[1, 0], h[1, 1], h[1, 2] = yx, yy, yz
-    h[2, 0], h[2, 1], h[2, 2] = zx, zy, zz
+    return xx, xy, xz, yx, yy, yz, zx, zy, zz
+
+
+@compiled()
+def _write_rotation(turn: Quaternion, out: FloatArray) -> None:
+    """Write the rotation matrix into the first three columns of `out`."""
+    r = as_matrix(turn)
+    for a in range(3):
+        out[a, 0], out[a, 1], out[a, 2] = r[3 * a], r[3 * a + 1], r[3 * a + 2]
 
 
 @compiled(fastmath=_SUMS)
@@ -367,7 +367,7 @@ def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: Float
     """Write the points (3, P) of all sets under their poses (M, 7); set j starts at ``starts[j]``."""
     rotation = np.empty((3, 3))
     for j in range(poses.shape[0]):
-        write_rotation(poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3], rotation)
+        _write_rotation((poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3]), rotation)
         for a in range(3):
             rx, ry, rz, t = rotation[a, 0], rotation[a, 1], rotation[a, 2], poses[j, 4 + a]
             for i in range(starts[j], starts[j + 1]):

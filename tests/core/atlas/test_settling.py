@@ -12,9 +12,10 @@ from atlas_cases import random_pose
 from scipy.spatial.transform import Rotation
 
 from gp_core import EXTERNAL, PROBE, Atlas, read_touches
-from gp_core.atlas import settling, settling_compiled, turning
+from gp_core.atlas import settling, settling_compiled
 from gp_core.atlas.named_fit import TouchModel, fit_named_points
 from gp_core.frames import mirror_x
+from gp_core.registration import turning
 
 _ROOT = Path(__file__).resolve().parents[3]
 

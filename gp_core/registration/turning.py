@@ -1,7 +1,8 @@
-"""The rotation that brings points onto points best, in plain numbers, as `gp_core.atlas.settling` needs it.
+"""The rotation that brings points onto points best, in plain numbers.
 
-Plain Python that Numba can compile; `gp_core.atlas.settling_compiled` does. Numba's cache looks at
-`settling.py` only: after a change here, touch that file too. Rotations are unit quaternions, w first.
+Plain Python that Numba can compile; `gp_core.registration.turning_compiled` does, for the kernels of JRMPC
+(`gp_core.registration.kernels`) and of the robust fit (`gp_core.atlas.settling_compiled`). Rotations are
+unit quaternions, w first.
 """
 
 from __future__ import annotations
@@ -9,16 +10,20 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-__all__ = ["TURNS", "Matrix3", "Quaternion", "as_matrix", "best_turn"]
+__all__ = ["NO_TURN", "TURNS", "Matrix3", "Quaternion", "as_matrix", "best_turn", "least_turn", "product"]
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
 Matrix3: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 Symmetric4: TypeAlias = tuple[float, float, float, float, float, float, float, float, float, float]
 
+NO_TURN = (1.0, 0.0, 0.0, 0.0)
+"""The identity."""
+
 _OPEN = 1e-10  # relative gap below which a rotation is not determined
 _SETTLED = 1e-14  # squared angle of a Newton step whose successor would be below rounding
 _NEWTON_STEPS = 12
 _SQUARINGS = 40
+_SQUARINGS_OF_TIES = 24  # each doubles the difference that rounding has made between eigenvectors that tie
 _ALIGNED = 1.0 - 1e-6  # trace of the square of a matrix of trace 1: nothing but its top eigenvector is left
 
 
@@ -29,21 +34,42 @@ def best_turn(h: Matrix3, start: Quaternion) -> Quaternion:
     other stationary rotations are saddles or minima. Where one is not, Newton starts again from Horn's
     eigenvector; where none is again, the rotation is open, and the answer is not a number.
     """
-    scale = 0.0
-    for i in range(9):
-        scale += abs(h[i])
+    scale = _size(h)
     turn, fresh = start, False
     for _ in range(_NEWTON_STEPS):
         definite, x, y, z = _newton_step(h, as_matrix(turn), _OPEN * scale)
         if definite:
-            turn = _product((1.0, 0.5 * x, 0.5 * y, 0.5 * z), turn)
+            turn = product((1.0, 0.5 * x, 0.5 * y, 0.5 * z), turn)
             if x * x + y * y + z * z < _SETTLED:
                 break
         elif fresh:
             return math.nan, math.nan, math.nan, math.nan
         else:
-            turn, fresh = _horn(h, scale), True
+            turn, fresh = _top(_horn(h, scale, _SQUARINGS)), True
     return turn
+
+
+def least_turn(h: Matrix3) -> Quaternion:
+    """Return the rotation R that makes trace(R^T h) largest; of many, the one nearest to no turn.
+
+    Horn's matrix, squared, tends to the projector on the eigenvectors that tie; its first row is what that
+    makes of no turn.
+    """
+    turn = best_turn(h, NO_TURN)
+    if not math.isnan(turn[0]):
+        return turn
+    scale = _size(h)
+    if scale == 0.0:
+        return NO_TURN
+    n = _horn(h, scale, _SQUARINGS_OF_TIES)
+    return product(NO_TURN, (n[0], n[1], n[2], n[3])) if n[0] > _OPEN else _top(n)
+
+
+def _size(h: Matrix3) -> float:
+    size = 0.0
+    for i in range(9):
+        size += abs(h[i])
+    return size
 
 
 def _newton_step(h: Matrix3, r: Matrix3, least: float) -> tuple[bool, float, float, float]:
@@ -74,8 +100,8 @@ def _newton_step(h: Matrix3, r: Matrix3, least: float) -> tuple[bool, float, flo
     return True, bx / d0 - l10 * y - l20 * z, y, z
 
 
-def _horn(h: Matrix3, scale: float) -> Quaternion:
-    """Return the top eigenvector, nearly, of Horn's (4, 4) matrix, by squaring it until no other is left.
+def _horn(h: Matrix3, scale: float, n_squarings: int) -> Symmetric4:
+    """Square Horn's (4, 4) matrix until nothing but its top eigenvector is left, or those that tie.
 
     Horn, J. Opt. Soc. Am. A 4(4), 1987. https://doi.org/10.1364/JOSAA.4.000629
     """
@@ -93,19 +119,24 @@ def _horn(h: Matrix3, scale: float) -> Quaternion:
         yz + zy,
         shift + zz - xx - yy,
     )
-    for _ in range(_SQUARINGS):
+    for _ in range(n_squarings):
         n = _squared(n)
         if n[0] + n[4] + n[7] + n[9] > _ALIGNED:
             break
+    return n
+
+
+def _top(n: Symmetric4) -> Quaternion:
+    """Return the row of the largest diagonal element, as a unit quaternion."""
     a, b, c, d, e, f, g, i, k, m = n
     top = max(a, e, i, m)
     if a == top:
-        return _product((1.0, 0.0, 0.0, 0.0), (a, b, c, d))
+        return product(NO_TURN, (a, b, c, d))
     if e == top:
-        return _product((1.0, 0.0, 0.0, 0.0), (b, e, f, g))
+        return product(NO_TURN, (b, e, f, g))
     if i == top:
-        return _product((1.0, 0.0, 0.0, 0.0), (c, f, i, k))
-    return _product((1.0, 0.0, 0.0, 0.0), (d, g, k, m))
+        return product(NO_TURN, (c, f, i, k))
+    return product(NO_TURN, (d, g, k, m))
 
 
 def _squared(n: Symmetric4) -> Symmetric4:
@@ -128,7 +159,7 @@ def _squared(n: Symmetric4) -> Symmetric4:
     )
 
 
-def _product(a: Quaternion, b: Quaternion) -> Quaternion:
+def product(a: Quaternion, b: Quaternion) -> Quaternion:
     """Multiply two quaternions and make the product unit: the turn b, then the turn a."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
@@ -149,5 +180,5 @@ def as_matrix(turn: Quaternion) -> Matrix3:
     return 1.0 - yy - zz, xy - wz, xz + wy, xy + wz, 1.0 - xx - zz, yz - wx, xz - wy, yz + wx, 1.0 - xx - yy
 
 
-TURNS = (_product, as_matrix, _squared, _horn, _newton_step, best_turn)
+TURNS = (_size, product, as_matrix, _squared, _horn, _top, _newton_step, best_turn, least_turn)
 """All functions of this module, each after those it calls."""
