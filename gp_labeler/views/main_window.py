@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
-from PySide6.QtCore import QByteArray
+from PySide6.QtCore import QByteArray, QSize
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -103,6 +103,7 @@ class MainWindow(QMainWindow):
         self._listen()
         self._recall_place()
         self._show_title()
+        self.welcome.open_scan.setFocus()  # else the first button there is, that of the theme
 
     def set_theme(self, name: str) -> None:
         """Look dark or light."""
@@ -245,7 +246,7 @@ class MainWindow(QMainWindow):
     def _recall_place(self) -> None:
         geometry = QByteArray.fromBase64(self.memory.get("geometry", str, "").encode())
         if geometry.isEmpty() or not self.restoreGeometry(geometry):
-            self.resize(1440, 900)
+            self.resize(QSize(1440, 900).boundedTo(self.screen().availableSize()))
 
     def _remember(self) -> None:
         view = self.workbench.session.view.state

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
-from window_cases import MIDDLE, ball_volume, close, settle
+from window_cases import MIDDLE, Answers, ball_volume, close, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import ACTIONS
@@ -328,7 +328,6 @@ def test_work_can_be_stopped(qtbot, window) -> None:
 @pytest.mark.slow
 def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
     from PySide6.QtWidgets import QApplication
-    from window_cases import Answers
 
     remains = []
     for _ in range(20):
@@ -343,6 +342,20 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
     gc.collect()
     assert [ref() for ref in remains if ref() is not None] == []
     assert [w for w in QApplication.topLevelWidgets() if w.isVisible()] == []
+
+
+def test_a_first_window_fits_the_screen_and_offers_to_open_a_scan(qapp) -> None:
+    window = make_plain(None, atlas=False)
+    window.ui.prompts = Answers()
+    room = window.screen().availableSize()
+    least = window.minimumSize()
+    assert window.width() <= max(room.width(), least.width())
+    assert window.height() <= max(room.height(), least.height())
+    window.show()
+    window.activateWindow()
+    QTest.qWaitForWindowExposed(window)
+    assert window.focusWidget() is window.welcome.open_scan
+    close(window)
 
 
 def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:
