@@ -175,9 +175,7 @@ class PoseReport:
         )
 
     def _touch_row(self, name: str, touch: Touch) -> str:
-        pose = self.estimate.pose
-        residual = None if pose is None else pose.residuals.get(name)
-        is_suspect = pose is not None and name in pose.suspects
+        residual, is_suspect = self._residual(name)
         bar = "" if residual is None else _bar(residual, _BAD if is_suspect else "#4d7fb3")
         mark = " <b>suspect</b>" if is_suspect else " left out" if touch.left_out else ""
         how = touch.how.value + (f", {touch.source}" if touch.source else "")
@@ -188,6 +186,16 @@ class PoseReport:
             f"<tr><td>{escape(name)}{mark}</td><td>{_numbers(touch.position, 2)}</td>"
             f"<td>{number}</td><td>{bar}</td><td>{escape(how)}</td></tr>"
         )
+
+    def _residual(self, name: str) -> tuple[float | None, bool]:
+        """Return how far a touch is from its feature, or a skull feature from its fellow in the scan."""
+        pose, registered = self.estimate.pose, self.estimate.registered
+        if pose is not None and name in pose.residuals:
+            return pose.residuals[name], name in pose.suspects
+        fiducials = None if registered is None else registered.fiducials
+        if fiducials is None or name in CODES:
+            return None, False
+        return fiducials.residuals_mm.get(name), name in fiducials.suspects
 
     def _foot(self) -> str:
         return (

@@ -100,3 +100,21 @@ def test_pictures_are_part_of_the_page_or_named_beside_it(made):
     assert all(source.startswith("data:image/png;base64,") for source in embedded.images)
     assert len(embedded.images) == 2
     assert Page(report(made, pictures).html(embed=False)).images == ["picture-0.png", "picture-1.png"]
+
+
+def test_skull_features_tell_how_well_they_fit() -> None:
+    atlas, rng = Atlas.published(), np.random.default_rng(0)
+    session = Session(SpecimenState("GP-015"), author="AB")
+    estimating = Estimating(session)
+    estimating.use_atlas(atlas)
+    animal = draw_animal(atlas, rng=rng).side("L")
+    for code in PROBE:
+        touching.record_touch(session, "L", code, animal[code])
+    for n, there in enumerate(rng.uniform(-20, 20, (5, 3)), start=1):
+        touching.mark_skull(session, f"S{n}", there)
+        touching.record_touch(session, "L", f"S{n}", there + 0.3 * rng.normal(size=3))
+    residuals = estimating.current.registered.fiducials.residuals_mm
+    text = Page(PoseReport(session.state, estimating.current).html()).text
+    for name in ("S1", "S5"):
+        assert re.search(rf"{name} .{{0,60}} {residuals[name]:.2f} ", text)
+    session.close(discard=True)
