@@ -21,6 +21,7 @@ from PySide6.QtGui import QImage, QPainter  # noqa: E402
 from PySide6.QtWidgets import QApplication  # noqa: E402
 
 from gp_core import PROBE, Atlas, RigidTransform, Side, estimate_pose  # noqa: E402
+from gp_core.atlas.expected import expected_features  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scene.pose import PoseActor  # noqa: E402
 from gp_labeler.scene.pose_data import (  # noqa: E402
@@ -31,7 +32,6 @@ from gp_labeler.scene.pose_data import (  # noqa: E402
     DrawnTruth,
     DrawnVector,
     PoseScene,
-    features_in_scan,
 )
 from gp_labeler.scene.scene3d import Scene3D  # noqa: E402
 from gp_labeler.scene.slice_view import SliceView  # noqa: E402
@@ -54,7 +54,7 @@ def _scenes() -> Iterator[PoseScene]:
         second = DrawnPose(
             "second", poses[1].T_scan_cochlea, poses[1].covariance, poses[1].cone, role="pose_2"
         )
-        features = features_in_scan(found[0], atlas, T_scan_touches)
+        features = expected_features(found[0], atlas)  # tracker and scan are one here
         yield PoseScene(
             (poses[0], second),
             (DrawnTruth(Side.LEFT, np.zeros(3), np.eye(3)[0]),),
