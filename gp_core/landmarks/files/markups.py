@@ -34,6 +34,9 @@ _SCHEMA = (
     "https://raw.githubusercontent.com/slicer/slicer/master/"
     "Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#"
 )
+_LINES = ("Line",)
+"""What this program writes beside point lists: through points of the lists, so that nothing is lost."""
+
 _NUMBERS_ON_LINES = re.compile(r"\[\n\s+([-+0-9.eE,\s]+?)\n\s+\]")
 
 
@@ -58,7 +61,8 @@ def read_markups(path: str | PathLike[str]) -> PointList:
     """
     content = _load(path)
     header = FileHeader.from_json(content["gpLabeler"], path) if "gpLabeler" in content else None
-    points = tuple(point for markup in _point_lists(content, path) for point in _points(markup, path))
+    lists = _point_lists(content, path, told=_LINES if header else ())
+    points = tuple(point for markup in lists for point in _points(markup, path))
     return PointList(points, Path(path), "scan" if header is None else header.frame, header)
 
 
@@ -79,7 +83,10 @@ def _load(path: str | PathLike[str]) -> dict[str, Any]:
     return content
 
 
-def _point_lists(content: dict[str, Any], file: str | PathLike[str]) -> list[dict[str, Any]]:
+def _point_lists(
+    content: dict[str, Any], file: str | PathLike[str], told: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return the point lists; what else there is is told of, unless its kind is `told` already."""
     found = []
     kinds = []
     for markup in content["markups"]:
@@ -87,7 +94,7 @@ def _point_lists(content: dict[str, Any], file: str | PathLike[str]) -> list[dic
         kinds.append(shown(kind))
         if isinstance(markup, dict) and kind == "Fiducial":
             found.append(markup)
-        else:
+        elif kind not in told:
             _log.warning("%s: passed over a markup of type %s", file, shown(kind))
     if not found:
         raise FileFormatError(
