@@ -6,8 +6,8 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.checks import FloatArray
-from gp_core.frames import RigidTransform, mirror_x
-from gp_core.landmarks.anatomy import with_cochlea_origin
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.anatomy import mirror_right, with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
@@ -108,7 +108,7 @@ def _in_head(atlas: Atlas, left: FloatArray, right: FloatArray, name: str) -> Sp
     for side, shape in ((Side.LEFT, left), (Side.RIGHT, right)):
         points = shape @ (_turn(T_head_ear @ shape[row], towards) @ T_head_ear).T + aside
         points[row, 0] = 0.0  # so it is, but for rounding
-        points = points if side is Side.LEFT else mirror_x(points)
+        points = mirror_right(points, side)
         named = dict(zip(_PLACED, points, strict=True))
         sides[side] = LandmarkSet.from_mapping(named, side, frame="scan")
     shared = sides[Side.LEFT][_MIDLINE]

@@ -5,8 +5,7 @@ from __future__ import annotations
 from gp_core.atlas.atlas import DEFINING, Atlas
 from gp_core.atlas.pose import CochleaPose
 from gp_core.checks import FloatArray
-from gp_core.frames import mirror_x
-from gp_core.landmarks.anatomy import cochlea_frame
+from gp_core.landmarks.anatomy import cochlea_frame, mirror_right
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 
@@ -29,11 +28,10 @@ def expected_features(pose: CochleaPose, atlas: Atlas) -> dict[str, FloatArray]:
     dict of str to (3,) array, mm
         In the frame of the touches.
     """
-    is_left = pose.side is Side.LEFT
     if pose.T_touches_atlas is not None:
-        moved = pose.T_touches_atlas.apply(atlas.mean if is_left else mirror_x(atlas.mean))
+        moved = pose.T_touches_atlas.apply(mirror_right(atlas.mean, pose.side))
     else:
         defining = LandmarkSet.from_mapping({code: atlas[code] for code in DEFINING}, "L", frame="atlas")
         local = cochlea_frame(defining).inverse().apply(atlas.mean)  # a right ear is its mirror in z there
-        moved = pose.transform_to_touches.apply(local * (1, 1, 1 if is_left else -1))
+        moved = pose.transform_to_touches.apply(local * (1, 1, 1 if pose.side is Side.LEFT else -1))
     return dict(zip(atlas.codes, moved, strict=True))

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from gp_core.atlas.atlas import DEFINING, PLACED, Atlas
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GeometryError, GpError
-from gp_core.frames import mirror_x
-from gp_core.landmarks.anatomy import cochlea_frame
+from gp_core.landmarks.anatomy import cochlea_frame, mirror_right
 from gp_core.landmarks.features import CODES, Side, check_codes
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.procrustes import weighted_procrustes
@@ -93,7 +92,7 @@ def left_shapes(specimens: Sequence[Specimen]) -> tuple[list[str], FloatArray]:
 
 def as_left(landmarks: LandmarkSet) -> FloatArray:
     """Return the points (20, 3) of a set, mirrored in x if they are of a right side."""
-    return landmarks.points if landmarks.side is Side.LEFT else mirror_x(landmarks.points)
+    return mirror_right(landmarks.points, landmarks.side)
 
 
 def per_feature_covariance(covariance: FloatArray) -> FloatArray:

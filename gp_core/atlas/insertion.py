@@ -14,9 +14,8 @@ from gp_core.checks import FloatArray, as_points, check_option
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import write_text
-from gp_core.landmarks.files.disk import read_text
-from gp_core.landmarks.files.table import delimiter_of
-from gp_core.landmarks.files.text import parse_position, shown, split_fields, split_lines
+from gp_core.landmarks.files.table import read_rows
+from gp_core.landmarks.files.text import parse_position, rows_text, shown
 
 __all__ = ["UNITS", "carry_path", "read_path", "turn_about", "winding_side", "write_path"]
 
@@ -135,21 +134,18 @@ def write_path(path: str | PathLike[str], points: FloatArray) -> None:
     GpError
         The file cannot be written.
     """
-    write_text(path, "".join(f"{','.join(repr(float(n)) for n in point)}\n" for point in points))
+    write_text(path, rows_text(points))
 
 
 def _read_rows(path: str | PathLike[str]) -> FloatArray:
-    lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
-    delimiter = delimiter_of(lines[0][1]) if lines else ","
     found = []
-    for i, (number, line) in enumerate(lines):
-        fields = split_fields(line, delimiter, number, path)
+    for i, (number, fields) in enumerate(read_rows(path, aligned=True)):
         if i == 0 and not any(_is_number(field) for field in fields):
             continue  # a header
         point = parse_position(fields, file=path, landmark=f"row {number}") if len(fields) == 3 else None
         if point is None:
             raise FileFormatError(
-                f"line {number} must be three numbers, got {shown(line)}",
+                f"line {number} must be three numbers, got {shown(' '.join(fields))}",
                 file=path,
                 remedy="Write x, y, z in every row, with decimal points.",
             )

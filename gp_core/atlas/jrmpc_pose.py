@@ -11,8 +11,8 @@ from gp_core.atlas.pose import CochleaPose
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GpError
 from gp_core.frames import RigidTransform
-from gp_core.landmarks.anatomy import axis_frame, cochlea_frame, round_window_frame
-from gp_core.landmarks.features import EXTERNAL, TRAINING, Side, index_of
+from gp_core.landmarks.anatomy import axis_frame, cochlea_frame, round_window_frame, touched_features
+from gp_core.landmarks.features import TRAINING, Side, index_of
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcResult, JrmpcSettings, jrmpc
 
@@ -123,7 +123,7 @@ def estimate_jrmpc(
             remedy="Give --atlas with landmark files, or use --method robust.",
         )
     training = training_sides(specimens, touches.side)
-    codes = _touched(touches)
+    codes = touched_features(touches)
     T_touches_window = round_window_frame(touches)
     probe = T_touches_window.inverse().apply(touches.array(codes))
     result = register_with_training(training, probe, features=features, settings=settings)
@@ -148,17 +148,6 @@ def estimate_jrmpc(
             "the 95 % regions show the scatter of the labelled animals, not the errors of the touches",
         ),
     )
-
-
-def _touched(touches: LandmarkSet) -> tuple[str, ...]:
-    for code in touches.placed:
-        if code not in EXTERNAL:
-            raise FeatureError(
-                f"{code} is inside the bone and cannot be touched",
-                landmark=code,
-                remedy=f"Touch any of {' '.join(EXTERNAL)}.",
-            )
-    return touches.placed
 
 
 def _pose_frame(points: FloatArray, frame: str) -> RigidTransform:

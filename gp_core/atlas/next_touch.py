@@ -8,13 +8,9 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.named_fit import NamedFit, TouchModel, fit_named_points
-from gp_core.atlas.robust_pose import (
-    _defining_points,
-    _leftwards,
-    _pose_covariance,
-    touch_model,
-)
+from gp_core.atlas.robust_pose import defining_points, pose_covariance, touch_model
 from gp_core.atlas.uncertainty import cone_95, radius_95
+from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
 
@@ -82,7 +78,7 @@ def gains(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = Non
     'IN'
     """
     model = touch_model(touches, atlas, probe_noise)
-    fit = fit_named_points(model, _leftwards(touches.array(model.codes), touches.side))
+    fit = fit_named_points(model, mirror_right(touches.array(model.codes), touches.side))
     radius, cone = _regions(atlas, model, fit)
     found = []
     for code in EXTERNAL:
@@ -94,8 +90,8 @@ def gains(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = Non
 
 def _regions(atlas: Atlas, model: TouchModel, fit: NamedFit) -> tuple[float, float]:
     """Return radius and cone of the pose that a fit gives; both are the same in the mirror."""
-    defining = _defining_points(atlas, model, fit)
-    covariance = _pose_covariance(atlas, model, fit, defining, Side.LEFT)
+    defining = defining_points(atlas, model, fit)
+    covariance = pose_covariance(atlas, model, fit, defining, Side.LEFT)
     axis = fit.rotation @ (defining[0] - defining[1])
     return radius_95(covariance), cone_95(covariance, axis / np.linalg.norm(axis))
 

@@ -16,7 +16,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import FileHeader, LabelledPoint, write_text
 from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.markups import write_point_lists
-from gp_core.landmarks.files.text import shown
+from gp_core.landmarks.files.text import rows_text, shown
 from gp_core.landmarks.sets import Status
 
 __all__ = ["AXIS_POINT_MM", "read_pose", "tfm_text", "write_csv", "write_landmarks", "write_tfm"]
@@ -140,8 +140,7 @@ def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:
     GpError
         The file cannot be written.
     """
-    lines = (",".join(repr(float(n)) for n in row) for row in pose.transform)
-    write_text(path, "\n".join(lines) + "\n")
+    write_text(path, rows_text(pose.transform))
 
 
 def write_landmarks(path: str | PathLike[str], pose: CochleaPose) -> None:

@@ -23,11 +23,11 @@ from gp_core.atlas.uncertainty import cochlea_jacobian
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GpError
 from gp_core.frames import RigidTransform, mirror_x
-from gp_core.landmarks.anatomy import axis_frame, cochlea_origin
-from gp_core.landmarks.features import EXTERNAL, Side
+from gp_core.landmarks.anatomy import axis_frame, cochlea_origin, mirror_right, touched_features
+from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["estimate_robust", "locate_robust"]
+__all__ = ["defining_points", "estimate_robust", "locate_robust", "pose_covariance", "touch_model"]
 
 _SUSPECT_WEIGHT = 0.2
 _SUSPECT_SQUARED = 20.0
@@ -69,17 +69,17 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
     """
     compile_if_repeated()
     model = touch_model(touches, atlas, probe_noise)
-    points = _leftwards(touches.array(model.codes), touches.side)
+    points = mirror_right(touches.array(model.codes), touches.side)
     fit = fit_named_points(model, points)
     suspects = _suspects(model, fit)
-    defining = _defining_points(atlas, model, fit)
+    defining = defining_points(atlas, model, fit)
     frame = _cochlea_in_touches(defining, fit, touches)
     return CochleaPose(
         side=touches.side,
         method="robust",
         atlas=atlas.name,
         transform_to_touches=frame,
-        covariance=_pose_covariance(atlas, model, fit, defining, touches.side),
+        covariance=pose_covariance(atlas, model, fit, defining, touches.side),
         residuals=_residuals(model, fit),
         suspects=suspects,
         warnings=tuple(_warnings(model, points, fit, touches.side, suspects)),
@@ -98,22 +98,23 @@ def locate_robust(touches: LandmarkSet, atlas: Atlas) -> RigidTransform:
     """
     compile_if_repeated()
     model = touch_model(touches, atlas, None)
-    fit = fit_named_points(model, _leftwards(touches.array(model.codes), touches.side))
-    return _cochlea_in_touches(_defining_points(atlas, model, fit), fit, touches)
+    fit = fit_named_points(model, mirror_right(touches.array(model.codes), touches.side))
+    return _cochlea_in_touches(defining_points(atlas, model, fit), fit, touches)
 
 
 def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -> TouchModel:
-    """Return what the atlas says of the touched features, after checking that they can be used."""
+    """Return what the atlas says of the touched features, after checking that they can be used.
+
+    Raises
+    ------
+    FeatureError
+        Too few features, or one that no probe can touch.
+    GpError
+        `probe_noise` is no positive number.
+    """
     if probe_noise is not None and not (np.isfinite(probe_noise) and probe_noise > 0):
         raise GpError(f"probe noise must be a positive number of mm, got {probe_noise!r}")
-    codes = touches.placed
-    for code in codes:
-        if code not in EXTERNAL:
-            raise FeatureError(
-                f"{code} is inside the bone and cannot be touched",
-                landmark=code,
-                remedy=f"Touch any of {' '.join(EXTERNAL)}.",
-            )
+    codes = touched_features(touches)
     usable = tuple(code for code in codes if code in atlas.codes)
     if len(usable) < 3:
         raise FeatureError(
@@ -124,12 +125,8 @@ def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -
     return TouchModel(usable, atlas.rows(usable), atlas.variances(usable), probe_noise)
 
 
-def _leftwards(points: FloatArray, side: Side) -> FloatArray:
-    return points if side is Side.LEFT else mirror_x(points)
-
-
-def _defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArray:
-    """Return the expected CA, CB, RWA, RWP (4, 3) of this animal, in the atlas frame."""
+def defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArray:
+    """Return the expected CA, CB, RWA, RWP (4, 3) of this animal, mm, in the atlas frame."""
     shape = _shape_of_residual(model, fit) @ fit.residual
     return atlas.rows(DEFINING) + shape.reshape(-1, 3)
 
@@ -147,7 +144,7 @@ def _shape_of_residual(model: TouchModel, fit: NamedFit) -> FloatArray:
 
 def _cochlea_in_touches(defining: FloatArray, fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
     """Return ``T_touches_cochlea`` with x along the modiolar axis on both sides."""
-    ca, cb, rwa, rwp = _leftwards(defining @ fit.rotation.T + fit.translation, touches.side)
+    ca, cb, rwa, rwp = mirror_right(defining @ fit.rotation.T + fit.translation, touches.side)
     origin = cochlea_origin(ca, cb, rwa, rwp)
     return axis_frame(origin, ca - cb, (rwa + rwp) / 2 - origin, dst=touches.frame, src="cochlea")
 
@@ -159,10 +156,12 @@ def _atlas_in_touches(fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
     return RigidTransform.from_parts(rotation, translation, dst=touches.frame, src="atlas")
 
 
-def _pose_covariance(
+def pose_covariance(
     atlas: Atlas, model: TouchModel, fit: NamedFit, defining: FloatArray, side: Side
 ) -> FloatArray:
-    """Return the (6, 6) covariance of the cochlea frame.
+    """Return the (6, 6) covariance of the cochlea frame: origin (mm), rotation vector (rad).
+
+    `defining` are the `defining_points`.
 
     Near the solution the estimate is linear in the residuals, so its error is a linear map of the animal's
     shape and of the touch errors. The shape enters with all its correlations as measured: features taken one

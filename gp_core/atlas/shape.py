@@ -10,8 +10,7 @@ from gp_core.atlas.atlas import DEFINING, Atlas
 from gp_core.atlas.named_fit import NamedFit, TouchModel, fit_named_points, motion_jacobian
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GeometryError
-from gp_core.frames import mirror_x
-from gp_core.landmarks.anatomy import cochlea_origin
+from gp_core.landmarks.anatomy import cochlea_origin, mirror_right
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 
@@ -111,7 +110,7 @@ def _known(atlas: Atlas, landmarks: LandmarkSet) -> tuple[str, ...]:
 def _fit(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...]) -> NamedFit:
     points = landmarks.array(known)
     model = TouchModel(known, atlas.rows(known), atlas.variances(known), LABELLING_NOISE_MM)
-    return fit_named_points(model, points if landmarks.side is Side.LEFT else mirror_x(points))
+    return fit_named_points(model, mirror_right(points, landmarks.side))
 
 
 def _given(
@@ -151,10 +150,9 @@ def _check_turn(information: FloatArray) -> None:
 def _to_frame(
     mean: FloatArray, covariance: FloatArray, fit: NamedFit, side: Side
 ) -> tuple[FloatArray, FloatArray]:
-    points = mean @ fit.rotation.T + fit.translation
+    points = mirror_right(mean @ fit.rotation.T + fit.translation, side)
     turn = np.kron(np.eye(len(mean)), fit.rotation)
     if side is Side.RIGHT:
-        points = mirror_x(points)
         turn = np.kron(np.eye(len(mean)), np.diag([-1.0, 1.0, 1.0])) @ turn
     return points, turn @ covariance @ turn.T
 

@@ -8,10 +8,9 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.frames import cross_matrix
+from gp_core.quantiles import NORMAL_95, chi_square_share
 
 __all__ = ["cochlea_jacobian", "cone_95", "radius_95"]
-
-_NORMAL_95 = 1.6448536269514722
 
 
 def radius_95(covariance: FloatArray) -> float:
@@ -43,14 +42,13 @@ def _norm_quantile(covariance: FloatArray) -> float:
     """95 % quantile of the length of a Gaussian vector.
 
     The squared length is taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946,
-    doi:10.2307/3002019), whose quantile is Wilson and Hilferty's (1931, doi:10.1073/pnas.17.12.684).
+    doi:10.2307/3002019).
     """
     mean = float(np.trace(covariance))
     if mean <= 0:
         return 0.0
     freedom = mean**2 / float((covariance * covariance).sum())
-    spread = 2 / (9 * freedom)
-    return float((mean * (1 - spread + _NORMAL_95 * spread**0.5) ** 3) ** 0.5)
+    return float((mean * chi_square_share(freedom, NORMAL_95)) ** 0.5)
 
 
 def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: FloatArray) -> FloatArray:

@@ -10,17 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
-from gp_core.errors import GeometryError
-from gp_core.frames import RigidTransform
-from gp_core.landmarks.features import Side
+from gp_core.errors import FeatureError, GeometryError
+from gp_core.frames import RigidTransform, mirror_x
+from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = [
     "axis_frame",
     "cochlea_frame",
     "cochlea_origin",
+    "mirror_right",
     "modiolar_axis",
     "round_window_frame",
+    "touched_features",
     "with_cochlea_origin",
 ]
 
@@ -128,6 +130,29 @@ def round_window_frame(landmarks: LandmarkSet) -> RigidTransform:
     foot = rwp + np.dot(lli - rwp, across) * across
     x = _sign(landmarks.side) * across
     return axis_frame(2 * foot - lli, x, lli - foot, dst=landmarks.frame, src="window")
+
+
+def mirror_right(points: FloatArray, side: Side) -> FloatArray:
+    """Return points (N, 3) of a left side as they are, those of a right one mirrored in x; there and back."""
+    return points if side is Side.LEFT else mirror_x(points)
+
+
+def touched_features(touches: LandmarkSet) -> tuple[str, ...]:
+    """Return the placed features of a set of touches.
+
+    Raises
+    ------
+    FeatureError
+        One of them is no external feature, so that no probe can have touched it.
+    """
+    for code in touches.placed:
+        if code not in EXTERNAL:
+            raise FeatureError(
+                f"{code} is inside the bone and cannot be touched",
+                landmark=code,
+                remedy=f"Touch any of {' '.join(EXTERNAL)}.",
+            )
+    return touches.placed
 
 
 def _sign(side: Side) -> float:

@@ -14,6 +14,7 @@ from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import feature
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.quantiles import NORMAL_95, chi_square_share
 from gp_core.registration.procrustes import RigidFit, fit_rigid
 
 __all__ = ["FiducialRegistration", "named_points", "register_fiducials"]
@@ -25,7 +26,6 @@ _TELLING = 0.5
 
 _EXACT_MM = 1e-6
 _FEW = 6
-_NORMAL_95 = 1.6448536269514722
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,7 @@ class FiducialRegistration:
         Wilson and Hilferty's (1931, doi:10.1073/pnas.17.12.684), a little on the safe side with three points.
         """
         freedom = 3 * len(self.fiducials) - 6
-        spread = 2 / (9 * freedom)
-        return float(self.fle_mm * (1 - spread - _NORMAL_95 * spread**0.5) ** -1.5)
+        return float(self.fle_mm / chi_square_share(freedom, -NORMAL_95) ** 0.5)
 
     @property
     def warnings(self) -> tuple[str, ...]:

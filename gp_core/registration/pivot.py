@@ -11,9 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError, GeometryError, GpError
-from gp_core.landmarks.files.disk import read_text
-from gp_core.landmarks.files.table import delimiter_of
-from gp_core.landmarks.files.text import shown, split_fields, split_lines
+from gp_core.landmarks.files.table import read_rows
+from gp_core.landmarks.files.text import shown
 
 __all__ = ["PivotCalibration", "calibrate_pivot", "read_marker_poses"]
 
@@ -300,17 +299,14 @@ def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
 
 
 def _read_rows(path: str | PathLike[str]) -> list[list[float]]:
-    lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
-    delimiter = delimiter_of(lines[0][1]) if lines else ","
     found = []
-    for i, (number, line) in enumerate(lines):
-        fields = split_fields(" ".join(line.split()) if delimiter == " " else line, delimiter, number, path)
+    for i, (number, fields) in enumerate(read_rows(path, aligned=True)):
         try:
             found.append([float(field) if field.lower() not in _NOT_SEEN else np.nan for field in fields])
         except ValueError:
             if i > 0:
                 raise FileFormatError(
-                    f"line {number} must hold numbers only, got {shown(line)}",
+                    f"line {number} must hold numbers only, got {shown(' '.join(fields))}",
                     file=path,
                     remedy="Write decimal points, and commas between numbers.",
                 ) from None

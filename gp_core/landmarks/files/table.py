@@ -23,7 +23,7 @@ from gp_core.landmarks.files.points import (
 from gp_core.landmarks.files.text import has_decimal_comma, shown, split_fields, split_lines
 from gp_core.landmarks.sets import LandmarkSet, Status
 
-__all__ = ["delimiter_of", "read_table", "write_csv"]
+__all__ = ["read_rows", "read_table", "write_csv"]
 
 _NAME_COLUMNS = ("label", "name", "landmark", "feature", "code", "point")
 _AXES = {"lps": False, "ras": True, "xyz": False}  # whether x and y change sign on the way to LPS
@@ -60,9 +60,7 @@ def read_table(path: str | PathLike[str]) -> PointList:
     FileFormatError
         Columns are missing, a row has the wrong number of them, or a position is not three finite numbers.
     """
-    lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
-    delimiter = delimiter_of(lines[0][1]) if lines else ","
-    rows = [(number, split_fields(line, delimiter, number, path)) for number, line in lines]
+    rows = read_rows(path)
     names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]] if rows else []
     has_header = any(name in _NAME_COLUMNS for name in names)
     columns = _columns(names, path) if has_header else _Columns(0, (1, 2, 3), 4, False, {})
@@ -70,7 +68,29 @@ def read_table(path: str | PathLike[str]) -> PointList:
     return PointList(points, Path(path))
 
 
-def delimiter_of(line: str) -> str:
+def read_rows(path: str | PathLike[str], *, aligned: bool = False) -> list[tuple[int, list[str]]]:
+    """Return the numbered rows of a table, split into fields, without comments (``#``) and blank lines.
+
+    Parameters
+    ----------
+    path : path
+        Text with commas, semicolons, tabs or blanks between the columns.
+    aligned : bool
+        Whether many blanks are one, as where they align the columns; then no field can be empty.
+
+    Raises
+    ------
+    FileFormatError
+        Not such a text, or quotes that do not close.
+    """
+    lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
+    delimiter = _delimiter_of(lines[0][1]) if lines else ","
+    if aligned and delimiter == " ":
+        lines = [(number, " ".join(line.split())) for number, line in lines]
+    return [(number, split_fields(line, delimiter, number, path)) for number, line in lines]
+
+
+def _delimiter_of(line: str) -> str:
     """Return what separates the columns of a table, told from its first line."""
     if all(has_decimal_comma(field) for field in line.split()[1:]) and len(line.split()) > 2:
         return " "  # the commas are decimal ones: for the message, since such numbers are refused

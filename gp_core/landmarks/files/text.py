@@ -18,6 +18,7 @@ __all__ = [
     "flips_xy",
     "has_decimal_comma",
     "parse_position",
+    "rows_text",
     "shown",
     "split_fields",
     "split_lines",
@@ -61,6 +62,11 @@ def split_fields(line: str, delimiter: str, number: int, file: str | PathLike[st
         raise FileFormatError(
             f"line {number} cannot be split into columns ({error})", file=file, remedy="Mend its quotes."
         ) from None
+
+
+def rows_text(rows: FloatArray) -> str:
+    """Return rows of numbers (N, C) as lines, commas between the numbers, which keep every bit."""
+    return "".join(f"{','.join(repr(float(n)) for n in row)}\n" for row in rows)
 
 
 def flips_xy(system: object, file: str | PathLike[str]) -> bool:

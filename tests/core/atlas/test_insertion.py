@@ -90,6 +90,12 @@ def test_the_cochlea_of_the_atlas_winds_that_way() -> None:
     assert angles[0] > angles[1] > angles[2]
 
 
+def test_blanks_may_align_the_columns(tmp_path: Path) -> None:
+    file = tmp_path / "path.txt"
+    file.write_text("".join("".join(f"{v:>12.6f}" for v in point) + "\n" for point in _spiral()))
+    np.testing.assert_allclose(read_path(file, units="mm"), _spiral(), atol=1e-6)
+
+
 @pytest.mark.parametrize("units", UNITS)
 @pytest.mark.parametrize("header", ["", "X,Y,Z\n"])
 def test_a_path_is_read_in_its_units(units: str, header: str, tmp_path: Path) -> None:
