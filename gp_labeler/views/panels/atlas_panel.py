@@ -28,7 +28,7 @@ from gp_labeler.workbench import Workbench
 __all__ = ["AtlasPanel"]
 
 _ANY = 16_777_215
-_WIDEST = 900
+_WIDEST = 1000
 _N_NOTICES = 4
 _METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
 

@@ -9,12 +9,12 @@ import pytest
 from animal_cases import drawn_animals, write_animals, write_side
 from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
+from PySide6.QtGui import QDropEvent, QFontMetrics
 from PySide6.QtWidgets import QApplication
 from window_cases import settle
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.landmarks.features import Side
+from gp_core.landmarks.features import Side, feature
 from gp_labeler.session import labelling
 from gp_labeler.views.panels.atlas_panel import AtlasPanel
 from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
@@ -135,6 +135,14 @@ def test_no_word_is_cut(desk, panel, folder, theme, wide) -> None:
     panel.set_wide(wide)
     panel.resize(1100 if wide else panel.width(), 900)
     assert list(cut_words(panel)) == []
+
+
+def test_beside_no_scan_the_names_of_features_stand_in_full(panel, qtbot) -> None:
+    panel.set_wide(True)
+    panel.resize(1190, 700)  # what a window of 1280 x 800 leaves
+    table = panel.labels.table
+    widest = max(QFontMetrics(table.font()).horizontalAdvance(feature(c).name) for c in table.rows.codes)
+    qtbot.waitUntil(lambda: table.columnWidth(0) >= widest + 55)  # the code stands before it
 
 
 def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qtbot) -> None:
