@@ -20,6 +20,9 @@ __all__ = ["Commands"]
 _VIEW_KEYS = {"Return", "Enter", "Space", "Delete", "Backspace"}
 """Keys that buttons, tables and text fields need themselves: they act while the pointer is in a view."""
 
+_FOLDED = {"from": "Look from", "cut": "Cut bone"}
+"""Groups that have a menu of their own: else the menu View is higher than a small screen."""
+
 
 class Commands(QObject):
     """A `QAction` for each row of the table.
@@ -61,15 +64,19 @@ class Commands(QObject):
     def fill(self, bar: QMenuBar) -> None:
         """Make the menus."""
         for name in MENUS:
-            menu, group = bar.addMenu(f"&{name}"), None
+            shown = menu = bar.addMenu(f"&{name}")
             menu.setToolTipsVisible(True)
+            group = None
             for row in ACTIONS.values():
                 if row.menu != name:
                     continue
-                if group is not None and row.group != group:
-                    menu.addSeparator()
-                group = row.group
-                menu.addAction(self.actions[row.id])
+                if row.group != group:
+                    if group is not None:
+                        menu.addSeparator()
+                    group = row.group
+                    shown = menu.addMenu(_FOLDED[group]) if group in _FOLDED else menu
+                    shown.setToolTipsVisible(True)
+                shown.addAction(self.actions[row.id])
                 if row.id == "file.demo" and self._desk.recent is not None:
                     self._add_recent(menu)
 

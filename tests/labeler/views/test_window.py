@@ -358,6 +358,13 @@ def test_a_first_window_fits_the_screen_and_offers_to_open_a_scan(qapp) -> None:
     close(window)
 
 
+def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
+    menus = {entry.text(): entry.menu() for entry in window.menuBar().actions()}
+    assert max(menu.sizeHint().height() for menu in menus.values()) < 740
+    folded = [entry.menu().title() for entry in menus["&View"].actions() if entry.menu() is not None]
+    assert folded == ["Look from", "Cut bone"]
+
+
 def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:
     long = Volume.from_parts(ball_volume().array[:, 12:52, 24:40], [0.25] * 3, [0, 0, 0], name="long")
     window.workbench.open_volume(long)
