@@ -201,7 +201,7 @@ class MainWindow(QMainWindow):
         """Show the first page until there is something to work on."""
         state = self.workbench.session.state
         is_open = state.volume is not None
-        if is_open and self.pages.currentIndex() == 0 and self.workbench.volume is not None:
+        if is_open and self.pages.currentIndex() == 0:
             self.set_step("label")
             self.grid.scene_view.setFocus()
         if not is_open and self.rail.step not in _ALONE:

@@ -72,7 +72,7 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     """
     active = session.active
     if not has_scan:
-        return _without_its_scan(session) if session.volume_is_lost else _without_scan()
+        return _without_scan() if session.state.volume is None else _without_its_scan(session)
     if active.code is None:
         return _between(session)
     side, row = active.side, feature(active.code)
@@ -177,11 +177,11 @@ def _without_scan() -> CardContent:
 def _without_its_scan(session: Session) -> CardContent:
     reference = session.state.volume
     assert reference is not None
-    there = breakable(str(reference.path))
+    lost, there = session.volume_is_lost, breakable(str(reference.path))
     return CardContent(
         session.state.specimen,
-        name="Its scan is not found",
-        definition=f"It was at {there}. The labels are kept: say where the scan is now.",
+        name="Its scan is not found" if lost else "Its scan is not open yet",
+        definition=f"It was at {there}. The labels are kept: say where the scan is now." if lost else "",
         action="find",
         action_text="Find scan…",
         can_skip=False,

@@ -344,6 +344,12 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
     assert [w for w in QApplication.topLevelWidgets() if w.isVisible()] == []
 
 
+def write_ball(file: Path) -> None:
+    import SimpleITK as sitk  # noqa: N813
+
+    sitk.WriteImage(sitk.GetImageFromArray(ball_volume().array), str(file))
+
+
 def test_a_first_window_fits_the_screen_and_offers_to_open_a_scan(qapp) -> None:
     window = make_plain(None, atlas=False)
     window.ui.prompts = Answers()
@@ -356,6 +362,22 @@ def test_a_first_window_fits_the_screen_and_offers_to_open_a_scan(qapp) -> None:
     QTest.qWaitForWindowExposed(window)
     assert window.focusWidget() is window.welcome.open_scan
     close(window)
+
+
+def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tmp_path) -> None:
+    first, file = make_window(), tmp_path / "ball.mha"
+    write_ball(file)
+    first.workbench.open_scan(file, spacing=0.25)
+    settle(qtbot, first)
+    saved = first.workbench.session.save(tmp_path / "one")
+    close(first)
+    window = make_window()
+    assert window.rail.step == "scan"
+    window.ui.open_path(saved)
+    assert window.rail.step == "label"
+    assert window.steps["label"].card.content.name == "Its scan is not open yet"
+    settle(qtbot, window)
+    assert window.steps["label"].card.content.code == "CA"
 
 
 def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
@@ -390,10 +412,8 @@ def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) 
 
 
 def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make_window, tmp_path) -> None:
-    import SimpleITK as sitk  # noqa: N813
-
     window, file = make_window(), tmp_path / "ball.mha"
-    sitk.WriteImage(sitk.GetImageFromArray(ball_volume().array), str(file))
+    write_ball(file)
     window.workbench.open_scan(file, spacing=0.25)
     settle(qtbot, window)
     labelling.place(window.workbench.session, np.array([8.0, 8.0, 8.0]), side=Side.LEFT, code="CA")
@@ -402,8 +422,8 @@ def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make
     moved = file.rename(tmp_path / "elsewhere.mha")
     window.ui.open_path(saved)
     settle(qtbot, window)
-    window.set_step("label")
     card = window.steps["label"].card
+    window.set_step("label")
     assert (card.content.name, card.primary.accessibleName()) == ("Its scan is not found", "Find scan…")
     window.status.set_without_scan("")  # as once the message has gone
     assert "Find scan" in window.status.next_click.text()
