@@ -185,7 +185,9 @@ class Scene3D:
         self.hover.refresh(view)
         self.scale_bar.refresh(view, self.camera)
         self._backdrop.restore()
-        self.target.draw(self._stage.base, self._stage.overlay)
+        is_hidden = self.cube.visible and self.slices.images  # a slice may stand before it
+        over = (self.cube.renderer,) if is_hidden else ()
+        self.target.draw(self._stage.base, *over, self._stage.overlay)
 
     def _sight(self) -> Sight:
         look = (*self.bone.look, self.cube.visible, self._stage.scale, self._stage.bone.GetUseSSAO())

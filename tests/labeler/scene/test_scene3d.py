@@ -271,6 +271,18 @@ def test_slices_in_3d_show_the_marker_where_it_is(scene: Scene3D) -> None:
         assert found == pytest.approx(scene.display_of(BALL[None])[0], abs=2.0)
 
 
+def test_a_slice_before_the_cube_does_not_hide_it(scene: Scene3D) -> None:
+    source = SliceSource(scan_of([(BALL, 1.0)], np.eye(3)))
+    scene.camera.view_from("A")
+    scene.camera.focus_on(MIDDLE, across_mm=4)
+    slices = [source.image(Plane.CORONAL, BALL[1])]
+    scene.cube.visible = False
+    scene.slices.show(slices, WindowLevel(0, 200))
+    without = scene.image().astype(int)
+    scene.cube.visible = True
+    assert (np.abs(scene.image() - without).max(axis=2) > 30).sum() > 300
+
+
 def test_the_cube_and_the_scale_bar(scene: Scene3D) -> None:
     empty = scene.image()
     scene.scale_bar.visible = scene.cube.visible = True
