@@ -117,10 +117,14 @@ class LandmarkModel(QAbstractTableModel):
             return "place"
         if state is PointState.DOUBTFUL:
             return self._workbench.session.doubts(side)[code].word
+        if feature(code).computed and state is PointState.TO_DO:
+            return "by itself"
         return str(state.value)
 
     def _sentence(self, code: str, side: Side, state: PointState) -> str:
         text = f"{code} {side.word}: {state.value}"
+        if feature(code).computed and state is PointState.TO_DO:
+            return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
         if state is PointState.DOUBTFUL:
             text += f", {self._workbench.session.doubts(side)[code].text}"
         if state is PointState.GHOST:

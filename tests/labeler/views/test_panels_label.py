@@ -121,6 +121,7 @@ def test_every_state_has_its_word(desk, panel):
     assert word(table, "RWM", LEFT) == "unseen"
     assert word(table, "FPA", LEFT) == "ghost"
     assert word(table, "FPA", RIGHT) == "to do"
+    assert word(table, "CO", RIGHT) == "by itself", "nobody places it"
     distance = desk.session.doubts(LEFT)["OI"].distance
     assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
 
