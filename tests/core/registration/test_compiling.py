@@ -22,6 +22,8 @@ print(outer(3), sum(outer.stats.cache_hits.values()))
 def package(tmp_path: Path) -> Path:
     folder = tmp_path / "gp_core" / "registration"
     folder.mkdir(parents=True)
+    for each in (folder, folder.parent):  # or the installed package would be found instead
+        (each / "__init__.py").write_text("")
     (folder / "compiling.py").write_text(Path(compiling.__file__).read_text(encoding="utf-8"))
     (folder / "inner.py").write_text("def inner(x):\n    return x + 1\n")
     (folder / "outer.py").write_text(
