@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPolygonF
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.colours import DARK
@@ -36,6 +36,7 @@ _CLOSE_PIXELS = 12.0
 """From so many logical pixels a millimetre on, points beside the slice are named too."""
 
 _TEXT, _HALO = "#E8EDF2", "#0B0F14"
+_NAME_SIZE = 12
 """Slices are black in every theme, and what is written on them light."""
 
 
@@ -61,11 +62,12 @@ class SlicePainter:
         self._slice: SliceImage | None = None
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
+        self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
         follow(view, workbench.threshold_previewed, self._on_preview)
 
     def forget(self) -> None:
         """Let go of the pictures."""
-        self._slice, self._picture, self._outline = None, None, None
+        self._slice, self._picture, self._outline, self._ground = None, None, None, None
 
     def paint(self, painter: QPainter) -> None:
         """Paint everything."""
@@ -78,8 +80,7 @@ class SlicePainter:
             QPainter.RenderHint.Antialiasing | QPainter.RenderHint.SmoothPixmapTransform, True
         )
         painter.scale(1 / ratio, 1 / ratio)
-        self._paint_image(painter, view.source, view.shown)
-        self._paint_outline(painter, view.shown, ratio)
+        self._paint_ground(painter, view.source, view.shown, ratio)
         self._paint_crosshair(painter, view.shown, theme, ratio)
         self._paint_letters(painter, view.shown, ratio)
         self._paint_scale_bar(painter, view.shown, ratio)
@@ -92,6 +93,22 @@ class SlicePainter:
 
     def _on_preview(self, threshold: float | None) -> None:
         self._preview = threshold
+
+    def _paint_ground(self, painter: QPainter, source: SliceSource, shown: Shown, ratio: float) -> None:
+        """Paint the slice and the edge of bone, from what is kept while nothing of them changes."""
+        view, desk = self._view.window_level(), self._desk
+        looks = (view, self._preview, desk.threshold, desk.session.view.state.outline_visible)
+        kept = self._ground
+        if kept is None or kept[0] is not shown or kept[1] is not source or kept[2] != looks:
+            picture = QPixmap(*shown.size)
+            picture.fill(QColor("#000000"))
+            below = QPainter(picture)
+            below.setRenderHints(painter.renderHints())
+            self._paint_image(below, source, shown)
+            self._paint_outline(below, shown, ratio)
+            below.end()
+            kept = self._ground = (shown, source, looks, picture)
+        painter.drawPixmap(QPointF(0, 0), kept[3])
 
     def _paint_image(self, painter: QPainter, source: SliceSource, shown: Shown) -> None:
         position = source.snap(shown.plane, shown.position)
@@ -151,10 +168,7 @@ class SlicePainter:
             (top, width / 2, inset),
             (bottom, width / 2, height - inset),
         ):
-            text = _outlined(letter, _font(13, ratio, bold=True))
-            box = text.boundingRect()
-            text.translate(x - box.center().x(), y - box.center().y())
-            _draw_text(painter, text, _TEXT, ratio)
+            word_picture(letter, 13, _TEXT, ratio).draw_about(painter, x, y)
 
     def _paint_scale_bar(self, painter: QPainter, shown: Shown, ratio: float) -> None:
         length, pixels = scale_bar_length(shown.mm_per_pixel, 90 * ratio)
@@ -163,10 +177,8 @@ class SlicePainter:
         for colour, thick in ((_HALO, 4.5), (_TEXT, 2.5)):
             painter.setPen(QPen(QColor(colour), thick * ratio))
             painter.drawLine(QPointF(right - pixels, y), QPointF(right, y))
-        text = _outlined(f"{length:g} mm", _font(12, ratio))
-        box = text.boundingRect()
-        text.translate(right - pixels / 2 - box.center().x(), y - 6 * ratio - box.bottom())
-        _draw_text(painter, text, _TEXT, ratio)
+        word = word_picture(f"{length:g} mm", 12, _TEXT, ratio, bold=False)
+        word.draw(painter, right - pixels / 2 - word.box.center().x(), y - 6 * ratio - word.box.bottom())
 
     def _paint_ghosts(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
         axes = np.stack([shown.plane.right, shown.plane.down])
@@ -178,11 +190,9 @@ class SlicePainter:
             painter.setBrush(QColor(colour.red(), colour.green(), colour.blue(), 26))
             painter.setPen(QPen(colour, 1.8 * ratio))
             painter.drawPolygon(ring)
-            text = _outlined(ghost.label, _font(13, ratio, bold=True))
-            box, letters = ring.boundingRect(), text.boundingRect()
-            right = min(box.right() + 4 * ratio, shown.size[0] - letters.width() - 6 * ratio)
-            text.translate(right, max(box.top(), letters.height() + 6 * ratio))
-            _draw_text(painter, text, colour.name(), ratio)
+            word, box = word_picture(ghost.label, 13, colour.name(), ratio), ring.boundingRect()
+            right = min(box.right() + 4 * ratio, shown.size[0] - word.box.width() - 6 * ratio)
+            word.draw(painter, right, max(box.top(), word.box.height() + 6 * ratio))
 
     def _paint_marks(
         self, painter: QPainter, source: SliceSource, shown: Shown, theme: Theme, ratio: float
@@ -216,28 +226,6 @@ def _picture(image: SliceImage, window: object, preview: float | None) -> QImage
 
 def _on_black(state: str) -> str:
     return DARK.states[state]
-
-
-def _font(pixels: float, ratio: float, *, bold: bool = False) -> QFont:
-    font = base_font()
-    font.setPixelSize(round(pixels * ratio))
-    font.setBold(bold)
-    return font
-
-
-def _outlined(text: str, font: QFont) -> QPainterPath:
-    path = QPainterPath()
-    path.addText(QPointF(0, 0), font, text)
-    return path
-
-
-def _draw_text(painter: QPainter, text: QPainterPath, colour: str, ratio: float, fade: float = 1.0) -> None:
-    """Draw letters with an edge that keeps them legible on bone."""
-    painter.save()
-    painter.setOpacity(fade)
-    painter.strokePath(text, QPen(QColor(_HALO), 3 * ratio))
-    painter.fillPath(text, QColor(colour))
-    painter.restore()
 
 
 def _radius(mark: Mark, glyph_mm: float | None, shown: Shown, ratio: float) -> float:
@@ -290,7 +278,9 @@ def _name(mark: Mark, pixel: FloatArray) -> SliceName:
 
 
 def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int], ratio: float) -> None:
-    font = _font(12, ratio, bold=True)
+    font = base_font()
+    font.setPixelSize(round(_NAME_SIZE * ratio))
+    font.setBold(True)
     metrics = QFontMetricsF(font)
     high = metrics.capHeight() + 4 * ratio
     corners, shown = place_labels(
@@ -301,5 +291,5 @@ def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int]
         ranks=[name.rank for name in names],
     )
     for n in np.flatnonzero(shown):
-        word = word_picture(names[n].text, font.pixelSize(), names[n].colour, ratio)
+        word = word_picture(names[n].text, _NAME_SIZE, names[n].colour, ratio)
         word.draw(painter, corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)
