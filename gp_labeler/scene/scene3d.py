@@ -185,8 +185,8 @@ class Scene3D:
         self.hover.refresh(view)
         self.scale_bar.refresh(view, self.camera)
         self._backdrop.restore()
-        is_hidden = self.cube.visible and self.slices.images  # a slice may stand before it
-        over = (self.cube.renderer,) if is_hidden else ()
+        covered = self.cube.visible and bool(self.slices.images)  # a slice may stand before it
+        over = (self.cube.renderer,) if covered else ()
         self.target.draw(self._stage.base, *over, self._stage.overlay)
 
     def _sight(self) -> Sight:

@@ -24,7 +24,7 @@ from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
 from gp_labeler.session.state import SpecimenState
 
-__all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "make_estimate"]
+__all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", "make_estimate"]
 
 _DEFINING = ("CA", "CB", "RWA", "RWP")
 REGISTRATIONS = ("auto", "features", "skull")
@@ -178,16 +178,14 @@ class Estimate:
         placed = self.in_scan(method)
         if placed is None or self.truth is None:
             return None
-        distance = float(np.linalg.norm(placed.origin - self.truth.translation))
-        return distance, float(angle_between_deg(placed.axis, self.truth.rotation[:, 0]))
+        return apart(placed.origin, placed.axis, self.truth.translation, self.truth.rotation[:, 0])
 
     def apart(self) -> tuple[float, float] | None:
         """Return how far the poses of two methods lie apart, mm and degrees; None where there is but one."""
         if len(self.poses) < 2:
             return None
         one, other = (self.poses[method] for method in self.settings.methods[:2])
-        distance = float(np.linalg.norm(one.origin - other.origin))
-        return distance, float(angle_between_deg(one.axis, other.axis))
+        return apart(one.origin, one.axis, other.origin, other.axis)
 
     def as_dict(self) -> dict[str, Any]:
         """Return what a verdict and a report keep of it."""
@@ -203,6 +201,13 @@ class Estimate:
         if (errors := self.errors()) is not None:
             out["error_mm"], out["error_deg"] = errors
         return out
+
+
+def apart(
+    origin: FloatArray, axis: FloatArray, other_origin: FloatArray, other_axis: FloatArray
+) -> tuple[float, float]:
+    """Return the distance of two (3,) origins, mm, and the angle between two (3,) axes, degrees."""
+    return float(np.linalg.norm(origin - other_origin)), float(angle_between_deg(axis, other_axis))
 
 
 def make_estimate(

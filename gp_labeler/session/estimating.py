@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import numpy as np
 from psygnal import Signal
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.pose import METHODS, CochleaPose
+from gp_core.atlas.pose import METHODS
 from gp_core.checks import check_option
 from gp_core.errors import GpError
-from gp_core.frames import RigidTransform, angle_between_deg
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Specimen
-from gp_labeler.session.estimate import REGISTRATIONS, Estimate, EstimateSettings, make_estimate
+from gp_labeler.session.estimate import REGISTRATIONS, Estimate, EstimateSettings, apart, make_estimate
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import RecordPoseCheck
 from gp_labeler.session.state import PoseCheck, SpecimenState
@@ -155,7 +154,8 @@ class Estimating:
             return None
         settings = replace(current.settings, methods=(current.pose.method,))
         other = make_estimate(state, settings, current.atlas, self._specimens).pose
-        return None if other is None else _difference(current.pose, other)
+        mine = current.pose
+        return None if other is None else apart(mine.origin, mine.axis, other.origin, other.axis)
 
     def judge(self, verdict: str, *, by: str = "", note: str = "") -> PoseCheck:
         """Keep a person's verdict on the estimate, ``accept`` or ``reject``, in the specimen.
@@ -188,8 +188,3 @@ class Estimating:
 
 def _without_joint(methods: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(method for method in methods if method != "jrmpc") or ("robust",)
-
-
-def _difference(one: CochleaPose, other: CochleaPose) -> tuple[float, float]:
-    distance = float(np.linalg.norm(one.origin - other.origin))
-    return distance, float(angle_between_deg(one.axis, other.axis))

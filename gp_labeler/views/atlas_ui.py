@@ -3,13 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from gp_labeler.views.prompts import Prompts
-from gp_labeler.workbench import Workbench
-
-if TYPE_CHECKING:
-    from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.ui_part import UiPart
 
 __all__ = ["AtlasUi"]
 
@@ -17,19 +12,8 @@ _ATLASES = "Atlases (*.json);;All files (*)"
 _LABELLED = "Labelled animals (*.mrk.json *.fcsv *.gpspecimen.json);;All files (*)"
 
 
-class AtlasUi:
+class AtlasUi(UiPart):
     """The part of `WindowUi` that concerns the atlas."""
-
-    _window: MainWindow
-    _desk: Workbench
-    prompts: Prompts
-
-    if TYPE_CHECKING:
-
-        @property
-        def _folder(self) -> str: ...
-
-        def _remember_folder(self, path: Path) -> None: ...
 
     def show_step(self, step: str) -> None:
         """Show the panel of a step of the rail."""

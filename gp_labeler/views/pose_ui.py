@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
@@ -19,12 +18,8 @@ from gp_labeler.session.pose_exports import FORMATS, InsertionPath
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.panels.physical_dialog import PhysicalDialog
 from gp_labeler.views.panels.tracker_dialog import TrackerDialog
-from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.report_file import report_of, reported_estimate, save_report
-from gp_labeler.workbench import Workbench
-
-if TYPE_CHECKING:
-    from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.ui_part import UiPart
 
 __all__ = ["PoseUi"]
 
@@ -34,19 +29,8 @@ _WHICH_AXES = "Which of its axes are x (modiolar axis, to the apex), y (to the r
 _PATHS = "Insertion path (*.csv *.txt);;All files (*)"
 
 
-class PoseUi:
+class PoseUi(UiPart):
     """The part of `WindowUi` that concerns the pose."""
-
-    _window: MainWindow
-    _desk: Workbench
-    prompts: Prompts
-
-    if TYPE_CHECKING:
-
-        @property
-        def _folder(self) -> str: ...
-
-        def _remember_folder(self, path: Path) -> None: ...
 
     def ask_open_touches(self) -> None:
         """Ask for a file of touches, and take them."""

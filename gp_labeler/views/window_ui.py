@@ -303,13 +303,6 @@ class WindowUi(AtlasUi, PoseUi):
         """Whether a person answers, in dialogs that show more than a question; scripts are asked in words."""
         return isinstance(self.prompts, Prompts)
 
-    @property
-    def _folder(self) -> str:
-        return self._window.memory.get("folder", str, str(Path.home()))  # type: ignore[no-any-return]
-
-    def _remember_folder(self, path: Path) -> None:
-        self._window.memory.set(folder=str(Path(path).absolute().parent))
-
     def _open_unsaved(self, path: Path, error: UnsavedEditsError) -> None:
         answer = self.prompts.choose(
             "Unsaved work was found", error.recovery.text, ["Recover these edits", "Open as saved"]

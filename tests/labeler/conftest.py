@@ -47,6 +47,19 @@ def make_window(qtbot, tmp_path) -> Iterator[Callable[..., object]]:
     assert left == []
 
 
+@pytest.fixture(scope="module")
+def one_window(qapp) -> Iterator[object]:
+    """One window for all tests of a file: to open a scan anew is quicker than to make a window."""
+    from gp_labeler.views.application import make_window as make
+
+    made = make(None, atlas=False)
+    made.ui.prompts = Answers()
+    made.resize(1100, 760)
+    made.show()
+    yield made
+    close(made)
+
+
 @pytest.fixture
 def window(qtbot, make_window, ball):
     """A window with the ball open and meshed."""

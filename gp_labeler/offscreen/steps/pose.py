@@ -10,7 +10,6 @@ import numpy as np
 from gp_core import PROBE, Atlas, CochleaPose, fit_atlas, load_specimens
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_core.frames import angle_between_deg
 from gp_core.landmarks.anatomy import modiolar_axis
 from gp_core.landmarks.features import Side
 from gp_labeler.offscreen.events import leave
@@ -19,6 +18,7 @@ from gp_labeler.offscreen.step import Step
 from gp_labeler.offscreen.steps.touching import Points, Touches, current_estimate
 from gp_labeler.scene.pose_data import PARTS
 from gp_labeler.session.estimate import Estimate as SideEstimate
+from gp_labeler.session.estimate import apart
 from gp_labeler.views.report_file import report_of, save_report
 
 __all__ = ["Estimate", "Estimated", "Overlay", "Report", "Verdict"]
@@ -49,7 +49,7 @@ class Estimated:
         if self.truth is None or placed is None:
             return self.estimate.errors()
         origin, axis = self.truth
-        return float(np.linalg.norm(placed.origin - origin)), float(angle_between_deg(placed.axis, axis))
+        return apart(placed.origin, placed.axis, origin, axis)
 
     def as_dict(self) -> dict[str, Any]:
         """Return a row of the report."""

@@ -8,26 +8,15 @@ from PySide6.QtCore import QPoint, QPointF, Qt
 from PySide6.QtGui import QWheelEvent
 from PySide6.QtTest import QTest
 from PySide6.QtWidgets import QApplication
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, Answers, close, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How
 from gp_labeler.session.view import CUTS
-from gp_labeler.views.application import make_window
 
 LEFT_BUTTON, NO_KEYS = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
-
-
-@pytest.fixture(scope="module")
-def one_window(qapp):
-    made = make_window(None, atlas=False)
-    made.ui.prompts = Answers()
-    made.resize(1100, 760)
-    made.show()
-    yield made
-    close(made)
 
 
 @pytest.fixture

@@ -6,14 +6,13 @@ import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, Answers, close, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How
 from gp_labeler.session.workflow import Active
-from gp_labeler.views.application import make_window
 
 THREE_LEFT = np.array([3, 0, 0])
 LEFT_BUTTON = Qt.MouseButton.LeftButton
@@ -34,17 +33,6 @@ def drag(view, start: QPoint, end: QPoint, button=LEFT_BUTTON, modifiers=Qt.Keyb
 def on_ball(*direction: float) -> np.ndarray:
     towards = np.array(direction, dtype=float)
     return MIDDLE + BALL_MM * towards / np.linalg.norm(towards)
-
-
-@pytest.fixture(scope="module")
-def one_window(qapp):
-    """One window for all tests of this file: to open a scan anew is quicker than to make a window."""
-    made = make_window(None, atlas=False)
-    made.ui.prompts = Answers()
-    made.resize(1100, 760)
-    made.show()
-    yield made
-    close(made)
 
 
 @pytest.fixture
