@@ -199,3 +199,12 @@ def test_in_the_step_pose_no_click_moves_a_landmark(desk, ball):
     assert desk.tool == "touch"
     desk.begin_labelling()
     assert desk.tool == "place"
+
+
+def test_a_feature_that_is_touched_again_is_done_again(desk, animal):
+    first = ORDER[0]
+    for code in ORDER[:3]:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    desk.pose.aim(first)
+    desk.pose.record(animal[first] + 0.1, TouchHow.TYPED)
+    assert desk.pose.target == ORDER[3], "it goes on with what is untouched"

@@ -110,11 +110,13 @@ def test_skull_features_tell_how_well_they_fit() -> None:
     animal = draw_animal(atlas, rng=rng).side("L")
     for code in PROBE:
         touching.record_touch(session, "L", code, animal[code])
-    for n, there in enumerate(rng.uniform(-20, 20, (5, 3)), start=1):
+    for n, there in enumerate(rng.uniform(-20, 20, (8, 3)), start=1):
         touching.mark_skull(session, f"S{n}", there)
-        touching.record_touch(session, "L", f"S{n}", there + 0.3 * rng.normal(size=3))
+        off = 8.0 if n == 7 else 0.0  # one that is wrong
+        touching.record_touch(session, "L", f"S{n}", there + 0.1 * rng.normal(size=3) + off)
     residuals = estimating.current.registered.fiducials.residuals_mm
     text = Page(PoseReport(session.state, estimating.current).html()).text
     for name in ("S1", "S5"):
         assert re.search(rf"{name} .{{0,60}} {residuals[name]:.2f} ", text)
+    assert re.findall(r"(S\d) suspect", text) == ["S7"]
     session.close(discard=True)
