@@ -6,6 +6,7 @@ Nothing here waits: whoever shows it calls `poll` 30 times a second while it is 
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,6 +20,7 @@ from gp_core.registration.pivot import PivotCalibration
 from gp_labeler.session.session import Session
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import (
+    Limits,
     LinkPhase,
     PivotCollector,
     PoseSender,
@@ -63,6 +65,7 @@ class TrackerDesk:
         self._desk = desk
         self._link: TrackerLink | None = None
         self._sender: PoseSender | None = None
+        self._limits = Limits()
         self._recorder = TouchRecorder(Probe())
         self._words = ""
         self._latest: Sample | None = None
@@ -98,8 +101,20 @@ class TrackerDesk:
     def connect(self, address: TrackerAddress) -> None:
         """Connect in the background, in place of the link there was."""
         self.disconnect()
-        self._link = TrackerLink(address)
+        self._link = TrackerLink(address, self._limits)
         self._link.open()
+        self.changed.emit()
+
+    @property
+    def may_stand_still(self) -> bool:
+        """Whether a marker may stand still to the last digit, as that of a device without noise does."""
+        return self._limits.frozen_s is None
+
+    def set_may_stand_still(self, may: bool) -> None:
+        """Believe a marker that stands still to the last digit, or not; from the next message on."""
+        self._limits = replace(self._limits, frozen_s=None if may else Limits().frozen_s)
+        if self._link is not None:
+            self._link.set_limits(self._limits)
         self.changed.emit()
 
     def disconnect(self) -> None:

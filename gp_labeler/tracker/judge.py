@@ -129,6 +129,12 @@ class Judge:
         self._waiting: deque[Sample] = deque()
         self._motion = _Motion(self.limits)
 
+    def set_limits(self, limits: Limits) -> None:
+        """Judge by other limits from now on; what is known of the devices stays."""
+        self.limits = self._probe.limits = self._motion.limits = limits
+        if self._reference is not None:
+            self._reference.limits = limits
+
     def take(self, messages: list[TrackerMessage], now: float) -> list[Sample]:
         """Judge messages in the order of arrival.
 
@@ -239,7 +245,7 @@ class _Motion:
     """Finds jumps: one that jumps back is passed over, another is believed once it has moved steadily."""
 
     def __init__(self, limits: Limits) -> None:
-        self._limits = limits
+        self.limits = limits
         self._before: Sample | None = None
         self._good: Sample | None = None
         self._since: float | None = None
@@ -253,7 +259,7 @@ class _Motion:
             self._since = None
         elif fast:
             self._since = sample.time
-        elif self._since is not None and sample.time - self._since >= self._limits.settle_s:
+        elif self._since is not None and sample.time - self._since >= self.limits.settle_s:
             self._since = None
         if self._since is not None:
             return replace(sample, fault=Fault.JUMP, detail=self._words(sample))
@@ -264,13 +270,13 @@ class _Motion:
         """Whether a second jump leads back to where the first one began."""
         if self._good is None:
             return False
-        seconds = min(sample.time - self._good.time, self._limits.settle_s)
+        seconds = min(sample.time - self._good.time, self.limits.settle_s)
         return not self._too_fast(self._good, sample, seconds)
 
     def _too_fast(self, before: Sample, after: Sample, seconds: float) -> bool:
         step = _step(before, after)
-        far = step.mm > max(self._limits.speed_mm_s * seconds, self._limits.noise_mm)
-        turned = step.degrees > max(self._limits.turn_deg_s * seconds, self._limits.noise_deg)
+        far = step.mm > max(self.limits.speed_mm_s * seconds, self.limits.noise_mm)
+        turned = step.degrees > max(self.limits.turn_deg_s * seconds, self.limits.noise_deg)
         return far or turned
 
     def _words(self, sample: Sample) -> str:

@@ -96,6 +96,11 @@ class TrackerLink:
         self.latest = None
         self.devices = {}
 
+    def set_limits(self, limits: Limits) -> None:
+        """Judge by other limits from now on, also after a reconnection."""
+        self.limits = limits
+        self._judge.set_limits(limits)
+
     @property
     def state(self) -> LinkState:
         """How it stood at the last poll."""

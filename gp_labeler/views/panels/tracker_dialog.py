@@ -31,6 +31,7 @@ from gp_labeler.workbench import Workbench
 __all__ = ["TrackerDialog"]
 
 _MEMORY = "tracker"
+_STILL = "may stand still"
 _SEND_PORT = 18945
 _HINTS: Mapping[str, tuple[str, str]] = {
     "host": ("Host", "127.0.0.1, or the name of the computer that runs PLUS or Slicer"),
@@ -116,6 +117,7 @@ class TrackerDialog(QDialog):
         except GpError as error:
             self._complain(error)
             return
+        tracker.set_may_stand_still(self.still.isChecked())
         self._remember()
         self._complain(None)
         tracker.connect(address)
@@ -149,6 +151,12 @@ class TrackerDialog(QDialog):
             return
         self._remember()
         self._complain(None)
+
+    def _use_still(self, may: bool) -> None:
+        """Believe what stands still, at once where the probe is tracked; otherwise connecting does."""
+        if self._desk.tracker.on:
+            self._desk.tracker.set_may_stand_still(may)
+            self._remember()
 
     def _toggle_pivot(self) -> None:
         tracker = self._desk.tracker
@@ -191,15 +199,19 @@ class TrackerDialog(QDialog):
             "button": address.button or "",
             "tip": "0 0 0",
         }
+        still = self._desk.tracker.may_stand_still
         if self._desk.tracker.address is None:
             known |= self._memory.fields(_MEMORY)
+            still = known.get(_STILL) is True
+        self.still.setChecked(still)
         for name, field in self.fields.items():
             field.setText(str(known.get(name, "")))
         if self._desk.tracker.probe.tip_offset.any():
             self.fields["tip"].setText(_tip_text(self._desk.tracker.probe.tip_offset))
 
     def _remember(self) -> None:
-        self._memory.set(**{_MEMORY: {name: field.text() for name, field in self.fields.items()}})
+        typed: dict[str, Any] = {name: field.text() for name, field in self.fields.items()}
+        self._memory.set(**{_MEMORY: typed | {_STILL: self.still.isChecked()}})
 
     # Widgets
 
@@ -220,6 +232,11 @@ class TrackerDialog(QDialog):
         self.send_port = QLineEdit(str(_SEND_PORT))
         self.send_port.setAccessibleName("Port to send the pose from")
         self.send_port.setFixedWidth(72)
+        self.still = QCheckBox("Readings may stand still: a robot arm or a simulation")
+        self.still.setToolTip(
+            "For a device without noise, whose readings repeat to the last digit. Leave it off for a camera: "
+            "some\ngo on telling the last position of a covered marker, which would then be recorded."
+        )
         self.audible = QCheckBox("A sound for every touch: one recorded, two refused")
 
     def _make_buttons(self) -> None:
@@ -228,6 +245,7 @@ class TrackerDialog(QDialog):
         for button in (self.connect_button, self.finish):
             button.setProperty("role", "primary")
         self.connect_button.clicked.connect(self._toggle_link)
+        self.still.clicked.connect(self._use_still)
         self.fields["tip"].editingFinished.connect(self._use_tip)
         self.pivot.clicked.connect(self._toggle_pivot)
         self.finish.clicked.connect(self._finish_pivot)
@@ -257,6 +275,7 @@ class TrackerDialog(QDialog):
         for name in ("host", "port", "probe", "reference", "button"):
             form.addRow(_HINTS[name][0], self.fields[name])
         card.add(form)
+        card.add(self.still)
         row = QHBoxLayout()
         row.setSpacing(12)
         row.addWidget(self.connect_button)

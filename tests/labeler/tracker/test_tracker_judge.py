@@ -108,6 +108,20 @@ def test_a_marker_still_to_the_last_digit_is_frozen() -> None:
     assert {s.fault for s in robot.take(still, 1.0)} == {Fault.NONE}
 
 
+def test_other_limits_count_from_the_next_message_on() -> None:
+    judge = Judge("ProbeToTracker", "Reference")
+    still = [
+        message(pose(1), k * _STEP, device=name)
+        for k in range(60)
+        for name in ("Reference", "ProbeToTracker")
+    ]
+    assert judge.take(still[:60], 1.0)[-1].fault is Fault.FROZEN
+    judge.set_limits(Limits(frozen_s=None))
+    assert {s.fault for s in judge.take(still[60:90], 1.5)} == {Fault.NONE}
+    judge.set_limits(Limits())
+    assert {s.fault for s in judge.take(still[90:], 2.0)} == {Fault.FROZEN}
+
+
 def test_one_wrong_position_is_passed_over() -> None:
     faults = _stream(Judge("ProbeToTracker"), [0.0] * 20 + [40.0] + [0.0] * 20)
     assert faults[20] is Fault.JUMP

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt
+from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QWidget
 from tracker_cases import POINTS, TIP, SimulatorProcess
 
@@ -85,6 +85,34 @@ def test_the_dialog_connects_remembers_and_finds_the_tip(qtbot, desk, top, simul
     assert again.fields["port"].text() == str(simulator.port)
     again.close()
     dialog.close()
+
+
+def test_a_device_without_noise_is_believed_where_a_person_says_so(qtbot, desk, top, simulator):
+    memory = WindowState()
+    dialog = TrackerDialog(desk, memory, top)
+    dialog.show()
+    assert not dialog.still.isChecked()
+    typed(qtbot, dialog.fields["port"], str(simulator.port))
+    qtbot.mouseClick(dialog.connect_button, Qt.MouseButton.LeftButton)
+    simulator.do("go MN 0.2")
+    simulator.tell("stale 60")
+    going(qtbot, desk, lambda: "repeats its last position" in dialog.words.text())
+    qtbot.mouseClick(dialog.still, Qt.MouseButton.LeftButton, pos=QPoint(8, dialog.still.height() // 2))
+    going(qtbot, desk, lambda: desk.tracker.visible)
+    desk.tracker.refused.connect(lambda _: desk.tracker.press())
+    desk.tracker.press()
+    going(qtbot, desk, lambda: bool(desk.session.state.touches))
+    (touch,) = desk.session.state.touches.values()
+    assert touch.spread_mm < 1e-9
+    simulator.tell("stale 0")
+    dialog.close()
+    desk.tracker.disconnect()
+    desk.tracker.set_may_stand_still(False)
+    again = TrackerDialog(desk, memory, top)
+    assert again.still.isChecked(), "remembered with the device"
+    qtbot.mouseClick(again.connect_button, Qt.MouseButton.LeftButton)
+    assert desk.tracker.may_stand_still
+    again.close()
 
 
 def test_a_tip_typed_while_the_probe_is_tracked_counts_at_once(qtbot, desk, top, simulator):
