@@ -51,6 +51,14 @@ def _set_method(methods: tuple[str, ...]) -> Run:
     return lambda desk, ui: desk.pose.choose(methods=methods)
 
 
+def _window_is_touched(desk: Workbench) -> bool:
+    return desk.pose.estimating.settings.round_window == "touched"
+
+
+def _toggle_window(desk: Workbench, ui: Ui) -> None:
+    desk.pose.choose(round_window="expected" if _window_is_touched(desk) else "touched")
+
+
 def _toggle_touching(desk: Workbench, ui: Ui) -> None:
     desk.set_tool("look" if desk.tool == "touch" else "touch")
 
@@ -87,6 +95,9 @@ def pose_rows() -> Iterator[Action]:
               group="estimate")
     for name, title, methods in _METHODS:
         yield row(name, title, (), _set_method(methods), checked=_has_method(methods), group="estimate")
+    yield row("touched_window", "Robot's y to the touched round window", (), _toggle_window,
+              checked=_window_is_touched, group="estimate",
+              hint="Unticked: to the round window that the atlas expects, better where touches are rough")
     yield row("overlay", "Estimate over bone and slices", ("Y",), _toggle_overlay,
               checked=lambda d: d.pose.overlay.visible, group="look", icon="eye")
     yield row("along_axis", "Look along the axis", ("A",), lambda d, ui: ui.look_along_axis(), _in_scan,

@@ -233,8 +233,9 @@ class PoseDesk:
 
     def export(self, path: str | PathLike[str]) -> Path:
         """Write the pose in the format that the file's name asks for; see `pose_exports.save_pose`."""
-        file = save_pose(self._pose(), path)
-        self._desk.say(f"Wrote {file.name}")
+        pose = self._pose()
+        file = save_pose(pose, path)
+        self._desk.say(f"Wrote {file.name}, y to the {pose.round_window} round window")
         self._desk.wrote.emit("pose", file)
         return file
 

@@ -21,9 +21,11 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import check_plausible_size, write_text
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
-__all__ = ["METHODS", "CochleaPose", "estimate_pose"]
+__all__ = ["METHODS", "ROUND_WINDOWS", "CochleaPose", "estimate_pose"]
 
 METHODS = ("robust", "jrmpc")
+ROUND_WINDOWS = ("touched", "expected")
+"""Whose round window y of the cochlea frame points to: the touched one, or the one of the fitted atlas."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,8 @@ class CochleaPose:
         Scale of the touch errors that was found or given, mm a coordinate.
     T_touches_atlas : RigidTransform or None
         The registered atlas, for a left side; for a right side, from the atlas mirrored in x.
+    round_window : str
+        Of which round window the middle is: ``touched`` or ``expected``.
     """
 
     side: Side
@@ -64,6 +68,7 @@ class CochleaPose:
     warnings: tuple[str, ...] = ()
     probe_noise: float | None = None
     T_touches_atlas: RigidTransform | None = field(default=None, repr=False)
+    round_window: str = "expected"
 
     @property
     def origin(self) -> FloatArray:
@@ -106,6 +111,7 @@ class CochleaPose:
             "cone_95_deg": float(np.degrees(self.cone_95)),
             "residuals_mm": self.residuals,
             "probe_noise_mm": self.probe_noise,
+            "round_window": self.round_window,
             "suspect": list(self.suspects),
             "warnings": list(self.warnings),
             "registered_atlas": None
@@ -138,6 +144,7 @@ def estimate_pose(
     method: str = "robust",
     specimens: Sequence[Specimen] | None = None,
     probe_noise: float | None = None,
+    round_window: str = "touched",
 ) -> CochleaPose:
     """Estimate the pose of a cochlea from a few touched features, with no CT.
 
@@ -155,6 +162,10 @@ def estimate_pose(
         Labelled animals.
     probe_noise : float, optional
         Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+    round_window : {"touched", "expected"}
+        What y of the frame points to: the middle of the touched RWA and RWP, as the paper's robot has it,
+        where both are touched and fit; or that of the fitted atlas, nearer the truth where touches are rough.
+        Origin and axis are the same.
 
     Returns
     -------
@@ -174,6 +185,7 @@ def estimate_pose(
     True
     """
     check_option(method, "method", METHODS)
+    check_option(round_window, "round window", ROUND_WINDOWS)
     landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
@@ -181,12 +193,16 @@ def estimate_pose(
     if method == "jrmpc":
         from gp_core.atlas.jrmpc_pose import estimate_jrmpc  # it makes the result that is defined here
 
-        return estimate_jrmpc(landmarks, specimens)
-    from gp_core.atlas.robust_pose import estimate_robust
+        pose = estimate_jrmpc(landmarks, specimens)
+    else:
+        from gp_core.atlas.robust_pose import estimate_robust
 
-    if atlas is None:
-        atlas = _default_atlas(specimens)
-    return estimate_robust(landmarks, atlas, probe_noise=probe_noise)
+        pose = estimate_robust(landmarks, atlas or _default_atlas(specimens), probe_noise=probe_noise)
+    if round_window == "expected":
+        return pose
+    from gp_core.atlas.touched_window import towards_touched_window
+
+    return towards_touched_window(pose, landmarks)
 
 
 def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.atlas.pose import METHODS, CochleaPose
+from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError, GpError
 from gp_core.frames import FRAMES, RigidTransform
@@ -87,6 +87,9 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
     covariance = _numbers(content, "covariance", (6, 6))
     if not np.array_equal(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -_AGREE:
         raise GpError("its covariance is none")
+    round_window = content.get("round_window", "expected")
+    if round_window not in ROUND_WINDOWS:
+        raise GpError(f"unknown round window {shown(round_window)}")
     registered = content.get("registered_atlas")
     return CochleaPose(
         side=Side.parse(content["side"]),
@@ -101,6 +104,7 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         T_touches_atlas=None
         if registered is None
         else RigidTransform(_numbers(content, "registered_atlas", (4, 4)), frame, "atlas"),
+        round_window=round_window,
     )
 
 

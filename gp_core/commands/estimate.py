@@ -11,7 +11,7 @@ import numpy as np
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.insertion import UNITS, carry_path, read_path, write_path
 from gp_core.atlas.next_touch import MM_A_DEGREE, TouchGain, gains
-from gp_core.atlas.pose import METHODS, CochleaPose, estimate_pose
+from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose, estimate_pose
 from gp_core.checks import FloatArray
 from gp_core.commands.options import Subparsers, add_command, add_json, blaming, read_atlas, save_json, say
 from gp_core.errors import GpError
@@ -49,6 +49,13 @@ def add(commands: Subparsers) -> None:
         type=float,
         metavar="MM",
         help="error of an ordinary touch; default: found from the touches",
+    )
+    parser.add_argument(
+        "--round-window",
+        choices=ROUND_WINDOWS,
+        default="touched",
+        help="what y of the written frame points to: the middle of the touched RWA and RWP, where both fit "
+        "(default), or of the fitted atlas",
     )
     add_json(parser)
     parser.add_argument("--tfm", metavar="FILE", help="write the pose as an ITK / Slicer transform here")
@@ -95,7 +102,13 @@ def run(args: argparse.Namespace) -> int:
     own_atlas = "" if args.atlas == ["published"] else f" with atlas {' '.join(args.atlas)}"
     with blaming(args.touches + own_atlas):
         pose = estimate_pose(
-            touches, args.side, atlas, method=args.method, specimens=specimens, probe_noise=args.probe_noise
+            touches,
+            args.side,
+            atlas,
+            method=args.method,
+            specimens=specimens,
+            probe_noise=args.probe_noise,
+            round_window=args.round_window,
         )
         next_touches = () if atlas is None else gains(touches, atlas, probe_noise=args.probe_noise)
     if path is not None:

@@ -44,12 +44,15 @@ class EstimateSettings:
     registration : str
         By what touches are laid into the scan: ``features`` labelled and touched, ``skull`` features, or
         ``auto``, the skull's where there are enough.
+    round_window : str
+        Which round window y of the cochlea frame points to: ``touched`` or ``expected``.
     """
 
     side: Side = Side.LEFT
     methods: tuple[str, ...] = ("robust",)
     probe_noise: float | None = None
     registration: str = "auto"
+    round_window: str = "touched"
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +268,15 @@ def _pose(
     noise = settings.probe_noise if method == "robust" else None
     probe = replace(touches, extra={})
     animals = specimens if method == "jrmpc" else None
-    return estimate_pose(probe, settings.side, atlas, method=method, specimens=animals, probe_noise=noise)
+    return estimate_pose(
+        probe,
+        settings.side,
+        atlas,
+        method=method,
+        specimens=animals,
+        probe_noise=noise,
+        round_window=settings.round_window,
+    )
 
 
 def _check_joint(touches: LandmarkSet, specimens: Sequence[Specimen]) -> None:

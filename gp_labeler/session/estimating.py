@@ -9,7 +9,7 @@ from typing import Any
 from psygnal import Signal
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.pose import METHODS
+from gp_core.atlas.pose import METHODS, ROUND_WINDOWS
 from gp_core.checks import check_option
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -87,6 +87,7 @@ class Estimating:
         for method in settings.methods:
             check_option(method, "method", METHODS)
         check_option(settings.registration, "registration", REGISTRATIONS)
+        check_option(settings.round_window, "round window", ROUND_WINDOWS)
         if settings != self._settings:
             self._settings = settings
             self.changed.emit()

@@ -158,7 +158,14 @@ class Recorder(QObject):
         """Return the steps that lead to the estimate as it is set up here, and write it into files."""
         pose = self._window.workbench.pose
         settings, side = pose.estimating.settings, pose.side.value
-        how = step("estimate", side=side, method=list(settings.methods), probe_noise=settings.probe_noise)
+        window = None if settings.round_window == "touched" else settings.round_window
+        how = step(
+            "estimate",
+            side=side,
+            method=list(settings.methods),
+            probe_noise=settings.probe_noise,
+            round_window=window,
+        )
         is_fitted = pose.estimate is not None and pose.estimate.registered is not None
         register = [step("register", side=side, by=settings.registration)] if is_fitted else []
         return [*register, {**how, "path": files}]

@@ -94,6 +94,8 @@ class Estimate(Step):
         ``robust``, ``jrmpc`` or both; the first is the one that is told and written.
     probe_noise : float, optional
         Ordinary error of a touch, mm a coordinate; by default found from the touches.
+    round_window : str
+        What y of the cochlea frame points to: the ``touched`` round window, or the ``expected`` one.
     path : text or texts
         Where the pose is written: .json, .tfm, .csv (4 x 4) or .mrk.json.
     """
@@ -109,6 +111,7 @@ class Estimate(Step):
     specimens: tuple[str, ...] = ()
     method: tuple[str, ...] = ("robust",)
     probe_noise: float | None = None
+    round_window: str = "touched"
     path: tuple[str, ...] = ("pose.json",)
 
     def run(self, rig: Rig) -> str:  # noqa: D102
@@ -117,7 +120,12 @@ class Estimate(Step):
         points = self.touches if self.touches is not None or there else "simulated"
         if points is not None:
             Touches(self.side, points, features=self.features, noise=self.noise, seed=self.seed).run(rig)
-        rig.desk.pose.choose(side=self.side, methods=self.method, probe_noise=self.probe_noise)
+        rig.desk.pose.choose(
+            side=self.side,
+            methods=self.method,
+            probe_noise=self.probe_noise,
+            round_window=self.round_window,
+        )
         estimate = current_estimate(rig, self.side)
         for method in self.method:
             if method not in estimate.poses:

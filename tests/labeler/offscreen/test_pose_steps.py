@@ -132,6 +132,17 @@ def test_real_touches_give_what_the_core_gives(tmp_path) -> None:
     assert report.poses[0]["error_mm"] is None
 
 
+@pytest.mark.parametrize("window", ["touched", "expected"])
+def test_the_matrix_for_a_robot_turns_y_to_the_window_that_was_chosen(tmp_path, window) -> None:
+    points = touched(PROBE, noise=0.15, seed=4)
+    step = {"do": "estimate", "side": "L", "touches": points, "round_window": window, "path": "robot.csv"}
+    assert run(tmp_path, step).ok
+    matrix = np.loadtxt(tmp_path / "out" / "robot.csv", delimiter=",")
+    to_window = np.mean([points["RWA"], points["RWP"]], axis=0) - matrix[:3, 3]
+    off = abs(np.degrees(np.arctan2(to_window @ matrix[:3, 2], to_window @ matrix[:3, 1])))
+    assert off < 1e-6 if window == "touched" else 1 < off < 10
+
+
 @pytest.mark.slow
 def test_both_methods_side_by_side(tmp_path) -> None:
     from gp_core import write_markups

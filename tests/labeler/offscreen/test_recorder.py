@@ -76,7 +76,9 @@ NOT_WRITTEN = {
     "pose.physical": "tells only: its result is no part of the specimen",
     **dict.fromkeys(("atlas.show", "atlas.try"), "tells only: nothing of it is kept"),
     "atlas.save": ONLY_FILE,
-    **dict.fromkeys(("pose.robust", "pose.jrmpc", "pose.both"), "written with a verdict"),
+    **dict.fromkeys(
+        ("pose.robust", "pose.jrmpc", "pose.both", "pose.touched_window"), "written with a verdict"
+    ),
 }
 """Why a command leaves no step."""
 

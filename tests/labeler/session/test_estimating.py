@@ -201,6 +201,13 @@ def test_a_file_of_skull_features_is_taken_and_one_without_is_refused(session, a
         touching.load_skull(session, file)
 
 
+def test_only_a_touched_or_an_expected_window_can_be_chosen(estimating):
+    estimating.choose(round_window="expected")
+    with pytest.raises(GpError, match="round window must be one of touched, expected"):
+        estimating.choose(round_window="seen")
+    assert estimating.settings.round_window == "expected"
+
+
 def test_what_lies_inside_the_bone_cannot_be_touched(session):
     with pytest.raises(GpError, match="CA is inside the bone"):
         touching.record_touch(session, "L", "CA", (0, 0, 0))

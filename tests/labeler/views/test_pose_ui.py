@@ -81,3 +81,20 @@ def test_a_file_named_for_the_other_side_is_told_and_moved_by_a_click(qtbot, mak
     qtbot.mouseClick(panel.result.other_side, Qt.MouseButton.LeftButton)
     assert window.workbench.pose.side is Side.RIGHT
     assert not any("By its name" in text for text in told(panel))
+
+
+def test_y_of_the_robot_is_chosen_in_the_menu_and_told_with_the_file(make_window, tmp_path):
+    window = make_window()
+    rng = np.random.default_rng(4)
+    touch(window, {code: ANIMAL[code] + 0.15 * rng.normal(size=3) for code in PROBE})
+    file, command = tmp_path / "robot.csv", window.commands.actions["pose.touched_window"]
+    matrices, said = [], []
+    window.workbench.message.connect(lambda text, level: said.append(text))
+    for of in ("touched", "expected"):
+        assert command.isChecked() is (of == "touched")
+        window.workbench.pose.export(file)
+        assert said[-1] == f"Wrote robot.csv, y to the {of} round window"
+        matrices.append(np.loadtxt(file, delimiter=","))
+        window.commands.run("pose.touched_window")
+    np.testing.assert_allclose(matrices[0][:3, [0, 3]], matrices[1][:3, [0, 3]], atol=1e-12)
+    assert np.abs(matrices[0] - matrices[1]).max() > 5e-3

@@ -1,0 +1,110 @@
+"""The frame a robot reads: y to the round window as it was touched."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from atlas_cases import draw_side, draw_specimens, random_pose
+from scipy.spatial.transform import Rotation
+
+from gp_core import PROBE, Atlas, CochleaPose, LandmarkSet, Side, estimate_pose
+from gp_core.atlas.pose_files import read_pose
+from gp_core.cli import main
+from gp_core.errors import GpError
+from gp_core.landmarks.anatomy import axis_frame
+
+ATLAS = Atlas.published()
+
+
+def _animal(seed: int, side: Side = Side.LEFT) -> LandmarkSet:
+    rng = np.random.default_rng(seed)
+    return draw_side(ATLAS, rng, side).moved(random_pose(rng))
+
+
+def _touched(animal: LandmarkSet, seed: int, noise: float = 0.15) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    return {code: p + noise * rng.normal(size=3) for code, p in animal.as_mapping(PROBE).items()}
+
+
+def _check_letter(pose: CochleaPose, touches: dict[str, np.ndarray]) -> None:
+    x, y, z = pose.transform[:3, :3].T
+    middle = (touches["RWA"] + touches["RWP"]) / 2
+    to_window = middle - pose.origin
+    np.testing.assert_allclose(np.cross(x, y), z, atol=1e-12)
+    np.testing.assert_allclose(x, pose.axis, atol=1e-12)
+    assert to_window @ z == pytest.approx(0, abs=1e-9)
+    assert to_window @ y > 0
+
+
+@pytest.mark.parametrize("side", Side)
+@pytest.mark.parametrize("method", ["robust", "jrmpc"])
+def test_y_points_to_the_touched_middle_and_nothing_else_changes(side: Side, method: str) -> None:
+    animals = draw_specimens(ATLAS, 4, np.random.default_rng(1))
+    touches = _touched(_animal(2, side), 3)
+    pose = estimate_pose(touches, side, ATLAS, method=method, specimens=animals)
+    other = estimate_pose(touches, side, ATLAS, method=method, specimens=animals, round_window="expected")
+    assert (pose.round_window, other.round_window) == ("touched", "expected")
+    _check_letter(pose, touches)
+    np.testing.assert_allclose(pose.origin, other.origin, atol=1e-12)
+    np.testing.assert_allclose(pose.axis, other.axis, atol=1e-12)
+    assert pose.radius_95 == pytest.approx(other.radius_95, rel=1e-9)
+    assert pose.cone_95 == pytest.approx(other.cone_95, rel=1e-9)
+    assert abs(other.transform[:3, 1] @ pose.transform[:3, 2]) > 1e-4  # else this test says nothing
+
+
+def test_a_window_not_touched_or_mistouched_is_the_expected_one() -> None:
+    touches = _touched(_animal(4), 5, noise=0.05)
+    few = {code: p for code, p in touches.items() if code != "RWP"}
+    assert estimate_pose(few, "L", ATLAS).round_window == "expected"
+    off = {**touches, "RWA": touches["RWA"] + (0.0, 4.0, 0.0)}
+    pose = estimate_pose(off, "L", ATLAS)
+    assert pose.suspects == ("RWA",)
+    assert pose.round_window == "expected"
+
+
+def test_the_turn_is_at_least_as_sure_as_it_says() -> None:
+    squared = []
+    for seed in range(120):
+        animal = _animal(seed, side := Side.LEFT if seed % 2 else Side.RIGHT)
+        pose = estimate_pose(_touched(animal, seed + 1000), side, ATLAS, probe_noise=0.15)
+        if pose.round_window == "expected":
+            continue
+        co, ca, rwa, rwp = (animal[code] for code in ("CO", "CA", "RWA", "RWP"))
+        truth = axis_frame(co, ca - co, (rwa + rwp) / 2 - co, dst="tracker", src="cochlea").rotation
+        error = Rotation.from_matrix(truth @ pose.transform[:3, :3].T).as_rotvec()
+        variance = pose.axis @ pose.covariance[3:, 3:] @ pose.axis
+        squared.append((error @ pose.axis) ** 2 / variance)
+    assert len(squared) > 100
+    assert 0.5 < np.mean(squared) < 1.0  # 0.67 in 400 animals
+
+
+def test_the_choice_is_kept_in_the_file_and_older_files_are_read(tmp_path: Path) -> None:
+    pose = estimate_pose(_touched(_animal(6), 7), "L", ATLAS)
+    file = tmp_path / "pose.json"
+    pose.save(file)
+    assert read_pose(file).as_dict() == pose.as_dict()
+    content = json.loads(file.read_text())
+    del content["round_window"]
+    file.write_text(json.dumps(content))
+    assert read_pose(file).round_window == "expected"
+    file.write_text(json.dumps({**content, "round_window": "open"}))
+    with pytest.raises(GpError, match="unknown round window 'open'"):
+        read_pose(file)
+
+
+def test_the_shell_has_the_choice_too(tmp_path: Path) -> None:
+    touches = _touched(_animal(8), 9)
+    file, csv = tmp_path / "touches.csv", tmp_path / "pose.csv"
+    file.write_text("name,x,y,z\n" + "".join(f"{c},{p[0]},{p[1]},{p[2]}\n" for c, p in touches.items()))
+    for choice in ("touched", "expected"):
+        assert main(["estimate", str(file), "--side", "L", "--csv", str(csv), "--round-window", choice]) == 0
+        wanted = estimate_pose(touches, "L", ATLAS, round_window=choice)
+        np.testing.assert_allclose(np.loadtxt(csv, delimiter=","), wanted.transform, atol=1e-9)
+
+
+def test_another_word_is_refused() -> None:
+    with pytest.raises(GpError, match="round window must be one of touched, expected, got 'seen'"):
+        estimate_pose(_touched(_animal(1), 1), "L", ATLAS, round_window="seen")
