@@ -6,6 +6,7 @@ thread; results of long work come back through the dispatcher it was given.
 
 from __future__ import annotations
 
+import os
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -84,6 +85,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self._author = author
         self._last: tuple[Side, str] | None = None
         self._abandoned: Session | None = None
+        self._copied: str | None = None  # of what this is a copy
         super().__init__(atlas)
         self.session: Session = new_session(directory, predict=self._predict, author=author)
         self._follow(self.session)
@@ -106,9 +108,11 @@ class Workbench(AtlasDesk, BoneDesk):
         return self.in_use and self.session.state.volume is None
 
     @property
-    def title(self) -> str:
-        """Name of the specimen, with a star while it has unsaved edits."""
-        return self.session.state.specimen + (" *" if self.session.dirty else "")
+    def place(self) -> str:
+        """Where the specimen is kept, which tells two of one name apart; empty where it was never saved."""
+        if self.session.path is None:
+            return "" if self._copied is None else f"copy of {self._copied}"
+        return _place(self.session.path, self.session.state.specimen)
 
     # Opening
 
@@ -138,7 +142,8 @@ class Workbench(AtlasDesk, BoneDesk):
             path, self.directory, unsaved=unsaved, as_copy=as_copy, predict=self._predict, author=self._author
         )
         self._remember(path)
-        self._replace(session)
+        copied = _place(Path(path).absolute(), session.state.specimen) if as_copy else None
+        self._replace(session, copied=copied)
 
     def recover(self, recovery: Recovery) -> None:
         """Go on where a killed program stopped."""
@@ -274,12 +279,13 @@ class Workbench(AtlasDesk, BoneDesk):
         if volume.path is not None:
             self._remember(volume.path)
 
-    def _replace(self, session: Session) -> None:
+    def _replace(self, session: Session, *, copied: str | None = None) -> None:
         """Close one session and take another; the old one's unsaved edits stay in its journal."""
         self._unfollow()
         old, self.session = self.session, session
         old.close(discard=not old.dirty or old is self._abandoned)
         self._abandoned = None
+        self._copied = copied
         self.truth = None
         self.drag = self._last = None
         self._bone.forget()
@@ -339,6 +345,14 @@ class Workbench(AtlasDesk, BoneDesk):
 
     def _on_failed(self, task: Task[Any]) -> None:
         self.say(task.message, "error")
+
+
+def _place(file: Path, specimen: str) -> str:
+    """Return where a specimen file is, without what its name says already."""
+    shown = file.with_name(file.name.removesuffix(SUFFIX))
+    shown = shown.parent if shown.name == specimen else shown
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111 - which has an answer where nobody has a home
+    return str("~" / shown.relative_to(home)) if shown.is_relative_to(home) else str(shown)
 
 
 def _kept(state: Any) -> dict[str, Any]:

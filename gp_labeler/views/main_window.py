@@ -194,7 +194,10 @@ class MainWindow(QMainWindow):
         follow(self, desk.session_replaced, self._show_page)
         follow(self, desk.import_asked, self._on_import_asked)
         follow(self, desk.scan_differs, self._on_scan_differs)
-        for signal in (desk.session_replaced, desk.details_changed, desk.dirty_changed, desk.touches_changed):
+        for signal in (
+            *(desk.session_replaced, desk.details_changed, desk.dirty_changed, desk.touches_changed),
+            desk.saved,
+        ):
             follow(self, signal, self._show_title)
 
     def _show_page(self, *_: object) -> None:
@@ -231,9 +234,9 @@ class MainWindow(QMainWindow):
         self.ui.take_other_scan(error, volume)  # type: ignore[arg-type]
 
     def _show_title(self, *_: object) -> None:
-        session = self.workbench.session
-        name = session.state.specimen if self.workbench.in_use else ""
-        self.setWindowTitle(f"{name}[*] – gp-labeler" if name else "gp-labeler[*]")  # noqa: RUF001
+        desk, session = self.workbench, self.workbench.session
+        named = (session.state.specimen, desk.place, "gp-labeler") if desk.in_use else ("gp-labeler",)
+        self.setWindowTitle(" – ".join((f"{named[0]}[*]", *filter(None, named[1:]))))  # noqa: RUF001
         self.setWindowModified(session.dirty)
 
     # What is remembered

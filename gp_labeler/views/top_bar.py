@@ -66,9 +66,11 @@ class TopBar(QWidget):
             "" if volume is None else f"{size_text(volume.size)}  ·  {spacing_text(volume.spacing)}  ·  LPS"
         )
         self.about.setText(about)
-        set_role(self.saved, "warning" if session.dirty else "good")
-        known = session.path is not None
-        self.saved.setText("● not saved" if session.dirty else "● saved" if known else "")
+        place = self._desk.place if self._desk.in_use else ""
+        self.name.setToolTip(place)
+        set_role(self.saved, "warning" if session.dirty or session.path is None else "good")
+        kept = "● saved" if session.path is not None else "● a copy" if place else ""
+        self.saved.setText("● not saved" if session.dirty else kept)
         self.saved.setToolTip("Every edit is kept in a journal at once; Ctrl+S writes the specimen file")
         for button, id in self._working:
             is_edit = id.startswith("edit.") and self._desk.in_use

@@ -167,6 +167,21 @@ def test_a_specimen_finds_its_scan(desk, ball_file, tmp_path) -> None:
     assert "CA" in desk.session.landmarks("L")
 
 
+def test_where_a_specimen_is_kept_tells_two_of_one_name_apart(desk, ball, tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("USERPROFILE", str(tmp_path))
+    desk.open_volume(ball)
+    assert desk.place == ""
+    for name, place in (("ball", "~"), ("study/ball", "~/study"), ("study/ball 2", "~/study/ball 2")):
+        (tmp_path / "study").mkdir(exist_ok=True)
+        saved = desk.session.save(tmp_path / name)
+        assert desk.place == str(Path(place))
+    desk.open_specimen(saved, as_copy=True)
+    assert desk.place == f"copy of {Path('~/study/ball 2')}"
+    desk.open_volume(ball)
+    assert desk.place == ""
+
+
 def test_a_scan_that_moved_is_named_and_found_again(desk, ball_file, tmp_path) -> None:
     desk.open(ball_file)
     desk.wait()

@@ -26,6 +26,7 @@ from gp_labeler.session import labelling
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.views.application import make_window as make_plain
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+from gp_labeler.views.top_bar import TopBar
 
 
 def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbot) -> None:
@@ -203,6 +204,10 @@ def test_a_window_killed_in_the_middle_loses_nothing(make_window, tmp_path) -> N
     assert session.undo_text == "place OS left"
 
 
+def _kept(window) -> str:
+    return window.findChild(TopBar).saved.text()
+
+
 def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tmp_path) -> None:
     saved = window.workbench.session.save(tmp_path / "one")
     other = make_window()
@@ -213,6 +218,14 @@ def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tm
     other.ui.open_path(saved)
     assert other.workbench.session.path is None
     assert other.workbench.session.state.specimen == "ball"
+    titles = [each.windowTitle().replace("[*]", "") for each in (window, other)]
+    original = tmp_path / "one"
+    assert titles == [f"ball – {original} – gp-labeler", f"ball – copy of {original} – gp-labeler"]  # noqa: RUF001
+    assert _kept(other) == "● a copy"
+    other.ui.prompts.files = [tmp_path / "ball"]
+    other.commands.run("file.save_as")
+    assert other.windowTitle().replace("[*]", "") == f"ball – {tmp_path} – gp-labeler"  # noqa: RUF001
+    assert _kept(other) == "● saved"
 
 
 def test_landmarks_are_exported_and_imported(window, make_window, tmp_path) -> None:
