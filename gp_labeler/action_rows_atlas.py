@@ -19,7 +19,7 @@ def _is_loaded(desk: Workbench) -> bool:
 
 
 def _is_own(desk: Workbench) -> bool:
-    return not desk.is_published_atlas
+    return not desk.is_published_atlas or bool(desk.atlas_problem)  # then another one was chosen
 
 
 def _can_try(desk: Workbench) -> bool:

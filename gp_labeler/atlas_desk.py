@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from functools import partial
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.shape import predict
@@ -18,14 +19,17 @@ from gp_labeler.atlas_work import (
     FitAtlas,
     FittedAtlas,
     ReadAtlas,
+    RecallAtlas,
+    Recalled,
     RefitAtlas,
     Trial,
     TryAtlas,
 )
 from gp_labeler.desk_signals import DeskSignals
 from gp_labeler.session.animals import Animals
+from gp_labeler.session.atlas_memory import AtlasMemory, AtlasSource
 from gp_labeler.session.ghosts import Departure, Predict
-from gp_labeler.session.jobs import Jobs
+from gp_labeler.session.jobs import Jobs, Task
 from gp_labeler.session.session import Session
 from gp_labeler.work import LoadAtlas
 
@@ -45,15 +49,18 @@ class AtlasDesk(DeskSignals):
 
     jobs: Jobs
     session: Session
+    atlas_memory: AtlasMemory | None
 
     def __init__(self, atlas: Atlas | None = None) -> None:
         super().__init__()
         self._atlas = atlas
         self._atlas_specimens: tuple[Specimen, ...] = ()
         self.atlas_file: Path | None = None
+        self.atlas_problem = ""  # why the one chosen last is not in use
         self.animals: Animals | None = None
         self.trial: Trial | None = None
         self.session_replaced.connect(self._hold_against)
+        self.jobs.cancelled.connect(self._on_cancelled)
 
     @property
     def atlas(self) -> Atlas | None:
@@ -87,32 +94,46 @@ class AtlasDesk(DeskSignals):
     # Which atlas
 
     def load_atlas(self) -> None:
-        """Get the published atlas ready in the background, where there is none; ghosts appear when it is."""
+        """Get an atlas ready in the background, where there is none; ghosts appear when it is.
 
-        def take(atlas: Atlas) -> None:
-            if self._atlas is None:  # else another one came first
-                self.use_atlas(atlas)
-
-        if self._atlas is None:
-            self.jobs.submit(LoadAtlas(), take, key="first atlas")
+        That is the one chosen last; where it is gone or damaged, the published one, with a warning.
+        """
+        if self._atlas is not None:
+            return
+        source = None if self.atlas_memory is None else self.atlas_memory.recall()
+        if source is None:
+            self._begin_with_published()
+        else:
+            self.jobs.submit(RecallAtlas(source), partial(self._take_recalled, source), key="first atlas")
 
     def use_published_atlas(self) -> None:
         """Take the published atlas, in the background."""
-        self.jobs.submit(LoadAtlas(), self.use_atlas, key="atlas")
+
+        def take(atlas: Atlas) -> None:
+            self.use_atlas(atlas)
+            self._remember_source(None)
+
+        self.jobs.submit(LoadAtlas(), take, key="atlas")
 
     def open_atlas(self, path: str | PathLike[str]) -> None:
         """Read an atlas file in the background, and take it."""
         file = Path(path)
 
         def take(atlas: Atlas) -> None:
-            self.use_atlas(atlas, file=file)
-            self.message.emit(f"The atlas of {file.name} is in use", "info")
+            self._take_read(atlas, file)
+            self._remember_source(AtlasSource(file))
 
         self.jobs.submit(ReadAtlas(file), take, key="atlas")
 
     def fit_atlas(self, paths: Iterable[str | PathLike[str]]) -> None:
         """Read labelled animals in the background, fit an atlas to them, and take it."""
-        self.jobs.submit(FitAtlas(tuple(map(Path, paths))), self._take_fitted, key="atlas")
+        animals = tuple(map(Path, paths))
+
+        def take(fitted: FittedAtlas) -> None:
+            self._take_fitted(fitted)
+            self._remember_source(AtlasSource(animals=animals))
+
+        self.jobs.submit(FitAtlas(animals), take, key="atlas")
 
     def save_atlas(self, path: str | PathLike[str]) -> None:
         """Write the atlas in use; raises `GpError` where there is none, or it cannot be written."""
@@ -124,6 +145,8 @@ class AtlasDesk(DeskSignals):
         except OSError as error:
             raise GpError(f"cannot be written ({error.strerror})", file=file) from None
         self.atlas_file = None if self.is_published_atlas else file
+        if self.atlas_file is not None and self.animals is None:  # else it is fitted to them again
+            self._remember_source(AtlasSource(file))
         self.atlas_details_changed.emit()
 
     def try_atlas(self) -> None:
@@ -159,9 +182,42 @@ class AtlasDesk(DeskSignals):
         self._atlas, self._atlas_specimens = atlas, animals.specimens
         self.animals = animals if animals.specimens else None
         self.atlas_file, self.trial = file, None
+        self.atlas_problem = ""
         self.session.set_predict(self._predict)
         self.atlas_changed.emit()
         self._hold_against()
+
+    def _begin_with_published(self) -> None:
+        def take(atlas: Atlas) -> None:
+            if self._atlas is None:  # else another one came first
+                self.use_atlas(atlas)
+
+        self.jobs.submit(LoadAtlas(), take, key="first atlas")
+
+    def _take_recalled(self, source: AtlasSource, recalled: Recalled) -> None:
+        if self._atlas is not None:
+            return
+        if recalled.problem:
+            self.use_atlas(recalled.fitted.atlas)
+            self.atlas_problem = f"The atlas of {source.text} cannot be had any more: {recalled.problem}"
+            self.atlas_details_changed.emit()
+            self.message.emit(f"{self.atlas_problem} The published one is in use.", "warning")
+        elif source.file is not None:
+            self._take_read(recalled.fitted.atlas, source.file)
+        else:
+            self._take_fitted(recalled.fitted)
+
+    def _on_cancelled(self, task: Task[Any]) -> None:
+        if isinstance(task.job, RecallAtlas) and self._atlas is None:
+            self._begin_with_published()
+
+    def _remember_source(self, source: AtlasSource | None) -> None:
+        if self.atlas_memory is not None:
+            self.atlas_memory.remember(source)
+
+    def _take_read(self, atlas: Atlas, file: Path) -> None:
+        self.use_atlas(atlas, file=file)
+        self.message.emit(f"The atlas of {file.name} is in use", "info")
 
     def _take_fitted(self, fitted: FittedAtlas) -> None:
         self._take(fitted.atlas, fitted.animals)

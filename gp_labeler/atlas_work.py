@@ -12,10 +12,21 @@ from gp_core.landmarks.features import PROBE, TRAINING, Side
 from gp_core.landmarks.sets import Specimen
 from gp_core.study.leave_one_out import LeaveOneOutReport, Row, leave_one_out
 from gp_labeler.session.animals import Animals, Skipped, read_animals
+from gp_labeler.session.atlas_memory import AtlasSource
 from gp_labeler.session.jobs import Progress
-from gp_labeler.work import load_modules
+from gp_labeler.work import LoadAtlas, load_modules
 
-__all__ = ["FEWEST_ANIMALS", "FitAtlas", "FittedAtlas", "ReadAtlas", "RefitAtlas", "Trial", "TryAtlas"]
+__all__ = [
+    "FEWEST_ANIMALS",
+    "FitAtlas",
+    "FittedAtlas",
+    "ReadAtlas",
+    "RecallAtlas",
+    "Recalled",
+    "RefitAtlas",
+    "Trial",
+    "TryAtlas",
+]
 
 FEWEST_ANIMALS = 3
 """Leave-one-out needs two to learn from."""
@@ -71,6 +82,41 @@ class FitAtlas:
             return FittedAtlas(fit_atlas(animals.specimens, name=animals.text), animals)
         except GpError as error:
             raise _with_reasons(error, animals) from None
+
+
+@dataclass(frozen=True)
+class Recalled:
+    """The atlas to begin with.
+
+    Parameters
+    ----------
+    fitted : FittedAtlas
+        Without animals where it comes from a file.
+    problem : str
+        Why it is the published one and not the one that was chosen; empty where it is that.
+    """
+
+    fitted: FittedAtlas
+    problem: str = ""
+
+
+@dataclass(frozen=True)
+class RecallAtlas:
+    """Read the atlas that was chosen last, or fit it anew; the published one where that cannot be."""
+
+    source: AtlasSource
+    title = "Loading the atlas"
+
+    def run(self, progress: Progress) -> Recalled:
+        """Read or fit."""
+        file = self.source.file
+        try:
+            if file is None:
+                return Recalled(FitAtlas(self.source.animals).run(progress))
+            return Recalled(FittedAtlas(ReadAtlas(file).run(progress), Animals(())))
+        except (GpError, OSError) as error:
+            problem = f"{str(error).rstrip('.')}."
+            return Recalled(FittedAtlas(LoadAtlas().run(progress), Animals(())), problem)
 
 
 @dataclass(frozen=True, eq=False)

@@ -57,7 +57,7 @@ class DeskSignals:
     atlas_changed = Signal()
     """Another atlas is in use: `atlas`, `atlas_specimens`."""
     atlas_details_changed = Signal()
-    """What is known of the atlas in use changed: `atlas_file`, `trial`."""
+    """What is known of the atlas in use changed: `atlas_file`, `atlas_problem`, `trial`."""
     volume_opened = Signal(object)
     surfaces_changed = Signal()
     threshold_previewed = Signal(object)

@@ -24,6 +24,7 @@ from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import PoseDesk
 from gp_labeler.session import labelling
+from gp_labeler.session.atlas_memory import AtlasMemory
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.jobs import Dispatcher, Jobs, Task
 from gp_labeler.session.opening import new_session, open_session, recover_session, tidy_name
@@ -58,12 +59,12 @@ class Workbench(AtlasDesk, BoneDesk):
     Parameters
     ----------
     directory : Path, optional
-        State directory (`session.places.default_directory()` in the window); None keeps no journal and no
-        list of recent files.
+        State directory (`session.places.default_directory()` in the window); None keeps no journal, no list
+        of recent files, and does not remember the atlas.
     dispatcher : callable, optional
         Brings results of jobs to this thread.
     atlas : Atlas, optional
-        Behind ghosts, doubts and poses; by default the published one, loaded as a job by `load_atlas`.
+        Behind ghosts, doubts and poses; by default the one chosen last, loaded as a job by `load_atlas`.
     author : str, optional
         Who labels.
     """
@@ -79,6 +80,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.directory = directory
         self.jobs = Jobs(dispatcher)
         self.recent = RecentFiles(directory) if directory else None
+        self.atlas_memory = AtlasMemory(directory) if directory else None
         self.truth: Specimen | None = None  # of a phantom: where its features really are
         self.drag: Drag | None = None
         self.tool = "place"

@@ -49,7 +49,7 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
     directory : Path, optional
         State directory; None keeps nothing on disk.
     atlas : bool
-        Whether to load the published atlas, for ghosts.
+        Whether to load the atlas chosen last, else the published one, for ghosts.
     """
     make_application()
     importlib.import_module("scipy.ndimage")  # the scene needs it; no job may be importing SciPy meanwhile

@@ -161,3 +161,118 @@ def test_an_atlas_opened_at_the_start_is_not_replaced_by_the_published_one(desk,
     desk.wait()
     assert desk.atlas_file == tmp_path / "own.json"
     assert desk.atlas.n_samples == 8
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start the program anew, once more each time, and wait until its atlas is there."""
+    made = []
+
+    def started(directory=tmp_path / "state"):
+        if made:
+            made[-1].close(discard=True)
+        made.append(Desk(directory))
+        made[-1].load_atlas()
+        made[-1].wait()
+        return made[-1]
+
+    yield started
+    made[-1].close(discard=True)
+
+
+def test_an_atlas_file_is_there_again_at_the_next_start(start, folder, tmp_path) -> None:
+    file = tmp_path / "own.json"
+    fit_atlas(load_specimens(folder)).save(file)
+    start().open_atlas(file)
+    desk = start()
+    assert desk.is_published_atlas, "what was still being read was not chosen yet"
+    desk.open_atlas(file)
+    desk.wait()
+    desk = start()
+    assert (desk.atlas_file, desk.atlas.n_samples) == (file, 8)
+    assert desk.said == [("info", "The atlas of own.json is in use")]
+    desk.use_published_atlas()
+    desk.wait()
+    assert start().is_published_atlas
+
+
+def test_the_animals_of_an_atlas_are_fitted_to_again_at_the_next_start(start, folder, tmp_path) -> None:
+    desk = start()
+    desk.fit_atlas([folder])
+    desk.wait()
+    fitted = desk.atlas
+    desk.save_atlas(tmp_path / "copy.json")
+    desk = start()
+    np.testing.assert_array_equal(desk.atlas.mean, fitted.mean)
+    assert len(desk.atlas_specimens) == 4, "so leave-one-out and JRMPC can go on"
+    desk.open_atlas(tmp_path / "copy.json")
+    desk.wait()
+    desk.save_atlas(tmp_path / "third.json")
+    assert start().atlas_file == tmp_path / "third.json"
+
+
+@pytest.mark.parametrize("harm", ["gone", "damaged"])
+@pytest.mark.parametrize("what", ["file", "animals"])
+def test_an_atlas_that_is_gone_gives_way_to_the_published_one(start, folder, tmp_path, what, harm) -> None:
+    file, desk = tmp_path / "own.json", start()
+    fit_atlas(load_specimens(folder)).save(file)
+    desk.open_atlas(file) if what == "file" else desk.fit_atlas([folder])
+    desk.wait()
+    for each in (file, *folder.iterdir()):
+        each.unlink() if harm == "gone" else each.write_text("{")
+    if harm == "gone":
+        folder.rmdir()
+    desk = start()
+    assert desk.is_published_atlas
+    (level, said) = desk.said[-1]
+    assert level == "warning"
+    name = "own.json" if what == "file" else "animals"
+    assert said.startswith(f"The atlas of {name} cannot be had any more: ")
+    assert said.endswith("The published one is in use.")
+    assert desk.atlas_problem in said
+    desk = start()
+    assert desk.said, "it may have been on a drive that was not there"
+    desk.use_published_atlas()
+    desk.wait()
+    assert desk.atlas_problem == ""
+    assert start().said == []
+
+
+def test_nothing_is_remembered_without_a_state_directory(start, folder, tmp_path) -> None:
+    desk = start(None)
+    desk.fit_atlas([folder])
+    desk.wait()
+    assert start(None).is_published_atlas
+    (tmp_path / "state").mkdir()
+    for text in ("{", "[]", '{"file": 3}', '{"animals": [""]}', '{"animals": []}'):
+        (tmp_path / "state" / "atlas.json").write_text(text)
+        assert start().is_published_atlas
+        assert start().said == []
+
+
+def test_an_atlas_chosen_while_the_last_one_is_read_stays(start, folder, tmp_path) -> None:
+    desk = start()
+    desk.fit_atlas([folder])
+    desk.wait()
+    desk.close(discard=True)
+    again = Desk(tmp_path / "state")
+    try:
+        again.load_atlas()
+        again.use_published_atlas()
+        again.wait()
+        assert again.is_published_atlas
+    finally:
+        again.close(discard=True)
+
+
+def test_stopping_the_atlas_of_the_last_time_leaves_the_published_one(start, folder, tmp_path) -> None:
+    desk = start()
+    desk.fit_atlas([folder])
+    desk.wait()
+    desk.close(discard=True)
+    again = Desk(tmp_path / "state")
+    again.load_atlas()
+    again.jobs.cancel_all()
+    again.wait()
+    assert again.is_published_atlas
+    again.close(discard=True)

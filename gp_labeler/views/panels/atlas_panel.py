@@ -23,6 +23,7 @@ from gp_labeler.views.panels.atlas_table import AtlasTable
 from gp_labeler.views.panels.import_words import sentence
 from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.pose_parts import Notices
 from gp_labeler.workbench import Workbench
 
 __all__ = ["AtlasPanel"]
@@ -123,6 +124,8 @@ class AtlasCard(_AskingCard):
         self.published, self.open, self.save = (
             self._button(row, f"atlas.{name}", *texts) for name, texts in _BUTTONS.items()
         )
+        self.notices = Notices()
+        self.add(self.notices)
         self.add(row)
         for signal in (workbench.atlas_changed, workbench.atlas_details_changed, workbench.session_replaced):
             follow(self, signal, self.refresh)
@@ -132,7 +135,9 @@ class AtlasCard(_AskingCard):
         """Show which it is."""
         desk, atlas = self._desk, self._desk.atlas
         self.name.set_words(_title(desk))
-        self.published.setEnabled(not desk.is_published_atlas)
+        self.published.setEnabled(not desk.is_published_atlas or bool(desk.atlas_problem))
+        remedy = "Choose another, or press Published and it is forgotten."
+        self.notices.show_notices([("warning", desk.atlas_problem, remedy)] if desk.atlas_problem else [])
         self.save.setEnabled(atlas is not None)
         if atlas is None:
             self.facts.show_facts({})

@@ -11,12 +11,12 @@ from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
 from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QFontMetrics
 from PySide6.QtWidgets import QApplication
-from window_cases import settle
+from window_cases import close, settle
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.features import Side, feature
 from gp_labeler.session import labelling
-from gp_labeler.views.panels.atlas_panel import AtlasPanel
+from gp_labeler.views.panels.atlas_panel import AtlasCard, AtlasPanel
 from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
@@ -178,6 +178,30 @@ def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qt
     window.commands.run("atlas.try")
     settle(qtbot, window, 180)  # compiling may be part of it
     assert desk.trial.n_sides == 6
+
+
+def test_an_atlas_that_is_gone_at_the_next_start_is_told_until_another_is_chosen(
+    make_window, folder, tmp_path, qtbot
+) -> None:
+    window = make_window(atlas=True)
+    settle(qtbot, window)
+    window.workbench.fit_atlas([folder])
+    settle(qtbot, window)
+    window.workbench.save_atlas(tmp_path / "own.json")
+    window.workbench.open_atlas(tmp_path / "own.json")
+    settle(qtbot, window)
+    close(window)
+    (tmp_path / "own.json").unlink()
+    again = make_window(atlas=True)
+    settle(qtbot, again)
+    again.commands.run("atlas.show")
+    notice = again.findChild(AtlasCard).notices
+    assert notice.isVisible()
+    assert "The atlas of own.json cannot be had any more" in notice.shown[0][1]
+    qtbot.mouseClick(again.findChild(AtlasCard).published, CLICK)
+    settle(qtbot, again)
+    assert not notice.isVisible()
+    assert not again.commands.actions["atlas.published"].isEnabled()
 
 
 def test_a_damaged_atlas_dropped_on_the_window_is_named(make_window, tmp_path, qtbot) -> None:
