@@ -15,7 +15,7 @@ from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.quantiles import NORMAL_95, chi_square_share
-from gp_core.registration.procrustes import RigidFit, fit_rigid
+from gp_core.registration.procrustes import RigidFit, fit_rigid, rms_without_each
 
 __all__ = ["FiducialRegistration", "named_points", "register_fiducials"]
 
@@ -212,13 +212,6 @@ class _Pairs:
         names = [self.names[i] for i in kept]
         return fit_rigid(self.touched[kept], self.aims[kept], names=names, dst=self.dst, src=self.src)
 
-    def rms_of(self, kept: Sequence[int]) -> float:
-        """Return the registration error of these points, or infinity where they make no registration."""
-        try:
-            return self.fit(kept).rms
-        except GeometryError:
-            return np.inf
-
 
 def _suspects(pairs: _Pairs) -> list[int]:
     """Return the points without which the others fit much better, worst first."""
@@ -226,12 +219,12 @@ def _suspects(pairs: _Pairs) -> list[int]:
     found: list[int] = []
     rms = pairs.fit(kept).rms
     while len(kept) >= _FEWEST_TO_DOUBT and rms > _EXACT_MM:
-        best, worst = min((pairs.rms_of([k for k in kept if k != i]), i) for i in kept)
-        if best > _TELLING * rms:
+        without = rms_without_each(pairs.touched[kept], pairs.aims[kept])
+        best = int(without.argmin())
+        if without[best] > _TELLING * rms:
             break
-        kept.remove(worst)
-        found.append(worst)
-        rms = best
+        found.append(kept.pop(best))
+        rms = without[best]
     return found
 
 

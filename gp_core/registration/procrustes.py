@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 
-__all__ = ["RigidFit", "align", "fit_rigid", "surely_no_line", "weighted_procrustes"]
+__all__ = ["RigidFit", "align", "fit_rigid", "rms_without_each", "surely_no_line", "weighted_procrustes"]
 
 COLLINEAR = 1e-3
 """Width over length below which points count as one line: 1 µm a mm, finer than any touch or voxel."""
@@ -136,6 +136,31 @@ def align(points: FloatArray, aims: FloatArray, weights: FloatArray) -> tuple[Fl
     return rotation, aim_centre - rotation @ point_centre
 
 
+def rms_without_each(points: FloatArray, aims: FloatArray) -> FloatArray:
+    """Return the registration error (N,), mm, of all pairs but one, each left out in turn.
+
+    It is infinite where the others determine no rotation.
+
+    Parameters
+    ----------
+    points, aims : (N, 3) array
+        Corresponding points, known to be finite, mm.
+    """
+    n = len(points)
+    others = np.nonzero(~np.eye(n, dtype=bool))[1].reshape(n, n - 1)
+    moving, fixed = (cloud[others] - cloud[others].mean(axis=1, keepdims=True) for cloud in (points, aims))
+    left, spread, right = np.linalg.svd(fixed.transpose(0, 2, 1) @ moving)
+    sign = np.where(np.linalg.det(left @ right) > 0, 1.0, -1.0)
+    is_open = spread[:, 1] + sign * spread[:, 2] <= _AMBIGUOUS * spread[:, 0]
+    for centred, cloud in ((moving, points), (fixed, aims)):
+        is_open |= _are_lines(centred, float(np.abs(cloud).max()))
+    left[:, :, 2] *= sign[:, None]
+    off = moving @ (left @ right).transpose(0, 2, 1) - fixed
+    rms: FloatArray = np.sqrt((off**2).sum(axis=(1, 2)) / (n - 1))
+    rms[is_open] = np.inf
+    return rms
+
+
 def _nearest_rotation(covariance: FloatArray) -> FloatArray:
     left, spread, right = np.linalg.svd(covariance)
     sign = 1.0 if np.linalg.det(left @ right) > 0 else -1.0
@@ -167,10 +192,17 @@ def _check_rank(points: FloatArray, aims: FloatArray, weights: FloatArray, names
 
 def _is_line(points: FloatArray, weights: FloatArray) -> bool:
     centred = points - weights @ points / weights.sum()
-    length, width = np.linalg.svd(np.sqrt(weights)[:, None] * centred, compute_uv=False)[:2]
+    rounded = float(np.sqrt(weights.mean())) * float(np.abs(points).max())
+    return bool(_are_lines((np.sqrt(weights)[:, None] * centred)[None], rounded)[0])
+
+
+def _are_lines(centred: FloatArray, largest: float) -> NDArray[np.bool_]:
+    """Return which of M clouds (M, N, 3) about 0 are lines, where no coordinate was above `largest`."""
+    length, width, _ = np.linalg.svd(centred, compute_uv=False).T
     # Coincident points leave rounding only, as wide as long: hold them against the coordinates too.
-    rounding = 1e-13 * float(np.sqrt(weights.sum())) * float(np.abs(points).max())
-    return bool(width <= max(COLLINEAR * length, rounding))
+    rounding = 1e-13 * float(np.sqrt(centred.shape[1])) * largest
+    lines: NDArray[np.bool_] = width <= np.maximum(COLLINEAR * length, rounding)
+    return lines
 
 
 def surely_no_line(points: FloatArray) -> bool:

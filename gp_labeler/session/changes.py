@@ -30,9 +30,14 @@ def _collect(old: Mapping[str, Any], new: Mapping[str, Any], path: list[str], ch
         here = [*path, key]
         if key in old and isinstance(value, dict) and isinstance(old[key], dict):
             _collect(old[key], value, here, changes)
-        elif key not in old or dumped(old[key]) != dumped(value):  # as text, for -0.0, 1 and 1.0, True and 1
+        elif key not in old or not _is_same(old[key], value):
             changes["set"].append([here, value])
     changes["drop"].extend([*path, key] for key in old if key not in new)
+
+
+def _is_same(one: Any, other: Any) -> bool:
+    """Whether two values are written alike: as text, for -0.0, 1 and 1.0, True and 1."""
+    return repr(one) == repr(other) or dumped(one) == dumped(other)
 
 
 def patched(document: Document, changes: Changes) -> Document:

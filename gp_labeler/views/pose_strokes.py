@@ -11,6 +11,8 @@ from gp_labeler.scene.colours import DARK
 
 __all__ = ["area", "arrow", "colour_of", "hull", "line", "marker", "polygon"]
 
+_Corner = tuple[float, float]
+
 _HALO = QColor(DARK.halo)
 _DASHES = {"solid": None, "dashed": [4.0, 2.2], "dotted": [1.2, 1.7]}
 _CORNERS = {
@@ -94,17 +96,17 @@ def polygon(points: FloatArray) -> QPolygonF:
 
 def hull(points: FloatArray) -> FloatArray:
     """Return the corners of the convex hull of (N, 2) points, in order (Andrew's monotone chain)."""
-    ordered = points[np.lexsort((points[:, 1], points[:, 0]))]
-    chains = []
+    ordered = sorted(map(tuple, points.tolist()))
+    corners: list[_Corner] = []
     for run in (ordered, ordered[::-1]):
-        chain: list[FloatArray] = []
+        chain: list[_Corner] = []
         for point in run:
             while len(chain) > 1 and _turn(chain[-2], chain[-1], point) <= 0:
                 chain.pop()
             chain.append(point)
-        chains += chain[:-1]
-    return np.array(chains)
+        corners += chain[:-1]
+    return np.array(corners)
 
 
-def _turn(a: FloatArray, b: FloatArray, c: FloatArray) -> float:
-    return float((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]))
+def _turn(a: _Corner, b: _Corner, c: _Corner) -> float:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 from typing import NamedTuple
 
 from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QImage, QPainter, QPainterPath, QPen
+from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter
 
 from gp_labeler.scene.colours import DARK
 from gp_labeler.views.theme import base_font
@@ -14,6 +15,7 @@ from gp_labeler.views.theme import base_font
 __all__ = ["WordPicture", "word_picture"]
 
 _EDGE = 3.0
+_SIDES = 12
 _KEPT = 512
 
 
@@ -51,17 +53,24 @@ def word_picture(text: str, size: float, colour: str, ratio: float, *, bold: boo
     font = base_font()
     font.setPixelSize(round(size * ratio))
     font.setBold(bold)
-    letters = QPainterPath()
-    letters.addText(QPointF(0, 0), font, text)
     edge = _EDGE * ratio
-    letters_box = letters.boundingRect()
-    box = letters_box.adjusted(-edge, -edge, edge, edge).toAlignedRect()
+    letters = QFontMetricsF(font).tightBoundingRect(text)
+    box = letters.adjusted(-edge, -edge, edge, edge).toAlignedRect()
     image = QImage(box.size(), QImage.Format.Format_ARGB32_Premultiplied)
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
-    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    painter.setFont(font)
     painter.translate(-box.topLeft())
-    painter.strokePath(letters, QPen(QColor(DARK.halo), edge))
-    painter.fillPath(letters, QColor(colour))
+    painter.setPen(QColor(DARK.halo))
+    for x, y in _around(edge / 2):
+        painter.drawText(QPointF(x, y), text)
+    painter.setPen(QColor(colour))
+    painter.drawText(QPointF(0, 0), text)
     painter.end()
-    return WordPicture(image, -float(box.left()), -float(box.top()), letters_box)
+    return WordPicture(image, -float(box.left()), -float(box.top()), letters)
+
+
+def _around(radius: float) -> list[tuple[float, float]]:
+    """Return where a word is written to surround it: much quicker than a stroke along its letters."""
+    turns = (2 * math.pi * n / _SIDES for n in range(_SIDES))
+    return [(radius * math.cos(turn), radius * math.sin(turn)) for turn in turns]

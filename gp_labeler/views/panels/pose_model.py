@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
@@ -82,10 +82,14 @@ class TouchModel(QAbstractTableModel):
             self.rows = rows
             self.endResetModel()
             return
-        self.rows, before = rows, self.rows
+        before, largest = self.rows, self.largest
+        self.rows = rows
+        is_rescaled = self.largest != largest
         for n, (new, old) in enumerate(zip(rows, before, strict=True)):
-            if new != old:
+            if replace(new, misfit=old.misfit) != old:
                 self.dataChanged.emit(self.index(n, 0), self.index(n, CLEAR))
+            elif is_rescaled or new.misfit != old.misfit:  # most rows, with every touch: only this is painted
+                self.dataChanged.emit(self.index(n, MISFIT), self.index(n, MISFIT))
 
     @property
     def largest(self) -> float:

@@ -117,7 +117,8 @@ class Verdict(QWidget):
         """Draw in the colours of the theme."""
         theme, shape = theme_of(self), self._CHIPS[self._level]
         self._chip.setPixmap(chip_pixmap(shape, 14, theme, self.devicePixelRatioF()))
-        self.label.setStyleSheet(f"color: {theme.states[shape]}")
+        if (sheet := f"color: {theme.states[shape]}") != self.label.styleSheet():  # to restyle takes its time
+            self.label.setStyleSheet(sheet)
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().changeEvent(event)

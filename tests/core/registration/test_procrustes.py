@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import mirror_x
-from gp_core.registration.procrustes import fit_rigid, surely_no_line, weighted_procrustes
+from gp_core.registration.procrustes import fit_rigid, rms_without_each, surely_no_line, weighted_procrustes
 
 seeds = st.integers(0, 2**32 - 1)
 
@@ -159,3 +159,26 @@ def test_a_line_is_never_surely_none(width: float, sure: bool) -> None:
     assert surely_no_line(bent) is sure
     assert not surely_no_line(np.full((4, 3), 123.456))
     assert not surely_no_line(bent[:2])
+
+
+def test_leaving_each_out_at_once_is_leaving_them_out_one_by_one() -> None:
+    rng = np.random.default_rng(4)
+    points = 10 * rng.normal(size=(7, 3)) + 50
+    aims = points + 0.3 * rng.normal(size=points.shape)
+    wanted = [
+        fit_rigid(np.delete(points, i, 0), np.delete(aims, i, 0), dst="scan", src="tracker").rms
+        for i in range(7)
+    ]
+    np.testing.assert_allclose(rms_without_each(points, aims), wanted, rtol=1e-9)
+    mirrored = rms_without_each(points, points * (-1, 1, 1))
+    assert (mirrored > 1).all(), "a mirror image is no motion"
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_without_the_one_point_off_a_line_there_is_no_rotation(noise: float) -> None:
+    rng = np.random.default_rng(5)
+    line = np.outer(np.arange(5.0), (1.0, 2.0, 3.0)) + noise * rng.normal(size=(5, 3))
+    points = np.vstack([line, [3.0, 0.0, 0.0]])
+    without = rms_without_each(points, points + 1e-3 * rng.normal(size=points.shape))
+    assert np.isinf(without[5])
+    assert np.isfinite(without[:5]).all()
