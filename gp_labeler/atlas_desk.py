@@ -56,6 +56,7 @@ class AtlasDesk(DeskSignals):
         self._atlas = atlas
         self._atlas_specimens: tuple[Specimen, ...] = ()
         self.atlas_file: Path | None = None
+        self.atlas_source: AtlasSource | None = None
         self.atlas_problem = ""  # why the one chosen last is not in use
         self.animals: Animals | None = None
         self.trial: Trial | None = None
@@ -130,8 +131,9 @@ class AtlasDesk(DeskSignals):
         animals = tuple(map(Path, paths))
 
         def take(fitted: FittedAtlas) -> None:
-            self._take_fitted(fitted)
-            self._remember_source(AtlasSource(animals=animals))
+            source = AtlasSource(animals=animals)
+            self._take_fitted(fitted, source)
+            self._remember_source(source)
 
         self.jobs.submit(FitAtlas(animals), take, key="atlas")
 
@@ -148,6 +150,7 @@ class AtlasDesk(DeskSignals):
         if self.atlas_file is not None and self.animals is None:  # else it is fitted to them again
             self._remember_source(AtlasSource(file))
         self.atlas_details_changed.emit()
+        self.wrote.emit("atlas", file)
 
     def try_atlas(self) -> None:
         """Do leave-one-out on the animals that the atlas was fitted to, in the background."""
@@ -173,15 +176,16 @@ class AtlasDesk(DeskSignals):
         file : Path, optional
             Where it was read from.
         """
-        self._take(atlas, Animals(tuple(specimens)), file)
+        self._take(atlas, Animals(tuple(specimens)), None if file is None else AtlasSource(file))
 
     # Inside
 
-    def _take(self, atlas: Atlas, animals: Animals, file: Path | None = None) -> None:
+    def _take(self, atlas: Atlas, animals: Animals, source: AtlasSource | None) -> None:
         self._cancel("atlas trial")
         self._atlas, self._atlas_specimens = atlas, animals.specimens
         self.animals = animals if animals.specimens else None
-        self.atlas_file, self.trial = file, None
+        self.atlas_source, self.trial = source, None
+        self.atlas_file = None if source is None else source.file
         self.atlas_problem = ""
         self.session.set_predict(self._predict)
         self.atlas_changed.emit()
@@ -205,7 +209,7 @@ class AtlasDesk(DeskSignals):
         elif source.file is not None:
             self._take_read(recalled.fitted.atlas, source.file)
         else:
-            self._take_fitted(recalled.fitted)
+            self._take_fitted(recalled.fitted, source)
 
     def _on_cancelled(self, task: Task[Any]) -> None:
         if isinstance(task.job, RecallAtlas) and self._atlas is None:
@@ -219,8 +223,8 @@ class AtlasDesk(DeskSignals):
         self.use_atlas(atlas, file=file)
         self.message.emit(f"The atlas of {file.name} is in use", "info")
 
-    def _take_fitted(self, fitted: FittedAtlas) -> None:
-        self._take(fitted.atlas, fitted.animals)
+    def _take_fitted(self, fitted: FittedAtlas, source: AtlasSource) -> None:
+        self._take(fitted.atlas, fitted.animals, source)
         n = len(fitted.animals.skipped)
         text = f"The atlas was fitted to {fitted.animals.text}" + (f"; {n} skipped" if n else "")
         self.message.emit(text, "warning" if n else "info")

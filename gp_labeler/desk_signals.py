@@ -48,7 +48,7 @@ class DeskSignals:
     exported = Signal(object)
     """The `ExportReport` of landmark files that were written."""
     wrote = Signal(str, object)
-    """What of an estimate was written, ``pose`` or ``report``, and its file."""
+    """What was written, ``pose``, ``report``, ``path`` (carried) or ``atlas``, and its file."""
     pictured = Signal(object)
     """The file of a picture of the window."""
     view_changed = Signal(frozenset)

@@ -79,6 +79,8 @@ class PoseDesk:
     """The feature to touch next, or None where all are touched."""
     overlay_changed = Signal(object)
     """The `OverlayOptions`."""
+    path_changed = Signal(object)
+    """The `InsertionPath` that is carried to the estimate now, or None."""
     recorded = Signal(str)
     """Name of a touch that was recorded just now: time for a sound."""
 
@@ -244,12 +246,24 @@ class PoseDesk:
         if path is not None and self.estimate is not None:
             path.in_touches(self.estimate)
         self._path = path
+        self.path_changed.emit(path)
         self.changed.emit()
 
     @property
     def path(self) -> InsertionPath | None:
         """The insertion path that goes with the estimate."""
         return self._path
+
+    def save_path(self, path: str | PathLike[str]) -> Path:
+        """Write the carried insertion path in the frame of the touches; raises `GpError` without one."""
+        if self._path is None:
+            raise GpError("there is no insertion path", remedy="Carry one to the estimate first.")
+        self._pose()
+        assert self.estimate is not None
+        file = self._path.save_carried(self.estimate, path)
+        self._desk.say(f"Wrote {file.name}")
+        self._desk.wrote.emit("path", file)
+        return file
 
     def _pose(self) -> CochleaPose:
         estimate = self.estimate

@@ -76,18 +76,25 @@ class InsertionPath:
         The ear it was drawn for.
     source : Path
         Its file.
+    units, axes : str
+        How the file was read; see `gp_core.atlas.insertion.read_path`.
+    rows : int, optional
+        Of how many rows of it these are; None for all.
     """
 
     points: FloatArray
     side: Side
     source: Path
+    units: str = "mm"
+    axes: str = "x,y,z"
+    rows: int | None = None
 
     @classmethod
     def read(
         cls, path: str | PathLike[str], side: Side | str, *, units: str, axes: str = "x,y,z"
     ) -> InsertionPath:
         """Read a path; see `gp_core.atlas.insertion.read_path` for what is asked and raised."""
-        return cls(read_path(path, units=units, axes=axes), Side.parse(side), Path(path))
+        return cls(read_path(path, units=units, axes=axes), Side.parse(side), Path(path), units, axes)
 
     @classmethod
     def readings(cls, path: str | PathLike[str], side: Side | str, *, units: str) -> dict[str, InsertionPath]:
@@ -139,8 +146,16 @@ class InsertionPath:
         return int(at_centre[0]) if len(at_centre) and at_centre[0] > 1 else None
 
     def first(self, n: int) -> InsertionPath:
-        """Return the path of the first points only."""
-        return replace(self, points=self.points[:n])
+        """Return the path of the first points only.
+
+        Raises
+        ------
+        GpError
+            There are not as many, or they are no path.
+        """
+        if not 2 <= n <= len(self.points):
+            raise GpError(f"rows of the path must be 2 to {len(self.points)}, got {n}", file=self.source)
+        return replace(self, points=self.points[:n], rows=n)
 
     def in_touches(self, estimate: Estimate) -> FloatArray | None:
         """Return the path (N, 3) in the frame of the touches, mm; None without a pose."""

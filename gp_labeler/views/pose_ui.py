@@ -103,12 +103,11 @@ class PoseUi(UiPart):
 
     def ask_save_path(self) -> None:
         """Ask where, and write the carried path in the frame of the touches."""
-        path, estimate = self._desk.pose.path, self._desk.pose.estimate
         file = self.prompts.save_file(
             "Save the path for the robot", self._proposed("path.csv"), "CSV (*.csv)"
         )
-        if file is not None and path is not None and estimate is not None:
-            self._desk.say(f"Wrote {path.save_carried(estimate, file).name}")
+        if file is not None:
+            self._desk.pose.save_path(file)
 
     def show_tracker(self) -> None:
         """Show the settings of the tracked probe."""

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 from PySide6.QtCore import QObject
 
 from gp_core.landmarks.files import write_text
-from gp_labeler.atlas_work import FitAtlas, ReadAtlas
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import PARTS
@@ -21,13 +20,14 @@ from gp_labeler.session.history import History
 from gp_labeler.session.jobs import Task
 from gp_labeler.session.landmark_export import FORMATS, ExportReport
 from gp_labeler.session.opening import tidy_name
+from gp_labeler.session.pose_exports import InsertionPath
 from gp_labeler.session.specimen_edits import RecordPoseCheck
 from gp_labeler.session.specimen_file import SUFFIX, write_specimen
 from gp_labeler.session.state import SpecimenState
 from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.recorded_edits import Table, step, steps_of
-from gp_labeler.work import LoadAtlas, SaveMesh
+from gp_labeler.work import SaveMesh
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -76,6 +76,7 @@ class Recorder(QObject):
         self._starts: list[tuple[Table, SpecimenState]] = []
         self._replayed = History(desk.session.state)
         self._begin()
+        self._take_as_here()
         for signal, slot in (
             (desk.volume_opened, self._on_volume),
             (desk.edited, self._on_edited),
@@ -85,6 +86,8 @@ class Recorder(QObject):
             (desk.pictured, self._on_pictured),
             (desk.wrote, self._on_wrote),
             (desk.jobs.done, self._on_job),
+            (desk.atlas_changed, self._on_atlas),
+            (desk.pose.path_changed, self._on_path),
             (desk.view_changed, self._on_view_changed),
             (desk.tool_changed, self._on_tool),
             (desk.pose.overlay_changed, self._on_overlay),
@@ -132,6 +135,13 @@ class Recorder(QObject):
         theme = None if window.theme_name == "dark" else window.theme_name
         size = [window.width(), window.height()]
         self.tables.append(step("view", size=size, theme=theme) | self._seen(differing))
+
+    def _take_as_here(self) -> None:
+        """Write which atlas is in use, and which insertion path is carried."""
+        desk = self._window.workbench
+        if desk.atlas is not None and not desk.is_published_atlas:
+            self._on_atlas()
+        self._on_path(desk.pose.path)
 
     def _on_volume(self, _: Volume) -> None:
         self._begin()
@@ -238,19 +248,32 @@ class Recorder(QObject):
         self.tables.append(step("screenshot", path=file.name))
 
     def _on_wrote(self, what: str, file: Path) -> None:
+        if what == "atlas":
+            self.tables.append(step("action", id="atlas.save", files=[file.name]))
+            return
         self.tables += self._estimated([file.name] if what == "pose" else [])
         if what == "report":
             side = self._window.workbench.pose.side.value
             self.tables.append(step("report", side=side, path=file.name))
+        elif what == "path":
+            self.tables.append(step("path", save=file.name))
+
+    def _on_atlas(self) -> None:
+        desk = self._window.workbench
+        source = desk.atlas_source
+        if desk.is_published_atlas:
+            self.tables.append(step("atlas", path="published"))
+        elif source is not None and source.file is not None:
+            self.tables.append(step("atlas", path=str(source.file.absolute())))
+        elif source is not None:
+            self.tables.append(step("atlas", specimens=[str(path.absolute()) for path in source.animals]))
+
+    def _on_path(self, path: InsertionPath | None) -> None:
+        if path is not None:
+            about = {"units": path.units, "side": path.side.value, "axes": path.axes, "rows": path.rows}
+            self.tables.append(step("path", path=str(path.source.absolute()), **about))
 
     def _on_job(self, task: Task[Any]) -> None:
-        if isinstance(task.job, ReadAtlas):
-            self.tables.append(step("atlas", path=str(task.job.path.absolute())))
-        elif isinstance(task.job, FitAtlas):
-            files = [str(path.absolute()) for path in task.job.paths]
-            self.tables.append(step("atlas", specimens=files))
-        elif isinstance(task.job, LoadAtlas):
-            self.tables.append(step("atlas", path="published"))
         if isinstance(task.job, SaveMesh):
             self.tables.append(step("mesh", save=Path(task.job.path).name))
 

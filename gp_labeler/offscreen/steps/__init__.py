@@ -11,7 +11,7 @@ from gp_labeler.offscreen.steps.expecting import Expect
 from gp_labeler.offscreen.steps.files import Details, Export, Import, Save
 from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
 from gp_labeler.offscreen.steps.placing import Choose, Drag, Place, Put
-from gp_labeler.offscreen.steps.pose import Estimate, Overlay, Report, Verdict
+from gp_labeler.offscreen.steps.pose import CarryPath, Estimate, Overlay, Report, Verdict
 from gp_labeler.offscreen.steps.scan import Mesh, Open, Spacing, Threshold
 from gp_labeler.offscreen.steps.touching import Register, Skull, Touches
 
@@ -20,7 +20,7 @@ __all__ = ["STEPS"]
 _ALL: tuple[type[Step], ...] = (
     *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Put, Drag, Key, Act, Undo),
     *(Details, Import, Export, Fit, UseAtlas, Touches, Skull, Register, Estimate, Overlay, Verdict, Report),
-    *(Check, Screenshot, Save, Expect),
+    *(CarryPath, Check, Screenshot, Save, Expect),
 )
 
 STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

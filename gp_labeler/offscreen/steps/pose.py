@@ -19,9 +19,10 @@ from gp_labeler.offscreen.steps.touching import Points, Touches, current_estimat
 from gp_labeler.scene.pose_data import PARTS
 from gp_labeler.session.estimate import Estimate as SideEstimate
 from gp_labeler.session.estimate import apart
+from gp_labeler.session.pose_exports import InsertionPath
 from gp_labeler.views.report_file import report_of, save_report
 
-__all__ = ["Estimate", "Estimated", "Overlay", "Report", "Verdict"]
+__all__ = ["CarryPath", "Estimate", "Estimated", "Overlay", "Report", "Verdict"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +159,47 @@ def _truth(rig: Rig, side: Side) -> tuple[FloatArray, FloatArray] | None:
         return None
     ca, cb, co = (rig.truth(side, code) for code in ("CA", "CB", "CO"))
     return co, modiolar_axis(ca, cb)
+
+
+@dataclass(frozen=True)
+class CarryPath(Step):
+    """Carry an insertion path to the estimated cochlea, and write it for a robot.
+
+    Parameters
+    ----------
+    path : str, optional
+        A table of three columns; by default the path that is carried already.
+    units : str
+        What its numbers are in: ``m``, ``cm``, ``mm`` or ``um``. Needed, as a wrong size is driven into bone.
+    side : L or R
+        The ear that it was drawn for. Needed.
+    axes : str
+        Which of its axes are x (modiolar axis), y (to the round window) and z, such as ``z,-y,x``.
+    rows : int, optional
+        How many of its rows are the path.
+    save : str, optional
+        Where to write it in the frame of the touches, .csv.
+    """
+
+    do: ClassVar[str] = "path"
+    path: str | None = None
+    units: str | None = None
+    side: Side | None = None
+    axes: str = "x,y,z"
+    rows: int | None = None
+    save: str | None = None
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        pose = rig.desk.pose
+        if self.path is None and self.save is None:
+            raise GpError("path needs path, or save")
+        if self.path is not None:
+            if self.units is None or self.side is None:
+                raise GpError("path needs units and side: the ear it was drawn for")
+            read = InsertionPath.read(rig.to_read(self.path), self.side, units=self.units, axes=self.axes)
+            pose.carry(read if self.rows is None else read.first(self.rows))
+        told = "" if pose.path is None else f"{len(pose.path.points)} points"
+        return told if self.save is None else f"{rig.wrote(pose.save_path(rig.to_write(self.save)))}, {told}"
 
 
 @dataclass(frozen=True)

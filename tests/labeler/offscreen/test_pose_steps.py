@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -141,6 +142,41 @@ def test_the_matrix_for_a_robot_turns_y_to_the_window_that_was_chosen(tmp_path, 
     to_window = np.mean([points["RWA"], points["RWP"]], axis=0) - matrix[:3, 3]
     off = abs(np.degrees(np.arctan2(to_window @ matrix[:3, 2], to_window @ matrix[:3, 1])))
     assert off < 1e-6 if window == "touched" else 1 < off < 10
+
+
+def test_an_insertion_path_is_carried_to_the_estimate_and_written(tmp_path) -> None:
+    drawn = np.array([[-0.5, 2, 0], [0, 1.5, 0.2], [0.4, 1, 0.5], [0.5, 0.9, 0.6]])
+    np.savetxt(tmp_path / "drawn.csv", 1000 * drawn, delimiter=",")
+    about = {"path": "drawn.csv", "units": "um", "side": "L", "rows": 3}
+    report = run(
+        tmp_path,
+        {"do": "estimate", "side": "L", "touches": touched(PROBE, 0.15), "path": "robot.csv"},
+        {"do": "path", **about, "save": "carried.csv"},
+    )
+    assert report.ok, report.error
+    matrix, carried = (np.loadtxt(tmp_path / "out" / f"{n}.csv", delimiter=",") for n in ("robot", "carried"))
+    np.testing.assert_allclose(carried, drawn[:3] @ matrix[:3, :3].T + matrix[:3, 3], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("step", "complaint"),
+    [
+        ({}, "needs path, or save"),
+        ({"path": "drawn.csv", "side": "L"}, "needs units and side"),
+        ({"path": "drawn.csv", "units": "mm"}, "needs units and side"),
+        ({"path": "drawn.csv", "units": "mm", "side": "L", "rows": 9}, "rows of the path must be 2 to 3"),
+        (
+            {"path": "drawn.csv", "units": "mm", "side": "L", "save": "out.csv"},
+            "no estimate yet",
+        ),
+        ({"save": "out.csv"}, "no insertion path"),
+    ],
+)
+def test_an_insertion_path_that_cannot_be_carried_is_refused(tmp_path, step, complaint) -> None:
+    (tmp_path / "drawn.csv").write_text("-0.5,2,0\n0,1.5,0.2\n0.4,1,0.5\n")
+    report = run(tmp_path, {"do": "path", **step})
+    assert not report.ok
+    assert re.search(complaint, report.error)
 
 
 @pytest.mark.slow

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
+from animal_cases import drawn_animals, write_animals
 from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from PySide6.QtTest import QTest
 from script_cases import write_ball
@@ -36,7 +38,6 @@ INSIDE = MIDDLE + np.array([2.1, -1.7, 0.125])
 ON_BONE = MIDDLE + np.array([0.0, -BALL_MM, 0.0])
 
 DIALOG = "a dialog: what it does is written once it is done"
-ONLY_FILE = "leaves only a file: in a script, action with files and answers"
 CHOOSES = "chooses only: an edit is written with its point"
 ACTION_STEPS = {
     **dict.fromkeys(("file.open", "file.open_folder", "file.demo", "file.find_scan", "file.new"), "open"),
@@ -59,6 +60,8 @@ ACTION_STEPS = {
     "pose.record": "touches",
     "pose.export": "estimate",
     "pose.report": "report",
+    **dict.fromkeys(("pose.path", "pose.save_path"), "path"),
+    "atlas.save": "action",
     **dict.fromkeys(("atlas.published", "atlas.open", "atlas.fit_files", "atlas.fit_folder"), "atlas"),
     **dict.fromkeys(("pose.accept", "pose.reject"), "verdict"),
 }
@@ -72,10 +75,8 @@ NOT_WRITTEN = {
     **dict.fromkeys(("point.skip", "point.next", "point.previous", "point.other_side"), CHOOSES),
     **dict.fromkeys(("pose.skip", "pose.other_side"), CHOOSES),
     **dict.fromkeys(("pose.tracker", "pose.guide"), "shows settings, or asks for touches, which are written"),
-    **dict.fromkeys(("pose.path", "pose.save_path"), ONLY_FILE),
     "pose.physical": "tells only: its result is no part of the specimen",
     **dict.fromkeys(("atlas.show", "atlas.try"), "tells only: nothing of it is kept"),
-    "atlas.save": ONLY_FILE,
     **dict.fromkeys(
         ("pose.robust", "pose.jrmpc", "pose.both", "pose.touched_window"), "written with a verdict"
     ),
@@ -145,6 +146,15 @@ class Recording:
 
 def untimed(path) -> str:
     return re.sub(r'"time": "[^"]*"', "", path.read_text())
+
+
+def write_path(folder) -> Path:
+    """Write an insertion path of a left ear, in m, with the authors' axes and a row that is none."""
+    turn = np.linspace(0, 12, 30)
+    rows = np.column_stack([-1.9 * np.sin(turn), -1.9 * np.cos(turn), 0.1 * turn + 0.5]) / 1000
+    rows = np.vstack([rows, np.zeros(3)])
+    np.savetxt(folder / "curve.csv", rows, delimiter=",")
+    return folder / "curve.csv"
 
 
 @pytest.fixture
@@ -282,6 +292,39 @@ def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
     assert run("edit.undo") == ["undo"]
     recording.check(*FILES, "pose.json")
     assert (recording.folder / "again" / "page.html").exists()
+
+
+@pytest.mark.parametrize("when", ["before", "after"])
+def test_an_own_atlas_and_an_insertion_path_are_taken_again(recording, when) -> None:
+    desk, first, prompts = recording.desk, recording.folder / "first", recording.window.ui.prompts
+    animals = write_animals(recording.folder / "animals", drawn_animals(3))
+
+    def take() -> None:
+        prompts.files = [animals]
+        recording.window.commands.run("atlas.fit_folder")
+        settle(recording.qtbot, recording.window)
+        prompts.files = [write_path(recording.folder)]
+        prompts.answers = ["m", "left", "z,-y,x", "The first 30"]
+        recording.window.commands.run("pose.path")
+
+    if when == "before":
+        take()
+    recording.begin()
+    if when == "after":
+        take()
+    place_three(recording)
+    for code in ("MN", "OS", "RWA", "LLI", "RWP"):
+        touching.record_touch(recording.session, "R", code, desk.atlas[code] * (-1, 1, 1) + [0, 0, 300])
+    desk.pose.choose(side=Side.RIGHT, round_window="expected")
+    prompts.files = [first / "own.json"]
+    assert recording.run("atlas.save") == ["action"]
+    prompts.files = [first / "carried.csv"]
+    assert recording.run("pose.save_path") == ["estimate", "path"]
+    *_, carried, saved = (table for table in recording.recorder.tables if table["do"] == "path")
+    assert saved == {"do": "path", "save": "carried.csv"}
+    about = {"units": "m", "side": "L", "axes": "z,-y,x", "rows": 30}
+    assert carried == {"do": "path", "path": str(recording.folder / "curve.csv"), **about}
+    recording.check(*FILES[:1], "own.json", "carried.csv")
 
 
 def test_another_atlas_is_taken_again(recording) -> None:
