@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache, lru_cache
+
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, QSize, Qt
 from PySide6.QtGui import (
     QColor,
     QFont,
     QFontMetricsF,
+    QImage,
     QLinearGradient,
     QPainter,
     QPainterPath,
@@ -28,6 +31,9 @@ __all__ = ["FeaturePicture", "feature_picture"]
 _MARGIN = 18.0
 _ROOMY = 180
 """Logical pixels: in a narrower picture only the feature itself is named."""
+
+_GROUNDS = 16
+"""Pictures of the ear alone that are kept, drawn once for all features that are shown on the same."""
 
 _OSSICLES = (("DTM", "MH"), ("DTM", "LLI"), ("DTM", "DTL"))
 _ORBIT = 2
@@ -57,16 +63,39 @@ def feature_picture(code: str, side: Side | str, size: QSize, theme: Theme, *, r
     ratio : float
         Device pixels for each logical one.
     """
-    pixmap = QPixmap(round(size.width() * ratio), round(size.height() * ratio))
-    pixmap.setDevicePixelRatio(ratio)
-    pixmap.fill(Qt.GlobalColor.transparent)
+    side, frame = Side.parse(side), QRectF(0, 0, size.width(), size.height())
+    ground = _ground(_like(code, side), side, size.width(), size.height(), theme, ratio)
+    pixmap = QPixmap.fromImage(ground)
     painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _Picture(
-        painter, schematic_of(code, Side.parse(side)), QRectF(0, 0, size.width(), size.height()), theme
-    ).draw()
+    _Picture(painter, schematic_of(code, side), frame, theme).draw_feature()
     painter.end()
     return pixmap
+
+
+@cache
+def _like(code: str, side: Side) -> str:
+    """Return the first feature whose picture shows the same ear from the same side, as large."""
+    it = schematic_of(code, side)
+
+    def is_alike(other: Schematic) -> bool:
+        same_ear = np.array_equal(other.spiral, it.spiral) and np.array_equal(other.box, it.box)
+        return same_ear and len(other.head) == len(it.head)
+
+    return next(c for c in CODES if is_alike(schematic_of(c, side)))
+
+
+@lru_cache(_GROUNDS)
+def _ground(code: str, side: Side, width: int, height: int, theme: Theme, ratio: float) -> QImage:
+    """Draw the ear, and the head where it is shown, without any feature."""
+    image = QImage(round(width * ratio), round(height * ratio), QImage.Format.Format_ARGB32_Premultiplied)
+    image.setDevicePixelRatio(ratio)
+    image.fill(Qt.GlobalColor.transparent)
+    painter = QPainter(image)
+    painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+    _Picture(painter, schematic_of(code, side), QRectF(0, 0, width, height), theme).draw_ground()
+    painter.end()
+    return image
 
 
 class FeaturePicture(QWidget):
@@ -114,11 +143,14 @@ class _Picture:
         self._middle = (low + high) / 2
         self._taken: list[QRectF] = []
 
-    def draw(self) -> None:
+    def draw_ground(self) -> None:
         self._ground()
         if self._it.head:
             self._head()
         self._ear()
+
+    def draw_feature(self) -> None:
+        self._painter.setClipRect(self._frame)
         self._points()
         self._words()
 

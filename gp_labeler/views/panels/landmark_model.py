@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
-from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
+from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt, Signal
 
-from gp_core.landmarks.features import CODES, FEATURES, Side, feature
+from gp_core.landmarks.features import CODES, Side, feature, index_of
 from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import follow, mm_text
 from gp_labeler.workbench import Workbench
@@ -22,8 +22,19 @@ STATE_ROLE, ACTIVE_ROLE, LOCKED_ROLE, CODE_ROLE = (_USER + n for n in range(1, 5
 Index = QModelIndex | QPersistentModelIndex
 
 
+class _Cell(NamedTuple):
+    """Everything that the table shows of one feature of one side."""
+
+    state: PointState
+    is_active: bool
+    is_locked: bool
+    word: str
+
+
 class LandmarkModel(QAbstractTableModel):
     """States of the 20 features on both sides, as words and as roles for the chips.
+
+    It tells of each cell that changed, and of no other: the table then draws these alone.
 
     Parameters
     ----------
@@ -31,11 +42,14 @@ class LandmarkModel(QAbstractTableModel):
         Whose session it shows.
     """
 
+    headings_changed = Signal()
+    """Words of the header; for `headerDataChanged` Qt would lay out and draw the whole table anew."""
+
     def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
         super().__init__(parent)
         self._workbench = workbench
-        self._states: dict[Side, dict[str, PointState]] = {}
-        self._shown: dict[int, tuple[object, ...]] = {}
+        self._cells: dict[tuple[int, int], _Cell] = {}
+        self._headings: tuple[str, ...] = ()
         for signal in (
             workbench.session_replaced,
             workbench.landmarks_changed,
@@ -47,19 +61,20 @@ class LandmarkModel(QAbstractTableModel):
         self.refresh()
 
     def refresh(self, *_: object) -> None:
-        """Ask the session anew, and tell of the rows that changed."""
-        session, before = self._workbench.session, self._shown
-        self._states = {side: session.point_states(side, wait=False) for side in SIDES}
-        self._shown = {row: self._row(row) for row in range(len(CODES))}
-        for row in range(len(CODES)):
-            if self._shown[row] != before.get(row):
-                self.dataChanged.emit(self.index(row, 0), self.index(row, len(SIDES)))
-        self.headerDataChanged.emit(Qt.Orientation.Horizontal, 0, len(SIDES))
-
-    def _row(self, row: int) -> tuple[object, ...]:
-        """Return everything that the table shows of a feature."""
-        roles = (STATE_ROLE, ACTIVE_ROLE, LOCKED_ROLE, int(Qt.ItemDataRole.DisplayRole))
-        return tuple(self._cell(CODES[row], side, role) for side in SIDES for role in roles)
+        """Ask the session anew, and tell of what changed."""
+        session, cells, headings = self._workbench.session, self._cells, self._headings
+        self._cells = {
+            (index_of(code), column): self._cell(code, side, state)
+            for column, side in enumerate(SIDES, 1)
+            for code, state in session.point_states(side, wait=False).items()
+        }
+        self._headings = ("Feature", *(self._heading(side) for side in SIDES))
+        for where, cell in self._cells.items():
+            if cell != cells.get(where):
+                index = self.index(*where)
+                self.dataChanged.emit(index, index)
+        if self._headings != headings:
+            self.headings_changed.emit()
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's way
         return 0 if parent.isValid() else len(CODES)
@@ -72,21 +87,26 @@ class LandmarkModel(QAbstractTableModel):
     ) -> Any:
         if orientation is not Qt.Orientation.Horizontal or role != Qt.ItemDataRole.DisplayRole:
             return None
-        if section == 0:
-            return "Feature"
-        side = SIDES[section - 1]
-        progress = self._workbench.session.progress(side)
-        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
+        return self._headings[section]
 
     def data(self, index: Index, role: int = int(Qt.ItemDataRole.DisplayRole)) -> Any:  # noqa: D102
         if not index.isValid():
             return None
-        row = FEATURES[index.row()]
+        code, column = CODES[index.row()], index.column()
         if role == CODE_ROLE:
-            return row.code
-        if index.column() == 0:
-            return self._name(row.code, role)
-        return self._cell(row.code, SIDES[index.column() - 1], role)
+            return code
+        if column == 0:
+            return self._name(code, role)
+        cell = self._cells[index.row(), column]
+        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
+            return self._sentence(code, SIDES[column - 1], cell.state)
+        shown = {
+            STATE_ROLE: cell.state.value,
+            ACTIVE_ROLE: cell.is_active,
+            LOCKED_ROLE: cell.is_locked,
+            int(Qt.ItemDataRole.DisplayRole): cell.word,
+        }
+        return shown.get(role)
 
     def _name(self, code: str, role: int) -> Any:
         row = feature(code)
@@ -96,21 +116,16 @@ class LandmarkModel(QAbstractTableModel):
             return f"{code}: {row.name}. {row.definition}"
         return None
 
-    def _cell(self, code: str, side: Side, role: int) -> Any:
-        state = self._states[side][code]
-        active = self._workbench.session.active
-        is_active = active.code == code and (active.side is side or feature(code).shared)
-        if role == STATE_ROLE:
-            return state.value
-        if role == ACTIVE_ROLE:
-            return is_active
-        if role == LOCKED_ROLE:
-            return not feature(code).computed and self._workbench.session.state.landmark(side, code).locked
-        if role == Qt.ItemDataRole.DisplayRole:
-            return self._word(code, side, state, is_active)
-        if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
-            return self._sentence(code, side, state)
-        return None
+    def _heading(self, side: Side) -> str:
+        progress = self._workbench.session.progress(side)
+        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
+
+    def _cell(self, code: str, side: Side, state: PointState) -> _Cell:
+        session, row = self._workbench.session, feature(code)
+        active = session.active
+        is_active = active.code == code and (active.side is side or row.shared)
+        is_locked = not row.computed and session.state.landmark(side, code).locked
+        return _Cell(state, is_active, is_locked, self._word(code, side, state, is_active))
 
     def _word(self, code: str, side: Side, state: PointState, is_active: bool) -> str:
         if is_active and state in (PointState.TO_DO, PointState.GHOST):

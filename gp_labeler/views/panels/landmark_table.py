@@ -137,6 +137,7 @@ class _TableView(QTableView):
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        model.headings_changed.connect(header.viewport().update)
         self._fit_columns()
 
     def _fit_columns(self) -> None:

@@ -25,6 +25,8 @@ from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme, contrast
 from gp_labeler.workbench import Workbench
 
+pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
+
 LEFT, RIGHT = Side.LEFT, Side.RIGHT
 CLICK = Qt.MouseButton.LeftButton
 LOWEST_PANEL = QSize(PANEL_WIDTH, 698)

@@ -1,0 +1,223 @@
+"""What a change costs: only what it changes is drawn anew, and yet nothing on the screen is ever stale."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from panel_cases import deliver, desk_with_scan, in_scan, place
+from PySide6.QtCore import QEvent, QObject, QSize
+from PySide6.QtGui import QColor, QImage, QPixmap, QRegion
+from PySide6.QtWidgets import QApplication, QWidget
+
+from gp_core.landmarks.features import CODES, Side, index_of
+from gp_labeler.session import labelling
+from gp_labeler.session.edits import MarkUnseen, PlacePoint, SwapSides
+from gp_labeler.session.session import Session
+from gp_labeler.session.state import How, Provenance
+from gp_labeler.session.workflow import Active
+from gp_labeler.views import feature_picture as pictures
+from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
+from gp_labeler.views.panels.label_panel import PANEL_WIDTH, LabelPanel
+from gp_labeler.views.panels.landmark_model import LandmarkModel
+from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme
+from gp_labeler.workbench import Workbench
+
+pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
+
+LEFT, RIGHT = Side.LEFT, Side.RIGHT
+
+
+@pytest.fixture
+def desk() -> Iterator[Workbench]:
+    desk = desk_with_scan()
+    yield desk
+    desk.close(discard=True)
+
+
+@pytest.fixture
+def panel(desk: Workbench, qtbot) -> LabelPanel:
+    panel = LabelPanel(desk)
+    apply_theme(panel, DARK)
+    qtbot.addWidget(panel)
+    panel.resize(PANEL_WIDTH, 698)
+    panel.show()
+    qtbot.waitExposed(panel)
+    settle()
+    return panel
+
+
+def settle() -> None:
+    for _ in range(4):  # layouts inside layouts take a turn each
+        QApplication.processEvents()
+
+
+class Painted(QObject):
+    """What of a widget was painted since it was last asked."""
+
+    def __init__(self, widget: QWidget) -> None:
+        super().__init__(widget)
+        self._region = QRegion()
+        widget.installEventFilter(self)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name
+        if event.type() is QEvent.Type.Paint:
+            self._region += event.region()
+        return False
+
+    def taken(self) -> QRegion:
+        settle()
+        region, self._region = self._region, QRegion()
+        return region
+
+
+def pixels(image: QImage | QPixmap) -> np.ndarray:
+    """Return the (height, width, 4) bytes of a picture."""
+    plain = (image.toImage() if isinstance(image, QPixmap) else image).convertToFormat(
+        QImage.Format.Format_ARGB32_Premultiplied
+    )
+    return np.frombuffer(plain.constBits(), np.uint8).reshape(plain.height(), -1, 4).astype(int)
+
+
+def is_same(a: np.ndarray, b: np.ndarray) -> bool:
+    """Whether nobody can tell two pictures apart: Qt draws letters' edges a little otherwise at first."""
+    return a.shape == b.shape and int(np.abs(a - b).max()) < 24
+
+
+def on_screen(widget: QWidget) -> np.ndarray:
+    """Return what stands on the screen, unlike `grab`, which draws all anew."""
+    return pixels(widget.screen().grabWindow(widget.winId()))
+
+
+def picture_of(code: str, side: Side, size: QSize, theme: Theme, ratio: float = 1.0) -> np.ndarray:
+    return pixels(feature_picture(code, side, size, theme, ratio=ratio))
+
+
+def edits(desk: Workbench) -> Iterator[str]:
+    """Do all sorts of things one after another, and name each when it is done."""
+    session = desk.session
+    place(desk, "CA", "RWP", "OS", "RWA")
+    yield "placed, with ghosts of all others"
+    session.do(PlacePoint(RIGHT, "MH", tuple(in_scan("MH", RIGHT)), Provenance(How.MESH)))
+    yield "placed on the side that is not worked on"
+    place(desk, "IN", "FPP")
+    labelling.nudge(session, (2.5, 0, 0), side=LEFT, code="FPP")
+    yield "one is doubtful"
+    labelling.lock(session, side=LEFT, code="CA")
+    yield "locked"
+    session.undo()
+    session.undo()
+    yield "undone"
+    session.do(SwapSides())
+    yield "sides swapped"
+    session.do(MarkUnseen(LEFT, "CC", Provenance(How.UNSEEN)))
+    session.set_active(Active(RIGHT, "IN"))
+    yield "another active"
+    session.set_predict(None)
+    yield "without an atlas"
+    desk._replace(Session())
+    yield "another specimen"
+
+
+def test_one_point_draws_the_cell_of_that_point_alone(desk, panel):
+    view = panel.table.view
+    place(desk, "CA", "RWP", "OS")  # from here on the others have ghosts
+    painted = Painted(view.viewport())
+    painted.taken()
+    desk.session.do(PlacePoint(RIGHT, "MH", tuple(in_scan("MH", RIGHT)), Provenance(How.MESH)))
+    cell = view.visualRect(panel.table.model.index(index_of("MH"), 2))
+    assert painted.taken() == QRegion(cell)
+
+
+def test_a_change_of_the_active_point_draws_two_rows(desk, panel):
+    view = panel.table.view
+    desk.session.set_active(Active(LEFT, "OS"))
+    painted = Painted(view.viewport())
+    painted.taken()
+    desk.session.set_active(Active(LEFT, "MH"))
+    rows = {view.rowAt(y) for box in painted.taken() for y in (box.top(), box.bottom())}
+    assert rows == {index_of("OS"), index_of("MH")}
+
+
+def test_what_changes_nothing_draws_nothing(desk, panel):
+    painted = Painted(panel.table.view.viewport())
+    painted.taken()
+    desk.doubts_changed.emit()
+    desk.ghosts_changed.emit()
+    assert painted.taken().isEmpty()
+
+
+def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(desk, panel):
+    for what in edits(desk):
+        deliver(desk)
+        settle()
+        assert is_same(on_screen(panel), pixels(panel.grab())), what
+
+
+def test_the_table_is_never_stale(desk, qtbot):
+    model = LandmarkModel(desk)
+    for what in edits(desk):
+        deliver(desk)  # until then, one made now may know of doubts that nobody told of
+        fresh = LandmarkModel(desk)
+        for row in range(len(CODES)):
+            cells = [[m.itemData(m.index(row, column)) for column in range(3)] for m in (model, fresh)]
+            assert cells[0] == cells[1], (what, CODES[row])
+
+
+@pytest.mark.parametrize("code", ["RWA", "MN", "IN"])
+def test_a_picture_on_a_ground_that_was_kept_is_the_same(code):
+    """Grounds are shared by features, not by sides, sizes, themes or screens."""
+    kinds = [
+        (side, size, theme, ratio)
+        for side in Side
+        for size in (QSize(200, 120), QSize(120, 200))
+        for theme in (DARK, LIGHT)
+        for ratio in (1.0, 2.0)
+    ]
+    first = [picture_of(code, *kind) for kind in kinds]
+    again = [picture_of(code, *kind) for kind in reversed(kinds)]
+    assert all(is_same(a, b) for a, b in zip(first, again[::-1], strict=True))
+    assert not any(is_same(a, b) for n, a in enumerate(first) for b in first[n + 1 :])
+
+
+def test_the_picture_follows_feature_side_size_and_theme(qtbot):
+    picture = FeaturePicture()
+    apply_theme(picture, DARK)
+    qtbot.addWidget(picture)
+    picture.resize(200, 120)
+    picture.show()
+    qtbot.waitExposed(picture)
+
+    def shows(code: str, side: Side, theme: Theme) -> bool:
+        settle()
+        inside = (slice(8, -8), slice(8, -8))  # of the round corners
+        wanted = picture_of(code, side, picture.size(), theme, picture.devicePixelRatioF())
+        return is_same(on_screen(picture)[inside], wanted[inside])
+
+    picture.show_feature("RWA", LEFT)
+    assert shows("RWA", LEFT, DARK)
+    picture.show_feature("RWA", RIGHT)
+    assert shows("RWA", RIGHT, DARK)
+    picture.show_feature("IN", RIGHT)
+    assert shows("IN", RIGHT, DARK)
+    apply_theme(picture, LIGHT)
+    assert shows("IN", RIGHT, LIGHT)
+    picture.resize(160, 160)
+    assert shows("IN", RIGHT, LIGHT)
+
+
+@pytest.mark.parametrize("side", list(Side))
+def test_a_shared_ground_is_the_one_that_each_feature_would_draw(side, monkeypatch):
+    size = QSize(200, 120)
+    shared = {code: picture_of(code, side, size, DARK) for code in CODES}
+    monkeypatch.setattr(pictures, "_like", lambda code, side: code)
+    assert [code for code in CODES if not is_same(shared[code], picture_of(code, side, size, DARK))] == []
+
+
+@pytest.mark.parametrize("theme", [DARK, LIGHT])
+def test_a_ground_has_the_colours_of_its_theme(theme):
+    wanted = QColor(theme.scene.bottom)
+    for _ in range(2):
+        shown = picture_of("RWA", LEFT, QSize(200, 120), theme)[-2, 100, :3]
+        np.testing.assert_allclose(shown, (wanted.blue(), wanted.green(), wanted.red()), atol=8)
