@@ -11,7 +11,7 @@ from gp_labeler.session.edits import as_position
 from gp_labeler.session.state import Position, SpecimenState
 from gp_labeler.session.touches import Touch, touch_name
 
-__all__ = ["LeaveOutTouch", "RecordTouch", "RemoveTouches", "SetSkull", "TakeTouches"]
+__all__ = ["LeaveOutTouch", "RecordTouch", "RemoveTouches", "SetSkull", "SwapTouches", "TakeTouches"]
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,29 @@ class LeaveOutTouch:
             raise GpError(f"{self.name} {self.side.word} is not touched yet", landmark=self.name)
         changed = replace(state.touches[key], left_out=self.left_out)
         return replace(state, touches={**state.touches, key: changed})
+
+
+@dataclass(frozen=True)
+class SwapTouches:
+    """Give each of two touches of a side the other's name."""
+
+    side: Side
+    name: str
+    other: str
+
+    @property
+    def text(self) -> str:
+        """Such as ``swap touches MN and OS left``."""
+        return f"swap touches {self.name} and {self.other} {self.side.word}"
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the names exchanged; raises `GpError` where one of them is not touched."""
+        one, other = (self.side, self.name), (self.side, self.other)
+        for key in (one, other):
+            if key not in state.touches:
+                raise GpError(f"{key[1]} {self.side.word} is not touched yet", landmark=key[1])
+        swapped = {one: state.touches[other], other: state.touches[one]}
+        return replace(state, touches={**state.touches, **swapped})
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,15 @@ from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.files import read_points, read_touches
 from gp_labeler.session.edits import as_position
 from gp_labeler.session.session import Session
-from gp_labeler.session.touch_edits import LeaveOutTouch, RecordTouch, RemoveTouches, SetSkull, TakeTouches
-from gp_labeler.session.touches import Touch, TouchHow
+from gp_labeler.session.touch_edits import (
+    LeaveOutTouch,
+    RecordTouch,
+    RemoveTouches,
+    SetSkull,
+    SwapTouches,
+    TakeTouches,
+)
+from gp_labeler.session.touches import Touch, TouchHow, touch_name
 
 __all__ = [
     "clear_touches",
@@ -25,6 +32,7 @@ __all__ = [
     "mark_skull",
     "named_side",
     "record_touch",
+    "swap_touches",
 ]
 
 
@@ -103,6 +111,11 @@ def named_side(source: str) -> Side | None:
 def leave_out(session: Session, side: Side | str, name: str, left_out: bool = True) -> bool:
     """Let the estimate do without a touch, or take it in again."""
     return session.do(LeaveOutTouch(Side.parse(side), name, left_out))
+
+
+def swap_touches(session: Session, side: Side | str, name: str, other: str) -> bool:
+    """Give each of two touches of a side the other's name; raises `GpError` where one is not touched."""
+    return session.do(SwapTouches(Side.parse(side), touch_name(name), touch_name(other)))
 
 
 def clear_touches(session: Session, side: Side | str, name: str | None = None) -> bool:

@@ -20,7 +20,14 @@ from gp_labeler.session.edits import (
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.session.state import PointKey, SpecimenState, point_key
-from gp_labeler.session.touch_edits import LeaveOutTouch, RecordTouch, RemoveTouches, SetSkull, TakeTouches
+from gp_labeler.session.touch_edits import (
+    LeaveOutTouch,
+    RecordTouch,
+    RemoveTouches,
+    SetSkull,
+    SwapTouches,
+    TakeTouches,
+)
 from gp_labeler.session.touches import Touch
 
 __all__ = ["RECORDED", "Table", "step", "steps_of"]
@@ -150,6 +157,10 @@ def _forget(edit: RemoveTouches, before: SpecimenState, _: bool) -> list[Table]:
     return [step("touches", side=Side.parse(edit.side).value, clear=True)]
 
 
+def _swap_touches(edit: SwapTouches, *_: object) -> list[Table]:
+    return [step("touches", side=Side.parse(edit.side).value, swap=[edit.name, edit.other])]
+
+
 def _skull(edit: SetSkull, *_: object) -> list[Table]:
     return [{"do": "skull", "points": {name: list(point) for name, point in edit.skull.items()}}]
 
@@ -178,6 +189,7 @@ RECORDED: Mapping[type, Find] = MappingProxyType(
         LeaveOutTouch: _leave_out,
         RemoveTouches: _forget,
         SetSkull: _skull,
+        SwapTouches: _swap_touches,
         RecordPoseCheck: _verdict,
     }
 )

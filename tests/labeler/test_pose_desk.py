@@ -188,6 +188,21 @@ def test_touches_of_the_wrong_side_change_sides(desk, animal):
     assert len(desk.session.state.touches) == 6
 
 
+def test_two_touches_exchange_their_names_in_one_step(desk, animal):
+    for code in ("MN", "OS"):
+        desk.pose.record(animal[code], TouchHow.TYPED, name=code)
+    touching.leave_out(desk.session, "L", "OS")
+    before = dict(desk.session.state.touches)
+    touching.swap_touches(desk.session, "L", "mn", "OS")
+    after, (mn, os) = desk.session.state.touches, ((Side.LEFT, "MN"), (Side.LEFT, "OS"))
+    assert (after[mn], after[os]) == (before[os], before[mn])
+    assert desk.session.undo_text == "swap touches MN and OS left"
+    desk.session.undo()
+    assert desk.session.state.touches == before
+    with pytest.raises(GpError, match="RWA left is not touched yet"):
+        touching.swap_touches(desk.session, "L", "MN", "RWA")
+
+
 def test_in_the_step_pose_no_click_moves_a_landmark(desk, ball):
     desk.open_volume(ball)
     desk.begin_labelling()

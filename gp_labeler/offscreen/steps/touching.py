@@ -56,6 +56,8 @@ class Touches(Step):
         Keep the touches that are there.
     leave_out, take_in, forget : text or texts
         Names that the estimate does without, or with again; touches to forget.
+    swap : texts, optional
+        Two names, each of whose touches gets the other's.
     clear : bool
         Forget all touches of the side.
     """
@@ -75,12 +77,16 @@ class Touches(Step):
     leave_out: tuple[str, ...] = ()
     take_in: tuple[str, ...] = ()
     forget: tuple[str, ...] = ()
+    swap: tuple[str, ...] = ()
     clear: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         session = rig.desk.session
-        if self.points is None and not (self.leave_out or self.take_in or self.forget or self.clear):
-            raise GpError("touches needs points, leave_out, take_in, forget or clear")
+        edits = (self.leave_out, self.take_in, self.forget, self.swap, self.clear)
+        if self.points is None and not any(edits):
+            raise GpError("touches needs points, leave_out, take_in, forget, swap or clear")
+        if len(self.swap) not in (0, 2):
+            raise GpError(f"touches: swap must be two names, got {' '.join(self.swap)}")
         if self.clear:
             touching.clear_touches(session, self.side)
         if isinstance(self.points, Mapping):
@@ -89,6 +95,8 @@ class Touches(Step):
             take_touches(
                 rig, self.side, self.points, features=self.features, noise=self.noise, seed=self.seed
             )
+        if self.swap:
+            touching.swap_touches(session, self.side, *self.swap)
         for name in self.forget:
             touching.clear_touches(session, self.side, touch_name(name))
         for names, left_out in ((self.leave_out, True), (self.take_in, False)):

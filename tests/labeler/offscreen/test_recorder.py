@@ -254,6 +254,7 @@ def test_touches_and_verdicts_are_done_again(recording) -> None:
         touching.record_touch(session, "L", code, where, TouchHow.TRACKED, **details)
     touching.leave_out(session, "L", "OS")
     touching.leave_out(session, "L", "OS", False)
+    touching.swap_touches(session, "L", "MN", "OS")
     touching.record_touch(session, "L", "ZL", [0, 0, 0], TouchHow.TRACKED)
     touching.clear_touches(session, "L", "ZL")
     touching.mark_skull(session, "S1", [1, 2, 3])

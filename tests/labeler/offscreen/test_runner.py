@@ -148,6 +148,8 @@ IMPOSSIBLE = (
     ({"do": "touches", "side": "L", "points": "none.dat"}, "none.dat"),
     ({"do": "touches", "side": "L", "points": {}, "how": "guessed"}, "how must be one of"),
     ({"do": "touches", "side": "L", "leave_out": "OS"}, "not touched yet"),
+    ({"do": "touches", "side": "L", "swap": "OS"}, "swap must be two names, got OS"),
+    ({"do": "touches", "side": "L", "swap": ["OS", "MN"]}, "OS left is not touched yet"),
     ({"do": "skull", "points": "none.csv"}, "none.csv"),
     ({"do": "register", "side": "R"}, "3 more touches"),
     ({"do": "verdict", "side": "R", "verdict": "accept"}, "3 more touches"),

@@ -25,7 +25,14 @@ from gp_labeler.session.edits import (
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.session.state import How, PoseCheck, Provenance, SpecimenState
-from gp_labeler.session.touch_edits import LeaveOutTouch, RecordTouch, RemoveTouches, SetSkull, TakeTouches
+from gp_labeler.session.touch_edits import (
+    LeaveOutTouch,
+    RecordTouch,
+    RemoveTouches,
+    SetSkull,
+    SwapTouches,
+    TakeTouches,
+)
 from gp_labeler.session.touches import Touch, TouchHow
 
 PLACEABLE = tuple(f.code for f in FEATURES if not f.computed)
@@ -158,5 +165,6 @@ edits = st.one_of(
     st.builds(TakeTouches, sides, st.dictionaries(touched_names, touches, max_size=3)),
     st.builds(RemoveTouches, sides, st.none() | touched_names),
     st.builds(LeaveOutTouch, sides, touched_names, st.booleans()),
+    st.builds(SwapTouches, sides, touched_names, touched_names),
     st.builds(SetSkull, st.dictionaries(st.sampled_from(("S1", "S2")), positions, max_size=2)),
 )
