@@ -34,6 +34,7 @@ class ScaleBar:
         self._stage = stage
         self.visible = True
         self._written: tuple[object, ...] = ()
+        self._drawn: tuple[object, ...] = ()
         self._line = PixelLines(stage.overlay)
         self._sheet = SpriteSheet(stage.overlay)
 
@@ -42,8 +43,13 @@ class ScaleBar:
         if not self.visible:
             self._line.draw([], [], [])
             self._sheet.draw([], np.empty((0, 2)))
+            self._drawn = ()
             return
         colours, scale = self._stage.colours, self._stage.scale
+        now = (view.matrix.tobytes(), view.size, scale, colours)
+        if now == self._drawn:
+            return
+        self._drawn = now
         length, pixels = scale_bar_length(float(view.pixel_sizes(camera.focus[None])[0]), _BAR_PIXELS * scale)
         wanted = (length, scale, colours)
         if wanted != self._written:

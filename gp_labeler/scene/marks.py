@@ -84,6 +84,8 @@ class MarkActor:
         self._sheet = SpriteSheet(stage.overlay)
         self._images: list[NDArray[np.float32]] = []
         self._rings = PixelLines(stage.overlay)
+        self._drawn: tuple[object, ...] = ()
+        self._labels: list[Label] = []
 
     def show(self, marks: Sequence[Mark]) -> None:
         """Draw these marks in place of those before."""
@@ -122,6 +124,13 @@ class MarkActor:
         bone_opacity : float
             From 0 to 1; the fainter bone is, the clearer what lies behind it.
         """
+        looks = (bone_opacity, self.size, self.show_hidden, self._stage.scale, self._stage.colours)
+        now = (self._marks, view.matrix.tobytes(), view.size, hidden.tobytes(), looks)
+        if now != self._drawn:
+            self._drawn, self._labels = now, self._laid_out(view, hidden, bone_opacity)
+        return self._labels
+
+    def _laid_out(self, view: Viewpoint, hidden: NDArray[np.bool_], bone_opacity: float) -> list[Label]:
         display = view.display(self.positions)
         sizes, pixels = self.diameters(view), display[:, :2]
         radii = 0.5 * sizes / view.pixel_sizes(self.positions)

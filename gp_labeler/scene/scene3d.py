@@ -137,8 +137,7 @@ class Scene3D:
 
     @property
     def is_fine(self) -> bool:
-        """Whether the bone as it is to be seen now is drawn finely and kept: a frame then takes a moment."""
-        self._set_clipping()
+        """Whether the bone as it was to be seen in the last frame is drawn finely, and kept."""
         return self._backdrop.is_fine(self._sight())
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from PySide6.QtGui import QPainter
 
@@ -84,8 +86,7 @@ class SlicePen:
             self._vector(vector)
         for feature in seen.features:
             self._feature(feature)
-        for touch in seen.touches:
-            self._touch(touch)
+        self._touches(seen.touches)
         if seen.tip is not None:
             self._tip(seen.tip)
 
@@ -144,8 +145,11 @@ class SlicePen:
     def _near(self, point: FloatArray, reach: float = REACH_MM) -> bool:
         """Whether a point is drawn; sets how strongly."""
         off = self._off(point)
-        self._fade(1.0 if off < _NEAR_MM else 1.0 - 0.6 * min(off / reach, 1.0))
+        self._fade_by(off, reach)
         return off <= reach
+
+    def _fade_by(self, off: float, reach: float = REACH_MM) -> None:
+        self._fade(1.0 if off < _NEAR_MM else 1.0 - 0.6 * min(off / reach, 1.0))
 
     def _vector(self, vector: DrawnVector) -> None:
         if not self._near((vector.start + vector.end) / 2) or vector.length < 1e-6:
@@ -161,11 +165,15 @@ class SlicePen:
             pixel = self._pixels(feature.position)[0]
             marker(self._painter, pixel, "diamond", 2.8 * self._ratio, colour_of(feature.role))
 
-    def _touch(self, touch: DrawnTouch) -> None:
-        if not self._near(touch.position):
-            return
+    def _touches(self, touches: Sequence[DrawnTouch]) -> None:
+        places = np.array([touch.position for touch in touches]).reshape(-1, 3)
+        offs = np.abs(self._shown.off_slice(places))
+        for n in np.flatnonzero(offs <= REACH_MM).tolist():
+            self._fade_by(float(offs[n]))
+            self._touch(touches[n], self._pixels(places[n])[0], full=bool(offs[n] < _NEAR_MM))
+
+    def _touch(self, touch: DrawnTouch, pixel: FloatArray, *, full: bool) -> None:
         role = "doubtful" if touch.suspect else "touch" if touch.used else "unseen"
-        pixel, full = self._pixels(touch.position)[0], self._off(touch.position) < _NEAR_MM
         marker(self._painter, pixel, "tall", 4.6 * self._ratio, colour_of(role), full=full)
         if touch.suspect:
             about = ellipse(pixel, (11 * self._ratio) ** 2 * np.eye(2), 1.0)

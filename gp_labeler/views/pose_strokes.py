@@ -8,6 +8,7 @@ from PySide6.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.colours import DARK
+from gp_labeler.views.marker_pictures import marker_picture
 
 __all__ = ["area", "arrow", "colour_of", "hull", "line", "marker", "polygon"]
 
@@ -15,11 +16,6 @@ _Corner = tuple[float, float]
 
 _HALO = QColor(DARK.halo)
 _DASHES = {"solid": None, "dashed": [4.0, 2.2], "dotted": [1.2, 1.7]}
-_CORNERS = {
-    "diamond": ((0.0, -1.25), (1.1, 0.0), (0.0, 1.25), (-1.1, 0.0)),
-    "tall": ((0.0, -1.7), (1.0, 0.0), (0.0, 1.7), (-1.0, 0.0)),
-    "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
-}
 
 
 def colour_of(role: str) -> QColor:
@@ -65,16 +61,8 @@ def marker(
     painter: QPainter, pixel: FloatArray, shape: str, radius: float, colour: QColor, *, full: bool = True
 ) -> None:
     """Draw a ``ball``, ``diamond``, ``tall`` diamond or ``square`` about a pixel, or its outline only."""
-    path = QPainterPath()
-    if shape in _CORNERS:
-        path.addPolygon(polygon(pixel + radius * np.array(_CORNERS[shape])))
-        path.closeSubpath()
-    else:
-        path.addEllipse(QPointF(*pixel), radius, radius)
-    painter.strokePath(path, QPen(_HALO, 0.75 * radius))
-    if full:
-        painter.fillPath(path, colour)
-    painter.strokePath(path, QPen(colour, 0.35 * radius))
+    look = {"full": full, "line": 0.35 * radius, "halo": 0.75 * radius}
+    marker_picture(shape, radius, colour.name(), **look).draw(painter, pixel)
 
 
 def arrow(painter: QPainter, start: FloatArray, end: FloatArray, length: float, colour: QColor) -> None:

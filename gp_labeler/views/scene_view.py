@@ -311,7 +311,8 @@ class SceneView(QWidget):
         self.scene.render(quick=quick)
         pixels = self.scene.target.pixels()
         height, width, _ = pixels.shape
-        frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+        frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888)
+        frame = frame.convertToFormat(QImage.Format.Format_RGB32)  # as the screen has it: painted at once
         frame.setDevicePixelRatio(ratio)
         self._frame, self._stale, self._finished = frame, False, self.scene.is_fine
         if not (self._finished or self._fine_timer.isActive()):

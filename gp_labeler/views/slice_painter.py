@@ -19,6 +19,7 @@ from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+from gp_labeler.views.marker_pictures import marker_picture
 from gp_labeler.views.qt_paths import segments_path
 from gp_labeler.views.slice_layers import SliceName
 from gp_labeler.views.slice_lines import paint_lines
@@ -244,32 +245,19 @@ def _draw_mark(
     ratio: float,
 ) -> None:
     """Draw a point: full where the slice passes through it, its outline where it lies behind or before."""
-    centre = QPointF(*pixel)
-    colour = QColor(_on_black(mark.state))
-    shape = QPainterPath()
-    if mark.state in _CORNERS:
-        corners = [QPointF(*(pixel + 1.3 * radius * np.array(c))) for c in _CORNERS[mark.state]]
-        shape.addPolygon(QPolygonF(corners))
-        shape.closeSubpath()
-    else:
-        shape.addEllipse(centre, radius, radius)
+    shape, colour = _SHAPES.get(mark.state, "ball"), _on_black(mark.state)
     painter.save()
     painter.setOpacity(fade)
-    painter.strokePath(shape, QPen(QColor(_HALO), 3.2 * ratio))
-    if in_slice:
-        painter.fillPath(shape, colour)
-    painter.strokePath(shape, QPen(colour, 1.6 * ratio))
+    picture = marker_picture(shape, radius, colour, full=in_slice, line=1.6 * ratio, halo=3.2 * ratio)
+    picture.draw(painter, pixel)
     if mark.active:
         painter.setPen(QPen(QColor(_on_black("active")), 1.8 * ratio))
         painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawEllipse(centre, radius + 4 * ratio, radius + 4 * ratio)
+        painter.drawEllipse(QPointF(*pixel), radius + 4 * ratio, radius + 4 * ratio)
     painter.restore()
 
 
-_CORNERS = {
-    "computed": ((0.0, -1.0), (1.0, 0.0), (0.0, 1.0), (-1.0, 0.0)),
-    "doubtful": ((0.0, -1.0), (0.9, 0.7), (-0.9, 0.7)),
-}
+_SHAPES = {"computed": "rhomb", "doubtful": "triangle"}
 
 
 def _name(mark: Mark, pixel: FloatArray) -> SliceName:
