@@ -157,7 +157,7 @@ def test_a_click_on_a_slice_in_3d_places_on_it_and_slices_hide_bone(window) -> N
     assert view.scene.slices.images == ()
 
 
-def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, window) -> None:
+def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, window, monkeypatch) -> None:
     view = window.grid.scene_view
     view.grab()
     scene = view.scene
@@ -171,13 +171,12 @@ def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, w
     scene.bone.show(scene.bone.surfaces, quick=scene.bone.surfaces)  # as with a mesh so large as to need one
     view.redraw()
     qtbot.waitUntil(lambda: scene.is_fine, timeout=5000)
+    draw, fine = view._draw_frame, []
+    monkeypatch.setattr(view, "_draw_frame", lambda *, quick: (draw(quick=quick), fine.append(scene.is_fine)))
     QTest.keyClick(view, Qt.Key.Key_Left)
-    qtbot.wait(50)
-    assert not scene.is_fine
-    qtbot.waitUntil(lambda: scene.is_fine and view._finished, timeout=5000)
+    qtbot.waitUntil(lambda: len(fine) == 2 and view._finished, timeout=5000)
+    assert fine == [False, True], "the stand-in first"
     QTest.keyClick(view, Qt.Key.Key_Left)
-    qtbot.wait(50)
-    assert not scene.is_fine
     view.grab()  # a picture is finished, however little time there was
     assert scene.is_fine
 
