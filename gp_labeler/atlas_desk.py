@@ -37,6 +37,9 @@ __all__ = ["AtlasDesk", "is_atlas_file"]
 
 _HEAD = 4096
 
+_DRAWN_FIRST_S = 0.1
+"""Judging takes the interpreter away from drawing; a click that comes sooner spares it altogether."""
+
 
 class AtlasDesk(DeskSignals):
     """Keeps the atlas behind ghosts, doubts and poses; `Workbench` is one.
@@ -246,17 +249,22 @@ class AtlasDesk(DeskSignals):
         if self.is_held_out and sum(len(animal.sides) for animal in others) >= FEWEST_ANIMALS:
             self.jobs.submit(RefitAtlas(others), self._expect_by, key="atlas without")
         else:
-            self._judge(Side)
+            self._judge(Side, after=0.0)
 
     def _expect_by(self, atlas: Atlas) -> None:
         self.session.set_predict(partial(predict, atlas))
-        self._judge(Side)
+        self._judge(Side, after=0.0)
 
-    def _judge(self, sides: Iterable[Side]) -> None:
-        """Find the doubts of some sides in the background."""
+    def _judge(self, sides: Iterable[Side], *, after: float = _DRAWN_FIRST_S) -> None:
+        """Find the doubts of some sides in the background, by default once what was clicked is drawn."""
         for side in sides:
-            job = self.session.judging(side)
-            self.jobs.submit(job, lambda _: self.doubts_changed.emit(), key=f"judging {side.value}")
+            job, key = self.session.judging(side), f"judging {side.value}"
+            self.jobs.submit(job, self._take_judged, key=key, after=after)
+
+    def _take_judged(self, departures: Mapping[str, Departure]) -> None:
+        self.judged.emit()
+        if any(departure.is_doubtful for departure in departures.values()):
+            self.doubts_changed.emit()  # else all points look as they did: unknown doubts are not shown
 
     def _cancel(self, key: str) -> None:
         for task in self.jobs.running:

@@ -62,8 +62,10 @@ class DeskSignals:
     surfaces_changed = Signal()
     threshold_previewed = Signal(object)
     """A threshold that is being tried out on the slices; None when that is over."""
+    judged = Signal()
+    """Labels were held against the atlas: ask for `departures` again."""
     doubts_changed = Signal()
-    """Doubts were found or went away: ask `session.point_states(side, wait=False)` again."""
+    """Some of them are doubtful: ask `session.point_states(side, wait=False)` again."""
     dragged = Signal(object)
     """The `Drag` that goes on; None when it is over."""
     tool_changed = Signal(str)

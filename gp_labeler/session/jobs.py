@@ -69,6 +69,11 @@ class Progress:
             self._told = now
             self._report(min(max(fraction, 0.0), 1.0), text)
 
+    def wait(self, seconds: float) -> None:
+        """Do nothing for a while; raises `Cancelled` as soon as the job is to stop."""
+        if self._stop.wait(seconds):
+            raise Cancelled
+
     def cancelled(self) -> bool:
         """Return whether the job is to stop; for code that asks instead of being told."""
         return self._stop.is_set()
@@ -148,7 +153,9 @@ class Jobs:
         """Tasks that are not finished, oldest first."""
         return tuple(self._tasks)
 
-    def submit(self, job: Job[R], done: Callable[[R], None] | None = None, *, key: str = "") -> Task[R]:
+    def submit(
+        self, job: Job[R], done: Callable[[R], None] | None = None, *, key: str = "", after: float = 0.0
+    ) -> Task[R]:
         """Hand in a job.
 
         Parameters
@@ -159,6 +166,8 @@ class Jobs:
             Receives the result on the dispatcher's thread, unless the task was cancelled.
         key : str
             What it is for. A task with the same key is cancelled: its result is out of date.
+        after : float
+            Seconds until it begins; where a newer one takes its place in time, it never does.
         """
         if self._closed:
             raise RuntimeError("these jobs are closed")
@@ -168,7 +177,7 @@ class Jobs:
         new = Task(job, key, self._report)
         self._tasks.append(new)
         self.started.emit(new)
-        self._pool.submit(self._run, new, done)
+        self._pool.submit(self._run, new, done, after)
         return new
 
     def cancel_all(self) -> None:
@@ -183,14 +192,13 @@ class Jobs:
         self._pool.shutdown(wait=True, cancel_futures=True)
         self._tasks.clear()
 
-    def _run(self, task: Task[R], done: Callable[[R], None] | None) -> None:
+    def _run(self, task: Task[R], done: Callable[[R], None] | None, after: float) -> None:
         """On the worker: whatever the job does, the worker lives on."""
         result: R | None = None
         error: Exception | None = None
         state = TaskState.DONE
         try:
-            if task.progress.cancelled():
-                raise Cancelled
+            task.progress.wait(after)
             result = task.job.run(task.progress)
         except Cancelled:
             state = TaskState.CANCELLED

@@ -278,7 +278,7 @@ class LabelsCard(Card):
         self.add(self.table)
         for signal in (
             workbench.atlas_changed,
-            workbench.doubts_changed,
+            workbench.judged,
             workbench.landmarks_changed,
             workbench.session_replaced,
         ):

@@ -163,7 +163,7 @@ class AtlasTable(QTableView):
         self._arrange()
         self.clicked.connect(self._go_to)
         follow(self, workbench.atlas_changed, self._on_atlas)
-        for signal in (workbench.doubts_changed, workbench.landmarks_changed, workbench.session_replaced):
+        for signal in (workbench.judged, workbench.landmarks_changed, workbench.session_replaced):
             follow(self, signal, self._on_labels)
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name

@@ -110,6 +110,23 @@ def test_the_newest_of_a_key_wins(jobs, queue):
     assert (old.state, other.state, new.state) == (TaskState.CANCELLED, TaskState.DONE, TaskState.DONE)
 
 
+def test_a_job_for_later_is_spared_where_a_newer_one_comes_in_time(jobs, queue):
+    spared, results = Forever(), []
+    first = jobs.submit(spared, results.append, key="judging", after=60.0)
+    jobs.submit(Double(2), results.append, key="judging", after=0.01)
+    queue.deliver_until_idle(jobs, timeout=10)
+    assert results == [4]
+    assert first.state is TaskState.CANCELLED
+    assert not spared.entered.is_set()
+
+
+def test_closing_waits_for_no_job_for_later(jobs):
+    begun = time.monotonic()
+    jobs.submit(Double(2), after=60.0)
+    jobs.close()
+    assert time.monotonic() - begun < 30
+
+
 def test_failures_are_told_and_kill_no_worker(jobs, queue, caplog):
     failed, results = [], []
     jobs.failed.connect(lambda task: failed.append(task.message))
