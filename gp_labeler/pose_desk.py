@@ -212,6 +212,18 @@ class PoseDesk:
         session.do(RemoveTouches(wrong))
         self.choose(side=right)
 
+    @property
+    def swapped(self) -> tuple[str, str] | None:
+        """Two touched features that look as if each had the other's name, by any method."""
+        poses = () if self.estimate is None else self.estimate.poses.values()
+        return next((pose.swapped for pose in poses if pose.swapped is not None), None)
+
+    def swap_names(self) -> None:
+        """Give each of these two the other's name; raises `GpError` where none look so."""
+        if self.swapped is None:
+            raise GpError("no two touches look as if each had the other's name")
+        touching.swap_touches(self._desk.session, self.side, *self.swapped)
+
     def show(self, name: str) -> None:
         """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""
         estimate, touch = self.estimate, self._desk.session.state.touches.get((self.side, name))

@@ -56,6 +56,8 @@ class CochleaPose:
         The registered atlas, for a left side; for a right side, from the atlas mirrored in x.
     round_window : str
         Of which round window the middle is: ``touched`` or ``expected``.
+    swapped : (str, str) or None
+        Two touched features that look as if each had the other's name.
     """
 
     side: Side
@@ -69,6 +71,7 @@ class CochleaPose:
     probe_noise: float | None = None
     T_touches_atlas: RigidTransform | None = field(default=None, repr=False)
     round_window: str = "expected"
+    swapped: tuple[str, str] | None = None
 
     @property
     def origin(self) -> FloatArray:
@@ -113,6 +116,7 @@ class CochleaPose:
             "probe_noise_mm": self.probe_noise,
             "round_window": self.round_window,
             "suspect": list(self.suspects),
+            "swapped": None if self.swapped is None else list(self.swapped),
             "warnings": list(self.warnings),
             "registered_atlas": None
             if self.T_touches_atlas is None

@@ -105,6 +105,7 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         if registered is None
         else RigidTransform(_numbers(content, "registered_atlas", (4, 4)), frame, "atlas"),
         round_window=round_window,
+        swapped=_pair(content.get("swapped")),
     )
 
 
@@ -131,6 +132,15 @@ def _texts(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list):
         raise GpError(f"{shown(value)} stands for a list")
     return tuple(_text(text) for text in value)
+
+
+def _pair(value: Any) -> tuple[str, str] | None:
+    if value is None:
+        return None
+    names = _texts(value)
+    if len(names) != 2:
+        raise GpError(f"{shown(value)} stands for two names")
+    return names[0], names[1]
 
 
 def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:

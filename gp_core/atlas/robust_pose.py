@@ -74,6 +74,8 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
     suspects = _suspects(model, fit)
     defining = defining_points(atlas, model, fit)
     frame = _cochlea_in_touches(defining, fit, touches)
+    worse = _other_side_worse(model, points, fit)
+    swapped = _swapped(model, points, fit, max(_AGAINST_THE_USER, -worse)) if fit.rough else None
     return CochleaPose(
         side=touches.side,
         method="robust",
@@ -82,9 +84,10 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
         covariance=pose_covariance(atlas, model, fit, defining, touches.side),
         residuals=_residuals(model, fit),
         suspects=suspects,
-        warnings=tuple(_warnings(model, points, fit, touches.side, suspects)),
+        warnings=tuple(_warnings(fit, touches.side, suspects, worse, swapped)),
         probe_noise=fit.noise,
         T_touches_atlas=_atlas_in_touches(fit, touches),
+        swapped=swapped,
     )
 
 
@@ -213,20 +216,19 @@ def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
 
 
 def _warnings(
-    model: TouchModel, points: FloatArray, fit: NamedFit, side: Side, suspects: tuple[str, ...]
+    fit: NamedFit, side: Side, suspects: tuple[str, ...], worse: float, swapped: tuple[str, str] | None
 ) -> Iterator[str]:
-    worse = _other_side_worse(model, points, fit)
-    swap = _swap(model, points, fit, max(_AGAINST_THE_USER, -worse)) if fit.rough else ""
-    if swap:
-        yield f"{swap} look swapped"
+    if swapped is not None:
+        yield f"{' and '.join(swapped)} look swapped"
     else:
         yield from _side_warning(worse, side)
-    if suspects and not swap:
+    if suspects and swapped is None:
         names = " and ".join(suspects)
         verb, it = ("does", "it") if len(suspects) == 1 else ("do", "them")
         yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
-    if len(model.codes) < _ENOUGH_TO_TELL and not suspects:
-        yield f"only {len(model.codes)} points: a mistouch cannot be told from an unusual animal"
+    n = len(fit.weights)
+    if n < _ENOUGH_TO_TELL and not suspects:
+        yield f"only {n} points: a mistouch cannot be told from an unusual animal"
     if not fit.converged:
         yield "the fit did not settle; check the touches"
 
@@ -250,8 +252,8 @@ def _side_warning(worse: float, side: Side) -> Iterator[str]:
         )
 
 
-def _swap(model: TouchModel, points: FloatArray, fit: NamedFit, least: float) -> str:
-    """Name the two features whose exchange gains more than `least` in -2 log posterior, if there are such."""
+def _swapped(model: TouchModel, points: FloatArray, fit: NamedFit, least: float) -> tuple[str, str] | None:
+    """Return the two features whose exchange gains more than `least` in -2 log posterior, if any are such."""
     below = fit.misfit - least / 2
     i, j, misfit = best_exchange(model, points, fit, below)
-    return f"{model.codes[i]} and {model.codes[j]}" if misfit < below else ""
+    return (model.codes[i], model.codes[j]) if misfit < below else None

@@ -16,8 +16,8 @@ _GOOD_MM, _GOOD_DEG = 0.75, 14.0
 _POOR_MM, _POOR_DEG = 1.5, 25.0
 """Beyond this, an opening drilled for the round window may well miss it."""
 
-_WRONG_SIDE, _SWAPPED = "check the side", "look swapped"
-"""Ends of warnings that say that the pose itself is wrong, not only less sure."""
+_WRONG_SIDE = "check the side"
+"""End of a warning that says that the pose itself is wrong, not only less sure."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ def confidence(pose: CochleaPose) -> Confidence:
     radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
     if is_other_side(pose):
         return Confidence("danger", "Check the side", "The touches look like those of the other ear.")
-    if any(warning.endswith(_SWAPPED) for warning in pose.warnings):
+    if pose.swapped is not None:
         return Confidence("danger", "Check the names", "Two touches look as if each had the other's name.")
     if radius > _POOR_MM or cone > _POOR_DEG:
         return Confidence("danger", "Poor", "The true cochlea may lie well beside this one.")

@@ -48,17 +48,19 @@ class ResultCard(Card):
         self.waiting = text_label("", "title", wrap=True)
         self.one, self.two = _OnePose(), _TwoPoses()
         self.next = link("", "Make it the next to touch")
+        self.swap = link("", "Give each the other's name; undo brings them back")
         self.other_side = link("", "Move all touches to the other side; undo brings them back")
         self.add_to_heading(self.verdict)
         for what in (self.waiting, self.one, self.two, self.notices):
             self.add(what)
         row = QHBoxLayout()
         row.setSpacing(4)
-        row.addWidget(self.other_side)
-        row.addWidget(self.next)
+        for button in (self.other_side, self.swap, self.next):
+            row.addWidget(button)
         row.addStretch(1)
         self.add(row)
         self.next.clicked.connect(self._aim)
+        self.swap.clicked.connect(lambda: attempt(workbench, workbench.pose.swap_names))
         self.other_side.clicked.connect(lambda: attempt(workbench, workbench.pose.change_side))
 
     def refresh(self, *_: object) -> None:
@@ -84,8 +86,10 @@ class ResultCard(Card):
         wrong = pose is not None and (is_other_side(pose) or bool(_misnamed(self._desk)))
         self.other_side.setVisible(wrong)
         self.other_side.setText(f"They are of the {desk.side.other.word} side")
+        self.swap.setVisible(desk.swapped is not None)
+        self.swap.setText(f"Swap {' and '.join(desk.swapped or ())}")
         self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
-        self._show_gain(wanted=not wrong)
+        self._show_gain(wanted=not wrong and desk.swapped is None)
 
     def set_large(self, large: bool) -> None:
         """Show the estimate in large type, where there is room."""

@@ -192,8 +192,11 @@ def test_exchanged_names_are_called_out(published: Atlas) -> None:
     touches = _touched(_mean_side(published, Side.LEFT), codes)
     for a, b in (("OS", "CL"), ("MN", "RWP"), ("OI", "RWA")):
         swapped = {**touches, a: touches[b], b: touches[a]}
-        warnings = estimate_pose(swapped, "L", published).warnings
-        assert any(w == f"{a} and {b} look swapped" or w == f"{b} and {a} look swapped" for w in warnings)
+        pose = estimate_pose(swapped, "L", published)
+        assert pose.swapped is not None
+        assert set(pose.swapped) == {a, b}
+        assert f"{' and '.join(pose.swapped)} look swapped" in pose.warnings
+    assert estimate_pose(touches, "L", published).swapped is None
 
 
 def test_names_exchanged_in_real_touches_are_called_out(published: Atlas, shared_data: Path) -> None:

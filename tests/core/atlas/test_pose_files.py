@@ -49,6 +49,19 @@ def test_a_pose_comes_back_to_the_last_bit(side: Side, tmp_path: Path) -> None:
     assert (tmp_path / "again.json").read_bytes() == (tmp_path / "pose.json").read_bytes()
 
 
+def test_names_that_look_exchanged_come_back(tmp_path: Path) -> None:
+    touches = Atlas.published()
+    exchanged = {code: touches[{"MN": "OS", "OS": "MN"}.get(code, code)] for code in PROBE}
+    pose = estimate_pose(exchanged, "L")
+    assert pose.swapped is not None
+    pose.save(tmp_path / "pose.json")
+    assert read_pose(tmp_path / "pose.json").swapped == pose.swapped
+    content = json.loads((tmp_path / "pose.json").read_text())
+    del content["swapped"]  # as files of before have it
+    (tmp_path / "pose.json").write_text(json.dumps(content))
+    assert read_pose(tmp_path / "pose.json").swapped is None
+
+
 def test_a_pose_of_jrmpc_comes_back_too(tmp_path: Path) -> None:
     atlas = Atlas.published()
     animals = draw_specimens(atlas, 4, np.random.default_rng(1))
@@ -82,6 +95,8 @@ def test_a_file_of_before_the_registered_atlas_is_read(file: Path) -> None:
         ("residuals_mm", {"OS": "far"}, "'far' stands for a number"),
         ("residuals_mm", 3, "not where they should be"),
         ("suspect", "OS", "'OS' stands for a list"),
+        ("swapped", ["OS"], r"\['OS'\] stands for two names"),
+        ("swapped", ["OS", 3], "3 stands for a name"),
         ("warnings", [1], "1 stands for a name"),
         ("probe_noise_mm", True, "True stands for a number"),
         ("atlas", None, "None stands for a name"),

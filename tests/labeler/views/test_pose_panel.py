@@ -372,13 +372,25 @@ def test_the_wrong_side_is_called_out_and_right_on_the_other(desk, panel, qtbot)
     assert touches(desk, Side.RIGHT) == wrong
 
 
-def test_swapped_names_are_called_out(desk, panel):
+def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbot):
     touch(desk, *PROBE)
     at = touches(desk)
     desk.pose.record(at["MN"], TouchHow.TYPED, name="OS")
     desk.pose.record(at["OS"], TouchHow.TYPED, name="MN")
     assert "look swapped" in notices(panel)
     assert panel.result.verdict.label.text() == "Check the names"
+    assert panel.result.swap.text() in ("Swap MN and OS", "Swap OS and MN")
+    assert not panel.result.next.isVisible()
+    wrong = touches(desk)
+    qtbot.mouseClick(panel.result.swap, CLICK)
+    assert touches(desk) == at
+    assert panel.result.verdict.label.text() == "Good"
+    assert not panel.result.swap.isVisible()
+    with pytest.raises(GpError, match="no two touches"):
+        desk.pose.swap_names()
+    desk.session.undo()
+    assert touches(desk) == wrong, "one step"
+    assert panel.result.swap.isVisible()
 
 
 def test_two_methods_stand_side_by_side(desk, panel, qtbot):
