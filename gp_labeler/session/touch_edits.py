@@ -114,8 +114,8 @@ class SwapTouches:
 
     @property
     def text(self) -> str:
-        """Such as ``swap touches MN and OS left``."""
-        return f"swap touches {self.name} and {self.other} {self.side.word}"
+        """Such as ``swap MN and OS left``."""
+        return f"swap {self.name} and {self.other} {self.side.word}"
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the names exchanged; raises `GpError` where one of them is not touched."""
