@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -133,19 +134,19 @@ class DrawnPose:
         """(3,) unit vector that points about to the top of the head, for either side."""
         return self.T_scan_cochlea[:3, 2] * (1.0 if self.side is Side.LEFT else -1.0)
 
-    @property
+    @cached_property
     def tip(self) -> FloatArray:
         """(3,) end of the arrow, mm."""
         end: FloatArray = self.at([AXIS_MM, 0, 0])[0]
         return end
 
-    @property
+    @cached_property
     def tail(self) -> FloatArray:
         """(3,) where the arrow begins, a little behind the origin, mm."""
         start: FloatArray = self.at([-BEHIND_MM, 0, 0])[0]
         return start
 
-    @property
+    @cached_property
     def rim(self) -> FloatArray:
         """(N, 3) rim of the cone about the axis, mm."""
         turn = np.linspace(0.0, 2 * np.pi, _CORNERS, endpoint=False)
@@ -185,13 +186,13 @@ class DrawnTruth:
     axis: FloatArray
     label: str = "labelled"
 
-    @property
+    @cached_property
     def tip(self) -> FloatArray:
         """(3,) end of the line, mm."""
         end: FloatArray = self.origin + AXIS_MM * self.axis
         return end
 
-    @property
+    @cached_property
     def tail(self) -> FloatArray:
         """(3,) where the line begins, mm."""
         start: FloatArray = self.origin - BEHIND_MM * self.axis
@@ -332,7 +333,7 @@ class PoseScene:
         """Whether one of `PARTS` is shown."""
         return part in self.parts
 
-    @property
+    @cached_property
     def seen(self) -> PoseScene:
         """The same without what is hidden; regions, outlines and names hang on the poses and stay."""
         hidden = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.sprites import Text
 from gp_labeler.scene.stage import Stage
 
-__all__ = ["REACH_MM", "Name", "Spot", "names_of", "spots_of", "texts_of"]
+__all__ = ["REACH_MM", "Name", "Spot", "Written", "names_of", "texts_of", "written_in"]
 
 Spot = tuple[FloatArray, float]
 """A (3,) scan position that labels leave free, and how far about it, logical pixels."""
@@ -50,7 +51,25 @@ class Name(NamedTuple):
     reach_mm: float = 4.0
 
 
+class Written(NamedTuple):
+    """All that is written in a scene.
+
+    Parameters
+    ----------
+    names : tuple of Name
+    places : (N, 3) float array
+        Of the names, and of the spots that they leave free, scan frame, mm.
+    gaps : tuple of float
+        How far about each of those spots, logical pixels.
+    """
+
+    names: tuple[Name, ...]
+    places: FloatArray
+    gaps: tuple[float, ...]
+
+
 _ALONG = 16
+_KEPT = 4
 
 
 def texts_of(scene: PoseScene) -> Iterator[Name]:
@@ -91,13 +110,20 @@ def spots_of(scene: PoseScene) -> Iterator[Spot]:
         yield feature.position, 5.0
 
 
+@lru_cache(_KEPT)
+def written_in(scene: PoseScene) -> Written:
+    """Return what is written in a scene, which every view of it asks."""
+    names, spots = tuple(texts_of(scene)), tuple(spots_of(scene))
+    places = [name.place for name in names] + [place for place, _ in spots]
+    return Written(names, np.array(places).reshape(-1, 3), tuple(gap for _, gap in spots))
+
+
 def names_of(scene: PoseScene, view: Viewpoint, stage: Stage) -> list[Label]:
     """Return the labels of the 3D view; spots to leave free are labels without a text."""
-    names, spots = list(texts_of(scene)), list(spots_of(scene))
-    places = [name.place for name in names] + [place for place, _ in spots]
-    if not places:
+    names, places, gaps = written_in(scene)
+    if not len(places):
         return []
-    pixels = view.display(np.array(places))[:, :2]
+    pixels = view.display(places)[:, :2]
     states, scale = stage.colours.states, stage.scale
     labels = [
         Label(Text(name.text, states[name.role]), pixel, name.gap * scale, name.rank)
@@ -105,6 +131,6 @@ def names_of(scene: PoseScene, view: Viewpoint, stage: Stage) -> list[Label]:
     ]
     free = [
         Label(Text("", stage.colours.text), pixel, gap * scale, -2.0)
-        for (_, gap), pixel in zip(spots, pixels[len(names) :], strict=True)
+        for gap, pixel in zip(gaps, pixels[len(names) :], strict=True)
     ]
     return labels + free

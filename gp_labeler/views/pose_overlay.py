@@ -8,7 +8,7 @@ from PySide6.QtGui import QPainter
 
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.pose_data import PoseScene
-from gp_labeler.scene.pose_names import spots_of, texts_of
+from gp_labeler.scene.pose_names import written_in
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.views.pose_slices import SlicePen
 from gp_labeler.views.slice_layers import SliceName
@@ -49,8 +49,7 @@ class PoseOverlay(QObject):
 
     def names(self, shown: Shown, ratio: float) -> list[SliceName]:
         """Return what is written beside it, and what names leave free."""
-        names, spots = list(texts_of(self._scene)), list(spots_of(self._scene))
-        places = np.array([name.place for name in names] + [place for place, _ in spots]).reshape(-1, 3)
+        names, places, gaps = written_in(self._scene)
         pixels, off = shown.scan_to_pixel(places) + 0.5, np.abs(shown.off_slice(places))
         written = [
             SliceName(name.text, pixel, DARK.states[name.role], name.gap, name.rank)
@@ -59,6 +58,6 @@ class PoseOverlay(QObject):
         ]
         free = [
             SliceName("", pixel, DARK.text, gap, -2.0)
-            for (_, gap), pixel in zip(spots, pixels[len(names) :], strict=True)
+            for gap, pixel in zip(gaps, pixels[len(names) :], strict=True)
         ]
         return written + free

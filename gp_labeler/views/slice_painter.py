@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from PySide6.QtCore import QPointF, QRectF, Qt
@@ -10,10 +10,11 @@ from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath,
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.colours import DARK
-from gp_labeler.scene.ghosts import ellipse
+from gp_labeler.scene.ghosts import Ghost, ellipse
 from gp_labeler.scene.label_layout import place_labels
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.segments import Segment
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
@@ -46,6 +47,21 @@ def reach_of(source: SliceSource, plane: Plane) -> float:
     return max(_REACH_MM, 1.5 * source.step(plane))
 
 
+class _Points(NamedTuple):
+    """What of the labels is painted, as it was when one of them changed last."""
+
+    marks: list[Mark]
+    positions: FloatArray
+    ghosts: list[Ghost]
+    lines: list[Segment]
+
+    @classmethod
+    def of(cls, desk: Workbench) -> _Points:
+        marks = drawn_marks(desk)
+        positions = np.array([mark.position for mark in marks]).reshape(-1, 3)
+        return cls(marks, positions, drawn_ghosts(desk), drawn_segments(desk, DARK))
+
+
 class SlicePainter:
     """Paints one slice view; remembers the picture of the slice while only what lies over it changes.
 
@@ -64,11 +80,17 @@ class SlicePainter:
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
+        self._points: _Points | None = None
         follow(view, workbench.threshold_previewed, self._on_preview)
 
     def forget(self) -> None:
         """Let go of the pictures."""
         self._slice, self._picture, self._outline, self._ground = None, None, None, None
+        self.forget_points()
+
+    def forget_points(self) -> None:
+        """Ask for points, ghosts and lines anew when they are painted next."""
+        self._points = None
 
     def paint(self, painter: QPainter) -> None:
         """Paint everything."""
@@ -85,12 +107,14 @@ class SlicePainter:
         self._paint_crosshair(painter, view.shown, theme, ratio)
         self._paint_letters(painter, view.shown, ratio)
         self._paint_scale_bar(painter, view.shown, ratio)
-        lines, reach = drawn_segments(self._desk, theme.scene), reach_of(view.source, view.plane)
-        paint_lines(painter, lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
+        if self._points is None:
+            self._points = _Points.of(self._desk)
+        points, reach = self._points, reach_of(view.source, view.plane)
+        paint_lines(painter, points.lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
         for layer in view.layers:
             layer.paint(painter, view.shown, ratio)
-        self._paint_ghosts(painter, view.shown, theme, ratio)
-        self._paint_marks(painter, view.source, view.shown, theme, ratio)
+        self._paint_ghosts(painter, points.ghosts, view.shown, ratio)
+        self._paint_marks(painter, points, view.source, view.shown, ratio)
 
     def _on_preview(self, threshold: float | None) -> None:
         self._preview = threshold
@@ -181,10 +205,10 @@ class SlicePainter:
         word = word_picture(f"{length:g} mm", 12, _TEXT, ratio, bold=False)
         word.draw(painter, right - pixels / 2 - word.box.center().x(), y - 6 * ratio - word.box.bottom())
 
-    def _paint_ghosts(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
+    def _paint_ghosts(self, painter: QPainter, ghosts: list[Ghost], shown: Shown, ratio: float) -> None:
         axes = np.stack([shown.plane.right, shown.plane.down])
         colour = QColor(_on_black("ghost"))
-        for ghost in drawn_ghosts(self._desk):
+        for ghost in ghosts:
             centre = shown.scan_to_pixel(ghost.mean[None])[0] + 0.5
             covariance = axes @ ghost.covariance @ axes.T / shown.mm_per_pixel**2
             ring = QPolygonF([QPointF(*corner) for corner in ellipse(centre, covariance)])
@@ -196,10 +220,9 @@ class SlicePainter:
             word.draw(painter, right, max(box.top(), word.box.height() + 6 * ratio))
 
     def _paint_marks(
-        self, painter: QPainter, source: SliceSource, shown: Shown, theme: Theme, ratio: float
+        self, painter: QPainter, points: _Points, source: SliceSource, shown: Shown, ratio: float
     ) -> None:
-        marks = drawn_marks(self._desk)
-        positions = np.array([mark.position for mark in marks]).reshape(-1, 3)
+        marks, positions = points.marks, points.positions
         pixels, off = shown.scan_to_pixel(positions) + 0.5, np.abs(shown.off_slice(positions))
         near = off <= reach_of(source, shown.plane)
         in_slice = off <= 0.75 * source.step(shown.plane)

@@ -133,10 +133,12 @@ class SliceView(QWidget):
             desk.threshold_previewed,
             desk.view_changed,
             desk.dragged,
+            desk.pose.overlay_changed,
         ):
             follow(self, signal, self._repaint)
 
     def _repaint(self, *_: object) -> None:
+        self._painter.forget_points()
         self.update()
 
     def _on_volume(self, volume: Volume) -> None:
@@ -145,10 +147,10 @@ class SliceView(QWidget):
         self._on_crosshair(self._desk.session.crosshair)
 
     def _on_session_replaced(self, _: object) -> None:
+        self._repaint()
         if self._desk.volume is None:
             self.source = self.shown = None
             self._painter.forget()
-            self.update()
 
     def _on_crosshair(self, position: FloatArray) -> None:
         if self.shown is not None:

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from PySide6.QtCore import QObject
 from PySide6.QtGui import QColor, QFont, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
@@ -230,13 +229,14 @@ def base_font() -> QFont:
     return font
 
 
-def theme_of(widget: QObject | None) -> Theme:
-    """Return the theme that a widget is drawn in: that of the nearest one around it that has one."""
+def theme_of(widget: QWidget | None) -> Theme:
+    """Return the theme that a widget is drawn in: that of its window, or of the one that opened it."""
     while widget is not None:
-        name = widget.property(_PROPERTY)
+        window = widget.window()
+        name = window.property(_PROPERTY)
         if name in THEMES:
             return THEMES[name]
-        widget = widget.parent()
+        widget = window.parentWidget()
     app = QApplication.instance()
     return THEMES.get(app.property(_PROPERTY), DARK) if app is not None else DARK
 

@@ -1,0 +1,72 @@
+"""What slices keep between two paints is what the session holds, whatever was done in between."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from window_cases import MIDDLE
+
+from gp_core import Atlas, Side
+from gp_labeler.scene.colours import DARK
+from gp_labeler.session import labelling
+from gp_labeler.session.session import Session
+from gp_labeler.session.state import How
+from gp_labeler.session.workflow import Active
+from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+
+ATLAS = Atlas.published()
+
+
+def _place(session: Session, code: str, side: Side = Side.LEFT, shift: float = 0.0) -> None:
+    place = MIDDLE + ATLAS[code] + shift
+    labelling.place(session, place, How.MESH, side=side, code=code)
+
+
+def _told(marks, ghosts, lines):
+    return (
+        [(m.key, m.position.tolist(), m.label, m.state, m.active) for m in marks],
+        [(g.key, g.mean.tolist(), g.label, g.active) for g in ghosts],
+        [(line.start.tolist(), line.end.tolist()) for line in lines],
+    )
+
+
+ACTS = {
+    "place": lambda desk: _place(desk.session, "LLI"),
+    "move": lambda desk: _place(desk.session, "RWA", shift=0.5),
+    "undo": lambda desk: desk.session.undo(),
+    "not seen": lambda desk: labelling.mark_unseen(desk.session, side=Side.LEFT, code="RWA"),
+    "other point": lambda desk: desk.session.set_active(Active(Side.LEFT, "RWP")),
+    "other side": lambda desk: desk.session.set_active(Active(Side.RIGHT, "CA")),
+    "ghost": lambda desk: desk.session.set_active(Active(Side.LEFT, "LLI")),
+    "ghosts off": lambda desk: desk.session.view.update(ghosts_visible=False),
+    "axis off": lambda desk: desk.session.view.update(axis_visible=False),
+    "estimate": lambda desk: desk.pose.draw(visible=True),
+    "drag": lambda desk: (desk.begin_drag(Side.LEFT, "RWA"), desk.drag_to(MIDDLE + 0.3, How.SLICE)),
+    "another": lambda desk: desk.begin(),
+}
+
+
+@pytest.mark.parametrize("act", ACTS)
+def test_what_is_painted_follows(window, act) -> None:
+    desk, slices = window.workbench, window.grid.slice_views.values()
+    desk.use_atlas(ATLAS)
+    for code in ("CA", "CB", "RWA", "RWP"):
+        _place(desk.session, code)
+    desk.session.set_active(Active(Side.LEFT, "OS" if act == "ghosts off" else "RWA"))
+    before = []
+    for view in slices:
+        view.grab()
+        before.append(view._painter._points)
+        assert len(before[-1].marks) == 5, "the four, and CO"
+    ACTS[act](desk)
+    wanted = _told(drawn_marks(desk), drawn_ghosts(desk), drawn_segments(desk, DARK))
+    marks, _, ghosts, lines = before[0]
+    assert wanted != _told(marks, ghosts, lines), "the act shows, else this says nothing"
+    for view in slices:
+        view.grab()
+        kept = view._painter._points
+        if kept is None:
+            assert view.source is None
+            continue
+        assert _told(kept.marks, kept.ghosts, kept.lines) == wanted
+        np.testing.assert_array_equal(kept.positions, [mark.position for mark in kept.marks])
