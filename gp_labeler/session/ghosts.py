@@ -32,7 +32,7 @@ CHI2_95 = 7.815
 HEAD_MM = 40.0
 """No two features of a head are further apart."""
 
-N_REMEMBERED = 16
+N_REMEMBERED = 24
 
 MIRROR_SD_MM = 0.5
 MIRROR_SD_PER_MM = 0.05
@@ -180,7 +180,8 @@ class Expectations:
         to_do = [f.code for f in FEATURES if not f.computed and landmarks.status(f.code) is Status.TO_DO]
         if not to_do:
             return {}
-        expected = self._expected(_without(landmarks, "CO"))
+        key = ("expected", _fingerprint(landmarks))  # an edit of the other side asks for the same again
+        expected = self._remembered(key, lambda: dict(self._expected(_without(landmarks, "CO"))))
         found = mirror_ghosts(landmarks, other) | {c: Ghost(c, *expected[c]) for c in expected}
         return {code: found[code] for code in to_do if code in found}
 

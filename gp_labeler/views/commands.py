@@ -46,10 +46,9 @@ class Commands(QObject):
         self.actions = {row.id: self._made(row, window, views) for row in ACTIONS.values()}
         for signal in (
             workbench.session_replaced,
-            workbench.landmarks_changed,
             workbench.active_changed,
             workbench.ghosts_changed,
-            workbench.history_changed,
+            workbench.history_changed,  # after every edit
             workbench.view_changed,
             workbench.volume_opened,
             workbench.surfaces_changed,

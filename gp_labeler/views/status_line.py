@@ -136,7 +136,9 @@ class StatusLine(QWidget):
             "warning": theme.warning,
             "danger": theme.danger,
         }
-        self.next_click.setStyleSheet(f"color: {colours[role]}")
+        look = f"color: {colours[role]}"
+        if self.next_click.styleSheet() != look:  # Qt polishes the label anew even for the same one
+            self.next_click.setStyleSheet(look)
         self._role = role
         self._make_room()
 

@@ -15,7 +15,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["TopBar"]
 
-_LONGEST_UNDO = 26
+_LONGEST_UNDO, _GAP = 26, 6
 _TOOLS = (
     ("tool.place", "label", "Place"),
     ("tool.look", "axis", "Crosshair"),
@@ -90,7 +90,7 @@ class TopBar(QWidget):
     def _lay_out(self) -> None:
         row = QHBoxLayout(self)
         row.setContentsMargins(14, 4, 12, 4)
-        row.setSpacing(6)
+        row.setSpacing(_GAP)
         row.addWidget(self.name)
         row.addSpacing(6)
         row.addWidget(self.about)
@@ -137,9 +137,13 @@ class TopBar(QWidget):
         self._fit()
 
     def _fit(self) -> None:
-        """Leave out what the scan is like where there is no room for it."""
-        self.about.hide()
-        self.about.setVisible(self.sizeHint().width() + self.about.sizeHint().width() + 12 <= self.width())
+        """Leave out what the scan is like where there is no room for it.
+
+        It is not hidden to measure the others: that would lay out the bar anew at every edit.
+        """
+        about, shown = self.about.sizeHint().width(), not self.about.isHidden()
+        others = self.sizeHint().width() - (about + _GAP if shown else 0)
+        self.about.setVisible(others + about + 2 * _GAP <= self.width())
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         if event.type() == QEvent.Type.StyleChange:

@@ -189,6 +189,26 @@ def test_ghosts_need_three_points_and_an_atlas():
     assert "ZL" not in session.ghosts(L)
 
 
+def test_an_edit_of_one_side_asks_the_atlas_for_that_side_alone():
+    asked = []
+
+    def counted(landmarks):
+        asked.append(landmarks.side)
+        return predict(landmarks)
+
+    session = Session(predict=counted)
+    for side in (L, R):
+        for code in ("CA", "RWP", "OS"):
+            session.do(PlacePoint(side, code, shape(side)[code], MARK))
+        session.ghosts(side)
+    session.ghosts(L)
+    asked.clear()
+    session.do(PlacePoint(R, "MH", shape(R)["MH"], MARK))
+    left, right = session.ghosts(L), session.ghosts(R)
+    assert asked == [R]
+    assert left["MH"].source == right["FPP"].source == "atlas"
+
+
 def test_a_side_at_rest_stays_judged_while_the_other_is_labelled():
     session = Session(predict=predict)
     session.do(ImportLandmarks((shape(L),), MARK))
