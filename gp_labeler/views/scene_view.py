@@ -114,7 +114,15 @@ class SceneView(QWidget):
         """
         self._stale = True
         self._fine_timer.start(_FINE_AFTER_MS if quick else 0)
-        self.update()
+        if self._has_frame:
+            self._draw_timer.start()  # by itself: the other views are painted first, this one once it is drawn
+        else:
+            self.update()
+
+    @property
+    def is_stale(self) -> bool:
+        """Whether the scene has changed since the frame that is shown was drawn."""
+        return self._stale
 
     def reset(self) -> None:
         """Show everything, from the direction looked in now."""
