@@ -40,8 +40,8 @@ def place_labels(
     gaps : (N,) array_like
         Distance between each mark and its label, pixels.
     ranks : (N,) array_like
-        Labels of a higher rank are placed earlier; one of a positive rank is never left out, and those of a
-        negative one only fill free room.
+        Labels of a higher rank are placed earlier; one of a positive rank is never left out, nor cut off by
+        the edge of the view if it is no longer than that, and those of a negative one only fill free room.
 
     Returns
     -------
@@ -61,6 +61,8 @@ def place_labels(
         if not (inside[n] and size[n].all()):  # what has no size only keeps its place free
             continue
         boxes = _candidates(marks[n], size[n], gap[n])
+        if rank[n] > 0:
+            boxes = _pushed_inside(boxes, view)
         bad = (_covered(boxes, taken) @ weights + _outside(boxes, view)) / size[n].prod()
         best = int((bad + _RELUCTANCE * np.arange(len(boxes))).argmin())
         allowed = _COVERED_AT_MOST if rank[n] >= 0 else _COVERED_AT_MOST_MINOR
@@ -76,6 +78,13 @@ def _candidates(mark: FloatArray, size: FloatArray, gap: float) -> FloatArray:
     rings = np.repeat(_RINGS, len(_SIDES))[:, None]
     corner = mark + sides * rings * gap + (np.sign(sides) - 1) / 2 * size
     return np.concatenate([corner, corner + size], axis=1)
+
+
+def _pushed_inside(boxes: FloatArray, view: tuple[int, int]) -> FloatArray:
+    """Return boxes moved so far that they lie inside the view; one too long for it begins at its edge."""
+    room = np.maximum(np.array(view) - (boxes[:, 2:] - boxes[:, :2]), 0)
+    shift = np.clip(boxes[:, :2], 0, room) - boxes[:, :2]
+    return boxes + np.tile(shift, 2)
 
 
 def _covered(boxes: FloatArray, taken: FloatArray) -> FloatArray:

@@ -203,6 +203,17 @@ def test_labels_do_not_cover_each_other() -> None:
     assert place_labels([], [], (400, 400), gaps=[], ranks=[])[0].shape == (0, 2)
 
 
+@pytest.mark.parametrize("x", [1.0, 60.0, 100.0, 199.0])
+def test_what_must_be_said_is_not_cut_off_by_the_edge(x: float) -> None:
+    size = [150.0, 14.0]
+    corners, shown = place_labels([[x, 2.0]], [size], (200, 300), gaps=[10], ranks=[1])
+    assert shown.all()
+    assert (corners >= 0).all()
+    assert (corners + size <= [200, 300]).all()
+    too_long, _ = place_labels([[x, 2.0]], [[400.0, 14.0]], (200, 300), gaps=[10], ranks=[1])
+    assert too_long[0, 0] == 0, "its beginning can be read"
+
+
 def test_labels_are_drawn_beside_their_marks(scene: Scene3D) -> None:
     scene.marks.show([Mark("a", MIDDLE, state="computed")])
     scene.camera.focus_on(MIDDLE)
