@@ -21,7 +21,6 @@ from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.estimating import Estimating
 from gp_labeler.session.pose_exports import InsertionPath, save_pose
-from gp_labeler.session.touch_edits import RemoveTouches, TakeTouches
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.work import WarmFit, WarmJoint
 
@@ -204,13 +203,8 @@ class PoseDesk:
         GpError
             The other side was touched too.
         """
-        session, wrong, right = self._desk.session, self.side, self.side.other
-        touches = {name: touch for (side, name), touch in session.state.touches.items() if side is wrong}
-        if any(side is right for side, _ in session.state.touches):
-            raise GpError(f"the {right.word} side was touched too", remedy="Clear its touches first.")
-        session.do(TakeTouches(right, touches))
-        session.do(RemoveTouches(wrong))
-        self.choose(side=right)
+        touching.move_touches(self._desk.session, self.side)
+        self.choose(side=self.side.other)
 
     @property
     def swapped(self) -> tuple[str, str] | None:

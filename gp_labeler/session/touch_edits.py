@@ -11,7 +11,15 @@ from gp_labeler.session.edits import as_position
 from gp_labeler.session.state import Position, SpecimenState
 from gp_labeler.session.touches import Touch, touch_name
 
-__all__ = ["LeaveOutTouch", "RecordTouch", "RemoveTouches", "SetSkull", "SwapTouches", "TakeTouches"]
+__all__ = [
+    "LeaveOutTouch",
+    "MoveTouches",
+    "RecordTouch",
+    "RemoveTouches",
+    "SetSkull",
+    "SwapTouches",
+    "TakeTouches",
+]
 
 
 @dataclass(frozen=True)
@@ -125,6 +133,25 @@ class SwapTouches:
                 raise GpError(f"{key[1]} {self.side.word} is not touched yet", landmark=key[1])
         swapped = {one: state.touches[other], other: state.touches[one]}
         return replace(state, touches={**state.touches, **swapped})
+
+
+@dataclass(frozen=True)
+class MoveTouches:
+    """Say that all touches of a side are those of the other one."""
+
+    side: Side
+
+    @property
+    def text(self) -> str:
+        """Such as ``move left touches to the right``."""
+        return f"move {self.side.word} touches to the {self.side.other.word}"
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the touches moved; raises `GpError` where the other side was touched too."""
+        other = self.side.other
+        if any(side is other for side, _ in state.touches):
+            raise GpError(f"the {other.word} side was touched too", remedy="Clear its touches first.")
+        return replace(state, touches={(other, name): touch for (_, name), touch in state.touches.items()})
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from gp_labeler.session.edits import as_position
 from gp_labeler.session.session import Session
 from gp_labeler.session.touch_edits import (
     LeaveOutTouch,
+    MoveTouches,
     RecordTouch,
     RemoveTouches,
     SetSkull,
@@ -116,6 +117,11 @@ def leave_out(session: Session, side: Side | str, name: str, left_out: bool = Tr
 def swap_touches(session: Session, side: Side | str, name: str, other: str) -> bool:
     """Give each of two touches of a side the other's name; raises `GpError` where one is not touched."""
     return session.do(SwapTouches(Side.parse(side), touch_name(name), touch_name(other)))
+
+
+def move_touches(session: Session, side: Side | str) -> bool:
+    """Give all touches of a side to the other one; raises `GpError` where that was touched too."""
+    return session.do(MoveTouches(Side.parse(side)))
 
 
 def clear_touches(session: Session, side: Side | str, name: str | None = None) -> bool:

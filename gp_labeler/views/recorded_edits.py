@@ -22,6 +22,7 @@ from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, S
 from gp_labeler.session.state import PointKey, SpecimenState, point_key
 from gp_labeler.session.touch_edits import (
     LeaveOutTouch,
+    MoveTouches,
     RecordTouch,
     RemoveTouches,
     SetSkull,
@@ -161,6 +162,10 @@ def _swap_touches(edit: SwapTouches, *_: object) -> list[Table]:
     return [step("touches", side=Side.parse(edit.side).value, swap=[edit.name, edit.other])]
 
 
+def _move_touches(edit: MoveTouches, *_: object) -> list[Table]:
+    return [step("touches", side=Side.parse(edit.side).value, other_side=True)]
+
+
 def _skull(edit: SetSkull, *_: object) -> list[Table]:
     return [{"do": "skull", "points": {name: list(point) for name, point in edit.skull.items()}}]
 
@@ -190,6 +195,7 @@ RECORDED: Mapping[type, Find] = MappingProxyType(
         RemoveTouches: _forget,
         SetSkull: _skull,
         SwapTouches: _swap_touches,
+        MoveTouches: _move_touches,
         RecordPoseCheck: _verdict,
     }
 )

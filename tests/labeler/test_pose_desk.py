@@ -186,6 +186,8 @@ def test_touches_of_the_wrong_side_change_sides(desk, animal):
     assert desk.pose.side is Side.RIGHT
     assert {side for side, _ in desk.session.state.touches} == {Side.RIGHT}
     assert len(desk.session.state.touches) == 6
+    desk.session.undo()
+    assert {side for side, _ in desk.session.state.touches} == {Side.LEFT}, "in one step"
 
 
 def test_two_touches_exchange_their_names_in_one_step(desk, animal):

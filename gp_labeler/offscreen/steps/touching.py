@@ -58,6 +58,8 @@ class Touches(Step):
         Names that the estimate does without, or with again; touches to forget.
     swap : texts, optional
         Two names, each of whose touches gets the other's.
+    other_side : bool
+        Say that the touches there are are those of the other side.
     clear : bool
         Forget all touches of the side.
     """
@@ -78,13 +80,14 @@ class Touches(Step):
     take_in: tuple[str, ...] = ()
     forget: tuple[str, ...] = ()
     swap: tuple[str, ...] = ()
+    other_side: bool = False
     clear: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         session = rig.desk.session
-        edits = (self.leave_out, self.take_in, self.forget, self.swap, self.clear)
+        edits = (self.leave_out, self.take_in, self.forget, self.swap, self.other_side, self.clear)
         if self.points is None and not any(edits):
-            raise GpError("touches needs points, leave_out, take_in, forget, swap or clear")
+            raise GpError("touches needs points, leave_out, take_in, forget, swap, other_side or clear")
         if len(self.swap) not in (0, 2):
             raise GpError(f"touches: swap must be two names, got {' '.join(self.swap)}")
         if self.clear:
@@ -102,8 +105,11 @@ class Touches(Step):
         for names, left_out in ((self.leave_out, True), (self.take_in, False)):
             for name in names:
                 touching.leave_out(session, self.side, touch_name(name), left_out)
-        rig.desk.pose.choose(side=self.side)
-        there = [name for side, name in session.state.touches if side is self.side]
+        side = self.side.other if self.other_side else self.side
+        if self.other_side:
+            touching.move_touches(session, self.side)
+        rig.desk.pose.choose(side=side)
+        there = [name for of, name in session.state.touches if of is side]
         return f"{len(there)} touched: {' '.join(there)}" if there else "nothing touched"
 
     def _type(self, rig: Rig, points: Points) -> None:

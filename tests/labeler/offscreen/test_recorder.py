@@ -248,6 +248,9 @@ def test_touches_and_verdicts_are_done_again(recording) -> None:
     assert atlas is not None
     recording.begin()
     place_three(recording)
+    touching.record_touch(session, "R", "IN", [1.0, 2.0, 3.0], TouchHow.TRACKED)
+    touching.move_touches(session, "R")
+    touching.clear_touches(session, "L", "IN")
     for n, code in enumerate(("MN", "OS", "RWA", "LLI")):
         where = atlas[code] + [0.1 * n, 200, 0]
         details = {"source": "probe", "n_samples": 9, "spread_mm": 0.07} if n % 2 else {}

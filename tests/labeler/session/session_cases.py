@@ -27,6 +27,7 @@ from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, S
 from gp_labeler.session.state import How, PoseCheck, Provenance, SpecimenState
 from gp_labeler.session.touch_edits import (
     LeaveOutTouch,
+    MoveTouches,
     RecordTouch,
     RemoveTouches,
     SetSkull,
@@ -166,5 +167,6 @@ edits = st.one_of(
     st.builds(RemoveTouches, sides, st.none() | touched_names),
     st.builds(LeaveOutTouch, sides, touched_names, st.booleans()),
     st.builds(SwapTouches, sides, touched_names, touched_names),
+    st.builds(MoveTouches, sides),
     st.builds(SetSkull, st.dictionaries(st.sampled_from(("S1", "S2")), positions, max_size=2)),
 )
