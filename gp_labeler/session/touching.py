@@ -31,6 +31,7 @@ __all__ = [
     "load_skull",
     "load_touches",
     "mark_skull",
+    "move_touches",
     "named_side",
     "record_touch",
     "swap_touches",
