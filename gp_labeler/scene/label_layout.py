@@ -13,6 +13,10 @@ _SIDES = np.array([[1, -0.6], [-1, -0.6], [1, 0.6], [-1, 0.6], [0, -1], [0, 1], 
 """Directions from a mark in which its label may lie, the preferred first."""
 
 _RINGS = (1.0, 2.6)
+_STEPS = np.concatenate([ring * _SIDES for ring in _RINGS])
+_SHARES = np.tile((np.sign(_SIDES) - 1) / 2, (len(_RINGS), 1))
+"""From a mark to the corners of the boxes around it: in gaps, and in sizes of the box."""
+
 _RELUCTANCE = 0.02
 _MARK_WEIGHT = 0.5
 """Covering a mark a little is better than covering a word."""
@@ -57,9 +61,8 @@ def place_labels(
     half = gap[inside, None] / 2
     taken = np.concatenate([marks[inside] - half, marks[inside] + half], axis=1)
     weights = np.full(len(taken), _MARK_WEIGHT)
-    for n in np.lexsort((np.arange(len(marks)), -rank)):
-        if not (inside[n] and size[n].all()):  # what has no size only keeps its place free
-            continue
+    placed = np.flatnonzero(inside & size.all(axis=1))  # what has no size only keeps its place free
+    for n in placed[np.argsort(-rank[placed], kind="stable")]:
         boxes = _candidates(marks[n], size[n], gap[n])
         if rank[n] > 0:
             boxes = _pushed_inside(boxes, view)
@@ -74,9 +77,7 @@ def place_labels(
 
 def _candidates(mark: FloatArray, size: FloatArray, gap: float) -> FloatArray:
     """Boxes (left, top, right, bottom) around a mark: each side of it, near and then farther off."""
-    sides = np.concatenate([_SIDES] * len(_RINGS))
-    rings = np.repeat(_RINGS, len(_SIDES))[:, None]
-    corner = mark + sides * rings * gap + (np.sign(sides) - 1) / 2 * size
+    corner = mark + gap * _STEPS + _SHARES * size
     return np.concatenate([corner, corner + size], axis=1)
 
 
