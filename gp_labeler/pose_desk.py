@@ -63,6 +63,19 @@ class OverlayOptions:
     opacity: float = 1.0
 
 
+@dataclass(frozen=True)
+class _Touched:
+    """What was touched on the side in work, and on the other."""
+
+    side: Side
+    here: frozenset[str]
+    there: frozenset[str]
+
+    def was_moved(self, now: _Touched) -> bool:
+        """Whether all touches of this side are those of the other one now."""
+        return bool(self.here) and not self.there and not now.here and now.there == self.here
+
+
 class PoseDesk:
     """Keeps the estimate in step with whatever session, atlas and touches a workbench has.
 
@@ -92,7 +105,7 @@ class PoseDesk:
         self._path: InsertionPath | None = None
         self._prepared = False
         self.estimating = self._begin()
-        self._seen = (self.side, self._touched())
+        self._seen = self._touched_now()
         desk.session_replaced.connect(self._on_session_replaced)
         desk.atlas_changed.connect(self._on_atlas_changed)
 
@@ -203,8 +216,9 @@ class PoseDesk:
         GpError
             The other side was touched too.
         """
+        other = self.side.other
         touching.move_touches(self._desk.session, self.side)
-        self.choose(side=self.side.other)
+        self.choose(side=other)
 
     @property
     def swapped(self) -> tuple[str, str] | None:
@@ -322,17 +336,24 @@ class PoseDesk:
 
     def _follow_touches(self) -> None:
         """Ask again for what was undone or cleared, and go on where the target was touched."""
-        before, self._seen = self._seen, (self.side, self._touched())
-        if before[0] is not self.side:
+        before, self._seen = self._seen, self._touched_now()
+        if before.side is not self.side:
             return
-        lost, gained = before[1] - self._seen[1], self._seen[1] - before[1]
+        if before.was_moved(self._seen):  # undone or redone: else the side in work would look cleared
+            self.choose(side=self.side.other)
+            return
+        lost, gained = before.here - self._seen.here, self._seen.here - before.here
         if lost:
             self._aim(next(name for name in (*ORDER, *sorted(lost, key=_by_number)) if name in lost))
         elif self._target is None or self._target in gained:
             self._aim(self._first_untouched(after=self._target))
 
-    def _touched(self) -> frozenset[str]:
-        return frozenset(name for side, name in self._desk.session.state.touches if side is self.side)
+    def _touched(self, side: Side | None = None) -> frozenset[str]:
+        wanted = side or self.side
+        return frozenset(name for side, name in self._desk.session.state.touches if side is wanted)
+
+    def _touched_now(self) -> _Touched:
+        return _Touched(self.side, self._touched(), self._touched(self.side.other))
 
     def _first_untouched(self, after: str | None = None) -> str | None:
         start = ORDER.index(after) + 1 if after in ORDER else 0

@@ -190,6 +190,19 @@ def test_touches_of_the_wrong_side_change_sides(desk, animal):
     assert {side for side, _ in desk.session.state.touches} == {Side.LEFT}, "in one step"
 
 
+def test_the_side_in_work_follows_an_undone_change_of_sides(desk, animal):
+    for code in PROBE:
+        desk.pose.record(animal[code], TouchHow.TYPED)
+    desk.pose.change_side()
+    for side, step in ((Side.LEFT, desk.session.undo), (Side.RIGHT, desk.session.redo)):
+        step()
+        assert desk.pose.side is side
+        assert desk.pose.estimate.side is side, "what is seen is what was touched"
+        assert desk.pose.target == ORDER[6]
+    touching.clear_touches(desk.session, Side.RIGHT)
+    assert desk.pose.side is Side.RIGHT, "cleared is not moved"
+
+
 def test_two_touches_exchange_their_names_in_one_step(desk, animal):
     for code in ("MN", "OS"):
         desk.pose.record(animal[code], TouchHow.TYPED, name=code)

@@ -368,8 +368,9 @@ def test_the_wrong_side_is_called_out_and_right_on_the_other(desk, panel, qtbot)
     assert panel.result.verdict.label.text() == "Good"
     assert not panel.result.other_side.isVisible()
     desk.session.undo()
-    desk.session.undo()
-    assert touches(desk, Side.RIGHT) == wrong
+    assert touches(desk, Side.RIGHT) == wrong, "one step"
+    assert panel.head.side.value == "R", "the panel does not look cleared"
+    assert panel.result.other_side.isVisible()
 
 
 def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbot):
