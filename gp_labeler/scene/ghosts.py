@@ -146,6 +146,7 @@ def _ball() -> object:
 def _ellipsoid(ghost: Ghost) -> vtkMatrix4x4:
     """Place the unit ball as the 95 % ellipsoid."""
     values, axes = np.linalg.eigh(ghost.covariance)
+    axes[:, 0] *= np.sign(np.linalg.det(axes))  # a mirrored ball would turn its faces inward, and be black
     matrix = np.eye(4)
     matrix[:3, :3] = RADIUS_95 * axes * np.sqrt(values.clip(1e-12))
     matrix[:3, 3] = ghost.mean

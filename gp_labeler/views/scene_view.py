@@ -93,6 +93,7 @@ class SceneView(QWidget):
         self._source: SliceSource | None = None
         self._slices_old = False
         self._hover: FloatArray | None = None
+        self._pointer: tuple[float, float] | None = None
         self._dragging = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
         self._fine_timer.timeout.connect(self._refine)
@@ -115,7 +116,7 @@ class SceneView(QWidget):
         self._stale = True
         self._fine_timer.start(_FINE_AFTER_MS if quick else 0)
         if self._has_frame:
-            self._draw_timer.start()  # by itself: the other views are painted first, this one once it is drawn
+            self._draw_timer.start()  # by itself: other views are painted first, this one once it is drawn
         else:
             self.update()
 
@@ -308,6 +309,8 @@ class SceneView(QWidget):
     def _draw(self) -> None:
         if self._stale and self.isVisible():
             self._draw_frame(quick=True)
+            if self._pointer is not None:  # it may rest while what lies under it moves
+                self._point_at(*self._pointer)
             self.update()
 
     def _draw_frame(self, *, quick: bool) -> None:
@@ -353,10 +356,11 @@ class SceneView(QWidget):
         if self._hand.holds:
             if self._hand.move(x, y):
                 self._drag_to(x, y)
+                self._point_at(x, y)
         elif event.buttons() == Qt.MouseButton.NoButton:
             self._look_at(x, y, modifiers_of(event))
         elif self.scene.control.move(x, y):
-            self._set_hover(None)
+            self._leave_pointer()
             self.redraw(quick=True)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
@@ -394,7 +398,7 @@ class SceneView(QWidget):
             super().keyPressEvent(event)
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
-        self._set_hover(None)
+        self._leave_pointer()
         super().leaveEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
@@ -425,11 +429,21 @@ class SceneView(QWidget):
             self._desk.drag_to(view.scan([[x, y, depth]])[0], drag.how)
 
     def _look_at(self, x: float, y: float, held: Modifier) -> None:
-        point, _ = self._aim(x, y)
-        self._set_hover(point)
+        point = self._point_at(x, y)
         if point is not None and Modifier.SHIFT in held:
             self._desk.session.set_crosshair(point)
         self.setCursor(self._hand.cursor(point is not None, self._mark_at(x, y)))
+
+    def _point_at(self, x: float, y: float) -> FloatArray | None:
+        """Take where the pointer is; return the (3,) scan position where a click would land."""
+        self._pointer = x, y
+        point, _ = self._aim(x, y)
+        self._set_hover(point)
+        return point
+
+    def _leave_pointer(self) -> None:
+        self._pointer = None
+        self._set_hover(None)
 
     def _set_hover(self, point: FloatArray | None) -> None:
         if point is not None or self._hover is not None:

@@ -75,6 +75,7 @@ class SliceView(QWidget):
         self._control, self._hand = SliceControl(), Hand(workbench)
         self._painter = SlicePainter(workbench, self)
         self._greying: tuple[float, float] | None = None
+        self._pointer: tuple[float, float] | None = None
         self._grip = np.zeros(3)
         self._edge: BoneEdge | None = None
         self._listen()
@@ -85,21 +86,18 @@ class SliceView(QWidget):
         """Show the whole slice."""
         if self.source is not None:
             self._whole = Shown.fitted(self.source, self.plane, self._size())
-            self.shown = self._whole.at(self._position())
-            self.update()
+            self._take(self._whole.at(self._position()))
 
     def go_to(self, position: FloatArray) -> None:
         """Bring a (3,) scan position into sight."""
         if self.shown is not None:
-            self.shown = self.shown.showing(position, 0.2)
-            self.update()
+            self._take(self.shown.showing(position, 0.2))
 
     def zoom_to(self, position: FloatArray, across_mm: float) -> None:
         """Show so many mm, across the shorter side, around a (3,) scan position."""
         if self.shown is not None:
             centred = self.shown.centred(position).at(self._position())
-            self.shown = centred.zoomed(centred.mm_per_pixel * min(centred.size) / across_mm)
-            self.update()
+            self._take(centred.zoomed(centred.mm_per_pixel * min(centred.size) / across_mm))
 
     def step(self, n: int) -> None:
         """Go so many slices on."""
@@ -137,6 +135,13 @@ class SliceView(QWidget):
         ):
             follow(self, signal, self._repaint)
 
+    def _take(self, shown: Shown) -> None:
+        """Show another part of the scan, and tell what now lies under the pointer, which may rest."""
+        self.shown = shown
+        self.update()
+        if self._pointer is not None:
+            self.hovered.emit(shown.pixel_to_scan([self._pointer])[0])
+
     def _repaint(self, *_: object) -> None:
         self._painter.forget_points()
         self.update()
@@ -151,13 +156,14 @@ class SliceView(QWidget):
         if self._desk.volume is None:
             self.source = self.shown = None
             self._painter.forget()
+            if self._pointer is not None:
+                self.hovered.emit(None)
 
     def _on_crosshair(self, position: FloatArray) -> None:
         if self.shown is not None:
             there = self.shown.at(float(position[self.plane.axis]))
-            self.shown = there.showing(position, 0.02) if self._is_inside(position) else there
-            self.moved.emit(self.shown.position)
-            self.update()
+            self._take(there.showing(position, 0.02) if self._is_inside(position) else there)
+            self.moved.emit(there.position)
 
     def _position(self) -> float:
         return float(self._desk.session.crosshair[self.plane.axis])
@@ -210,7 +216,7 @@ class SliceView(QWidget):
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if self.shown is None:
             return
-        x, y = pixel_of(self, event.position())
+        x, y = self._pointer = pixel_of(self, event.position())
         here = self.shown.pixel_to_scan([[x, y]])[0]
         self.hovered.emit(here)
         if event.buttons() == Qt.MouseButton.NoButton:
@@ -220,8 +226,7 @@ class SliceView(QWidget):
             return
         view = self._control.move(self.shown, x, y)
         if view is not self.shown:
-            self.shown = view
-            self.update()
+            self._take(view)
         elif self._hand.move(x, y):
             self._drag_to(here, free=bool(modifiers_of(event) & _FREES))
         elif self._greying is not None:
@@ -257,8 +262,7 @@ class SliceView(QWidget):
         held, step = modifiers_of(event), self.source.step(self.plane)
         view = self._control.wheel(self.shown, notches_of(event), x, y, held, step)
         if Modifier.CTRL in held:
-            self.shown = view
-            self.update()
+            self._take(view)
         else:
             self.move_to(view.position)
 
@@ -275,6 +279,7 @@ class SliceView(QWidget):
             super().keyPressEvent(event)
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        self._pointer = None
         self.hovered.emit(None)
         super().leaveEvent(event)
 

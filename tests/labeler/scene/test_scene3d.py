@@ -242,6 +242,14 @@ def test_a_ghost_is_outlined_by_its_95_percent_ellipse(scene: Scene3D) -> None:
     assert radius == pytest.approx(1.5)
 
 
+@pytest.mark.parametrize("spread", [(1.0, 2.0, 3.0), (2.0, 1.0, 3.0), (3.0, 2.0, 1.0), (1.0, 3.0, 2.0)])
+def test_a_ghost_is_bright_inside_whichever_way_it_is_long(scene: Scene3D, spread: tuple[float, ...]) -> None:
+    scene.camera.focus_on(MIDDLE, across_mm=20)
+    without = scene.image()[120, 160].astype(int)
+    scene.ghosts.show([Ghost("L:IN", MIDDLE, np.diag(spread), active=True)])
+    assert (scene.image()[120, 160] > without + 8).all()
+
+
 def test_crosshair_lines_slices_and_hover_are_drawn_and_taken_away(scene: Scene3D) -> None:
     volume = scan_of([(BALL, RADIUS)], np.eye(3))
     source = SliceSource(volume)

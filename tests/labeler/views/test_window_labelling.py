@@ -328,6 +328,28 @@ def test_hovering_tells_position_voxel_and_value(window) -> None:
     assert window.status.where.text().endswith("outside")
 
 
+def test_a_resting_pointer_tells_what_comes_to_lie_under_it(window, scene, qtbot) -> None:
+    session, told = window.workbench.session, window.status.where
+    view = window.grid.slice_views[Plane.AXIAL]
+    session.set_crosshair(MIDDLE)
+    QTest.mouseMove(view, pixel(view, MIDDLE + np.array([4.0, 1.0, 0.0])))
+    before = told.text()
+    assert before.endswith("1400")
+    session.set_crosshair(MIDDLE + np.array([0.0, 0.0, 5.5]))
+    assert told.text() != before
+    assert told.text().endswith("600"), "beside the ball"
+    view.zoom_to(MIDDLE + np.array([0.0, 0.0, 5.5]), 0.5)
+    assert told.text().endswith("1400"), "in the bone of the middle"
+    QTest.mouseMove(scene, pixel(scene, on_ball(0.3, -1, 0.2)))
+    before = told.text()
+    scene.view_from("L")
+    qtbot.waitUntil(lambda: not scene.is_stale)
+    assert told.text() not in (before, ""), "it is on another part of the ball now"
+    scene.zoom_to(MIDDLE + np.array([0.0, 40.0, 0.0]), 10)
+    qtbot.waitUntil(lambda: not scene.is_stale)
+    assert told.text() == "", "and here on none"
+
+
 def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
     session = window.workbench.session
     where = on_ball(1, 0.2, 0.4)
