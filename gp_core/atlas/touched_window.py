@@ -34,10 +34,13 @@ def towards_touched_window(pose: CochleaPose, touches: LandmarkSet) -> CochleaPo
     Returns
     -------
     CochleaPose
-        Its `round_window` is ``touched``; the pose as it was where RWA or RWP was not touched, is suspect, or
-        their middle lies on the axis.
+        Its `round_window` is ``touched``; the pose as it was where RWA or RWP was not touched, is suspect or
+        looks exchanged with another feature, or their middle lies on the axis.
     """
-    if not all(code in touches and code not in pose.suspects for code in _EDGES):
+    doubtful = {*pose.suspects, *(pose.swapped or ())}
+    if pose.swapped is not None and set(pose.swapped) == set(_EDGES):
+        doubtful = set(pose.suspects)  # with each other: their middle is the same
+    if not all(code in touches and code not in doubtful for code in _EDGES):
         return pose
     to_window = touches.array(_EDGES).mean(axis=0) - pose.origin
     frame = pose.transform_to_touches

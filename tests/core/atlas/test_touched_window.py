@@ -65,6 +65,16 @@ def test_a_window_not_touched_or_mistouched_is_the_expected_one() -> None:
     assert pose.round_window == "expected"
 
 
+@pytest.mark.parametrize(("a", "b", "wanted"), [("RWP", "LLI", "expected"), ("RWA", "RWP", "touched")])
+def test_an_edge_under_another_name_is_no_window(a: str, b: str, wanted: str) -> None:
+    touches = _touched(_animal(1), 2, noise=0.05)
+    pose = estimate_pose({**touches, a: touches[b], b: touches[a]}, "L", ATLAS)
+    assert pose.swapped is not None
+    assert set(pose.swapped) == {a, b}
+    assert pose.suspects == ()
+    assert pose.round_window == wanted
+
+
 def test_the_turn_is_at_least_as_sure_as_it_says() -> None:
     squared = []
     for seed in range(120):
