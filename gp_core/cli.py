@@ -10,6 +10,7 @@ from collections.abc import Sequence
 
 from gp_core import __version__
 from gp_core.commands import estimate, labels, study, study_errors, study_physical, study_search, tracking
+from gp_core.commands.options import keep_inputs
 from gp_core.errors import GpError
 
 __all__ = ["main", "make_parser"]
@@ -44,6 +45,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
     args = make_parser().parse_args(arguments)
     try:
+        keep_inputs(args)
         status: int = args.run(args)
     except GpError as error:
         sys.stderr.write(f"gp-core: {error}\n")

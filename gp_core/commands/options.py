@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -22,6 +23,7 @@ __all__ = [
     "add_json",
     "add_specimens",
     "blaming",
+    "keep_inputs",
     "read_atlas",
     "save_json",
     "say",
@@ -29,6 +31,11 @@ __all__ = [
 
 Subparsers = Any
 """What `argparse.ArgumentParser.add_subparsers` returns; its class is private."""
+
+_WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output")
+"""Names of the options whose files are written; every other word that is a file is read."""
+
+_ANOTHER = "Name another file."
 
 AtlasSource = tuple[Atlas | None, list[Specimen] | None]
 
@@ -61,6 +68,35 @@ def add_specimens(parser: argparse.ArgumentParser) -> None:
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add ``--json FILE``."""
     parser.add_argument("--json", metavar="FILE", help="write the full result here")
+
+
+def keep_inputs(args: argparse.Namespace) -> None:
+    """Refuse to write over a file that is read, or two results to one file.
+
+    Raises
+    ------
+    GpError
+        Two options name the same file.
+    """
+    read = {os.path.realpath(word) for word in _words_read(args) if Path(word).is_file()}
+    written: dict[str, str] = {}
+    for name in _WRITTEN:
+        word = getattr(args, name, None)
+        if word is None:
+            continue
+        path, option = os.path.realpath(word), f"--{name.replace('_', '-')}"
+        if path in read:
+            raise GpError(f"is read, and {option} would write over it", file=word, remedy=_ANOTHER)
+        if path in written:
+            raise GpError(f"would be written by {written[path]} and {option}", file=word, remedy=_ANOTHER)
+        written[path] = option
+
+
+def _words_read(args: argparse.Namespace) -> Iterator[str]:
+    for name, value in vars(args).items():
+        if name not in _WRITTEN:
+            values = value if isinstance(value, list) else [value]
+            yield from (word for word in values if isinstance(word, str))
 
 
 def read_atlas(words: list[str]) -> AtlasSource:

@@ -100,6 +100,38 @@ def test_a_specimen_that_lacks_a_feature_is_blamed_itself(
     assert error.startswith("gp-core: specimen B, landmark MN: the left side has no MN")
 
 
+@pytest.mark.parametrize("option", ["--json", "--csv", "--tfm", "--landmarks"])
+def test_nothing_read_is_written_over(
+    option: str, touches: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = touches.read_bytes()
+    same = tmp_path / "." / "sub" / ".." / touches.name
+    (tmp_path / "sub").mkdir()
+    error = _error(["estimate", str(touches), "--side", "L", option, str(same)], capsys)
+    assert error == f"gp-core: {same}: is read, and {option} would write over it. Name another file.\n"
+    assert touches.read_bytes() == before
+
+
+def test_two_results_do_not_go_to_one_file(
+    touches: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = str(tmp_path / "pose.txt")
+    error = _error(["estimate", str(touches), "--side", "L", "--csv", out, "--tfm", out], capsys)
+    assert f"{out}: would be written by --tfm and --csv" in error
+    assert not Path(out).exists()
+
+
+def test_an_atlas_is_not_written_over_the_animals_it_is_fitted_to(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    files = [tmp_path / f"{name}_L.mrk.json" for name in "ABC"]
+    for file in files:
+        animal = draw_animal(gp_core.Atlas.published(), rng=np.random.default_rng(ord(file.name[0])))
+        write_markups(file, animal.side("L"), specimen=file.name[0])
+    error = _error(["fit", *map(str, files), "-o", str(files[1])], capsys)
+    assert error.startswith(f"gp-core: {files[1]}: is read, and --output would write over it")
+
+
 def test_writing_onto_a_folder_is_said_plainly(
     touches: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
