@@ -1,9 +1,9 @@
 """How long a touch takes in the window: until it is told, and until all that comes of it is seen.
 
-Run from the project's root: ``python benchmarks/touch.py``. No display is needed. A synthetic head is labelled
-on both sides and open in four views; one of seven touches is recorded again and again, each time a little
-elsewhere: it is written to the journal, the pose estimated and registered, the panel, mesh and slices brought up
-to date and painted. The peer, in the same run, is the same window painted whole with nothing changed.
+Run from the project's root: ``python benchmarks/touch.py``. No display is needed. A synthetic head is
+labelled on both sides and open in four views; one of seven touches is recorded again and again, each time a
+little elsewhere: it is written to the journal, the pose estimated and registered, the panel, mesh and slices
+brought up to date and painted. The peer, in the same run, is the same window painted whole with nothing changed.
 """
 
 from __future__ import annotations
