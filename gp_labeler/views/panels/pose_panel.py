@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, Signal
+from PySide6.QtCore import QSize, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QDragEnterEvent,
@@ -149,6 +149,7 @@ class PosePanel(QWidget):
     def _connect(self) -> None:
         self.head.atlas_asked.connect(self.atlas_asked)
         self.head.new_asked.connect(self.new_asked)
+        self.head.specimen.returnPressed.connect(self._leave_name)
         self.touches.file_asked.connect(self.touch_file_asked)
         self.touches.tracker_asked.connect(self.tracker_asked)
         self.touches.guide_asked.connect(self.guide_asked)
@@ -163,6 +164,13 @@ class PosePanel(QWidget):
         super().showEvent(event)
         if self._stale:
             self.refresh()
+        if not event.spontaneous():
+            QTimer.singleShot(0, self, self._leave_name)
+
+    def _leave_name(self) -> None:
+        """Take the keys from the specimen's name: J records a touch, and is no letter of it."""
+        if self.isVisible() and self.focusWidget() is self.head.specimen:
+            self.touches.table.setFocus()
 
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().hideEvent(event)

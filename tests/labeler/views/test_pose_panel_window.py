@@ -72,6 +72,22 @@ def test_the_step_needs_no_scan(qtbot, bare, tmp_path):
     assert panel.isVisible()
 
 
+def test_keys_are_commands_and_no_letters_of_the_specimens_name(qtbot, bare):
+    name = bare.steps["pose"].head.specimen
+    bare.activateWindow()
+    to_step(qtbot, bare, "pose")
+    for _ in range(2):
+        qtbot.waitUntil(lambda: bare.focusWidget() is not None and bare.focusWidget() is not name)
+        for key in (Qt.Key.Key_J, Qt.Key.Key_I):
+            qtbot.keyClick(bare.focusWidget(), key)
+        assert name.text() in ("unnamed", "GP-9")
+        name.setFocus()
+        name.selectAll()
+        qtbot.keyClicks(name, "GP-9")
+        qtbot.keyClick(name, Qt.Key.Key_Return)
+    assert bare.workbench.session.state.specimen == "GP-9"
+
+
 def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_window, tmp_path):
     to_step(qtbot, bare, "pose")
     drop(bare, touch_file(tmp_path))
