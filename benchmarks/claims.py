@@ -1,8 +1,8 @@
 """Measure what README.md and docs/method.md claim and no command of gp-core prints.
 
 Run from the top of a checkout: ``python benchmarks/claims.py labelled/``, labelled animals as for gp-core.
-Each is estimated with an atlas that has seen nothing of it, by the paper's six touched features. Half a minute;
-``--seed N`` draws other touches.
+Each is estimated with an atlas that has seen nothing of it, by the paper's six touched features. It takes
+half a minute; ``--seed N`` draws other touches.
 """
 
 from __future__ import annotations

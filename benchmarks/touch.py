@@ -3,7 +3,7 @@
 Run from the project's root: ``python benchmarks/touch.py``. No display is needed. A synthetic head is
 labelled on both sides and open in four views; one of seven touches is recorded again and again, each time a
 little elsewhere: it is written to the journal, the pose estimated and registered, the panel, mesh and slices
-brought up to date and painted. The peer, in the same run, is the same window painted whole with nothing changed.
+brought up to date and painted. The peer, in the same run, is that window painted whole with nothing changed.
 """
 
 from __future__ import annotations
