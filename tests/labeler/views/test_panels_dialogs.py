@@ -286,6 +286,17 @@ def state_directory(tmp_path) -> Path:
     return directory
 
 
+def test_what_can_be_recovered_is_read_without_scrolling_sideways(state_directory, parent, qtbot):
+    dialog = RecoverDialog(find_recoveries(state_directory), parent=parent)
+    dialog.list.item(0).setText("GP-014: 12 unsaved edits, the last at noon: mark CA left as checked " * 2)
+    dialog.show()
+    qtbot.waitExposed(dialog)
+    first, second = (dialog.list.visualItemRect(dialog.list.item(n)) for n in (0, 1))
+    assert first.right() <= dialog.list.viewport().width()
+    assert first.height() > second.height() * 0.9, "it goes on in the next line"
+    assert not dialog.list.horizontalScrollBar().isVisible()
+
+
 def test_recovery_offers_each_and_deletes_only_at_the_second_click(state_directory, parent, qtbot):
     recoveries = find_recoveries(state_directory)
     dialog = RecoverDialog(recoveries, parent=parent)
