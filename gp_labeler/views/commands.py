@@ -55,7 +55,9 @@ class Commands(QObject):
             workbench.tool_changed,
             workbench.atlas_changed,
             workbench.pose.changed,
+            workbench.pose.target_changed,
             workbench.pose.overlay_changed,
+            workbench.tracker.changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()

@@ -15,6 +15,7 @@ from gp_labeler.pose_desk import ORDER
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
 from gp_labeler.session.touches import TouchHow
+from gp_labeler.tracker import TrackerAddress
 
 ATLAS = Atlas.published()
 ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
@@ -86,6 +87,15 @@ def test_keys_are_commands_and_no_letters_of_the_specimens_name(qtbot, bare):
         qtbot.keyClicks(name, "GP-9")
         qtbot.keyClick(name, Qt.Key.Key_Return)
     assert bare.workbench.session.state.specimen == "GP-9"
+
+
+def test_the_key_that_records_works_from_the_moment_a_tracker_is_connected(bare):
+    tracker, record = bare.workbench.tracker, bare.commands.actions["pose.record"]
+    assert not record.isEnabled()
+    tracker.connect(TrackerAddress(port=1))
+    assert record.isEnabled()
+    tracker.disconnect()
+    assert not record.isEnabled()
 
 
 def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_window, tmp_path):
