@@ -167,7 +167,7 @@ def estimate_pose(
     probe_noise : float, optional
         Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
     round_window : {"touched", "expected"}
-        What y of the frame points to: the middle of the touched RWA and RWP, as the paper's robot has it,
+        What y of the frame points to: the middle of the touched RWA and RWP, as the authors' robot had it,
         where both are touched and fit; or that of the fitted atlas, nearer the truth where touches are rough.
         Origin and axis are the same.
 

@@ -1,6 +1,6 @@
 """The cochlea frame turned about its axis, so that y points to the round window as it was touched.
 
-That is the frame which the robot of Usevitch et al. 2021 read. Origin and axis stay those of the estimate.
+The robot of Usevitch et al. 2021 was given that frame. Origin and axis stay those of the estimate.
 """
 
 from __future__ import annotations
