@@ -67,6 +67,7 @@ class TrackerDesk:
         self._sender: PoseSender | None = None
         self._limits = Limits()
         self._recorder = TouchRecorder(Probe())
+        self._dwell = False
         self._words = ""
         self._latest: Sample | None = None
         self._tip: FloatArray | None = None
@@ -195,11 +196,11 @@ class TrackerDesk:
     @property
     def dwell(self) -> bool:
         """Whether holding still records."""
-        return self._recorder.dwell
+        return self._dwell
 
     def set_dwell(self, dwell: bool) -> None:
-        """Let holding still record, or not."""
-        self._recorder.dwell = dwell
+        """Let holding still record, or not; nothing is while no feature is asked for."""
+        self._dwell = dwell
         self.changed.emit()
 
     @property
@@ -283,6 +284,7 @@ class TrackerDesk:
     def _keep_aim(self) -> None:
         """Drop what was begun for another feature, side or specimen: it is not a touch of this one."""
         before, self._aim = self._aim, self._aim_now()
+        self._recorder.dwell = self._dwell and self._aim[2] is not None
         if before == self._aim:
             return
         was_recording = self._recorder.recording
@@ -304,7 +306,7 @@ class TrackerDesk:
                 spread_mm=outcome.spread_mm,
             )
         except GpError as error:
-            self.refused.emit(str(error))
+            self.refused.emit(f"{str(error)[:1].upper()}{str(error)[1:]}")
             return
         self.touched.emit(outcome)
 

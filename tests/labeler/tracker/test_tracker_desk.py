@@ -11,6 +11,7 @@ from tracker_cases import POINTS, TIP, SimulatorProcess, until
 
 from gp_core import Atlas, Side
 from gp_core.errors import GpError
+from gp_labeler.pose_desk import ORDER
 from gp_labeler.session import touching
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import LinkPhase, TrackerAddress
@@ -89,6 +90,23 @@ def test_tracker_touches_do_not_mix_with_a_dry_run(desk, simulator):
     desk.tracker.press()
     until(lambda: any("cannot mix" in text for text in refusals), desk.tracker.poll, "a refusal")
     assert list(desk.session.state.touches) == [(desk.pose.side, "ZL")]
+
+
+def test_holding_still_where_nothing_is_asked_for_is_no_touch(desk, simulator):
+    for code in ORDER:
+        desk.pose.record(Atlas.published()[code], TouchHow.TYPED, name=code)
+    assert desk.pose.target is None
+    refusals = []
+    desk.tracker.refused.connect(refusals.append)
+    simulator.do("go RWA 0.2")
+    connected(desk, simulator)
+    desk.tracker.set_dwell(True)
+    end = time.monotonic() + 1.2
+    until(lambda: time.monotonic() > end, desk.tracker.poll)
+    assert refusals == []
+    desk.tracker.press()
+    until(lambda: bool(refusals), desk.tracker.poll, "who presses is told")
+    assert refusals[0] == "All features are touched. Choose one to touch again."
 
 
 def test_without_a_tracker_a_press_says_so(desk):
