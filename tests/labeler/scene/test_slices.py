@@ -200,8 +200,10 @@ def test_straight_slices_are_quick() -> None:
     volume = Volume(np.zeros((256, 256, 256), np.uint16), np.diag([0.1, 0.1, 0.1, 1]))
     source, window = SliceSource(volume), WindowLevel(0, 100)
     source.image(Plane.AXIAL, 3.0).grey(window)
-    start = time.perf_counter()
+    costs = []
     for n in range(30):
+        start = time.thread_time()  # of this thread alone, whatever else the machine does
         for plane in Plane:
             source.image(plane, 0.1 * n).grey(window)
-    assert (time.perf_counter() - start) / 30 < 0.03
+        costs.append(time.thread_time() - start)
+    assert np.median(costs) < 0.03

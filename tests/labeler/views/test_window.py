@@ -327,7 +327,8 @@ def test_the_window_answers_while_work_goes_on(qtbot, window) -> None:
     timer.stop()
     assert any(shown)
     assert len(gaps) > 20
-    assert sorted(gaps)[-2] < 0.05  # one may be another process of this machine
+    assert max(gaps) < 0.5 * sum(gaps), "work on this thread would be one gap"
+    assert np.median(gaps) < 0.05
 
 
 def test_work_can_be_stopped(qtbot, window) -> None:
