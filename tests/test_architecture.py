@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -14,6 +15,8 @@ _ROOT = Path(__file__).resolve().parents[1]
 _SOURCES = sorted(p for package in ("gp_core", "gp_labeler") for p in (_ROOT / package).rglob("*.py"))
 _LONGEST_FILE = 500
 _LONGEST_FUNCTION = 60
+_INNER_ROOMS = ("files", "commands")
+"""The map names them as a whole."""
 
 
 def _functions(tree: ast.AST) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
@@ -33,6 +36,15 @@ def test_files_and_functions_keep_their_size(path: Path) -> None:
     assert text.count("\n") <= _LONGEST_FILE
     for function in _functions(ast.parse(text)):
         assert _body_lines(function) <= _LONGEST_FUNCTION, f"{function.name}, line {function.lineno}"
+
+
+def test_the_map_of_the_house_names_every_module() -> None:
+    text = (_ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    named = set(re.findall(r"\w+", text.partition("Arrows")[0]))
+    rooms = [path for path in _SOURCES if "gp_core" in path.parts and path.parent.name not in _INNER_ROOMS]
+    rooms += [path for path in _SOURCES if path.parent.name == "gp_labeler"]
+    stems = {re.sub("^action_rows_.*", "action_rows", path.stem) for path in rooms} - {"__init__"}
+    assert sorted(stems - named) == []
 
 
 def test_the_core_brings_no_window_with_it() -> None:

@@ -76,3 +76,5 @@ def settle(qtbot, window, seconds: float = 20.0) -> None:
     desk = window.workbench
     qtbot.waitUntil(lambda: not desk.jobs.running, timeout=int(1000 * seconds))
     qtbot.wait(10)
+    view = window.grid.scene_view  # drawn in an event of its own, which a busy machine may put off
+    qtbot.waitUntil(lambda: not (view.is_stale and view.isVisible()), timeout=int(1000 * seconds))

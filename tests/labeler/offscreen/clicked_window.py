@@ -8,6 +8,8 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import time
+from collections.abc import Callable
 
 import numpy as np
 from PySide6.QtCore import QPoint, QPointF
@@ -26,6 +28,13 @@ def xdotool(*words: object) -> None:
     """Let the X server move the mouse or press keys, and let the window take it in."""
     subprocess.run(["xdotool", *map(str, words)], check=True, timeout=20)
     QTest.qWait(150)
+
+
+def until(true: Callable[[], bool]) -> None:
+    """Wait for what a click or key brings about; where it never does, the test tells what there is."""
+    end = time.monotonic() + 20
+    while not true() and time.monotonic() < end:
+        QTest.qWait(10)
 
 
 def point_at(widget: QWidget, pixel: tuple[float, float]) -> None:
@@ -54,20 +63,26 @@ def drive() -> dict[str, object]:
 
     point_at(axial, axial.pixel_at(INSIDE))
     xdotool("click", 1)
+    until(lambda: "CA" in session.landmarks(Side.LEFT))
     found["slice_off"] = float(np.linalg.norm(session.landmarks(Side.LEFT)["CA"] - INSIDE))
     point_at(scene, scene.pixel_at(ON_BONE))
     xdotool("click", 1)
+    until(lambda: "RWP" in session.landmarks(Side.LEFT))
     found["bone_off"] = float(np.linalg.norm(session.landmarks(Side.LEFT)["RWP"] - ON_BONE))
     before = scene.scene.camera.direction
     point_at(scene, scene.pixel_at(MIDDLE - [3.0, 5.0, 2.0]))  # on bone, away from the point
     xdotool("mousedown", 1)
     xdotool("mousemove_relative", "--sync", 80, 30)
     xdotool("mouseup", 1)
+    until(lambda: bool((before != scene.scene.camera.direction).any()))
     found["turned_deg"] = float(np.degrees(np.arccos(np.clip(before @ scene.scene.camera.direction, -1, 1))))
     found["placed"] = list(session.landmarks(Side.LEFT).placed)
     xdotool("key", "ctrl+z")
+    until(lambda: list(session.landmarks(Side.LEFT).placed) != found["placed"])
     found["after_undo"] = list(session.landmarks(Side.LEFT).placed)
+    layout = session.view.state.layout
     xdotool("key", "z")
+    until(lambda: session.view.state.layout != layout)
     found["layout"] = session.view.state.layout
     close(window)
     return found
