@@ -28,6 +28,8 @@ __all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", 
 
 _DEFINING = ("CA", "CB", "RWA", "RWP")
 REGISTRATIONS = ("auto", "features", "skull")
+_SAME_MM, _SAME_DEG = 0.001, 0.01
+"""Up to here a pose is the one that was judged: it is computed anew each time."""
 
 
 @dataclass(frozen=True)
@@ -204,6 +206,28 @@ class Estimate:
         if (errors := self.errors()) is not None:
             out["error_mm"], out["error_deg"] = errors
         return out
+
+    def moved_since(self, judged: Mapping[str, Any]) -> tuple[float, float] | None:
+        """Return by how much the cochlea's frame moved, mm, and turned, degrees, since it was judged.
+
+        Parameters
+        ----------
+        judged : mapping
+            `PoseCheck.pose`.
+
+        Returns
+        -------
+        (float, float) or None
+            None where it is the same pose, or what was judged is not known.
+        """
+        then = np.array(judged.get("transform", ()), dtype=np.float64)
+        if self.pose is None or then.shape != (4, 4):
+            return None
+        now = self.pose.transform
+        mm = float(np.linalg.norm(now[:3, 3] - then[:3, 3]))
+        turn = (np.trace(then[:3, :3].T @ now[:3, :3]) - 1) / 2
+        degrees = float(np.degrees(np.arccos(np.clip(turn, -1, 1))))
+        return (mm, degrees) if mm > _SAME_MM or degrees > _SAME_DEG else None
 
 
 def apart(

@@ -100,7 +100,10 @@ class PoseReport:
         word, colour = ("Accepted", _GOOD) if check.verdict == "accept" else ("Rejected", _BAD)
         note = f" &middot; {escape(check.note)}" if check.note else ""
         by = escape(check.by or "unknown")
-        return f'<p class="box"><b style="color:{colour}">{word}</b> by {by}, {_when(check.time)}{note}</p>'
+        moved = self.estimate.moved_since(check.pose)
+        since = "" if moved is None else f'<br><b style="color:{_BAD}">{_moved(*moved)}</b>'
+        said = f'<b style="color:{colour}">{word}</b> by {by}, {_when(check.time)}{note}{since}'
+        return f'<p class="box">{said}</p>'
 
     def _poses(self) -> str:
         poses = self.estimate.poses
@@ -120,6 +123,7 @@ class PoseReport:
         yield f"Origin CO, {frame} frame, mm", [_numbers(pose.origin, 2) for _, pose in poses]
         yield "Modiolar axis CB&rarr;CA", [_numbers(pose.axis, 3) for _, pose in poses]
         yield "95 % region", [_region(pose) for _, pose in poses]
+        yield "Robot's y to the round window", [f"as {pose.round_window}" for _, pose in poses]
         yield "Atlas", [escape(pose.atlas) for _, pose in poses]
         if estimate.registered is not None:
             placed = [estimate.in_scan(method) for method, _ in poses]
@@ -227,6 +231,10 @@ def _bar(residual: float, colour: str) -> str:
 
 def _region(pose: CochleaPose) -> str:
     return f"{pose.radius_95:.2f} mm, cone {np.degrees(pose.cone_95):.1f}&deg;"
+
+
+def _moved(mm: float, degrees: float) -> str:
+    return f"Not of this estimate: it moved by {mm:.2f} mm and turned by {degrees:.1f}&deg; since."
 
 
 def _numbers(values: object, digits: int) -> str:

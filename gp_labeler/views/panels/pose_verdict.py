@@ -12,6 +12,9 @@ from gp_labeler.workbench import Workbench
 __all__ = ["VerdictCard"]
 
 _N_SHOWN = 3
+_Moved = tuple[float, float]
+"""How far an estimate is from the one that was judged, mm and degrees."""
+
 _WORDS = {"accept": ("good", "Accepted"), "reject": ("error", "Rejected")}
 
 
@@ -39,7 +42,7 @@ class VerdictCard(Card):
         self.reject.setToolTip("Keep in the specimen that this estimate is not to be used")
         self._said = QVBoxLayout()
         self._said.setSpacing(4)
-        self._shown: tuple[PoseCheck, ...] | None = None
+        self._shown: tuple[tuple[PoseCheck, ...], tuple[_Moved | None, ...]] | None = None
         who, what = QHBoxLayout(), QHBoxLayout()
         for row, widgets in ((who, (self.initials, self.note)), (what, (self.accept, self.reject))):
             row.setSpacing(6)
@@ -60,12 +63,14 @@ class VerdictCard(Card):
         for button in (self.accept, self.reject):
             button.setEnabled(is_there)
         checks = tuple(c for c in self._desk.session.state.pose_checks if c.side is desk.side)[::-1]
-        if checks == self._shown:
+        estimate = desk.estimate
+        moved = tuple(estimate.moved_since(c.pose) if estimate else None for c in checks[:_N_SHOWN])
+        if (checks, moved) == self._shown:
             return
-        self._shown = checks
+        self._shown = checks, moved
         emptied(self._said)
-        for check in checks[:_N_SHOWN]:
-            self._said.addWidget(_said(check))
+        for check, since in zip(checks, moved, strict=False):  # no more than are shown
+            self._said.addWidget(_said(check, since))
         if len(checks) > _N_SHOWN:
             self._said.addWidget(text_label(f"and {len(checks) - _N_SHOWN} before", "hint"))
 
@@ -84,10 +89,14 @@ class VerdictCard(Card):
         self.refresh()
 
 
-def _said(check: PoseCheck) -> Notice:
+def _said(check: PoseCheck, moved: _Moved | None) -> Notice:
+    """Return the words of a verdict; one on an estimate that has moved since is none on this."""
     level, word = _WORDS[check.verdict]
     when = check.time.replace("T", " ").removesuffix("+00:00")
     radius = check.pose.get("radius_95_mm")
     about = f"95 % within {radius:.2f} mm" if isinstance(radius, float) else ""
     by = f" by {check.by}" if check.by else ""
-    return Notice(level, f"{word}{by}, {when} UTC", "  ·  ".join(filter(None, (check.note, about))))
+    since = ""
+    if moved is not None:
+        level, since = "warning", f"since then it moved by {moved[0]:.2f} mm, {moved[1]:.1f}°"
+    return Notice(level, f"{word}{by}, {when} UTC", "  ·  ".join(filter(None, (check.note, about, since))))

@@ -94,6 +94,29 @@ def test_the_suspect_is_marked_and_the_verdict_is_told(made):
     assert "<Stylus & co>" in page.text
 
 
+def test_a_verdict_on_another_estimate_is_said_to_be_that():
+    session = Session(SpecimenState("GP-015"), author="AB")
+    estimating = Estimating(session)
+    estimating.use_atlas(Atlas.published())
+    for code in PROBE:
+        touching.record_touch(session, "L", code, Atlas.published()[code])
+    check = estimating.judge("accept")
+    made = (session, estimating)
+    assert "Not of this estimate" not in Page(report(made).html()).text
+    touching.record_touch(session, "L", "RWP", Atlas.published()["RWP"] + (0.8, 0, 0))
+    mm, degrees = estimating.current.moved_since(check.pose)
+    page = Page(report(made).html()).text
+    assert f"Not of this estimate: it moved by {mm:.2f} mm and turned by {degrees:.1f}° since." in page
+    assert mm > 0.05
+    session.undo()
+    assert estimating.current.moved_since(check.pose) is None
+    estimating.choose(round_window="expected")
+    touching.record_touch(session, "L", "RWP", Atlas.published()["RWP"])
+    assert "round window as expected" in Page(report(made).html()).text
+    assert estimating.current.moved_since({}) is None
+    session.close(discard=True)
+
+
 def test_pictures_are_part_of_the_page_or_named_beside_it(made):
     pictures = {"Overview": b"\x89PNG1", "Along the axis": b"\x89PNG2"}
     embedded = Page(report(made, pictures).html())

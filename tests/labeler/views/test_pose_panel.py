@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from panel_cases import cut_words, deliver, desk_with_scan
-from PySide6.QtCore import QMimeData, QPoint, QPointF, QSize, Qt, QUrl
+from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, QSize, Qt, QUrl
 from PySide6.QtGui import QDragEnterEvent, QDropEvent, QGuiApplication
-from PySide6.QtWidgets import QApplication, QLineEdit
+from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
 
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
 from gp_core.atlas.draw import draw_animal
@@ -21,6 +21,7 @@ from gp_labeler.session import labelling, touching
 from gp_labeler.session.jobs import QueueDispatcher
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.panels.label_panel import PANEL_WIDTH
+from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
 from gp_labeler.views.panels.pose_words import parse_position
@@ -392,6 +393,18 @@ def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbo
     desk.session.undo()
     assert touches(desk) == wrong, "one step"
     assert panel.result.swap.isVisible()
+
+
+def test_a_verdict_is_not_taken_for_one_on_another_estimate(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    qtbot.mouseClick(panel.verdict.accept, CLICK)
+    (said,) = panel.verdict.findChildren(Notice)
+    assert said.level == "good"
+    desk.pose.record(ANIMAL["RWP"] + THERE + [0.8, 0, 0], TouchHow.TYPED, name="RWP")
+    QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    (said,) = panel.verdict.findChildren(Notice)
+    assert said.level == "warning"
+    assert any("since then it moved by" in label.text() for label in said.findChildren(QLabel))
 
 
 def test_two_methods_stand_side_by_side(desk, panel, qtbot):
