@@ -67,7 +67,11 @@ def modiolar_axis(ca: ArrayLike, cb: ArrayLike) -> FloatArray:
     axis = np.asarray(ca, dtype=np.float64) - np.asarray(cb, dtype=np.float64)
     length = np.linalg.norm(axis, axis=-1, keepdims=True)
     if (length < _SMALLEST_MM).any():
-        raise GeometryError("CA and CB are at the same place, so they give no axis", landmark="CA")
+        raise GeometryError(
+            "CA and CB are at the same place, so they give no axis",
+            landmark="CA",
+            remedy="Place one of them again.",
+        )
     unit: FloatArray = axis / length
     return unit
 

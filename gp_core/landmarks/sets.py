@@ -219,5 +219,9 @@ class Specimen:
         """
         wanted = Side.parse(side)
         if wanted not in self.sides:
-            raise FeatureError(f"the {wanted.word} side is not labelled", specimen=self.name)
+            raise FeatureError(
+                f"the {wanted.word} side is not labelled",
+                specimen=self.name,
+                remedy=f"Label it, or ask for the {wanted.other.word} side.",
+            )
         return self.sides[wanted]

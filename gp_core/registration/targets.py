@@ -114,9 +114,7 @@ class Surface:
         """Take the candidates that are nearer than the best squared distance so far."""
         candidates = _nearest_in_triangles(points[rows], self._corners[triangles])
         squared = np.sum((candidates - points[rows]) ** 2, axis=1)
-        order = np.argsort(
-            -squared, kind="stable"
-        )  # of several writes to one row the last, the nearest, stays
+        order = np.argsort(-squared, kind="stable")  # of several writes to a row the last, the nearest, stays
         rows, candidates, squared = rows[order], candidates[order], squared[order]
         better = squared < best[rows]
         best[rows[better]] = squared[better]

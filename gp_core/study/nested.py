@@ -125,7 +125,10 @@ def nested_search(
     """
     start, fewest = check_start(specimens, method, training, fewest_training)
     if len(specimens) < _FEWEST_ANIMALS:
-        raise GpError(f"a nested search needs at least {_FEWEST_ANIMALS} animals, got {len(specimens)}")
+        raise GpError(
+            f"a nested search needs at least {_FEWEST_ANIMALS} animals, got {len(specimens)}",
+            remedy="Give more of them, or search without holding animals out.",
+        )
     used = settings if method == "jrmpc" else None
     memory = Checkpoint(checkpoint, fingerprint(specimens, used, ("nested", method)))
     ticker = Ticker(progress)

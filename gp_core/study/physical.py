@@ -104,11 +104,16 @@ def physical_test(
     Usevitch et al., "Estimating the pose of a guinea-pig cochlea without medical imaging", 2021, Figure 6.
     """
     if touches.side is not ct.side:
-        raise GpError(f"the touches are of the {touches.side.word} side, the CT of the {ct.side.word}")
+        raise GpError(
+            f"the touches are of the {touches.side.word} side, the CT of the {ct.side.word}",
+            remedy="Give the landmarks of the side that was touched.",
+        )
     for code in ("CA", "CB", "RWA", "RWP"):
         if code not in ct:
             raise FeatureError(
-                f"the CT landmarks have no {code}, which defines the true cochlea", landmark=code
+                f"the CT landmarks have no {code}, which defines the true cochlea",
+                landmark=code,
+                remedy="Label CA, CB, RWA and RWP in the CT.",
             )
     poses = _estimates(touches, atlas, specimens)
     by_names = register_by_names(touches, ct)

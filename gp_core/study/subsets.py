@@ -41,7 +41,10 @@ def check_labels(specimens: Sequence[Specimen], codes: Iterable[str]) -> None:
     """
     names = [specimen.name for specimen in specimens]
     if len(names) < _FEWEST_ANIMALS:
-        raise GpError(f"a study needs at least {_FEWEST_ANIMALS} labelled animals, got {len(names)}")
+        raise GpError(
+            f"a study needs at least {_FEWEST_ANIMALS} labelled animals, got {len(names)}",
+            remedy="Give more landmark files, or the folder that holds them.",
+        )
     for name in names:
         if names.count(name) > 1:
             raise GpError("two animals have this name", specimen=name, remedy="Name them apart.")
@@ -71,6 +74,7 @@ def sides_of(specimens: Sequence[Specimen]) -> list[tuple[Side, list[int]]]:
         if 0 < len(which) < _FEWEST_ANIMALS:
             raise GpError(
                 f"the {side.word} side is labelled in {len(which)} animals only; a study needs "
-                f"{_FEWEST_ANIMALS} or none"
+                f"{_FEWEST_ANIMALS} or none",
+                remedy="Label it in more of them, or give the files of the other side only.",
             )
     return [(side, which) for side, which in found if which]

@@ -9,21 +9,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from window_cases import BALL_MM, MIDDLE, ball_volume
+from window_cases import BALL_MM, MIDDLE, write_ball
 
 from gp_labeler.__main__ import main
 
 
 @pytest.fixture
 def ball_file(tmp_path) -> Path:
-    import SimpleITK as sitk  # noqa: N813
-
-    volume = ball_volume()
-    image = sitk.GetImageFromArray(volume.array)
-    image.SetSpacing(volume.spacing)
-    image.SetOrigin(volume.origin.tolist())
-    sitk.WriteImage(image, str(tmp_path / "ball.nrrd"))
-    return tmp_path / "ball.nrrd"
+    return write_ball(tmp_path / "ball.nrrd")
 
 
 def test_mesh_writes_the_surface_in_lps(ball_file, tmp_path, capsys) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, ball_volume
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, ball_volume, write_ball
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
@@ -51,14 +51,7 @@ def on_ball(desk, ball):
 
 @pytest.fixture
 def ball_file(tmp_path) -> Path:
-    import SimpleITK as sitk  # noqa: N813
-
-    volume = ball_volume()
-    image = sitk.GetImageFromArray(volume.array)
-    image.SetSpacing(volume.spacing)
-    image.SetOrigin(volume.origin.tolist())
-    sitk.WriteImage(image, str(tmp_path / "ball.mha"))
-    return tmp_path / "ball.mha"
+    return write_ball(tmp_path / "ball.mha")
 
 
 def test_a_scan_becomes_bone(desk, ball_file) -> None:

@@ -24,6 +24,18 @@ def ball_volume() -> Volume:
     return Volume.from_parts(value.astype(np.float32), [VOXEL_MM] * 3, start, name="ball")
 
 
+def write_ball(file: Path) -> Path:
+    """Write that ball as a scan."""
+    import SimpleITK as sitk  # noqa: N813
+
+    volume = ball_volume()
+    image = sitk.GetImageFromArray(volume.array)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin.tolist())
+    sitk.WriteImage(image, str(file))
+    return file
+
+
 class Answers:
     """Answers questions in the user's place, and remembers them."""
 
