@@ -78,6 +78,8 @@ class Departure:
         From the expected place, mm.
     expected : (3,) float array
         That place, mm, scan frame.
+    covariance : (3, 3) float array
+        Of that place, mm².
     n_sd : float
         The same in standard deviations.
     """
@@ -85,12 +87,18 @@ class Departure:
     code: str
     distance: float
     expected: FloatArray
+    covariance: FloatArray
     n_sd: float
 
     @property
     def is_doubtful(self) -> bool:
         """Whether a person should look at the point again."""
         return self.n_sd > DOUBTFUL_SD
+
+    @property
+    def ghost(self) -> Ghost | None:
+        """Where the point should be; None where that would mean nothing."""
+        return None if self.distance > HEAD_MM else Ghost(self.code, self.expected, self.covariance)
 
     @property
     def word(self) -> str:
@@ -207,7 +215,7 @@ class Expectations:
         off = landmarks[code] - mean
         spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
         n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
-        return Departure(code, float(np.linalg.norm(off)), mean, n_sd)
+        return Departure(code, float(np.linalg.norm(off)), mean, covariance, n_sd)
 
 
 @dataclass(frozen=True)

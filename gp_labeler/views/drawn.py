@@ -61,16 +61,18 @@ def drawn_marks(workbench: Workbench) -> list[Mark]:
 
 
 def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
-    """Return where points to do are expected: all of the active side faintly, the active one boldly."""
+    """Return where the active point is expected: one that is to do, or is doubted where it was placed."""
     session = workbench.session
-    if not session.view.state.ghosts_visible:
+    side, code = session.active.side, session.active.code
+    if code is None or not session.view.state.ghosts_visible:
         return []
-    active, drawn = session.active, []
-    for code, ghost in session.ghosts(active.side).items():
-        is_active = code == active.code
-        label = f"{code}?" if is_active else ""
-        drawn.append(Ghost(key_of(active.side, code), ghost.position, ghost.covariance, label, is_active))
-    return [ghost for ghost in drawn if ghost.active]
+    ghost = session.ghosts(side).get(code)
+    if ghost is None and session.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
+        doubted = (workbench.departures(side) or {}).get(code)
+        ghost = None if doubted is None else doubted.ghost
+    if ghost is None:
+        return []
+    return [Ghost(key_of(side, code), ghost.position, ghost.covariance, f"{code}?", active=True)]
 
 
 def drawn_segments(workbench: Workbench, colours: SceneColours) -> list[Segment]:

@@ -64,9 +64,11 @@ class Hand:
         return mark
 
     def cancel(self) -> None:
-        """Let a dragged point go back to where it was."""
-        self._mark = None
+        """Let a dragged point go back to where it was, and the crosshair with it."""
+        self._mark, drag = None, self._desk.drag
         self._desk.end_drag(keep=False)
+        if drag is not None:
+            self._desk.session.set_crosshair(self._desk.session.landmarks(drag.side)[drag.code])
 
     def click(self, position: FloatArray | None, how: How, mark: str | None) -> None:
         """Take a click at a scan position (None: it missed) and on a mark (None: on none).

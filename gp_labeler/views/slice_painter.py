@@ -113,8 +113,11 @@ class SlicePainter:
         paint_lines(painter, points.lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
         for layer in view.layers:
             layer.paint(painter, view.shown, ratio)
-        self._paint_ghosts(painter, points.ghosts, view.shown, ratio)
-        self._paint_marks(painter, points, view.source, view.shown, ratio)
+        names = self._paint_ghosts(painter, points.ghosts, view.shown, ratio)
+        names += self._paint_marks(painter, points, view.source, view.shown, ratio)
+        if self._desk.session.view.state.labels_visible:
+            names += [name for layer in view.layers for name in layer.names(view.shown, ratio)]
+            _draw_names(painter, names, view.shown.size, ratio)
 
     def _on_preview(self, threshold: float | None) -> None:
         self._preview = threshold
@@ -205,23 +208,31 @@ class SlicePainter:
         word = word_picture(f"{length:g} mm", 12, _TEXT, ratio, bold=False)
         word.draw(painter, right - pixels / 2 - word.box.center().x(), y - 6 * ratio - word.box.bottom())
 
-    def _paint_ghosts(self, painter: QPainter, ghosts: list[Ghost], shown: Shown, ratio: float) -> None:
+    def _paint_ghosts(
+        self, painter: QPainter, ghosts: list[Ghost], shown: Shown, ratio: float
+    ) -> list[SliceName]:
+        """Paint where points are expected; return their names."""
+        names: list[SliceName] = []
         axes = np.stack([shown.plane.right, shown.plane.down])
         colour = QColor(_on_black("ghost"))
         for ghost in ghosts:
             centre = shown.scan_to_pixel(ghost.mean[None])[0] + 0.5
             covariance = axes @ ghost.covariance @ axes.T / shown.mm_per_pixel**2
-            ring = QPolygonF([QPointF(*corner) for corner in ellipse(centre, covariance)])
+            corners = ellipse(centre, covariance)
+            ring = QPolygonF([QPointF(*corner) for corner in corners])
             painter.setBrush(QColor(colour.red(), colour.green(), colour.blue(), 26))
             painter.setPen(QPen(colour, 1.8 * ratio))
             painter.drawPolygon(ring)
-            word, box = word_picture(ghost.label, 13, colour.name(), ratio), ring.boundingRect()
-            right = min(box.right() + 4 * ratio, shown.size[0] - word.box.width() - 6 * ratio)
-            word.draw(painter, right, max(box.top(), word.box.height() + 6 * ratio))
+            if ring.boundingRect().intersects(QRectF(0, 0, *shown.size)):  # it may be larger than the view
+                upper_right = corners[int((corners[:, 0] - corners[:, 1]).argmax())]
+                beside = np.clip(upper_right, 1.0, np.array(shown.size) - 1.0)
+                names.append(SliceName(ghost.label, beside, colour.name(), 4.0, 3.0))
+        return names
 
     def _paint_marks(
         self, painter: QPainter, points: _Points, source: SliceSource, shown: Shown, ratio: float
-    ) -> None:
+    ) -> list[SliceName]:
+        """Paint the points on the slice and close to it; return the names of those to be named."""
         marks, positions = points.marks, points.positions
         pixels, off = shown.scan_to_pixel(positions) + 0.5, np.abs(shown.off_slice(positions))
         near = off <= reach_of(source, shown.plane)
@@ -230,12 +241,9 @@ class SlicePainter:
             fade = 1.0 if in_slice[n] else 1.0 - 0.65 * off[n] / reach_of(source, shown.plane)
             radius = _radius(marks[n], self._desk.session.view.state.glyph_mm, shown, ratio)
             _draw_mark(painter, marks[n], pixels[n], radius, bool(in_slice[n]), float(fade), ratio)
-        if self._desk.session.view.state.labels_visible:
-            close = shown.mm_per_pixel * _CLOSE_PIXELS * ratio < 1.0
-            named = [n for n in np.flatnonzero(near) if close or in_slice[n] or marks[n].active]
-            names = [_name(marks[n], pixels[n]) for n in named]
-            names += [name for layer in self._view.layers for name in layer.names(shown, ratio)]
-            _draw_names(painter, names, shown.size, ratio)
+        close = shown.mm_per_pixel * _CLOSE_PIXELS * ratio < 1.0
+        named = [n for n in np.flatnonzero(near) if close or in_slice[n] or marks[n].active]
+        return [_name(marks[n], pixels[n]) for n in named]
 
 
 def _picture(image: SliceImage, window: object, preview: float | None) -> QImage:

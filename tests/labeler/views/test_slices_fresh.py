@@ -9,9 +9,11 @@ from window_cases import MIDDLE
 from gp_core import Atlas, Side
 from gp_labeler.scene.colours import DARK
 from gp_labeler.session import labelling
+from gp_labeler.session.edits import CheckPoint
 from gp_labeler.session.session import Session
 from gp_labeler.session.state import How
 from gp_labeler.session.workflow import Active
+from gp_labeler.views import slice_painter
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 
 ATLAS = Atlas.published()
@@ -70,3 +72,32 @@ def test_what_is_painted_follows(window, act) -> None:
             continue
         assert _told(kept.marks, kept.ghosts, kept.lines) == wanted
         np.testing.assert_array_equal(kept.positions, [mark.position for mark in kept.marks])
+
+
+def test_a_doubted_point_shows_where_it_should_be(window, qtbot, monkeypatch) -> None:
+    desk, view = window.workbench, next(iter(window.grid.slice_views.values()))
+    desk.use_atlas(ATLAS)
+    for code in ("CA", "CB", "RWA", "RWP", "OS", "LLI"):
+        _place(desk.session, code)
+    _place(desk.session, "RWL", shift=2.0)
+    desk.session.set_active(Active(Side.LEFT, "RWL"))
+    qtbot.waitUntil(lambda: drawn_ghosts(desk) != [])
+    view.grab()
+    (ghost,) = view._painter._points.ghosts
+    assert (ghost.key, ghost.label) == ("L:RWL", "RWL?")
+    assert np.linalg.norm(ghost.mean - (MIDDLE + ATLAS["RWL"])) < 0.5
+    named: list[str] = []
+    take = lambda _, names, *__: named.extend(name.text for name in names)  # noqa: E731
+    monkeypatch.setattr(slice_painter, "_draw_names", take)
+    desk.session.set_crosshair(MIDDLE + ATLAS["RWA"])
+    view.zoom_to(MIDDLE + ATLAS["RWA"], 12.0)
+    view.grab()
+    assert {"RWL?", "RWA"} <= set(named), "names are placed together, so that none lies on another"
+    assert desk.begin_drag(Side.LEFT, "RWL")
+    assert drawn_ghosts(desk)[0].mean is ghost.mean, "one sees where to drag it"
+    desk.end_drag(keep=False)
+    desk.session.set_active(Active(Side.LEFT, "OS"))
+    assert drawn_ghosts(desk) == [], "a point that is well placed has none"
+    desk.session.set_active(Active(Side.LEFT, "RWL"))
+    desk.session.do(CheckPoint(Side.LEFT, "RWL", True))
+    assert drawn_ghosts(desk) == [], "nor one that a person found right"

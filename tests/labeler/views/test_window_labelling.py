@@ -163,6 +163,7 @@ def test_escape_lets_a_dragged_point_go_back(window, scene) -> None:
     QTest.keyClick(scene, Qt.Key.Key_Escape)
     QTest.mouseRelease(scene, LEFT_BUTTON, pos=where + QPoint(30, 0))
     np.testing.assert_array_equal(placed(window), before)
+    np.testing.assert_array_equal(window.workbench.session.crosshair, before)
 
 
 def test_a_point_dragged_on_a_slice_keeps_its_depth(window) -> None:
