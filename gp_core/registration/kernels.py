@@ -403,6 +403,10 @@ def run_batch(
         Start in, answer out; see `maximise`.
     beta, sizes : (B,)
         Outlier term and size of each problem.
+    prior, epsilon : float
+        As `maximise` takes them.
+    max_iterations : int
+        Iterations at most.
     still : float
         Change below which a problem is at rest and stops.
     iterations, change : (B,)

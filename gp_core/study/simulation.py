@@ -175,6 +175,15 @@ def simulate_sides(
     The labelled sides are registered by JRMPC on some features; mean and covariance of each of the 20
     features in the joint frame make a Gaussian. CO is computed anew from the drawn points, as in an animal.
 
+    Parameters
+    ----------
+    specimens, n, settings, rng
+        As for `simulate`.
+    side : Side
+        The side to draw.
+    features : sequence of str
+        What the labelled sides are registered by.
+
     Returns
     -------
     list of LandmarkSet

@@ -52,6 +52,8 @@ class TrackerLink:
         What is believed.
     silent_s : float
         Without a message of the probe for that long, the link is silent.
+    clock : callable
+        What tells the time, s; tests have their own.
 
     Examples
     --------
