@@ -133,6 +133,9 @@ class Estimate(Step):
                 raise GpError(estimate.problems.get(method, f"{method} gave no pose"))
         pose = estimate.pose
         assert pose is not None
+        for method in self.method:
+            for warning in estimate.poses[method].warnings:
+                rig.desk.say(f"{method}: {warning}", "warning")
         rig.poses[self.side] = Estimated(estimate, pose, _truth(rig, self.side))
         files = [rig.desk.pose.export(rig.to_write(path)) for path in self.path]
         return _told(rig.poses[self.side], rig.wrote(*files))

@@ -133,6 +133,24 @@ def test_real_touches_give_what_the_core_gives(tmp_path) -> None:
     assert report.poses[0]["error_mm"] is None
 
 
+def test_what_must_be_known_of_an_estimate_is_told_with_its_step(tmp_path) -> None:
+    wrong = touched(PROBE)
+    wrong["CL"], wrong["MN"] = wrong["MN"], wrong["CL"]
+    report = run(
+        tmp_path,
+        {"do": "estimate", "side": "L", "touches": wrong},
+        {"do": "touches", "side": "L", "swap": ["CL", "MN"]},
+        {"do": "estimate", "side": "L"},
+        {"do": "touches", "side": "L", "other_side": True},
+        {"do": "estimate", "side": "R"},
+    )
+    assert report.ok, report.error
+    first, right, other = (record.warnings for record in report.steps if record.title.startswith("estimate"))
+    assert first == ("robust: CL and MN look swapped",)
+    assert right == ()
+    assert other == ("robust: the left side fits these points better than the right: check the side",)
+
+
 @pytest.mark.parametrize("window", ["touched", "expected"])
 def test_the_matrix_for_a_robot_turns_y_to_the_window_that_was_chosen(tmp_path, window) -> None:
     points = touched(PROBE, noise=0.15, seed=4)
