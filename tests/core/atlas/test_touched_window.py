@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,9 @@ import pytest
 from atlas_cases import draw_side, draw_specimens, random_pose
 from scipy.spatial.transform import Rotation
 
-from gp_core import PROBE, Atlas, CochleaPose, LandmarkSet, Side, estimate_pose
+from gp_core import PROBE, Atlas, CochleaPose, LandmarkSet, RigidTransform, Side, estimate_pose
 from gp_core.atlas.pose_files import read_pose
+from gp_core.atlas.touched_window import towards_touched_window
 from gp_core.cli import main
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import axis_frame
@@ -89,6 +91,34 @@ def test_the_turn_is_at_least_as_sure_as_it_says() -> None:
         squared.append((error @ pose.axis) ** 2 / variance)
     assert len(squared) > 100
     assert 0.5 < np.mean(squared) < 1.0  # 0.67 in 400 animals
+
+
+def _moved(pose: CochleaPose, by: np.ndarray) -> CochleaPose:
+    """The pose off by (origin, rotation vector) of its own frame of reference."""
+    frame = pose.transform_to_touches
+    rotation = Rotation.from_rotvec(by[3:]).as_matrix() @ frame.rotation
+    moved = RigidTransform.from_parts(rotation, frame.translation + by[:3], dst=frame.dst, src=frame.src)
+    return replace(pose, transform_to_touches=moved)
+
+
+def test_the_covariance_is_that_of_small_errors() -> None:
+    touches = LandmarkSet.from_mapping(_touched(_animal(10), 11), "L", frame="tracker")
+    pose = estimate_pose(touches, "L", ATLAS, probe_noise=0.15, round_window="expected")
+    turned = towards_touched_window(pose, touches)
+
+    def error(by: np.ndarray) -> np.ndarray:
+        """What (pose, middle of the window) off by that does to the turned frame."""
+        off = {c: p + by[6:] * (c in ("RWA", "RWP")) for c, p in touches.as_mapping(PROBE).items()}
+        window = LandmarkSet.from_mapping(off, "L", frame="tracker")
+        found = towards_touched_window(_moved(pose, by[:6]), window)
+        turn = found.transform[:3, :3] @ turned.transform[:3, :3].T
+        return np.append(found.origin - turned.origin, Rotation.from_matrix(turn).as_rotvec())
+
+    step = 1e-6
+    jacobian = np.array([(error(step * row) - error(-step * row)) / (2 * step) for row in np.eye(9)]).T
+    errors = np.zeros((9, 9))
+    errors[:6, :6], errors[6:, 6:] = pose.covariance, 0.15**2 / 2 * np.eye(3)
+    np.testing.assert_allclose(turned.covariance, jacobian @ errors @ jacobian.T, rtol=1e-4, atol=1e-9)
 
 
 def test_the_choice_is_kept_in_the_file_and_older_files_are_read(tmp_path: Path) -> None:
