@@ -17,7 +17,15 @@ from gp_core.landmarks.files import write_text
 from gp_core.landmarks.files.table import read_rows
 from gp_core.landmarks.files.text import parse_position, rows_text, shown
 
-__all__ = ["UNITS", "carry_path", "read_path", "turn_about", "winding_side", "write_path"]
+__all__ = [
+    "UNITS",
+    "carry_path",
+    "read_path",
+    "rows_before_centre",
+    "turn_about",
+    "winding_side",
+    "write_path",
+]
 
 UNITS = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3}
 """Units that a path may be in, and how many mm they are."""
@@ -26,6 +34,7 @@ _SMALLEST_MM = 0.5
 _NEAREST_MM = 5.0
 _FARTHEST_MM = 300.0
 _ON_AXIS_MM = 0.05
+_CENTRE_MM = 1e-3
 _TELLING_TURN = 4.0
 """Turn about the axis, rad, from which a path shows the side of its ear; past the axis goes at most pi."""
 _CLEARLY = 1.25
@@ -107,6 +116,17 @@ def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> 
             remedy="Check its side, which way its axes point, and that it runs from the base to the apex.",
         )
     return pose.transform_to_touches.apply(points if side is pose.side else points * _MIRROR_Z)
+
+
+def rows_before_centre(path: ArrayLike) -> int | None:
+    """Return how many points come before one that is CO itself, where no path can be; None without such.
+
+    Parameters
+    ----------
+    path : (N, 3) array_like, mm, cochlea frame
+    """
+    at_centre = np.flatnonzero(np.linalg.norm(as_points(path, "path"), axis=1) < _CENTRE_MM)
+    return int(at_centre[0]) if len(at_centre) and at_centre[0] > 1 else None
 
 
 def winding_side(path: ArrayLike) -> Side | None:

@@ -9,13 +9,15 @@ from pathlib import Path
 import numpy as np
 
 from gp_core.atlas.fitting import fit_atlas
-from gp_core.atlas.insertion import UNITS, carry_path, read_path, write_path
+from gp_core.atlas.insertion import UNITS, carry_path, read_path, rows_before_centre, write_path
 from gp_core.atlas.next_touch import MM_A_DEGREE, TouchGain, gains
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose, estimate_pose
 from gp_core.checks import FloatArray
 from gp_core.commands.options import Subparsers, add_command, add_json, blaming, read_atlas, save_json, say
 from gp_core.errors import GpError
 from gp_core.landmarks.files import read_touches
+from gp_core.landmarks.files.naming import named_side
+from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["add", "pose_table"]
 
@@ -111,6 +113,15 @@ def run(args: argparse.Namespace) -> int:
             round_window=args.round_window,
         )
         next_touches = () if atlas is None else gains(touches, atlas, probe_noise=args.probe_noise)
+    _write(args, pose, path)
+    for line in pose_table(pose, Path(args.touches).name, next_touches):
+        say(line)
+    for line in _asides(args, touches, pose, path):
+        say(f"  {line}")
+    return 0
+
+
+def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None) -> None:
     if path is not None:
         with blaming(args.path):
             carried = carry_path(path, pose, path_side=args.path_side)
@@ -123,11 +134,22 @@ def run(args: argparse.Namespace) -> int:
     ):
         if file:
             save(file)
-    for line in pose_table(pose, Path(args.touches).name, next_touches):
-        say(line)
+
+
+def _asides(
+    args: argparse.Namespace, touches: LandmarkSet, pose: CochleaPose, path: FloatArray | None
+) -> Iterator[str]:
+    """Yield what the files say beside the pose, and what the written frame is."""
     if touches.unseen:
-        say(f"  not seen by the tracker: {' '.join(sorted(touches.unseen))}")
-    return 0
+        yield f"not seen by the tracker: {' '.join(sorted(touches.unseen))}"
+    named = named_side(args.touches)
+    if named not in (None, pose.side):
+        yield f"! by its name the file is of the {named.word} side: check the side"
+    centre = None if path is None else rows_before_centre(path)
+    if centre is not None:
+        yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
+    if any((args.json, args.tfm, args.csv, args.path_out)):
+        yield f"y of what was written points to the {pose.round_window} round window"
 
 
 def _path_of(args: argparse.Namespace) -> FloatArray | None:

@@ -8,9 +8,14 @@ from itertools import permutations, product
 from os import PathLike
 from pathlib import Path
 
-import numpy as np
-
-from gp_core.atlas.insertion import carry_path, read_path, turn_about, winding_side, write_path
+from gp_core.atlas.insertion import (
+    carry_path,
+    read_path,
+    rows_before_centre,
+    turn_about,
+    winding_side,
+    write_path,
+)
 from gp_core.atlas.pose import CochleaPose
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
@@ -40,8 +45,6 @@ _AXES = tuple(
     for signs in product(("", "-"), repeat=3)
 )
 """Every naming of three axes, the left-handed ones too, which `read_path` refuses."""
-
-_CENTRE_MM = 1e-6
 
 
 def save_pose(pose: CochleaPose, path: str | PathLike[str]) -> Path:
@@ -142,8 +145,7 @@ class InsertionPath:
     @property
     def n_before_centre(self) -> int | None:
         """How many points come before one that is CO itself, where no path can be; None without such."""
-        at_centre = np.flatnonzero(np.linalg.norm(self.points, axis=1) < _CENTRE_MM)
-        return int(at_centre[0]) if len(at_centre) and at_centre[0] > 1 else None
+        return rows_before_centre(self.points)
 
     def first(self, n: int) -> InsertionPath:
         """Return the path of the first points only.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from numpy.typing import ArrayLike
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.files import read_points, read_touches
+from gp_core.landmarks.files.naming import named_side
 from gp_labeler.session.edits import as_position
 from gp_labeler.session.session import Session
 from gp_labeler.session.touch_edits import (
@@ -101,13 +101,6 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
     if named not in (None, Side.parse(side)):
         doubts.append(f"By its name it is of the {named.word} side: check the side")
     return tuple(doubts)
-
-
-def named_side(source: str) -> Side | None:
-    """Return the side that a file's name tells, such as ``SkullD_Right.dat``; None where it tells not one."""
-    words = {word for word in re.split(r"[^a-z0-9]+", Path(source).name.lower()) if word}
-    told = {side for side in Side if words & {side.word, side.value.lower()}}
-    return told.pop() if len(told) == 1 else None
 
 
 def leave_out(session: Session, side: Side | str, name: str, left_out: bool = True) -> bool:

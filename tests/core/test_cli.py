@@ -59,6 +59,30 @@ def test_estimate_writes_all_it_knows(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "95 % within" in text
 
 
+def test_estimate_says_what_names_and_paths_tell(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    touches = _touches(tmp_path)
+    assert main(["estimate", str(touches), "--side", "L"]) == 0
+    text = capsys.readouterr().out
+    assert "by its name" not in text
+    assert "round window" not in text, "nothing was written"
+    touches = touches.rename(tmp_path / "Skull_Right_new.csv")
+    angles = -np.linspace(0, 8, 20)
+    rows = [*zip(angles / -8, 2 * np.cos(angles), 2 * np.sin(angles), strict=True), (0, 0, 0), (0, 0, 2)]
+    path = tmp_path / "path.csv"
+    path.write_text("".join(f"{x},{y},{z}\n" for x, y, z in rows))
+    about = ["--path", str(path), "--path-units", "mm", "--path-side", "L", "--path-out"]
+    words = ["estimate", str(touches), "--side", "L", *about, str(tmp_path / "out.csv")]
+    assert main(words) == 0
+    text = capsys.readouterr().out
+    assert "! by its name the file is of the right side: check the side" in text
+    assert "! row 21 of the path is CO itself, where no path can be: --path-rows 20?" in text
+    assert "y of what was written points to the touched round window" in text
+    assert main([*words, "--path-rows", "20", "--round-window", "expected"]) == 0
+    text = capsys.readouterr().out
+    assert "CO itself" not in text
+    assert "the expected round window" in text
+
+
 def test_command_and_python_give_the_same_numbers(tmp_path: Path) -> None:
     touches, out = _touches(tmp_path), tmp_path / "pose.json"
     main(["estimate", str(touches), "--side", "R", "--json", str(out)])
@@ -187,3 +211,13 @@ def test_it_runs_from_the_shell(tmp_path: Path) -> None:
     done = subprocess.run(words, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
+
+
+def test_a_reader_that_has_read_enough_is_no_error(tmp_path: Path) -> None:
+    words = [sys.executable, "-m", "gp_core.cli", "estimate", str(_touches(tmp_path)), "--side", "L"]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 141

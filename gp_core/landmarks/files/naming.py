@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gp_core.landmarks.features import Side
 
-__all__ = ["landmark_file_name", "name_parts", "natural_key"]
+__all__ = ["landmark_file_name", "name_parts", "named_side", "natural_key"]
 
 # GP01_L, GP01-left, "GP01 right", GP01.R
 _SIDE_ENDING = re.compile(
@@ -35,6 +35,19 @@ def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None
     if match is None:
         return stem, None
     return match["specimen"], Side.parse(match["side"])
+
+
+def named_side(path: str | PathLike[str]) -> Side | None:
+    """Return the side that a word of a file's name tells, wherever it stands; None where it tells not one.
+
+    Examples
+    --------
+    >>> named_side("SkullA_Left_new.dat")
+    <Side.LEFT: 'L'>
+    """
+    words = {word for word in re.split(r"[^a-z0-9]+", Path(path).name.lower()) if word}
+    told = {side for side in Side if words & {side.word, side.value.lower()}}
+    return told.pop() if len(told) == 1 else None
 
 
 def natural_key(name: str) -> tuple[tuple[int, str], ...]:
