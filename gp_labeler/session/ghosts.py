@@ -166,6 +166,11 @@ class Expectations:
         known = self.known_departures(landmarks)
         return None if known is None else _doubtful(known)
 
+    def known_other_side(self, landmarks: LandmarkSet) -> bool:
+        """Return whether a side is known to be labelled under the name of the other; at once."""
+        own, other = self.known_departures(landmarks), self.known_departures(_renamed(landmarks))
+        return own is not None and other is not None and _doubtful_part(own) > 0.5 > 2 * _doubtful_part(other)
+
     def _remembered(self, key: tuple[object, ...], make: Callable[[], dict[str, T]]) -> Mapping[str, T]:
         found = self._recalled(key)
         if found is None:
@@ -227,9 +232,12 @@ class Judging:
     title: str = "Checking labels"
 
     def run(self, progress: Callable[[float], None]) -> Mapping[str, Departure]:
-        """Return the departures."""
+        """Return the departures; where most are doubtful, find those under the other side's name as well."""
         progress(0.0)
-        return self.expectations.departures(self.landmarks)
+        found = self.expectations.departures(self.landmarks)
+        if _doubtful_part(found) > 0.5:
+            self.expectations.departures(_renamed(self.landmarks))
+        return found
 
     @property
     def known(self) -> Mapping[str, Departure] | None:
@@ -267,6 +275,14 @@ def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost
 
 def _doubtful(departures: Mapping[str, Departure]) -> Mapping[str, Doubt]:
     return {code: departure for code, departure in departures.items() if departure.is_doubtful}
+
+
+def _doubtful_part(departures: Mapping[str, Departure]) -> float:
+    return len(_doubtful(departures)) / max(len(departures), 1)
+
+
+def _renamed(landmarks: LandmarkSet) -> LandmarkSet:
+    return replace(landmarks, side=landmarks.side.other)
 
 
 def _without(landmarks: LandmarkSet, code: str) -> LandmarkSet:

@@ -100,6 +100,10 @@ class Session(EditedSpecimen):
         """Return the points of one side that are far from where they are expected; this may take 150 ms."""
         return self._expectations.doubts(self.landmarks(side))
 
+    def is_other_side(self, side: Side) -> bool:
+        """Whether one side is known to be labelled under the name of the other; at once, see `judging`."""
+        return self._expectations.known_other_side(self.landmarks(side))
+
     def judging(self, side: Side) -> Judging:
         """Return the job that finds the doubts of one side as it stands, for `point_states` to know them."""
         return Judging(self._expectations, self.landmarks(side))

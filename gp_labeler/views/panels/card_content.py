@@ -125,6 +125,8 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
         ghost = session.ghosts(side)[code]
         who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
+    if state is PointState.DOUBTFUL and session.is_other_side(side):
+        return f"These labels fit the {side.other.word} side: Edit > Swap left and right.", "danger"
     if state is PointState.DOUBTFUL:
         words = session.doubts(side)[code].text
         return f"{words[:1].upper()}{words[1:]}.", "danger"

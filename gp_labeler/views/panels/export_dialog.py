@@ -169,6 +169,10 @@ class ExportDialog(QDialog):
         doubtful = [code for code, state in states.items() if state is PointState.DOUBTFUL]
         if not doubtful:
             return []
+        if self._workbench.session.is_other_side(side):
+            other = f"{side.other.word}: left and right are exchanged."
+            words = f"The labels of the {side.word} side fit the {other}"
+            return [("warning", words)]
         many = len(doubtful) > 1
         far = f"lie far from where the atlas expects {'them' if many else 'it'}"
         words = (

@@ -17,13 +17,14 @@ from gp_core.errors import FeatureError, GeometryError, GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, PlacePoint
+from gp_labeler.session.edits import CheckPoint, PlacePoint, SwapSides
 from gp_labeler.session.ghosts import Expectations, mirror_ghosts
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.session import Session
 from gp_labeler.session.state import How, SpecimenState
 from gp_labeler.session.view import View, ViewState
 from gp_labeler.session.workflow import Active, PointState, placing_order
+from gp_labeler.views.panels.card_content import content_of
 
 L, R = Side.LEFT, Side.RIGHT
 BOTH = ImportLandmarks((shape(L), shape(R)), MARK)
@@ -264,6 +265,27 @@ def test_doubts_can_be_found_by_a_job():
     with ThreadPoolExecutor(1) as pool:
         pool.submit(session.judging(L).run, lambda fraction: None).result()
     assert session.point_states(L, wait=False)["FPP"] is PointState.DOUBTFUL
+
+
+def test_labels_under_the_name_of_the_other_side_are_called_so():
+    atlas, rng = Atlas.published(), np.random.default_rng(3)
+    right = {code: (atlas[code] + rng.normal(size=3) * 0.1) * [-1, 1, 1] for code in atlas.codes}
+    session = Session(predict=partial(shape_predict, atlas))
+
+    def judged(side: Side) -> bool:
+        session.judging(side).run(lambda fraction: None)
+        return session.is_other_side(side)
+
+    session.do(ImportLandmarks((LandmarkSet.from_mapping(right, L),), MARK))
+    assert not session.is_other_side(L), "nobody has looked yet"
+    assert judged(L)
+    session.set_active(Active(L, "CB"))
+    assert "fit the right side" in content_of(session, has_scan=True).status
+    session.do(SwapSides())
+    assert not judged(R)
+    assert not judged(L)
+    session.do(PlacePoint(R, "CL", right["CL"] + [0, 4, 0], MARK))
+    assert not judged(R), "one that is off says nothing of the side"
 
 
 def test_the_published_atlas_expects_as_its_own_checks_do():
