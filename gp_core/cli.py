@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import io
 import logging
+import os
 import sys
 from collections.abc import Sequence
 
@@ -37,7 +38,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line.
+        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line; 130 where
+        it was stopped and 141 where nobody reads on, as shells have it.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
@@ -47,9 +49,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         keep_inputs(args)
         status: int = args.run(args)
+        sys.stdout.flush()
     except GpError as error:
         sys.stderr.write(f"gp-core: {error}\n")
         return 2
+    except BrokenPipeError:  # who reads has read enough, such as `head`; Python would complain at its end
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
     except OSError as error:
         sys.stderr.write(f"gp-core: {error.filename or 'file'}: {error.strerror or error}\n")
         return 2

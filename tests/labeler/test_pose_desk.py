@@ -178,7 +178,7 @@ def test_touches_of_the_wrong_side_change_sides(desk, animal):
         desk.pose.record(animal[code], TouchHow.TYPED)
     desk.pose.choose(side=Side.RIGHT)
     desk.pose.record(animal["MN"], TouchHow.TYPED, name="MN")
-    with pytest.raises(GpError, match="left side was touched too"):
+    with pytest.raises(GpError, match=r"left side was touched too\. Clear its touches first"):
         desk.pose.change_side()
     desk.session.undo()
     desk.pose.choose(side=Side.LEFT)

@@ -10,6 +10,7 @@ import sys
 import threading
 import weakref
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -315,6 +316,19 @@ def test_the_cube_and_the_scale_bar(scene: Scene3D) -> None:
         views.append(scene.image()[160:, :95].astype(int))
     for n, one in enumerate(views):
         assert all(np.abs(one - other).max() > 60 for other in views[n + 1 :])  # six letters
+
+
+def test_the_scale_bar_is_that_of_the_zoom(scene: Scene3D) -> None:
+    scene.scale_bar.visible = True
+    seen = [scene.image()]
+    for factor in (1.3, 2.0, 0.5):
+        scene.camera.zoom(factor)
+        seen.append(scene.image())
+        scene.scale_bar.visible = False
+        scene.image()
+        scene.scale_bar.visible = True  # from nothing
+        np.testing.assert_array_equal(scene.image(), seen[-1])
+    assert all((one != other).any() for one, other in pairwise(seen))
 
 
 def test_themes_quick_frames_and_sizes(scene: Scene3D, ball: Surface) -> None:

@@ -64,6 +64,11 @@ def test_changes_lead_from_one_document_to_the_other(old, new):
     assert difference(new, new) == {"set": [], "drop": []}
 
 
+@pytest.mark.parametrize(("old", "new"), [(0.0, -0.0), (1, 1.0), (True, 1), ([0.0], [-0.0])])
+def test_what_is_written_otherwise_is_another_value(old, new):
+    assert difference({"a": old}, {"a": new})["set"] == [[["a"], new]]
+
+
 def _flat(value, path=()):
     """Dicts by path, so that their order does not count; empty ones count as themselves."""
     if isinstance(value, dict) and value:
