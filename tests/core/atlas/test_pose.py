@@ -268,6 +268,11 @@ def test_touches_that_make_no_pose_are_refused(touches: dict, message: str, publ
         estimate_pose(touches, "L", published)
 
 
+def test_a_file_name_is_no_touches() -> None:
+    with pytest.raises(GpError, match=r"touches must be a mapping .* got str. Read a file .* read_touches"):
+        estimate_pose("touches.csv", "L")  # type: ignore[arg-type]
+
+
 def test_metres_are_recognised(published: Atlas) -> None:
     metres = {code: p / 1000 for code, p in _touched(_mean_side(published, Side.LEFT)).items()}
     with pytest.raises(GeometryError, match=r"look like metres.*multiply them by 1000"):
