@@ -212,7 +212,7 @@ def estimate_pose(
 def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:
     if not isinstance(touches, Mapping):
         raise GpError(
-            f"touches must be a mapping of names to positions, or a LandmarkSet, got {type(touches).__name__}",
+            f"touches must be a mapping of names to points, or a LandmarkSet, got {type(touches).__name__}",
             remedy="Read a file of touches with read_touches.",
         )
     return LandmarkSet.from_mapping(touches, side, frame="tracker")
