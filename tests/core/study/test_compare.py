@@ -83,6 +83,14 @@ def test_workers_do_not_change_the_answer() -> None:
         assert np.array_equal(a.errors.e_co_mm, b.errors.e_co_mm)
 
 
+def test_a_summary_is_of_all_errors(drawn: ComparisonReport) -> None:
+    row = drawn.rows[0]
+    summary, errors = row.as_dict()["e_co_mm"], np.sort(row.errors.e_co_mm)
+    assert summary["mean"] == pytest.approx(errors.mean())
+    assert summary["max"] == errors[-1]
+    assert np.interp(0.95 * (len(errors) - 1), range(len(errors)), errors) == pytest.approx(summary["p95"])
+
+
 def test_table_and_json_hold_the_same(drawn: ComparisonReport, tmp_path: Path) -> None:
     drawn.save_csv(tmp_path / "table.csv")
     with (tmp_path / "table.csv").open() as file:

@@ -40,7 +40,7 @@ def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbo
     assert height < status.height() >= text.heightForWidth(text.width())
     qtbot.wait(10)
     window.ui.open_demo()
-    qtbot.waitUntil(status.work.bar.isVisible)
+    qtbot.waitUntil(status.work.bar.isVisible, timeout=20000)
     status.work.stop.click()
     settle(qtbot, window)
     status.say("Saved", "info")
@@ -333,9 +333,9 @@ def test_the_window_answers_while_work_goes_on(qtbot, window) -> None:
 
 def test_work_can_be_stopped(qtbot, window) -> None:
     window.workbench.jobs.submit(Slow())
-    qtbot.waitUntil(lambda: window.status.work.bar.isVisible())
+    qtbot.waitUntil(lambda: window.status.work.bar.isVisible(), timeout=20000)
     QTest.mouseClick(window.status.work.stop, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: not window.workbench.jobs.running)
+    qtbot.waitUntil(lambda: not window.workbench.jobs.running, timeout=20000)
     assert not window.status.work.bar.isVisible()
 
 
