@@ -9,7 +9,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
-from gp_labeler.views.panels.parts import Card, ElidedLabel, text_label
+from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
 from gp_labeler.views.panels.pose_parts import Segments, link
 from gp_labeler.workbench import Workbench
 
@@ -53,6 +53,8 @@ class HeadCard(Card):
         self.noise.setFixedWidth(64)
         self.found = text_label("", "hint")
         self.atlas = ElidedLabel()
+        self.problem = text_label("", "warning", wrap=True)
+        self.problem.setAccessibleName("Why the atlas chosen last is not in use")
         self.to_atlas = link("Change", "Choose or fit another atlas (step 3)")
         self._lay_out()
         self.side.chosen.connect(lambda side: self._choose(side=Side.parse(side)))
@@ -64,7 +66,8 @@ class HeadCard(Card):
         self.new.clicked.connect(self.new_asked)
         for signal in (workbench.details_changed, workbench.session_replaced, workbench.volume_opened):
             follow(self, signal, self.refresh)
-        follow(self, workbench.atlas_changed, self.refresh)
+        for signal in (workbench.atlas_changed, workbench.atlas_details_changed):
+            follow(self, signal, self.refresh)
 
     def refresh(self, *_: object) -> None:
         """Show the settings in effect."""
@@ -81,6 +84,9 @@ class HeadCard(Card):
             self.specimen.setText(state.specimen)
         atlas = self._desk.atlas
         self.atlas.set_words("being loaded" if atlas is None else atlas.name)
+        problem = self._desk.atlas_problem
+        self.problem.setText(breakable(f"{problem} The published one is in use.") if problem else "")
+        self.problem.setVisible(bool(problem))
 
     def _lay_out(self) -> None:
         self.heading.hide()
@@ -102,7 +108,7 @@ class HeadCard(Card):
         noise.addWidget(self.found, 1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
-        for what in (self._named, choices, noise, atlas):
+        for what in (self._named, choices, noise, atlas, self.problem):
             self.add(what)
 
     def _rename(self) -> None:

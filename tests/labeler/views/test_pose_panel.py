@@ -395,6 +395,16 @@ def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbo
     assert panel.result.swap.isVisible()
 
 
+def test_an_atlas_that_is_not_the_one_chosen_is_told_beside_the_estimate(desk, panel):
+    assert not panel.head.problem.isVisible()
+    desk.atlas_problem = "The atlas of own.json cannot be had any more: own.json: does not exist."
+    desk.atlas_details_changed.emit()
+    assert panel.head.problem.isVisible()
+    assert "The published one is in use." in panel.head.problem.text()
+    desk.use_atlas(ATLAS)
+    assert not panel.head.problem.isVisible()
+
+
 def test_a_verdict_is_not_taken_for_one_on_another_estimate(desk, panel, qtbot):
     touch(desk, *PROBE)
     qtbot.mouseClick(panel.verdict.accept, CLICK)
