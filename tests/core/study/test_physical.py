@@ -128,8 +128,9 @@ def test_what_cannot_be_tested_is_refused() -> None:
     touches, ct, _ = skull()
     with pytest.raises(GpError, match=r"at least 3 skull features by the same names, got 0 \(touched: none"):
         physical_test(LandmarkSet(touches.points, "R", "tracker"), ct)  # type: ignore[arg-type]
-    with pytest.raises(GpError, match="CT landmarks have no CB"):
-        physical_test(touches, ct.with_point("CB", None))
+    for code in ("CA", "CB", "RWA", "RWP"):
+        with pytest.raises(GpError, match=f"CT landmarks have no {code}"):
+            physical_test(touches, ct.with_point(code, None))
     left = LandmarkSet(ct.points, "L", "scan", extra=ct.extra)  # type: ignore[arg-type]
     with pytest.raises(GpError, match="touches are of the right side, the CT of the left"):
         physical_test(touches, left)

@@ -38,6 +38,22 @@ class Weighed:
         return lambda probe: base + 0.1 * sum(weights.get(code, 1.0) for code in probe)
 
 
+@dataclass(frozen=True)
+class Indifferent:
+    """A problem to which all features are one."""
+
+    n_sides: int = 2
+
+    def scorer(self, training: Codes) -> Callable[[Codes], float]:
+        return lambda probe: 1.0
+
+
+def test_of_equals_the_fewest_touches_are_taken() -> None:
+    (step,) = Elimination(Indifferent(), None, Checkpoint(None, "key"), Ticker()).run(SMALL, len(SMALL))
+    assert len(step.probe_curve) > 1
+    assert len(step.probe) == 3
+
+
 def eliminate(problem: Weighed, fewest: int = 3, path: Path | None = None) -> Elimination:
     return Elimination(problem, None, Checkpoint(path, "key"), Ticker())
 
