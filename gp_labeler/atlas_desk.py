@@ -259,12 +259,13 @@ class AtlasDesk(DeskSignals):
         """Find the doubts of some sides in the background, by default once what was clicked is drawn."""
         for side in sides:
             job, key = self.session.judging(side), f"judging {side.value}"
-            self.jobs.submit(job, self._take_judged, key=key, after=after)
+            done = partial(self._take_judged, bool(self.session.near_doubts(side)))
+            self.jobs.submit(job, done, key=key, after=after)
 
-    def _take_judged(self, departures: Mapping[str, Departure]) -> None:
+    def _take_judged(self, showed_doubts: bool, departures: Mapping[str, Departure]) -> None:
         self.judged.emit()
-        if any(departure.is_doubtful for departure in departures.values()):
-            self.doubts_changed.emit()  # else all points look as they did: unknown doubts are not shown
+        if showed_doubts or any(departure.is_doubtful for departure in departures.values()):
+            self.doubts_changed.emit()  # else all points look as they did
 
     def _cancel(self, key: str) -> None:
         for task in self.jobs.running:

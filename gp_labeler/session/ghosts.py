@@ -14,7 +14,7 @@ from gp_core.atlas.quality import DOUBTFUL_SD
 from gp_core.atlas.shape import LABELLING_NOISE_MM
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_core.landmarks.features import FEATURES
+from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["Departure", "Doubt", "Expectations", "Ghost", "Judging", "Predict", "mirror_ghosts"]
@@ -134,6 +134,7 @@ class Expectations:
     def __init__(self, predict: Predict | None = None) -> None:
         self._predict = predict
         self._known: dict[tuple[object, ...], Mapping[str, Any]] = {}
+        self._judged: dict[Side, tuple[LandmarkSet, Mapping[str, Departure]]] = {}
         self._lock = threading.Lock()
 
     def ghosts(self, landmarks: LandmarkSet, other: LandmarkSet) -> Mapping[str, Ghost]:
@@ -161,10 +162,33 @@ class Expectations:
         """Return those of the `departures` that are doubtful."""
         return _doubtful(self.departures(landmarks))
 
-    def known_doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt] | None:
-        """Return `doubts` where they were found before, else None; at once."""
+    def near_doubts(self, landmarks: LandmarkSet) -> Mapping[str, Doubt]:
+        """Return `doubts` where they are known, else as the last edit leaves those before it; at once.
+
+        What other points are doubted for waits for the next judgement, lest all doubts blink at every edit;
+        a point that was moved is held against the place where the others expect it, which stays.
+        """
         known = self.known_departures(landmarks)
-        return None if known is None else _doubtful(known)
+        return _doubtful(self._carried(landmarks) if known is None else known)
+
+    def settle(self, landmarks: LandmarkSet, departures: Mapping[str, Departure]) -> None:
+        """Take the departures of a side from which those after the next edit follow."""
+        with self._lock:
+            self._judged[landmarks.side] = landmarks, departures
+
+    def _carried(self, landmarks: LandmarkSet) -> dict[str, Departure]:
+        with self._lock:
+            before, found = self._judged.get(landmarks.side, (landmarks, {}))
+        old, new = before.points, landmarks.points
+        stays = ((old == new) | (np.isnan(old) & np.isnan(new))).all(axis=1).tolist()
+        moved = {f.code for f, stayed in zip(FEATURES, stays, strict=True) if not (stayed or f.computed)}
+        if len(moved) > 1:
+            return {}
+        return {
+            code: _departure(code, landmarks[code], was.expected, was.covariance) if code in moved else was
+            for code, was in found.items()
+            if code in landmarks
+        }
 
     def known_other_side(self, landmarks: LandmarkSet) -> bool:
         """Return whether a side is known to be labelled under the name of the other; at once."""
@@ -216,11 +240,7 @@ class Expectations:
         expected = self._expected(_without(landmarks, code))
         if code not in expected:
             return None
-        mean, covariance = expected[code]
-        off = landmarks[code] - mean
-        spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
-        n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
-        return Departure(code, float(np.linalg.norm(off)), mean, covariance, n_sd)
+        return _departure(code, landmarks[code], *expected[code])
 
 
 @dataclass(frozen=True)
@@ -237,6 +257,7 @@ class Judging:
         found = self.expectations.departures(self.landmarks)
         if _doubtful_part(found) > 0.5:
             self.expectations.departures(_renamed(self.landmarks))
+        self.expectations.settle(self.landmarks, found)
         return found
 
     @property
@@ -271,6 +292,13 @@ def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost
         variance = MIRROR_SD_MM**2 + (MIRROR_SD_PER_MM * reach) ** 2
         found[code] = Ghost(code, position, variance * np.eye(3), "mirror")
     return found
+
+
+def _departure(code: str, position: FloatArray, mean: FloatArray, covariance: FloatArray) -> Departure:
+    off = position - mean
+    spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
+    n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
+    return Departure(code, float(np.linalg.norm(off)), mean, covariance, n_sd)
 
 
 def _doubtful(departures: Mapping[str, Departure]) -> Mapping[str, Doubt]:

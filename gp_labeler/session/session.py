@@ -104,6 +104,10 @@ class Session(EditedSpecimen):
         """Whether one side is known to be labelled under the name of the other; at once, see `judging`."""
         return self._expectations.known_other_side(self.landmarks(side))
 
+    def near_doubts(self, side: Side) -> Mapping[str, Doubt]:
+        """Return `doubts` as far as they can be told at once."""
+        return self._expectations.near_doubts(self.landmarks(side))
+
     def judging(self, side: Side) -> Judging:
         """Return the job that finds the doubts of one side as it stands, for `point_states` to know them."""
         return Judging(self._expectations, self.landmarks(side))
@@ -111,10 +115,10 @@ class Session(EditedSpecimen):
     def point_states(self, side: Side, *, wait: bool = True) -> dict[str, PointState]:
         """Return how far every feature of one side is, in the table's order.
 
-        Without `wait`, doubts count only where they are known already: run `judging`, then ask again.
+        Without `wait`, doubts are `near_doubts`: run `judging`, then ask again.
         """
-        ghosts, landmarks = self.ghosts(side), self.landmarks(side)
-        doubts = self.doubts(side) if wait else self._expectations.known_doubts(landmarks) or {}
+        ghosts = self.ghosts(side)
+        doubts = self.doubts(side) if wait else self.near_doubts(side)
         return {code: point_state(self.state, side, code, ghosts=ghosts, doubts=doubts) for code in CODES}
 
     def progress(self, side: Side) -> Progress:

@@ -67,9 +67,9 @@ def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
     if code is None or not session.view.state.ghosts_visible:
         return []
     ghost = session.ghosts(side).get(code)
-    if ghost is None and session.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
-        doubted = (workbench.departures(side) or {}).get(code)
-        ghost = None if doubted is None else doubted.ghost
+    doubt = session.near_doubts(side).get(code)
+    if doubt is not None and session.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
+        ghost = doubt.ghost
     if ghost is None:
         return []
     return [Ghost(key_of(side, code), ghost.position, ghost.covariance, f"{code}?", active=True)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import load_specimens
 from gp_core.study.leave_one_out import leave_one_out
 from gp_labeler.atlas_desk import is_atlas_file
+from gp_labeler.session.ghosts import Departure
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.session.state import How, Provenance
@@ -276,3 +278,15 @@ def test_stopping_the_atlas_of_the_last_time_leaves_the_published_one(start, fol
     again.wait()
     assert again.is_published_atlas
     again.close(discard=True)
+
+
+def test_views_are_told_of_a_judgement_that_changes_what_they_show(desk) -> None:
+    told = []
+    desk.doubts_changed.connect(lambda: told.append(1))
+    fine = Departure("CA", 0.1, np.zeros(3), np.eye(3), 0.2)
+    desk._take_judged(False, {"CA": fine})
+    assert told == [], "no point looks otherwise than before"
+    desk._take_judged(True, {"CA": fine})
+    assert told == [1], "a doubt shown until now is gone"
+    desk._take_judged(False, {"CA": replace(fine, n_sd=9.0)})
+    assert told == [1, 1]

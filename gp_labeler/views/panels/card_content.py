@@ -127,8 +127,9 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
     if state is PointState.DOUBTFUL and session.is_other_side(side):
         return f"These labels fit the {side.other.word} side: Edit > Swap left and right.", "danger"
-    if state is PointState.DOUBTFUL:
-        words = session.doubts(side)[code].text
+    doubt = session.near_doubts(side).get(code)
+    if state is PointState.DOUBTFUL and doubt is not None:
+        words = doubt.text
         return f"{words[:1].upper()}{words[1:]}.", "danger"
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"

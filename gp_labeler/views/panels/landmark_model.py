@@ -130,8 +130,8 @@ class LandmarkModel(QAbstractTableModel):
     def _word(self, code: str, side: Side, state: PointState, is_active: bool) -> str:
         if is_active and state in (PointState.TO_DO, PointState.GHOST):
             return "place"
-        if state is PointState.DOUBTFUL:
-            return self._workbench.session.doubts(side)[code].word
+        if state is PointState.DOUBTFUL and (doubt := self._workbench.session.near_doubts(side).get(code)):
+            return doubt.word
         if feature(code).computed and state is PointState.TO_DO:
             return "by itself"
         return str(state.value)
@@ -140,8 +140,8 @@ class LandmarkModel(QAbstractTableModel):
         text = f"{code} {side.word}: {state.value}"
         if feature(code).computed and state is PointState.TO_DO:
             return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
-        if state is PointState.DOUBTFUL:
-            text += f", {self._workbench.session.doubts(side)[code].text}"
+        if state is PointState.DOUBTFUL and (doubt := self._workbench.session.near_doubts(side).get(code)):
+            text += f", {doubt.text}"
         if state is PointState.GHOST:
             text += (
                 f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"

@@ -17,7 +17,7 @@ from gp_core.errors import FeatureError, GeometryError, GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, PlacePoint, SwapSides
+from gp_labeler.session.edits import CheckPoint, ClearPoint, PlacePoint, SwapSides
 from gp_labeler.session.ghosts import Expectations, mirror_ghosts
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.session import Session
@@ -265,6 +265,34 @@ def test_doubts_can_be_found_by_a_job():
     with ThreadPoolExecutor(1) as pool:
         pool.submit(session.judging(L).run, lambda fraction: None).result()
     assert session.point_states(L, wait=False)["FPP"] is PointState.DOUBTFUL
+
+
+def test_doubts_do_not_blink_while_an_edit_is_judged():
+    session = Session(BOTH.apply(SpecimenState()), predict=predict)
+    session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
+
+    def doubted() -> dict[str, float]:
+        states = session.point_states(L, wait=False)
+        assert set(session.near_doubts(L)) == {c for c, s in states.items() if s is PointState.DOUBTFUL}
+        return {code: round(doubt.distance, 1) for code, doubt in session.near_doubts(L).items()}
+
+    assert doubted() == {}, "nobody has looked yet"
+    session.judging(L).run(lambda fraction: None)
+    assert doubted() == {"FPP": 3.0}
+    session.do(PlacePoint(L, "OS", shape()["OS"] + 0.01, MARK))
+    assert doubted() == {"FPP": 3.0}, "another point was moved"
+    session.judging(L).run(lambda fraction: None)
+    session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 2, 0], MARK))
+    assert doubted() == {"FPP": 2.0}, "its own place tells by itself"
+    session.do(PlacePoint(L, "FPP", shape()["FPP"], MARK))
+    assert doubted() == {}
+    session.undo()
+    session.do(ClearPoint(L, "FPP"))
+    assert doubted() == {}, "what is not placed is not doubted"
+    session.undo()
+    session.judging(L).run(lambda fraction: None)
+    session.do(SwapSides())
+    assert doubted() == {}, "all is new"
 
 
 def test_labels_under_the_name_of_the_other_side_are_called_so():
