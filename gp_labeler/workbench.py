@@ -86,7 +86,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.tool = "place"
         self._author = author
         self._last: tuple[Side, str] | None = None
-        self._abandoned: Session | None = None
+        self._abandoned: SpecimenState | None = None
         self._copied: str | None = None  # of what this is a copy
         super().__init__(atlas)
         self.session: Session = new_session(directory, predict=self._predict, author=author)
@@ -175,8 +175,8 @@ class Workbench(AtlasDesk, BoneDesk):
         self._attach(volume, accept_changes=True)
 
     def abandon(self) -> None:
-        """Say that unsaved edits are not wanted any more, once something else is opened."""
-        self._abandoned = self.session
+        """Say that the unsaved edits so far are not wanted any more, once something else is opened."""
+        self._abandoned = self.session.state
 
     # Working
 
@@ -285,8 +285,12 @@ class Workbench(AtlasDesk, BoneDesk):
         """Close one session and take another; the old one's unsaved edits stay in its journal."""
         self._unfollow()
         old, self.session = self.session, session
-        old.close(discard=not old.dirty or old is self._abandoned)
+        kept = old.dirty and old.state is not self._abandoned  # edited since: a scan takes seconds to load
+        old.close(discard=not kept)
         self._abandoned = None
+        if kept and self.directory is not None:
+            name = old.state.specimen
+            self.say(f"Unsaved edits of {name} are kept, and offered at the next start", "warning")
         self._copied = copied
         self.truth = None
         self.drag = self._last = None

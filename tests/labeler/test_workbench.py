@@ -17,6 +17,7 @@ from gp_labeler.actions import ACTIONS, run
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session import labelling
 from gp_labeler.session.jobs import QueueDispatcher
+from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.session.state import How
 from gp_labeler.session.workflow import Active
 from gp_labeler.workbench import Workbench
@@ -337,3 +338,26 @@ def test_bone_too_thin_for_the_first_look_is_shown_by_the_second(desk) -> None:
     desk.wait()
     assert seen[-1] > 60_000
     assert not [text for level, text in desk.said if level == "error"]
+
+
+def test_what_is_edited_while_another_scan_loads_is_kept_and_told(on_ball, ball_file) -> None:
+    desk = on_ball
+    labelling.place(desk.session, MIDDLE + np.array([0, 0, 6]), How.MESH, side=Side.LEFT, code="CA")
+    desk.abandon()
+    desk.open(ball_file)
+    labelling.place(desk.session, MIDDLE + np.array([0, 6, 0]), How.MESH, side=Side.LEFT, code="CB")
+    desk.wait()
+    assert not desk.session.dirty
+    assert any("Unsaved edits of ball are kept" in text for level, text in desk.said if level == "warning")
+    (kept,) = find_recoveries(desk.directory)
+    desk.recover(kept)
+    assert {"CA", "CB"} <= set(desk.session.state.side(Side.LEFT).placed)
+
+
+def test_what_is_given_up_is_not_offered_again(on_ball, ball_file) -> None:
+    labelling.place(on_ball.session, MIDDLE + np.array([0, 0, 6]), How.MESH, side=Side.LEFT, code="CA")
+    on_ball.abandon()
+    on_ball.open(ball_file)
+    on_ball.wait()
+    assert not any("kept" in text for _, text in on_ball.said)
+    assert find_recoveries(on_ball.directory) == ()
