@@ -106,8 +106,9 @@ def _nested_lines(report: NestedReport) -> Iterator[str]:
     yield ""
     yield "  held out   training  dropped, and touched"
     for fold in report.folds:
-        dropped = " ".join(code for code in CODES if code not in fold.features) or "none"
-        yield f"  {fold.held_out:<9}  {len(fold.features):8}  -{dropped}; {' '.join(fold.probe)}"
+        dropped = " ".join(code for code in CODES if code not in fold.features)
+        left = f"-{dropped}" if dropped else "none"
+        yield f"  {fold.held_out:<9}  {len(fold.features):8}  {left}; {' '.join(fold.probe)}"
     yield ""
     yield "  errors                  E_CO mm: mean  median  max     E_MA deg: mean  median  max      E_T"
     both = (("chosen without the animal", report.errors), ("chosen on all animals", report.optimistic.errors))

@@ -22,13 +22,10 @@ from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple, vtk_ready
 
-__all__ = ["QUICK_VOXELS", "Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
+__all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
 
 OVERVIEW_VOXELS = 256**3
 """For the first look."""
-
-QUICK_VOXELS = 128**3
-"""For the stand-in that is drawn while the camera is dragged."""
 
 SMALLEST_PART_MM = 1.0
 """Ossicles are larger than this across; specks of noise are smaller."""

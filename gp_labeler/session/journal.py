@@ -28,15 +28,16 @@ from gp_labeler.session.specimen_file import application, write_durably
 __all__ = ["Entry", "Journal", "JournalContent", "read_journal"]
 
 VERSION = 1
-KINDS = ("edit", "merge", "undo", "redo", "change")
-"""``merge`` continues the edit before it; ``change`` cannot be undone (another volume)."""
-
 _LINE = re.compile(rb'\{"record":(.*),"crc32":([0-9]{1,10})\}\n', re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Entry:
-    """One confirmed edit: what kind, its text, when, and the document after it."""
+    """One confirmed edit: what kind, its text, when, and the document after it.
+
+    Kinds are ``edit``, ``merge`` (it continues the one before), ``undo``, ``redo`` and ``change``, which
+    cannot be undone (another volume).
+    """
 
     kind: str
     text: str

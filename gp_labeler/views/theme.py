@@ -23,7 +23,6 @@ __all__ = [
     "CAPTION_PX",
     "DARK",
     "FONT_PX",
-    "GRID",
     "LIGHT",
     "THEMES",
     "TITLE_PX",
@@ -33,9 +32,6 @@ __all__ = [
     "contrast",
     "theme_of",
 ]
-
-GRID = 4
-"""All distances are multiples of this many logical pixels."""
 
 CAPTION_PX, FONT_PX, TITLE_PX = 11, 12, 17
 FAMILIES = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")

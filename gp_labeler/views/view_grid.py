@@ -6,7 +6,6 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QToolButton, QVBoxLayout, QWidget
 
-from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.icons import icon
@@ -206,8 +205,3 @@ class ViewGrid(QWidget):
         self.frames["3d"].header.where.setText(
             "" if threshold is None else f"bone from {value_text(threshold)}"
         )
-
-    def fly_to(self, position: FloatArray) -> None:
-        """Bring a (3,) scan position into sight in every view."""
-        for view in self.views:
-            view.go_to(position)

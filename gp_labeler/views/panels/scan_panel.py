@@ -19,7 +19,6 @@ __all__ = ["ScanPanel", "facts_of"]
 
 _N_NOTES = 6
 _NONE = "Open a scan: a file, a folder of slices or a DICOM folder."
-_LOST = "The scan is not where it was: File > Find scan says where it is now."
 
 
 class ScanPanel(QWidget):
