@@ -17,7 +17,10 @@ from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.registration.pivot import PivotCalibration
+from gp_labeler.session.confidence import confidence, is_other_side
+from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.session import Session
+from gp_labeler.session.state import SpecimenState
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import (
     Limits,
@@ -69,6 +72,7 @@ class TrackerDesk:
         self._recorder = TouchRecorder(Probe())
         self._dwell = False
         self._words = ""
+        self._held = ""
         self._latest: Sample | None = None
         self._tip: FloatArray | None = None
         self._trail: deque[FloatArray] = deque(maxlen=_TRAIL)
@@ -76,6 +80,7 @@ class TrackerDesk:
         self.calibration: PivotCalibration | None = None
         self._aim = self._aim_now()
         desk.pose.changed.connect(self._on_pose_changed)
+        desk.details_changed.connect(self._on_pose_changed)
 
     # The link
 
@@ -253,7 +258,9 @@ class TrackerDesk:
     @property
     def sending(self) -> str:
         """How the sending of the pose stands, for a person; empty where nothing is sent."""
-        return "" if self._sender is None else self._sender.words
+        if self._sender is None:
+            return ""
+        return f"{self._sender.words} Held back: {self._held}." if self._held else self._sender.words
 
     def start_sending(self, port: int, host: str | None = None, device: str = "T_tracker_cochlea") -> None:
         """Send the pose from now on, whenever there is one; raises `GpError` where the port is taken."""
@@ -272,6 +279,7 @@ class TrackerDesk:
     def close(self) -> None:
         """End everything."""
         self._desk.pose.changed.disconnect(self._on_pose_changed)
+        self._desk.details_changed.disconnect(self._on_pose_changed)
         self.stop_sending()
         self.disconnect()
 
@@ -350,7 +358,20 @@ class TrackerDesk:
             return
         estimate = self._desk.pose.estimate
         pose = None if estimate is None else estimate.pose
-        if pose is None or pose.transform_to_touches.dst != "tracker":
+        self._held = "" if estimate is None else _why_held(estimate, self._desk.session.state)
+        if pose is None or pose.transform_to_touches.dst != "tracker" or self._held:
             self._sender.clear()
         else:
             self._sender.send(pose.transform_to_touches)
+
+
+def _why_held(estimate: Estimate, state: SpecimenState) -> str:
+    """Return why an estimate is not for a robot, although there is one; empty where it may have it."""
+    pose = estimate.pose
+    if pose is None:
+        return ""
+    if is_other_side(pose) or pose.swapped is not None:
+        return confidence(pose).word.lower()
+    last = next((check for check in reversed(state.pose_checks) if check.side is estimate.side), None)
+    is_rejected = last is not None and last.verdict == "reject" and estimate.moved_since(last.pose) is None
+    return "it was rejected" if is_rejected else ""

@@ -177,9 +177,10 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
     yield f"Cochlea from {source}, {pose.side.word} side, method {pose.method}, atlas {pose.atlas}"
     yield ""
     x, y, z = pose.origin
-    yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   95 % within {pose.radius_95:.2f} mm"
+    within = "95 % within" if pose.method == "robust" else "animals scatter by"
+    yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
     x, y, z = pose.axis
-    yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      95 % within {np.degrees(pose.cone_95):.1f} deg"
+    yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"
     yield ""
     yield "  touch   from the mean, mm"
     for code, distance in pose.residuals.items():

@@ -26,6 +26,7 @@ __all__ = ["PoseUi"]
 _TOUCHES = "Touches (*.dat *.csv *.mrk.json *.fcsv *.json *.txt);;All files (*)"
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
 _WHICH_AXES = "Which of its axes are x (modiolar axis, to the apex), y (to the round window), z"
+_AROUND_MM = 14.0
 _PATHS = "Insertion path (*.csv *.txt);;All files (*)"
 
 
@@ -144,6 +145,8 @@ class PoseUi(UiPart):
         self._desk.point_shown.emit(pose.origin)
         place_camera(view.scene.camera, placement(pose))
         view.redraw()
+        for slices in self._window.grid.slice_views.values():
+            slices.zoom_to(pose.origin, _AROUND_MM)  # else its region is but a speck there
 
     def _set_audible(self, audible: bool) -> None:
         self._window.tracker_display.audible = audible

@@ -83,8 +83,9 @@ def fine_mm(length: float | None) -> str:
 
 
 def region_text(pose: CochleaPose) -> str:
-    """Return where the cochlea is with 95 %."""
-    return f"95 % within {fine_mm(pose.radius_95)}  ·  cone {degrees_text(pose.cone_95)}"
+    """Return where the cochlea is with 95 %; of JRMPC, which does not know that, how the animals scatter."""
+    within = "95 % within" if pose.method == "robust" else "Animals scatter by"
+    return f"{within} {fine_mm(pose.radius_95)}  ·  cone {degrees_text(pose.cone_95)}"
 
 
 def gain_text(gain: TouchGain) -> str:

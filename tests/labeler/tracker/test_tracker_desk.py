@@ -9,7 +9,7 @@ import pyigtl
 import pytest
 from tracker_cases import POINTS, TIP, SimulatorProcess, until
 
-from gp_core import Atlas, Side
+from gp_core import PROBE, Atlas, Side
 from gp_core.errors import GpError
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.session import touching
@@ -142,6 +142,35 @@ def test_the_pose_is_sent_back_while_it_holds(desk):
         client.stop()
     desk.tracker.stop_sending()
     assert desk.tracker.sending == ""
+
+
+@pytest.mark.parametrize("trouble", ["names", "side", "rejected"])
+def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
+    atlas, right = Atlas.published(), np.array([-1.0, 1.0, 1.0])
+    desk.tracker.start_sending(0)
+    client = pyigtl.OpenIGTLinkClient("127.0.0.1", desk.tracker._sender.port)
+    try:
+        for name in PROBE:
+            source = {"MN": "OS", "OS": "MN"}.get(name, name) if trouble == "names" else name
+            position = atlas[source] * (right if trouble == "side" else 1.0)
+            desk.pose.record(position, TouchHow.TYPED, name=name)
+        if trouble == "rejected":
+            assert client.wait_for_message("T_tracker_cochlea", timeout=20) is not None
+            desk.pose.estimating.judge("reject")
+        why = {"names": "check the names", "side": "check the side", "rejected": "it was rejected"}[trouble]
+        assert desk.tracker.sending.endswith(f"Held back: {why}.")
+        assert desk.tracker._sender._matrix is None
+        if trouble == "names":
+            desk.pose.swap_names()
+        elif trouble == "side":
+            desk.pose.change_side()
+        else:
+            desk.pose.estimating.judge("accept")
+        assert "Held back" not in desk.tracker.sending
+        message = client.wait_for_message("T_tracker_cochlea", timeout=20)
+        np.testing.assert_allclose(message.matrix, desk.pose.estimate.pose.transform, atol=1e-4)
+    finally:
+        client.stop()
 
 
 @pytest.mark.parametrize("change", ["skip", "side", "specimen"])
