@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
@@ -105,6 +105,14 @@ class LandmarkSet:
     def __contains__(self, code: object) -> bool:
         """Whether a feature has a position."""
         return isinstance(code, str) and bool(np.isfinite(self[code]).all())
+
+    def __iter__(self) -> Iterator[str]:
+        """Go through the features that have a position, as through the keys of a mapping."""
+        return iter(self.placed)
+
+    def keys(self) -> tuple[str, ...]:
+        """Return what it can be asked for, so that ``dict(landmarks)`` holds every position."""
+        return self.placed
 
     @property
     def placed(self) -> tuple[str, ...]:

@@ -107,7 +107,11 @@ class LeaveOutTouch:
         """Return the state with the touch out or in; raises `GpError` where there is none."""
         key = (self.side, self.name)
         if key not in state.touches:
-            raise GpError(f"{self.name} {self.side.word} is not touched yet", landmark=self.name)
+            raise GpError(
+                f"{self.name} {self.side.word} is not touched yet",
+                landmark=self.name,
+                remedy="Touch it first.",
+            )
         changed = replace(state.touches[key], left_out=self.left_out)
         return replace(state, touches={**state.touches, key: changed})
 
@@ -128,9 +132,13 @@ class SwapTouches:
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the names exchanged; raises `GpError` where one of them is not touched."""
         one, other = (self.side, self.name), (self.side, self.other)
+        if one == other:
+            raise GpError(f"{self.name} cannot be exchanged with itself", remedy="Give two names.")
         for key in (one, other):
             if key not in state.touches:
-                raise GpError(f"{key[1]} {self.side.word} is not touched yet", landmark=key[1])
+                raise GpError(
+                    f"{key[1]} {self.side.word} is not touched yet", landmark=key[1], remedy="Touch it first."
+                )
         swapped = {one: state.touches[other], other: state.touches[one]}
         return replace(state, touches={**state.touches, **swapped})
 

@@ -216,6 +216,8 @@ def test_two_touches_exchange_their_names_in_one_step(desk, animal):
     assert desk.session.state.touches == before
     with pytest.raises(GpError, match="RWA left is not touched yet"):
         touching.swap_touches(desk.session, "L", "MN", "RWA")
+    with pytest.raises(GpError, match="MN cannot be exchanged with itself"):
+        touching.swap_touches(desk.session, "L", "MN", "MN")
 
 
 def test_in_the_step_pose_no_click_moves_a_landmark(desk, ball):

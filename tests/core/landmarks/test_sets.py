@@ -17,6 +17,15 @@ def test_points_are_addressed_by_name() -> None:
     assert "RWP" not in landmarks
 
 
+def test_a_set_is_gone_through_like_a_mapping() -> None:
+    points = {"LLI": np.array([1.0, 2.0, 3.0]), "CA": np.array([4.0, 5.0, 6.0])}
+    landmarks = LandmarkSet.from_mapping(points, "L")
+    assert list(landmarks) == ["CA", "LLI"]
+    again = dict(landmarks)
+    assert again.keys() == points.keys()
+    np.testing.assert_array_equal([again[code] for code in points], list(points.values()))
+
+
 def test_a_missing_point_is_named() -> None:
     with pytest.raises(FeatureError, match="landmark RWP: the left side has no RWP"):
         LandmarkSet.empty("L").array(["RWP"])
