@@ -16,7 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_core.landmarks.features import CODES, feature
+from gp_core.landmarks.features import CODES, Side, feature
+from gp_labeler.pose_desk import ORDER
+from gp_labeler.session.confidence import confidence
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.panels.parts import text_label
@@ -30,6 +32,11 @@ _RECORD = (Qt.Key.Key_Space, Qt.Key.Key_Return, Qt.Key.Key_Enter, Qt.Key.Key_Pag
 _REDO = (Qt.Key.Key_Backspace, Qt.Key.Key_PageUp)
 _SKIP = (Qt.Key.Key_S, Qt.Key.Key_Right)
 """Foot pedals for presentations send the page keys."""
+
+_RECORD_HINT = "Space, Page down or a foot pedal"
+_DONE_HINT = f"{_RECORD_HINT}: closes the guide"
+_TRUST = "font-size: 36px; font-weight: 700"
+"""Look of the word of trust; its role gives the colour."""
 
 
 class GuideWindow(QWidget):
@@ -48,13 +55,13 @@ class GuideWindow(QWidget):
 
     def __init__(self, workbench: Workbench, parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Window)
-        self._desk, self._last = workbench, ""
-        self._refusal = ""
+        self._desk, self._refusal = workbench, ""
+        self._last: tuple[Side, str] | None = None
         self.setWindowTitle("Guided touching")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setProperty("role", "panel")
-        self.setMinimumSize(720, 480)
+        self.setMinimumSize(960, 640)
         self._make_widgets()
         self._lay_out()
         self._listen()
@@ -70,9 +77,11 @@ class GuideWindow(QWidget):
         self.name.setText(row.name if row else "Skull feature" if target else "")
         self.definition.setText(row.definition if row else "")
         self.picture.show_feature(target if row else None, pose.side)
+        self.picture.setVisible(row is not None)
         self.record.setText("Record" if target else "Done")
-        self.redo.setEnabled(bool(self._last))
-        self.redo.setText(f"Redo {self._last}" if self._last else "Redo")
+        self.record.setToolTip(_RECORD_HINT if target else _DONE_HINT)
+        self.redo.setEnabled(self._to_redo is not None)
+        self.redo.setText(f"Redo {self._to_redo or ''}".rstrip())
         self.skip.setEnabled(target is not None)
         self._show_result()
         self._show_tracker()
@@ -82,33 +91,58 @@ class GuideWindow(QWidget):
         estimate = pose.estimate.pose if pose.estimate is not None else None
         if estimate is None:
             self.result.setText(pose.estimating.waiting_text or "No estimate")
-            self.warning.setText("")
+            for label in (self.trust, self.reason, self.warning):
+                label.hide()
             return
+        trust = confidence(estimate)
+        self.trust.setText(trust.word)
+        self.reason.setText(trust.reason)
+        set_role(self.trust, f"large-{trust.level}")
+        for label in (self.trust, self.reason):
+            label.show()
         self.result.setText(f"±{estimate.radius_95:.2f} mm · ±{degrees_text(estimate.cone_95)}")
         self.warning.setText("\n".join(sentence(words) for words in estimate.warnings[:2]))
+        self.warning.setVisible(bool(estimate.warnings))
 
     def _show_tracker(self, *_: object) -> None:
         tracker = self._desk.tracker
         self.state.setText(tracker_words(self._desk))
         set_role(self.state, f"large-{tracker_role(self._desk)}")
         self.connect_button.setVisible(not tracker.on)
-        self.record.setEnabled(tracker.on and self._desk.pose.target is not None)
+        self.record.setEnabled(tracker.on or self._desk.pose.target is None)
         self.progress.setValue(round(100 * tracker.progress))
         self.told.setText(self._refusal)
+        self.told.setVisible(bool(self._refusal))
 
     # What a person does
 
+    @property
+    def _to_redo(self) -> str | None:
+        """What was recorded last here; else, or from a touched one, the one before in the order asked for."""
+        pose, touched = self._desk.pose, self._desk.pose.names_touched
+        asked, again = ORDER, pose.target in touched
+        if self._last is not None and not again:
+            side, name = self._last
+            if side is pose.side and name in touched:
+                return name
+        if again and pose.target in ORDER:
+            asked = ORDER[: ORDER.index(pose.target)]
+        return next((name for name in reversed(asked) if name in touched), None)
+
     def _press(self) -> None:
+        if self._desk.pose.target is None:
+            self.close()
+            return
         self._refusal = ""
         attempt(self._desk, self._desk.tracker.press)
         self._show_tracker()
 
     def _redo(self) -> None:
-        if self._last:
-            self._desk.pose.aim(self._last)
+        if self._to_redo is not None:
+            self._desk.pose.aim(self._to_redo)
 
     def _on_recorded(self, name: str) -> None:
-        self._last, self._refusal = name, ""
+        self._last, self._refusal = (self._desk.pose.side, name), ""
         self.refresh()
 
     def _on_refused(self, reason: str) -> None:
@@ -139,13 +173,15 @@ class GuideWindow(QWidget):
         self.counter, self.code = text_label(role="large-hint"), text_label(role="huge")
         self.name, self.definition = text_label(role="large", wrap=True), text_label(role="big", wrap=True)
         self.result, self.warning = text_label(role="large"), text_label(role="big-warning", wrap=True)
+        self.trust, self.reason = text_label(), text_label(role="big", wrap=True)
+        self.trust.setStyleSheet(_TRUST)
         self.state, self.told = text_label(wrap=True), text_label(role="large-danger", wrap=True)
         self.picture = FeaturePicture()
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.progress = QProgressBar()
         self.progress.setTextVisible(False)
         self.progress.setFixedHeight(20)
-        self.record = _big("Record", "Space, Page down or a foot pedal", self._press)
+        self.record = _big("Record", _RECORD_HINT, self._press)
         self.record.setProperty("role", "huge-primary")
         self.redo = _big("Redo", "Backspace or Page up: touch the last one again", self._redo)
         self.skip = _big("Skip", "S or Right: it comes again at the end", self._desk.pose.skip)
@@ -170,7 +206,10 @@ class GuideWindow(QWidget):
         words.addStretch(1)
         words.addWidget(self.told)
         words.addWidget(_caption("Cochlea, within 95 %"))
-        words.addWidget(self.result)
+        estimate = _row(self.result, self.trust)
+        estimate.addStretch(1)
+        words.addLayout(estimate)
+        words.addWidget(self.reason)
         words.addWidget(self.warning)
         middle.addLayout(words, 6)
         whole.addLayout(middle, 1)

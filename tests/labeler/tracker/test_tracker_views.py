@@ -10,11 +10,13 @@ from tracker_cases import POINTS, TIP, SimulatorProcess
 
 from gp_core import Atlas, Side
 from gp_labeler.pose_desk import ORDER
+from gp_labeler.session.confidence import confidence
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.panels.tracker_card import TrackerCard
 from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.workbench import Workbench
 
@@ -216,3 +218,84 @@ def test_the_guide_tells_the_estimate_and_why_nothing_was_recorded(qtbot, desk, 
     assert len(desk.session.state.touches) == 4
     qtbot.keyClick(guide, Qt.Key.Key_Escape)
     assert not guide.isVisible()
+
+
+def touch(desk, *codes, noise=0.0):
+    rng = np.random.default_rng(1)
+    for code in codes:
+        position = Atlas.published()[code] + rng.normal(0, noise, 3)
+        desk.pose.record(position, TouchHow.TYPED, name=code)
+
+
+@pytest.mark.parametrize("key", [Qt.Key.Key_Space, Qt.Key.Key_PageDown, Qt.Key.Key_Escape, None])
+def test_done_closes_the_guide_also_without_a_tracker(qtbot, desk, top, key):
+    touch(desk, *ORDER[:-1])
+    guide = GuideWindow(desk, top)
+    guide.show()
+    assert not guide.record.isEnabled()
+    touch(desk, ORDER[-1])
+    assert (guide.code.text(), guide.record.text()) == ("All touched", "Done")
+    assert guide.record.isEnabled()
+    assert not guide.picture.isVisible()
+    with qtbot.waitSignal(guide.closed):
+        if key is None:
+            qtbot.mouseClick(guide.record, Qt.MouseButton.LeftButton)
+        else:
+            qtbot.keyClick(guide, key)
+    assert not guide.isVisible()
+    assert len(desk.session.state.touches) == len(ORDER)
+
+
+def test_redo_goes_back_through_what_was_touched_before_the_guide_was_opened(qtbot, desk, top):
+    touch(desk, *reversed(ORDER))  # in whatever order, such as from a file
+    guide = GuideWindow(desk, top)
+    guide.show()
+    for key, code in zip((Qt.Key.Key_Backspace, Qt.Key.Key_PageUp), ORDER[:-3:-1], strict=True):
+        assert guide.redo.text() == f"Redo {code}"
+        qtbot.keyClick(guide, key)
+        assert guide.code.text() == desk.pose.target == code
+        assert guide.picture.isVisible()
+    qtbot.keyClick(guide, Qt.Key.Key_S)
+    assert desk.pose.target is None
+    desk.pose.aim(ORDER[0])
+    assert not guide.redo.isEnabled()
+    touch(desk, ORDER[0])
+    assert guide.redo.text() == f"Redo {ORDER[0]}", "what was touched here comes before the order"
+    guide.close()
+
+
+def test_redo_is_for_this_side_only_and_not_for_what_was_undone(qtbot, desk, top):
+    touch(desk, *ORDER[:2])
+    guide = GuideWindow(desk, top)
+    guide.show()
+    touch(desk, ORDER[2])
+    desk.session.undo()
+    assert guide.redo.text() == f"Redo {ORDER[1]}"
+    desk.pose.choose(side=Side.RIGHT)
+    assert (guide.redo.text(), guide.redo.isEnabled()) == ("Redo", False)
+    qtbot.keyClick(guide, Qt.Key.Key_Backspace)
+    assert desk.pose.target == ORDER[0]
+    guide.close()
+
+
+@pytest.mark.parametrize("theme", list(THEMES))
+def test_every_estimate_is_shown_with_how_far_it_can_be_trusted(qtbot, desk, top, theme):
+    apply_theme(top, THEMES[theme])
+    guide = GuideWindow(desk, top)
+    guide.show()
+    assert not guide.trust.isVisible()
+    assert not guide.reason.isVisible()
+    seen = {}
+    for codes, noise in ((ORDER[:3], 0.0), (ORDER[:6], 0.0), (ORDER, 0.0), (ORDER, 3.0)):
+        touch(desk, *codes, noise=noise)
+        trust = confidence(desk.pose.estimate.pose)
+        assert guide.trust.isVisible()
+        assert (guide.trust.text(), guide.reason.text()) == (trust.word, trust.reason)
+        assert guide.trust.fontInfo().pixelSize() > guide.result.fontInfo().pixelSize()
+        colour = guide.trust.palette().color(guide.trust.foregroundRole()).name()
+        assert colour == getattr(THEMES[theme], trust.level).lower()
+        seen[trust.level] = colour
+    assert len(set(seen.values())) == 3, "good, warning and danger"
+    desk.pose.choose(side=Side.RIGHT)
+    assert not guide.trust.isVisible()
+    guide.close()
