@@ -78,7 +78,8 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     side, row = active.side, feature(active.code)
     state, mark = session.point_states(side, wait=False)[row.code], session.state.landmark(side, row.code)
     status, role = _status(session, side, row.code, state)
-    action, words = ("unlock", "Unlock") if mark.locked else _ACTIONS[state]
+    is_other = state is PointState.DOUBTFUL and session.is_other_side(side)
+    action, words = ("unlock", "Unlock") if mark.locked else _SWAP if is_other else _ACTIONS[state]
     aside, hint = _SHARED if row.shared else _EXTERNAL if row.external else ("", "")
     return CardContent(
         eyebrow=f"{_VERBS[state]} · {side.word} · {session.progress(side).text}",
@@ -109,6 +110,7 @@ _VERBS = {
     PointState.DOUBTFUL: "Look again",
     PointState.UNSEEN: "Not seen",
 }
+_SWAP = ("swap_sides", "Swap left and right")
 _ACTIONS = {
     PointState.TO_DO: ("crosshair", "Place at crosshair"),
     PointState.GHOST: ("ghost", "Accept ghost"),
@@ -126,7 +128,7 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
         who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
     if state is PointState.DOUBTFUL and session.is_other_side(side):
-        return f"These labels fit the {side.other.word} side: Edit > Swap left and right.", "danger"
+        return f"These labels fit the {side.other.word} side.", "danger"
     doubt = session.near_doubts(side).get(code)
     if state is PointState.DOUBTFUL and doubt is not None:
         words = doubt.text

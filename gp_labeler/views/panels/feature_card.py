@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import ACTIONS
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint
+from gp_labeler.session.edits import CheckPoint, SwapSides
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
@@ -237,6 +237,7 @@ _EDITS: Mapping[str, Callable[[Workbench], object]] = {
     "check": _check,
     "unlock": lambda desk: labelling.lock(desk.session, False),
     "next": lambda desk: labelling.skip(desk.session),
+    "swap_sides": lambda desk: desk.session.do(SwapSides()),
 }
 
 
@@ -246,6 +247,7 @@ _COMMANDS: Mapping[str, str] = {
     "check": "point.check",
     "unlock": "point.lock",
     "next": "point.skip",
+    "swap_sides": "edit.swap_sides",
 }
 """The commands that do the same as the one next action."""
 

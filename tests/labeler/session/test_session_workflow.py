@@ -308,7 +308,9 @@ def test_labels_under_the_name_of_the_other_side_are_called_so():
     assert not session.is_other_side(L), "nobody has looked yet"
     assert judged(L)
     session.set_active(Active(L, "CB"))
-    assert "fit the right side" in content_of(session, has_scan=True).status
+    card = content_of(session, has_scan=True)
+    assert "fit the right side" in card.status
+    assert (card.action, card.action_text) == ("swap_sides", "Swap left and right")
     session.do(SwapSides())
     assert not judged(R)
     assert not judged(L)

@@ -213,6 +213,20 @@ def test_without_a_ghost_it_places_at_the_crosshair(desk, panel, qtbot):
     np.testing.assert_allclose(desk.session.landmarks(LEFT)["CA"], [1, 2, 3])
 
 
+def test_labels_of_the_other_side_are_swapped_by_the_primary_button(desk, panel, qtbot):
+    codes = [feature.code for feature in FEATURES if not feature.computed and not feature.shared]
+    for code in codes:
+        labelling.place(desk.session, in_scan(code, RIGHT), side=LEFT, code=code)
+    deliver(desk)
+    desk.go_to(LEFT, "CL")
+    assert "fit the right side" in panel.card.content.status
+    assert panel.card.primary.text().startswith("Swap left and right")
+    assert list(cut_words(panel)) == []
+    qtbot.mouseClick(panel.card.primary, CLICK)
+    assert set(desk.session.landmarks(RIGHT).placed) >= set(codes)
+    assert not set(desk.session.landmarks(LEFT).placed) & set(codes)
+
+
 def test_a_placed_point_can_be_checked_and_a_locked_one_unlocked(desk, panel, qtbot):
     place(desk, "CA")
     desk.go_to(LEFT, "CA")
