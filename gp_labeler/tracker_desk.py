@@ -271,7 +271,7 @@ class TrackerDesk:
 
     def stop_sending(self) -> None:
         """Send nothing any more."""
-        sender, self._sender = self._sender, None
+        sender, self._sender, self._held = self._sender, None, ""
         if sender is not None:
             sender.close()
             self.changed.emit()
@@ -358,11 +358,20 @@ class TrackerDesk:
             return
         estimate = self._desk.pose.estimate
         pose = None if estimate is None else estimate.pose
-        self._held = "" if estimate is None else _why_held(estimate, self._desk.session.state)
+        self._hold("" if estimate is None else _why_held(estimate, self._desk.session.state))
         if pose is None or pose.transform_to_touches.dst != "tracker" or self._held:
             self._sender.clear()
         else:
             self._sender.send(pose.transform_to_touches)
+
+    def _hold(self, why: str) -> None:
+        """Hold the pose back, or no longer, and say so: whoever waits for it may not see the dialog."""
+        if why == self._held:
+            return
+        self._held = why
+        if why:
+            self._desk.say(f"The pose is held back from the robot: {why}", "warning")
+        self.changed.emit()
 
 
 def _why_held(estimate: Estimate, state: SpecimenState) -> str:

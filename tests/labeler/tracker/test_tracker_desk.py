@@ -147,7 +147,10 @@ def test_the_pose_is_sent_back_while_it_holds(desk):
 @pytest.mark.parametrize("trouble", ["names", "side", "rejected"])
 def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
     atlas, right = Atlas.published(), np.array([-1.0, 1.0, 1.0])
+    said, words = [], []
+    desk.message.connect(lambda text, _: said.append(text))
     desk.tracker.start_sending(0)
+    desk.tracker.changed.connect(lambda: words.append(desk.tracker.sending))
     client = pyigtl.OpenIGTLinkClient("127.0.0.1", desk.tracker._sender.port)
     try:
         for name in PROBE:
@@ -158,7 +161,8 @@ def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
             assert client.wait_for_message("T_tracker_cochlea", timeout=20) is not None
             desk.pose.estimating.judge("reject")
         why = {"names": "check the names", "side": "check the side", "rejected": "it was rejected"}[trouble]
-        assert desk.tracker.sending.endswith(f"Held back: {why}.")
+        assert words[-1].endswith(f"Held back: {why}."), "a dialog that is open shows it at once"
+        assert f"The pose is held back from the robot: {why}" in said
         assert desk.tracker._sender._matrix is None
         if trouble == "names":
             desk.pose.swap_names()
@@ -166,7 +170,7 @@ def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
             desk.pose.change_side()
         else:
             desk.pose.estimating.judge("accept")
-        assert "Held back" not in desk.tracker.sending
+        assert "Held back" not in words[-1]
         message = client.wait_for_message("T_tracker_cochlea", timeout=20)
         np.testing.assert_allclose(message.matrix, desk.pose.estimate.pose.transform, atol=1e-4)
     finally:
