@@ -229,6 +229,14 @@ def test_labels_are_drawn_beside_their_marks(scene: Scene3D) -> None:
     assert _coloured(scene.image(), DARK.states["computed"]).sum() == without
 
 
+def test_marks_that_come_to_be_hidden_are_laid_out_anew(scene: Scene3D) -> None:
+    scene.marks.show([Mark("a", MIDDLE, "RWA")])
+    view = scene.camera.viewpoint()
+    for behind in (False, True, True, False):
+        (label,) = scene.marks.refresh(view, np.array([behind]))
+        assert label.faint is behind
+
+
 def test_a_ghost_is_outlined_by_its_95_percent_ellipse(scene: Scene3D) -> None:
     covariance = np.diag([0.8, 0.3, 0.1])
     scene.ghosts.show([Ghost("L:IN", MIDDLE, covariance, active=True)])

@@ -3,25 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from panel_cases import deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import QEvent, QObject, QSize
+from panel_cases import ATLAS, deliver, desk_with_scan, in_scan, place
+from PySide6.QtCore import QEvent, QModelIndex, QObject, QSize
 from PySide6.QtGui import QColor, QImage, QPixmap, QRegion
-from PySide6.QtWidgets import QApplication, QWidget
+from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
+from gp_core import PROBE
+from gp_core.atlas.draw import draw_animal
 from gp_core.landmarks.features import CODES, Side, index_of
 from gp_labeler.session import labelling
 from gp_labeler.session.edits import MarkUnseen, PlacePoint, SwapSides
+from gp_labeler.session.jobs import QueueDispatcher
 from gp_labeler.session.session import Session
 from gp_labeler.session.state import How, Provenance
+from gp_labeler.session.touches import TouchHow
 from gp_labeler.session.workflow import Active
 from gp_labeler.views import feature_picture as pictures
 from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
 from gp_labeler.views.panels.label_panel import PANEL_WIDTH, LabelPanel
 from gp_labeler.views.panels.landmark_model import LandmarkModel
-from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme
+from gp_labeler.views.panels.pose_model import MISFIT, TouchModel
+from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of
 from gp_labeler.workbench import Workbench
 
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
@@ -238,3 +244,41 @@ def test_a_ground_has_the_colours_of_its_theme(theme):
     for _ in range(2):
         shown = picture_of("RWA", LEFT, QSize(200, 120), theme)[-2, 100, :3]
         np.testing.assert_allclose(shown, (wanted.blue(), wanted.green(), wanted.red()), atol=8)
+
+
+def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
+    animal = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
+    desk = Workbench(None, QueueDispatcher(), atlas=ATLAS)
+    for code in (*PROBE, "ZL"):
+        desk.pose.record(animal[code], TouchHow.TYPED, name=code)
+    model, painted = TouchModel(desk, lambda _: None), set()
+
+    def note(first: QModelIndex, last: QModelIndex) -> None:
+        columns = range(first.column(), last.column() + 1)
+        painted.update((row, c) for row in range(first.row(), last.row() + 1) for c in columns)
+
+    model.dataChanged.connect(note)
+    for far in (0.02, 6.0, 0.0):  # within the scale of the bars, beyond it, and back
+        before, largest = model.rows, model.largest
+        painted.clear()
+        desk.pose.record(animal["ZL"] + far, TouchHow.TYPED, name="ZL")
+        model.refresh()
+        for n, (new, old) in enumerate(zip(model.rows, before, strict=True)):
+            if new.name == "ZL":
+                assert {(n, column) for column in range(model.columnCount())} <= painted
+            if new.misfit != old.misfit or (model.largest != largest and new.misfit is not None):
+                assert (n, MISFIT) in painted
+            if replace(new, misfit=old.misfit) == old:
+                assert not {(n, column) for column in range(model.columnCount())} & painted - {(n, MISFIT)}
+        assert far != 6.0 or model.largest != largest
+    desk.close(discard=True)
+
+
+def test_a_dialog_has_the_theme_of_the_window_that_opened_it(qtbot) -> None:
+    window = QWidget()
+    qtbot.addWidget(window)
+    dialog = QDialog(window)
+    inside = QWidget(QWidget(dialog))
+    for theme in (LIGHT, DARK):
+        apply_theme(window, theme)
+        assert theme_of(inside) is theme_of(dialog) is theme_of(window) is theme
