@@ -30,6 +30,7 @@ from gp_core.landmarks.files import (
     write_markups,
 )
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
+from gp_core.landmarks.suggestion import Suggestion
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
@@ -70,6 +71,7 @@ __all__ = [
     "SimulationReport",
     "Specimen",
     "Status",
+    "Suggestion",
     "TouchGain",
     "__version__",
     "calibrate_pivot",

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,25 +15,33 @@ from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import CODES, Side, feature, index_of
+from gp_core.landmarks.suggestion import Suggestion
 
 __all__ = ["LandmarkSet", "Specimen", "Status"]
 
 
 class Status(str, Enum):
-    """How far a landmark is; the values are the words 3D Slicer writes as ``positionStatus``."""
+    """How far a landmark is; all values but ``suggested`` are the words of 3D Slicer's ``positionStatus``.
+
+    Only a placed landmark is an observation: a person has placed or confirmed it.
+    """
 
     PLACED = "defined"
+    SUGGESTED = "suggested"
     TO_DO = "undefined"
     UNSEEN = "missing"
 
 
-def _nothing() -> Mapping[str, FloatArray]:
+def _nothing() -> Mapping[str, Any]:
     return MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class LandmarkSet:
     """The landmarks of one side of one head; never changed in place.
+
+    `points`, `placed`, ``in``, `array`, iteration and everything else that means *observation* leave out what
+    is only suggested. `suggested` alone holds those, until `confirmed` makes observations of them.
 
     Parameters
     ----------
@@ -46,6 +55,9 @@ class LandmarkSet:
         Features that were looked for and cannot be seen (Slicer's ``missing``).
     extra : mapping of str to (3,) array
         Named points beside the 20 features, such as the skull features of a physical test, mm.
+    suggested : mapping of str to Suggestion
+        Where features that are to do are suggested, in the same frame, in the table's order. Once a feature
+        is placed or unseen, a person has decided, and its suggestion is dropped.
 
     Examples
     --------
@@ -59,6 +71,7 @@ class LandmarkSet:
     frame: str = "scan"
     unseen: frozenset[str] = frozenset()
     extra: Mapping[str, FloatArray] = field(default_factory=_nothing)
+    suggested: Mapping[str, Suggestion] = field(default_factory=_nothing)
 
     def __post_init__(self) -> None:
         points = as_points(self.points, "points", missing_allowed=True).copy()
@@ -69,6 +82,17 @@ class LandmarkSet:
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "side", Side.parse(self.side))
         object.__setattr__(self, "unseen", frozenset(feature(c).code for c in self.unseen) - set(self.placed))
+        object.__setattr__(self, "suggested", self._undecided(self.suggested))
+
+    def _undecided(self, suggested: Mapping[str, Suggestion]) -> Mapping[str, Suggestion]:
+        """Return the suggestions of the features that are to do."""
+        if not suggested:
+            return _nothing()
+        given = {_placeable(code): suggestion for code, suggestion in suggested.items()}
+        decided = self.unseen.union(self.placed)
+        return MappingProxyType(
+            {code: given[code] for code in CODES if code in given and code not in decided}
+        )
 
     @classmethod
     def empty(cls, side: Side | str, *, frame: str = "scan") -> LandmarkSet:
@@ -95,7 +119,8 @@ class LandmarkSet:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Let pickle carry the set to other processes, though it cannot carry a read-only mapping."""
-        return LandmarkSet, (self.points, self.side, self.frame, self.unseen, dict(self.extra))
+        content = (self.points, self.side, self.frame, self.unseen, dict(self.extra), dict(self.suggested))
+        return LandmarkSet, content
 
     def __getitem__(self, code: str) -> FloatArray:
         """Return the (3,) position of a feature, NaN where it is not placed."""
@@ -124,7 +149,10 @@ class LandmarkSet:
         """Return how far a feature is."""
         if code in self:
             return Status.PLACED
-        return Status.UNSEEN if feature(code).code in self.unseen else Status.TO_DO
+        code = feature(code).code
+        if code in self.unseen:
+            return Status.UNSEEN
+        return Status.SUGGESTED if code in self.suggested else Status.TO_DO
 
     def as_mapping(self, codes: Iterable[str] | None = None) -> dict[str, FloatArray]:
         """Return the placed positions by code; of `codes` only, where given."""
@@ -150,15 +178,44 @@ class LandmarkSet:
         return self.points[rows]
 
     def with_point(self, code: str, position: ArrayLike | None) -> LandmarkSet:
-        """Return a copy with one feature moved, or cleared where `position` is None."""
+        """Return a copy with one feature placed, or cleared where `position` is None; its suggestion goes."""
         points = self.points.copy()
         points[index_of(code)] = np.nan if position is None else _position(position, code)
-        return replace(self, points=points, unseen=self.unseen - {feature(code).code})
+        code = feature(code).code
+        others = {key: value for key, value in self.suggested.items() if key != code}
+        return replace(self, points=points, unseen=self.unseen - {code}, suggested=others)
 
     def with_unseen(self, code: str) -> LandmarkSet:
         """Return a copy in which one feature is marked as one that cannot be seen."""
         cleared = self.with_point(code, None)
         return replace(cleared, unseen=cleared.unseen | {feature(code).code})
+
+    def with_suggestions(self, suggestions: Mapping[str, Suggestion]) -> LandmarkSet:
+        """Return a copy with these suggestions, in this set's frame, where the feature is still to do.
+
+        Raises
+        ------
+        FeatureError
+            A name is unknown, or the feature is computed (CO) and so never suggested.
+        """
+        return replace(self, suggested={**self.suggested, **suggestions})
+
+    def confirmed(self, codes: Iterable[str]) -> LandmarkSet:
+        """Return a copy in which suggestions are observations, for a person has looked and agrees.
+
+        Raises
+        ------
+        FeatureError
+            One of them is not suggested.
+        """
+        landmarks = self
+        for code in (feature(code).code for code in codes):
+            if code not in self.suggested:
+                raise FeatureError(
+                    f"the {self.side.word} side has no suggestion for {code} to confirm", landmark=code
+                )
+            landmarks = landmarks.with_point(code, self.suggested[code].position)
+        return landmarks
 
     def moved(self, T_dst_src: RigidTransform) -> LandmarkSet:
         """Return the set in another frame.
@@ -172,8 +229,19 @@ class LandmarkSet:
             raise FrameError(f"T_{T_dst_src.dst}_{T_dst_src.src} cannot move points of frame {self.frame!r}")
         extra = {name: T_dst_src.apply(point[None])[0] for name, point in self.extra.items()}
         return replace(
-            self, points=T_dst_src.apply(self.points), frame=T_dst_src.dst, extra=MappingProxyType(extra)
+            self,
+            points=T_dst_src.apply(self.points),
+            frame=T_dst_src.dst,
+            extra=MappingProxyType(extra),
+            suggested={code: suggestion.moved(T_dst_src) for code, suggestion in self.suggested.items()},
         )
+
+
+def _placeable(code: str) -> str:
+    row = feature(code)
+    if row.computed:
+        raise FeatureError(f"{row.code} is computed and cannot be suggested", landmark=row.code)
+    return row.code
 
 
 def _position(position: ArrayLike, code: str) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import NamedTuple
@@ -137,10 +137,14 @@ def labelled_point(
 
 
 def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
-    """Return a set as a file is to hold it: every feature, in the table's order, then the extra points."""
-    positions = landmarks.as_mapping()
+    """Return a set as a file is to hold it: every feature, in the table's order, then the extra points.
+
+    A feature that is only suggested is one to do: other programs would take its position as observed.
+    """
+    observed = replace(landmarks, suggested={})
+    positions = observed.as_mapping()
     features = [
-        LabelledPoint(f.code, positions.get(f.code), landmarks.status(f.code), _description(f))
+        LabelledPoint(f.code, positions.get(f.code), observed.status(f.code), _description(f))
         for f in FEATURES
     ]
     extra = [LabelledPoint(name, position, Status.PLACED) for name, position in landmarks.extra.items()]

@@ -1,0 +1,69 @@
+"""A suggestion: where something expects a landmark that no person has looked at yet."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+
+__all__ = ["Suggestion"]
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """A suggested position of one landmark; not an observation.
+
+    Parameters
+    ----------
+    position : (3,) array_like
+        In mm, in the frame of the landmark set that holds it; kept as a tuple of three floats.
+    radius_95 : float, optional
+        Radius in mm that holds the landmark with 95 % probability; None where it is not known.
+    source : str
+        What suggests it: ``atlas``, ``mirror``, the name of a program, ...
+
+    Raises
+    ------
+    GpError
+        The position is not three finite numbers, or the radius is not a positive number.
+    """
+
+    position: tuple[float, float, float]
+    radius_95: float | None = None
+    source: str = ""
+
+    def __post_init__(self) -> None:
+        try:
+            x, y, z = (float(value) for value in self.position)
+        except (TypeError, ValueError):
+            x = y = z = math.nan
+        if not all(map(math.isfinite, (x, y, z))):
+            raise GpError(
+                f"a suggested position must be three finite numbers in mm, got {self.position!r}",
+                remedy="Leave out the suggestion.",
+            )
+        object.__setattr__(self, "position", (x, y, z))
+        if self.radius_95 is not None:
+            object.__setattr__(self, "radius_95", _radius(self.radius_95))
+
+    def moved(self, T_dst_src: RigidTransform) -> Suggestion:
+        """Return the suggestion in another frame."""
+        x, y, z = T_dst_src.apply(np.array([self.position]))[0].tolist()
+        return replace(self, position=(x, y, z))
+
+
+def _radius(value: object) -> float:
+    try:
+        radius = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError):
+        radius = math.nan
+    if not (math.isfinite(radius) and radius > 0):
+        raise GpError(
+            f"the 95 % radius of a suggestion must be a positive number of mm, got {value!r}",
+            remedy="Leave out the radius where it is not known.",
+        )
+    return radius
