@@ -17,6 +17,8 @@ from gp_core.atlas.insertion import carry_path, read_path
 from gp_core.atlas.next_touch import TouchGain, gains
 from gp_core.atlas.pose import CochleaPose, estimate_pose
 from gp_core.atlas.pose_files import read_pose
+from gp_core.atlas.pose_gate import GateReason, PoseGate
+from gp_core.atlas.pose_quality import PoseQuality, pose_quality
 from gp_core.atlas.quality import Finding, check_specimen
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
@@ -57,6 +59,7 @@ __all__ = [
     "Feature",
     "FiducialRegistration",
     "Finding",
+    "GateReason",
     "GpError",
     "JrmpcResult",
     "JrmpcSettings",
@@ -65,6 +68,8 @@ __all__ = [
     "NestedReport",
     "PhysicalReport",
     "PivotCalibration",
+    "PoseGate",
+    "PoseQuality",
     "RigidTransform",
     "SearchReport",
     "Side",
@@ -88,6 +93,7 @@ __all__ = [
     "load_specimens",
     "nested_search",
     "physical_test",
+    "pose_quality",
     "predict",
     "read_landmarks",
     "read_path",

@@ -38,8 +38,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line; 130 where
-        it was stopped and 141 where nobody reads on, as shells have it.
+        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line; 3 where a
+        pose was not written, since names or side look wrong; 130 where it was stopped and 141 where nobody
+        reads on, as shells have it.
     """
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
+from gp_core.atlas.pose_quality import pose_quality
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.registration.pivot import PivotCalibration
-from gp_labeler.session.confidence import confidence, is_other_side
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.session import Session
 from gp_labeler.session.state import SpecimenState
@@ -379,8 +379,8 @@ def _why_held(estimate: Estimate, state: SpecimenState) -> str:
     pose = estimate.pose
     if pose is None:
         return ""
-    if is_other_side(pose) or pose.swapped is not None:
-        return confidence(pose).word.lower()
+    if pose.side_state == "wrong" or pose.names_state == "wrong":
+        return pose_quality(pose).word.lower()
     last = next((check for check in reversed(state.pose_checks) if check.side is estimate.side), None)
     is_rejected = last is not None and last.verdict == "reject" and estimate.moved_since(last.pose) is None
     return "it was rejected" if is_rejected else ""

@@ -21,11 +21,14 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import check_plausible_size, write_text
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
-__all__ = ["METHODS", "ROUND_WINDOWS", "CochleaPose", "estimate_pose"]
+__all__ = ["METHODS", "READING_STATES", "ROUND_WINDOWS", "CochleaPose", "estimate_pose"]
 
 METHODS = ("robust", "jrmpc")
 ROUND_WINDOWS = ("touched", "expected")
 """Whose round window y of the cochlea frame points to: the touched one, or the one of the fitted atlas."""
+
+READING_STATES = ("clear", "undecided", "wrong", "unchecked")
+"""Whether the touches can be read otherwise: no; perhaps; another reading fits far better; nobody looked."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +60,11 @@ class CochleaPose:
     round_window : str
         Of which round window the middle is: ``touched`` or ``expected``.
     swapped : (str, str) or None
-        Two touched features that look as if each had the other's name.
+        Two touched features that look, or may be, as if each had the other's name.
+    side_state, names_state : str
+        Of `READING_STATES`: whether the touches may be those of the other ear, and whether two of them may
+        each have the other's name. Only a pose of which both are ``clear`` is for a robot; see
+        `gp_core.atlas.pose_gate.PoseGate`.
     """
 
     side: Side
@@ -72,6 +79,12 @@ class CochleaPose:
     T_touches_atlas: RigidTransform | None = field(default=None, repr=False)
     round_window: str = "expected"
     swapped: tuple[str, str] | None = None
+    side_state: str = "unchecked"
+    names_state: str = "unchecked"
+
+    def __post_init__(self) -> None:
+        check_option(self.side_state, "state of the side", READING_STATES)
+        check_option(self.names_state, "state of the names", READING_STATES)
 
     @property
     def origin(self) -> FloatArray:
@@ -87,6 +100,11 @@ class CochleaPose:
     def transform(self) -> FloatArray:
         """(4, 4) homogeneous matrix ``T_tracker_cochlea``, mm."""
         return self.transform_to_touches.matrix
+
+    @property
+    def state(self) -> str:
+        """Both states in words, such as ``side undecided, names clear``."""
+        return f"side {self.side_state}, names {self.names_state}"
 
     @property
     def radius_95(self) -> float:
@@ -117,6 +135,8 @@ class CochleaPose:
             "round_window": self.round_window,
             "suspect": list(self.suspects),
             "swapped": None if self.swapped is None else list(self.swapped),
+            "side_state": self.side_state,
+            "names_state": self.names_state,
             "warnings": list(self.warnings),
             "registered_atlas": None
             if self.T_touches_atlas is None

@@ -106,6 +106,8 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         else RigidTransform(_numbers(content, "registered_atlas", (4, 4)), frame, "atlas"),
         round_window=round_window,
         swapped=_pair(content.get("swapped")),
+        side_state=_text(content.get("side_state", "unchecked")),
+        names_state=_text(content.get("names_state", "unchecked")),
     )
 
 

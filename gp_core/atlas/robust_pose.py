@@ -88,6 +88,8 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
         probe_noise=fit.noise,
         T_touches_atlas=_atlas_in_touches(fit, touches),
         swapped=swapped,
+        side_state=_side_state(worse) if swapped is None else "clear",
+        names_state="clear" if swapped is None else "wrong",
     )
 
 
@@ -239,6 +241,12 @@ def _other_side_worse(model: TouchModel, points: FloatArray, fit: NamedFit) -> f
     if fit.rough:
         return 2 * (fit_named_points(model, mirrored).misfit - fit.misfit)
     return careful_misfit(model, mirrored, fit.noise) - careful_misfit(model, points, fit.noise)
+
+
+def _side_state(worse: float) -> str:
+    if worse < -_AGAINST_THE_USER:
+        return "wrong"
+    return "undecided" if worse < _CLEAR_MISFIT else "clear"
 
 
 def _side_warning(worse: float, side: Side) -> Iterator[str]:

@@ -12,6 +12,7 @@ from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.insertion import UNITS, carry_path, read_path, rows_before_centre, write_path
 from gp_core.atlas.next_touch import MM_A_DEGREE, TouchGain, gains
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose, estimate_pose
+from gp_core.atlas.pose_gate import doubt_about
 from gp_core.checks import FloatArray
 from gp_core.commands.options import Subparsers, add_command, add_json, blaming, read_atlas, save_json, say
 from gp_core.errors import GpError
@@ -19,7 +20,13 @@ from gp_core.landmarks.files import read_touches
 from gp_core.landmarks.files.naming import named_side
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["add", "pose_table"]
+__all__ = ["HELD_BACK", "add", "pose_table"]
+
+HELD_BACK = 3
+"""Status of a command that wrote no pose, since names or side look wrong."""
+
+_FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
+"""Options whose files carry a pose without its doubts."""
 
 _HARDLY = 0.03
 """Part of the present error region below which a gain is not worth a touch."""
@@ -69,6 +76,12 @@ def add(commands: Subparsers) -> None:
         metavar="FILE",
         help="write CO and a point of the axis here, as Slicer markups (.mrk.json)",
     )
+    parser.add_argument(
+        "--accept-warnings",
+        action="store_true",
+        help="write all files even where names or side look wrong or are undecided; without it, only --json "
+        "is written then, and the status is 3",
+    )
     _add_path(parser)
 
 
@@ -113,20 +126,39 @@ def run(args: argparse.Namespace) -> int:
             round_window=args.round_window,
         )
         next_touches = () if atlas is None else gains(touches, atlas, probe_noise=args.probe_noise)
-    _write(args, pose, path)
+    held_back = _is_held_back(pose) and not args.accept_warnings
+    _write(args, pose, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
-    for line in _asides(args, touches, pose, path):
+    for line in _asides(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
-    return 0
+    if held_back:
+        say(f"  ! {_what_was_held_back(args, pose)}")
+    return HELD_BACK if held_back else 0
 
 
-def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None) -> None:
+def _is_held_back(pose: CochleaPose) -> bool:
+    """Whether names or side look wrong, or are undecided; a method that does not look finds nothing wrong."""
+    return any(reason.code.split()[-1] != "unchecked" for reason in doubt_about(pose))
+
+
+def _what_was_held_back(args: argparse.Namespace, pose: CochleaPose) -> str:
+    why = " and ".join(reason.text for reason in doubt_about(pose))
+    files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
+    what = f"not written: {' '.join(files)}, as {why}" if files else why
+    return f"{what}. Check side and names, or give --accept-warnings"
+
+
+def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None, *, held_back: bool) -> None:
+    """Write what was asked for; of a pose that is held back only the JSON, which carries its state."""
     if path is not None:
         with blaming(args.path):
             carried = carry_path(path, pose, path_side=args.path_side)
-        write_path(args.path_out, carried)
     save_json(args.json, pose.as_dict())
+    if held_back:
+        return
+    if path is not None:
+        write_path(args.path_out, carried)
     for save, file in (
         (pose.save_tfm, args.tfm),
         (pose.save_csv, args.csv),
@@ -137,7 +169,12 @@ def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None)
 
 
 def _asides(
-    args: argparse.Namespace, touches: LandmarkSet, pose: CochleaPose, path: FloatArray | None
+    args: argparse.Namespace,
+    touches: LandmarkSet,
+    pose: CochleaPose,
+    path: FloatArray | None,
+    *,
+    held_back: bool,
 ) -> Iterator[str]:
     """Yield what the files say beside the pose, and what the written frame is."""
     if touches.unseen:
@@ -148,7 +185,7 @@ def _asides(
     centre = None if path is None else rows_before_centre(path)
     if centre is not None:
         yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
-    if any((args.json, args.tfm, args.csv, args.path_out)):
+    if args.json or (not held_back and any((args.tfm, args.csv, args.path_out))):
         yield f"y of what was written points to the {pose.round_window} round window"
 
 
@@ -181,6 +218,7 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
     yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
     x, y, z = pose.axis
     yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"
+    yield f"  state         {pose.state}"
     yield ""
     yield "  touch   from the mean, mm"
     for code, distance in pose.residuals.items():

@@ -16,9 +16,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_core.atlas.pose_quality import pose_quality
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_labeler.pose_desk import ORDER
-from gp_labeler.session.confidence import confidence
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.panels.parts import text_label
@@ -94,7 +94,7 @@ class GuideWindow(QWidget):
             for label in (self.trust, self.reason, self.warning):
                 label.hide()
             return
-        trust = confidence(estimate)
+        trust = pose_quality(estimate)
         self.trust.setText(trust.word)
         self.reason.setText(trust.reason)
         set_role(self.trust, f"large-{trust.level}")

@@ -9,8 +9,8 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gp_core.atlas.pose import CochleaPose
+from gp_core.atlas.pose_quality import pose_quality
 from gp_labeler.session import touching
-from gp_labeler.session.confidence import confidence, is_other_side
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.bind import attempt
@@ -81,9 +81,9 @@ class ResultCard(Card):
             self.two.show_poses(estimate)
         self.verdict.setVisible(pose is not None)
         if pose is not None:
-            trust = confidence(pose)
+            trust = pose_quality(pose)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
-        wrong = pose is not None and (is_other_side(pose) or bool(_misnamed(self._desk)))
+        wrong = pose is not None and (pose.side_state == "wrong" or bool(_misnamed(self._desk)))
         self.other_side.setVisible(wrong)
         self.other_side.setText(f"They are of the {desk.side.other.word} side")
         self.swap.setVisible(desk.swapped is not None)

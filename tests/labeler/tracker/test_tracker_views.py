@@ -9,8 +9,8 @@ from PySide6.QtWidgets import QWidget
 from tracker_cases import POINTS, TIP, SimulatorProcess
 
 from gp_core import Atlas, Side
+from gp_core.atlas.pose_quality import pose_quality
 from gp_labeler.pose_desk import ORDER
-from gp_labeler.session.confidence import confidence
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.views.guide import GuideWindow
@@ -288,7 +288,7 @@ def test_every_estimate_is_shown_with_how_far_it_can_be_trusted(qtbot, desk, top
     seen = {}
     for codes, noise in ((ORDER[:3], 0.0), (ORDER[:6], 0.0), (ORDER, 0.0), (ORDER, 3.0)):
         touch(desk, *codes, noise=noise)
-        trust = confidence(desk.pose.estimate.pose)
+        trust = pose_quality(desk.pose.estimate.pose)
         assert guide.trust.isVisible()
         assert (guide.trust.text(), guide.reason.text()) == (trust.word, trust.reason)
         assert guide.trust.fontInfo().pixelSize() > guide.result.fontInfo().pixelSize()
