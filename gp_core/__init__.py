@@ -30,6 +30,7 @@ from gp_core.landmarks.files import (
     read_landmarks,
     read_touches,
     write_markups,
+    write_suggestions,
 )
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
@@ -103,4 +104,5 @@ __all__ = [
     "search_features",
     "simulate",
     "write_markups",
+    "write_suggestions",
 ]

@@ -4,7 +4,7 @@ from gp_core.landmarks.files.dat import skull_feature_names
 from gp_core.landmarks.files.disk import write_text
 from gp_core.landmarks.files.fcsv import write_fcsv
 from gp_core.landmarks.files.header import FileHeader
-from gp_core.landmarks.files.markups import write_markups
+from gp_core.landmarks.files.markups import write_markups, write_suggestions
 from gp_core.landmarks.files.mat import import_mat, read_authors_mat
 from gp_core.landmarks.files.naming import landmark_file_name, natural_key
 from gp_core.landmarks.files.points import LabelledPoint, PointList
@@ -38,5 +38,6 @@ __all__ = [
     "write_csv",
     "write_fcsv",
     "write_markups",
+    "write_suggestions",
     "write_text",
 ]

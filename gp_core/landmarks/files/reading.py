@@ -12,13 +12,13 @@ import numpy as np
 
 from gp_core.checks import check_option, near_matches
 from gp_core.errors import FeatureError, FileFormatError, GeometryError
-from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.files.dat import is_sentinel, read_dat
 from gp_core.landmarks.files.disk import check_file
 from gp_core.landmarks.files.fcsv import read_fcsv
 from gp_core.landmarks.files.markups import read_markups
-from gp_core.landmarks.files.naming import name_parts
-from gp_core.landmarks.files.points import LabelledPoint, PointList
+from gp_core.landmarks.files.naming import is_named_suggested, name_parts
+from gp_core.landmarks.files.points import LabelledPoint, PointList, as_suggested
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.files.table import read_table
 from gp_core.landmarks.files.text import shown
@@ -62,14 +62,19 @@ def read_points(path: str | PathLike[str]) -> PointList:
     Returns
     -------
     PointList
-        Positions in mm; LPS, but of a ``.dat`` in the tracker frame.
+        Positions in mm; LPS, but of a ``.dat`` in the tracker frame. Points that the file marks as suggested,
+        in their description or because its name ends in ``_suggested``, have no position but a suggestion.
 
     Raises
     ------
     FileFormatError
         Another kind of file, or one that cannot be read.
     """
-    return _READERS[_suffix(path)](path)
+    suffix = _suffix(path)
+    points = _READERS[suffix](path)
+    if not is_named_suggested(path, suffix):
+        return points
+    return replace(points, points=tuple(as_suggested(point) for point in points.points))
 
 
 def read_landmarks(
@@ -91,7 +96,8 @@ def read_landmarks(
     Returns
     -------
     LandmarkSet
-        In the frame that the file names, else ``scan`` (``.dat``: ``tracker``).
+        In the frame that the file names, else ``scan`` (``.dat``: ``tracker``). What the file marks as
+        suggested is in `LandmarkSet.suggested`.
 
     Raises
     ------
@@ -202,7 +208,13 @@ def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -
     rows = np.array([positions.get(code, np.full(3, np.nan)) for code in CODES])
     unseen = {name for name, status in zip(names, points.statuses, strict=True) if status is Status.UNSEEN}
     extra = {name: p for name, p in positions.items() if name not in CODES and np.isfinite(p).all()}
-    return LandmarkSet(rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra))
+    suggested = {
+        name: point.suggestion
+        for name, point in zip(names, points.points, strict=True)
+        if point.suggestion is not None and name in CODES and not feature(name).computed
+    }
+    found = LandmarkSet(rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra))
+    return found.with_suggestions(suggested)
 
 
 def _names(points: PointList, unknown: Unknown) -> list[str]:
