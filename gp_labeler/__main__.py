@@ -11,6 +11,7 @@ from pathlib import Path
 from gp_core import __version__
 from gp_core.errors import GpError
 from gp_labeler.mesh_command import run_mesh
+from gp_labeler.plain_numbers import use_plain_numbers
 
 __all__ = ["main", "make_parser"]
 
@@ -54,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     int
         0; 2 where the input is wrong, said in one line.
     """
+    use_plain_numbers()
     logging.basicConfig(format="gp-labeler: %(message)s", level=logging.WARNING)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:

@@ -10,10 +10,11 @@ import traceback
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QLocale, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gp_core.errors import GpError
+from gp_labeler.plain_numbers import use_plain_numbers
 from gp_labeler.session.places import default_directory
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.views.dispatch import QtDispatcher
@@ -28,6 +29,8 @@ _log = logging.getLogger(__name__)
 
 def make_application() -> QApplication:
     """Return the one Qt application, made if need be; without a display, off screen."""
+    use_plain_numbers()
+    QLocale.setDefault(QLocale.c())
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
@@ -35,6 +38,7 @@ def make_application() -> QApplication:
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     app = QApplication(["gp-labeler"])
+    use_plain_numbers()  # Qt has just taken the locale from the environment
     app.setApplicationName("gp-labeler")
     app.setApplicationDisplayName("gp-labeler")
     app.setStyle("Fusion")

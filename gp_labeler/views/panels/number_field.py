@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QDoubleValidator, QKeyEvent, QWheelEvent
+from PySide6.QtCore import QRegularExpression, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QRegularExpressionValidator, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from gp_labeler.views.bind import value_text
 
 __all__ = ["NumberField"]
+
+_NUMBER = QRegularExpression(r"[-+]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][-+]?[0-9]+)?")
+"""In every locale: a keyboard's number block may write a comma for the point."""
 
 
 class NumberField(QLineEdit):
@@ -27,7 +30,7 @@ class NumberField(QLineEdit):
         self._value = 0.0
         self.step = 1.0
         self.setAccessibleName(name)
-        self.setValidator(QDoubleValidator(self))
+        self.setValidator(QRegularExpressionValidator(_NUMBER, self))
         self.editingFinished.connect(self._on_typed)
 
     @property
