@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -68,6 +69,26 @@ class Answers:
     def number(self, title: str, text: str, value: float) -> float | None:
         self.asked.append(text)
         return value
+
+
+def drop_file(widget, path: Path, x: float = 9, y: float = 9, entered: Callable[[], object] = bool) -> None:
+    """Drag a file onto a widget and let it go; `entered` is called while it hovers."""
+    from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+    from PySide6.QtGui import QDragEnterEvent, QDropEvent
+    from PySide6.QtWidgets import QApplication
+
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    where = QPointF(x, y)
+    how = (Qt.DropAction.CopyAction, data, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier)
+    try:
+        entering = QDragEnterEvent(where, *how)
+    except TypeError:  # PySide6 before 6.12; from there on, whole pixels are deprecated
+        entering = QDragEnterEvent(where.toPoint(), *how)
+    QApplication.sendEvent(widget, entering)
+    assert entering.isAccepted()
+    entered()
+    QApplication.sendEvent(widget, QDropEvent(where, *how))
 
 
 def close(window) -> None:

@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from panel_cases import cut_words, deliver, desk_with_scan
-from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, QSize, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QGuiApplication
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
+from window_cases import drop_file
 
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
 from gp_core.atlas.draw import draw_animal
@@ -95,16 +96,11 @@ def click(qtbot, panel: PosePanel, name: str, column: int) -> None:
 
 
 def drop(widget, path: Path) -> None:
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path))])
-    where, action = QPointF(20, 200), Qt.DropAction.CopyAction
-    none = Qt.KeyboardModifier.NoModifier
-    entering = QDragEnterEvent(where.toPoint(), action, data, CLICK, none)
-    QApplication.sendEvent(widget, entering)
-    assert entering.isAccepted()
-    if isinstance(widget, PosePanel):
-        assert path.name in widget.touches.change.toolTip()
-    QApplication.sendEvent(widget, QDropEvent(where, action, data, CLICK, none))
+    def hovering() -> None:
+        if isinstance(widget, PosePanel):
+            assert path.name in widget.touches.change.toolTip()
+
+    drop_file(widget, path, 20, 200, entered=hovering)
 
 
 def editor(panel: PosePanel) -> QLineEdit:
