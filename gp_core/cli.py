@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from gp_core import __version__
 from gp_core.commands import estimate, labels, study, study_errors, study_physical, study_search, tracking
-from gp_core.commands.options import keep_inputs
+from gp_core.commands.options import keeping_inputs
 from gp_core.errors import GpError
 
 __all__ = ["main", "make_parser"]
@@ -48,8 +48,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
     args = make_parser().parse_args(arguments)
     try:
-        keep_inputs(args)
-        status: int = args.run(args)
+        with keeping_inputs(args):
+            status: int = args.run(args)
         sys.stdout.flush()
     except GpError as error:
         sys.stderr.write(f"gp-core: {error}\n")

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import write_text
 from gp_core.errors import GpError
-from gp_core.landmarks.files import write_text
 from gp_labeler.offscreen.report import Report
 from gp_labeler.offscreen.runner import Tell, run_script
 from gp_labeler.offscreen.script import Script

@@ -18,7 +18,7 @@ from gp_core.landmarks.files.naming import natural_key
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.session.specimen_file import SUFFIX, read_specimen
 
-__all__ = ["Animals", "Skipped", "may_hold_labels", "read_animals"]
+__all__ = ["Animals", "Skipped", "labelled_files", "may_hold_labels", "read_animals"]
 
 FEWEST_PLACED = 4
 """A side with fewer says nothing that an atlas could learn from."""
@@ -184,8 +184,8 @@ def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
 def _files_at(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
-    here = list(_labelled_files(path))
-    found = here or [file for folder in sorted(path.iterdir()) for file in _labelled_files(folder)]
+    here = list(labelled_files(path))
+    found = here or [file for folder in sorted(path.iterdir()) for file in labelled_files(folder)]
     if not found:
         raise GpError(
             f"holds no labelled animals ({', '.join('*' + suffix for suffix in _IN_FOLDERS)})",
@@ -195,7 +195,8 @@ def _files_at(path: Path) -> list[Path]:
     return found
 
 
-def _labelled_files(folder: Path) -> Iterator[Path]:
+def labelled_files(folder: Path) -> Iterator[Path]:
+    """Yield the landmark and specimen files of a folder, not deeper."""
     if folder.is_dir():
         for file in sorted(folder.iterdir()):
             if file.name.lower().endswith(_IN_FOLDERS) and not file.name.startswith("."):

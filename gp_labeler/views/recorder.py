@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 
-from gp_core.landmarks.files import write_text
+from gp_core.disk import write_text
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import PARTS

@@ -1,7 +1,7 @@
 """Landmark files: Slicer's ``.mrk.json`` and ``.fcsv``, tables, the probe's ``.dat``, the authors' sets."""
 
+from gp_core.disk import write_text
 from gp_core.landmarks.files.dat import skull_feature_names
-from gp_core.landmarks.files.disk import write_text
 from gp_core.landmarks.files.fcsv import write_fcsv
 from gp_core.landmarks.files.header import FileHeader
 from gp_core.landmarks.files.markups import write_markups, write_suggestions
@@ -16,7 +16,7 @@ from gp_core.landmarks.files.reading import (
     specimen_of,
 )
 from gp_core.landmarks.files.scale import check_plausible_size
-from gp_core.landmarks.files.specimens import load_specimens
+from gp_core.landmarks.files.specimens import landmark_files, load_specimens
 from gp_core.landmarks.files.table import write_csv
 
 __all__ = [
@@ -26,6 +26,7 @@ __all__ = [
     "check_plausible_size",
     "import_mat",
     "landmark_file_name",
+    "landmark_files",
     "landmarks_of",
     "load_specimens",
     "natural_key",

@@ -9,8 +9,9 @@ import re
 from os import PathLike
 from pathlib import Path
 
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.points import (
     STATUS_WORDS,
     LabelledPoint,

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
-from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.header import FileHeader
 from gp_core.landmarks.files.points import (
     STATUS_WORDS,

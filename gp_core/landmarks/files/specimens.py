@@ -16,7 +16,7 @@ from gp_core.landmarks.files.reading import landmarks_of, read_points, specimen_
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
-__all__ = ["load_specimens"]
+__all__ = ["landmark_files", "load_specimens"]
 
 _SAME_MM = 1e-6
 _IN_FOLDERS = (".mrk.json", ".fcsv")
@@ -94,13 +94,21 @@ def _with_true_origin(landmarks: LandmarkSet) -> LandmarkSet:
 def _files(paths: list[str | PathLike[str]]) -> list[Path]:
     if not paths:
         raise FileFormatError("no landmark files were given", remedy="Name files, or folders of them.")
-    found = [file for path in paths for file in _files_at(Path(path))]
+    found = [file for path in paths for file in landmark_files(path)]
     return list(
         {file.absolute(): file for file in found}.values()
     )  # a file may be named along with its folder
 
 
-def _files_at(path: Path) -> list[Path]:
+def landmark_files(place: str | PathLike[str]) -> list[Path]:
+    """Return the landmark files of a folder, not deeper, or the one file that is named.
+
+    Raises
+    ------
+    FileFormatError
+        The folder holds none, or cannot be searched.
+    """
+    path = Path(place)
     try:
         if not path.is_dir():
             return [path]

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from gp_core import Atlas, Specimen, check_specimen, fit_atlas, load_specimens
+from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import write_text
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 

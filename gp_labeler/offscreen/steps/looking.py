@@ -14,7 +14,7 @@ from gp_labeler.offscreen.events import leave, press_keys
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Pair, Step, Triple
 from gp_labeler.scene.planes import Plane
-from gp_labeler.views.pictures import PICTURES, picture
+from gp_labeler.views.pictures import PICTURES, picture, write_picture
 from gp_labeler.views.theme import THEMES
 
 __all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]
@@ -196,8 +196,7 @@ class Screenshot(Step):
             leave(view)
         size = None if self.size is None else _pixels(self.size)
         image, file = picture(rig.window, self.what, size), rig.to_write(self.path)
-        if not image.save(str(file)):
-            raise GpError("cannot be written", file=file, remedy="Give a path that ends with .png.")
+        write_picture(image, file)
         return f"{rig.wrote(file)}, {image.width()} x {image.height()}"
 
 

@@ -75,10 +75,10 @@ def test_a_file_without_permission(tmp_path):
 def test_a_disk_that_refuses(tmp_path, monkeypatch):
     file = write_json(tmp_path / "GP01_L.mrk.json", markup(control_point("CA")))
 
-    def refuse(self):
+    def refuse(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(type(file), "read_bytes", refuse)
+    monkeypatch.setattr(os, "open", refuse)
     with pytest.raises(FileFormatError, match=r"GP01_L.*cannot be read \(Permission denied\)"):
         read_landmarks(file)
 
