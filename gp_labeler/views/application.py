@@ -14,6 +14,7 @@ from PySide6.QtCore import QLocale, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gp_core.errors import GpError
+from gp_labeler.installation import check_display
 from gp_labeler.plain_numbers import use_plain_numbers
 from gp_labeler.session.places import default_directory
 from gp_labeler.session.recovery import find_recoveries
@@ -28,7 +29,13 @@ _log = logging.getLogger(__name__)
 
 
 def make_application() -> QApplication:
-    """Return the one Qt application, made if need be; without a display, off screen."""
+    """Return the one Qt application, made if need be; without a display, off screen.
+
+    Raises
+    ------
+    GpError
+        Qt cannot draw on the display, or the platform, that the environment names.
+    """
     use_plain_numbers()
     QLocale.setDefault(QLocale.c())
     existing = QApplication.instance()
@@ -36,6 +43,7 @@ def make_application() -> QApplication:
         return existing
     if not _has_display():
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    check_display()
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     app = QApplication(["gp-labeler"])
     use_plain_numbers()  # Qt has just taken the locale from the environment
@@ -87,7 +95,7 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
     Raises
     ------
     GpError
-        There is no display.
+        There is no display that Qt can draw on.
     """
     if not _has_display():
         raise GpError(
