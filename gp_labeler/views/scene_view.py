@@ -214,6 +214,7 @@ class SceneView(QWidget):
 
     def _on_session_replaced(self, _: object) -> None:
         self._fitted = False
+        self._source = None
         self._on_view_changed(frozenset({"mesh_opacity", "cut", "slices_visible"}))
         self._show_points()
 

@@ -77,6 +77,7 @@ class SlicePainter:
         self._desk, self._view = workbench, view
         self._preview: float | None = None
         self._slice: SliceImage | None = None
+        self._where: tuple[SliceSource | None, float] = (None, 0.0)
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
@@ -86,6 +87,7 @@ class SlicePainter:
     def forget(self) -> None:
         """Let go of the pictures."""
         self._slice, self._picture, self._outline, self._ground = None, None, None, None
+        self._where = (None, 0.0)
         self.forget_points()
 
     def forget_points(self) -> None:
