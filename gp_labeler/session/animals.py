@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.quality import Finding, check_specimen
+from gp_core.atlas.label_check import Finding, check_specimen
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.files import load_specimens
@@ -25,7 +25,6 @@ FEWEST_PLACED = 4
 
 _IN_FOLDERS = (".mrk.json", ".fcsv", SUFFIX)
 _SAME_MM = 1e-3
-_HARMLESS = ("missing", "unseen", "unchecked")
 
 
 @dataclass(frozen=True)
@@ -138,7 +137,7 @@ class _Reading:
     def checked(self, name: str) -> Specimen:
         """Return an animal with the sides that can be used, and note what to look at."""
         animal = Specimen(name, self.sides[name])
-        findings = [f for f in check_specimen(animal, Atlas.published()) if f.kind not in _HARMLESS]
+        findings = [f for f in check_specimen(animal, Atlas.published()) if f.is_doubt]
         exchanged = {finding.side: finding for finding in findings if finding.kind == "other side"}
         for side, finding in exchanged.items():
             self.skipped.append(Skipped(f"{name} {side.word}", finding.text))

@@ -289,7 +289,7 @@ class LabelsCard(Card):
         """Say in a sentence what the table shows."""
         rows = self.table.rows
         if not rows.n_judged:
-            words = "Once five points of a side are placed, this shows how well they fit the atlas."
+            words = "Once four points of a side are placed, this shows how well they fit the atlas."
         elif rows.n_doubtful:
             words = f"{rows.n_doubtful} of {rows.n_judged} labels should be looked at again."
         else:

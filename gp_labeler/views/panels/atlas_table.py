@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_core.atlas.label_check import Departure
 from gp_core.landmarks.features import Side, feature
-from gp_labeler.session.ghosts import Departure
 from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.theme import FONT_PX, theme_of

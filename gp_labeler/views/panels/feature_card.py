@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import ACTIONS
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, SwapSides
+from gp_labeler.session.edits import CheckPoint, SwapPoints, SwapSides
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
@@ -227,6 +227,15 @@ def _check(workbench: Workbench) -> None:
         session.do(CheckPoint(active.side, active.code))
 
 
+def _swap_names(workbench: Workbench) -> None:
+    """Exchange the active point with the one that seems to have its name."""
+    session = workbench.session
+    side, code = session.active.side, session.active.code
+    doubt = session.near_doubts(side).get(code or "")
+    if doubt is not None and doubt.kind == "swapped":
+        session.do(SwapPoints(side, *doubt.landmarks))
+
+
 def _place_at_crosshair(workbench: Workbench) -> None:
     labelling.place(workbench.session, workbench.session.crosshair, How.SLICE)
 
@@ -238,6 +247,7 @@ _EDITS: Mapping[str, Callable[[Workbench], object]] = {
     "unlock": lambda desk: labelling.lock(desk.session, False),
     "next": lambda desk: labelling.skip(desk.session),
     "swap_sides": lambda desk: desk.session.do(SwapSides()),
+    "swap_names": _swap_names,
 }
 
 
@@ -248,6 +258,7 @@ _COMMANDS: Mapping[str, str] = {
     "unlock": "point.lock",
     "next": "point.skip",
     "swap_sides": "edit.swap_sides",
+    "swap_names": "edit.swap",
 }
 """The commands that do the same as the one next action."""
 
