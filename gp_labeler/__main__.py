@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gp_core import __version__
 from gp_core.errors import GpError
+from gp_core.terminal import leave_output, plain_terminal
 from gp_labeler.installation import explain_import
 from gp_labeler.mesh_command import run_mesh
 from gp_labeler.plain_numbers import use_plain_numbers
@@ -58,6 +59,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         0; 2 where the input is wrong or the installation incomplete, said in one line.
     """
     use_plain_numbers()
+    with plain_terminal():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     logging.basicConfig(format="gp-labeler: %(message)s", level=logging.WARNING)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -76,6 +82,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _refuse(error)
     except ImportError as error:
         return _refuse(explain_import(error))
+    except BrokenPipeError:  # who reads has read enough, such as `head`
+        leave_output()
+        return 141
+    except MemoryError:
+        return _refuse(GpError("there is not enough memory for this", remedy="Close other programs."))
     except OSError as error:
         sys.stderr.write(f"gp-labeler: {error.filename or 'file'}: {error.strerror or error}\n")
         return 2

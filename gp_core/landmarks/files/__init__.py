@@ -9,6 +9,7 @@ from gp_core.landmarks.files.mat import import_mat, read_authors_mat
 from gp_core.landmarks.files.naming import landmark_file_name, natural_key
 from gp_core.landmarks.files.points import LabelledPoint, PointList
 from gp_core.landmarks.files.reading import (
+    label_names,
     landmarks_of,
     read_landmarks,
     read_points,
@@ -25,6 +26,7 @@ __all__ = [
     "PointList",
     "check_plausible_size",
     "import_mat",
+    "label_names",
     "landmark_file_name",
     "landmark_files",
     "landmarks_of",

@@ -26,7 +26,7 @@ from gp_core.landmarks.files.points import (
     points_of,
     suggestions_of,
 )
-from gp_core.landmarks.files.text import flips_xy, shown
+from gp_core.landmarks.files.text import check_count, flips_xy, shown
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["read_markups", "write_markups", "write_point_lists", "write_suggestions"]
@@ -68,6 +68,8 @@ def read_markups(path: str | PathLike[str]) -> PointList:
     content = _load(path)
     header = FileHeader.from_json(content["gpLabeler"], path) if "gpLabeler" in content else None
     lists = _point_lists(content, path, told=_LINES if header else ())
+    listed = (markup.get("controlPoints") for markup in lists)
+    check_count(sum(len(points) for points in listed if isinstance(points, list)), "points", path)
     points = [point for markup in lists for point in _points(markup, path)]
     if header is not None:
         points = _without_accepted_ghosts(points, header, path)

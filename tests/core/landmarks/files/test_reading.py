@@ -99,7 +99,7 @@ def test_a_file_too_large_is_not_read(tmp_path):
 
 def test_all_points_at_one_place_is_an_error_of_three(tmp_path):
     file = tmp_path / "GP01_L.mrk.json"
-    write_json(file, markup(control_point("CA"), control_point("CB")))
+    write_json(file, markup(control_point("CA"), control_point("OS")))
     assert len(read_landmarks(file).placed) == 2
     write_json(file, markup(control_point("CA"), control_point("CB"), control_point("CL")))
     with pytest.raises(GeometryError, match="all 3 points are at the same place"):
