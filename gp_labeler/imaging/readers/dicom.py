@@ -20,7 +20,8 @@ from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
-from gp_labeler.imaging.readers.simpleitk import ItkSource, read_itk_planes
+from gp_labeler.imaging.readers.raw_voxels import Whole
+from gp_labeler.imaging.readers.simpleitk import read_itk_planes
 from gp_labeler.imaging.readers.source import FileSource, Plane, RawSource, SliceSource
 
 __all__ = ["inspect_dicom"]
@@ -358,7 +359,7 @@ def _value(stored: Plane, pixels: Pixels) -> Plane:
 
 def _frames_source(frame: Frame, channel: int | None) -> SliceSource:
     if frame.pixels is None:
-        return ItkSource(frame.path, channel)
+        return Whole(partial(read_itk_planes, frame.path), lambda plane: to_grey(plane, channel))
     finish = partial(_value, pixels=frame.pixels)
     return RawSource(
         frame.path, frame.pixels.offset, frame.pixels.dtype, frame.shape, frame.n_frames, finish=finish

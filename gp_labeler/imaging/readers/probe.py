@@ -128,7 +128,7 @@ def _kind_by_content(path: Path) -> str | None:
         head = file.read(352)
     if head.startswith(b"NRRD000"):
         return "NRRD"
-    if head[344:348] == b"n+1\0":
+    if head[344:348] == b"n+1\0" or head[4:8] == b"n+2\0":
         return "NIfTI"
     return "MetaImage" if head.startswith((b"ObjectType", b"NDims")) else None
 
