@@ -91,7 +91,7 @@ class ExportDialog(QDialog):
         self.browse = QPushButton("Browse…")
         self.browse.clicked.connect(self._browse)
         self.formats = {suffix: self._format_box(suffix) for suffix in FORMATS}
-        self.files = text_label("", "mono", wrap=True)
+        self.files = text_label("", "", wrap=True)
         self.replace = QCheckBox()
         self.replace.toggled.connect(self.refresh)
         self._findings = QVBoxLayout()

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
+from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan, in_scan, place
 from PySide6.QtCore import QModelIndex, QPoint, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QGuiApplication
 from PySide6.QtWidgets import QMenu
@@ -18,7 +18,7 @@ from gp_labeler.session.workflow import Active
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
 from gp_labeler.views.panels.feature_card import FeatureCard
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH, LabelPanel
+from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.views.panels.landmark_table import LandmarkTable
 from gp_labeler.views.panels.rail import Rail

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import cut_words, deliver, desk_with_scan
+from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan
 from PySide6.QtCore import QEvent, QPoint, QSize, Qt
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
@@ -21,7 +21,6 @@ from gp_labeler.pose_desk import ORDER
 from gp_labeler.session import labelling, touching
 from gp_labeler.session.jobs import QueueDispatcher
 from gp_labeler.session.touches import TouchHow
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
