@@ -12,6 +12,8 @@ import pytest
 from gp_labeler.installation import explain_import
 from gp_labeler.system_libraries import NEEDS, Need, advice, missing, packages_of
 
+pytestmark = pytest.mark.machine
+
 ROOT = Path(__file__).resolve().parents[2]
 NO_LIBRARY = "libEGL.so.1: cannot open shared object file: No such file or directory"
 COMMANDS = (

@@ -13,6 +13,8 @@ from window_cases import BALL_MM, MIDDLE, write_ball
 
 from gp_labeler.__main__ import main
 
+pytestmark = pytest.mark.machine
+
 
 @pytest.fixture
 def ball_file(tmp_path) -> Path:

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from window_cases import VOXEL_MM
 
+pytestmark = pytest.mark.machine
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 TOOLS = ("xvfb-run", "xdotool")

@@ -11,6 +11,8 @@ from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.runner import do_step, run_script
 from gp_labeler.offscreen.script import StepError, make_script
 
+pytestmark = pytest.mark.machine
+
 
 def on_ball(*direction: float) -> np.ndarray:
     towards = np.array(direction, dtype=float)

@@ -31,6 +31,8 @@ from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.target import RenderTarget
 from gp_labeler.scene.window_level import WindowLevel
 
+pytestmark = pytest.mark.machine
+
 BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
 
 

@@ -16,6 +16,8 @@ from gp_labeler.session import labelling
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import TrackerAddress
 
+pytestmark = pytest.mark.machine
+
 ATLAS = Atlas.published()
 ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
 LEFT, CLICK = Side.LEFT, Qt.MouseButton.LeftButton

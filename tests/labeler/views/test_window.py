@@ -28,6 +28,8 @@ from gp_labeler.views.application import make_window as make_plain
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.views.top_bar import TopBar
 
+pytestmark = pytest.mark.machine
+
 
 def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbot) -> None:
     status, words = window.status, "the file is truncated after three gigabytes and cannot be read. " * 3
