@@ -44,7 +44,7 @@ def run(folder: Path, *words: str, blocked: tuple[str, ...] = (), library: bool 
         [sys.executable, "-m", "gp_labeler", *words],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=False,
         cwd=folder,
         env={**kept, "PYTHONPATH": path, "XDG_STATE_HOME": str(folder), **env},
@@ -208,7 +208,7 @@ def test_the_set_up_never_asks_and_ends_with_one_line(user, sudo, status, tmp_pa
         fake(programs, "sudo", sudo)
     command = ["bash", str(project / "tools" / "setup"), "app"]
     env = {"PATH": str(programs)}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60, env=env, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=env, check=False)
     assert done.returncode == status, done.stderr
     assert (project / "with-pip").exists(), "what works without the libraries is set up all the same"
     assert done.stdout == ""

@@ -10,6 +10,9 @@ import numpy as np
 from gp_labeler.imaging.volume import Volume
 
 BALL_MM, VOXEL_MM = 6.0, 0.25
+PATIENCE_MS = 120_000
+"""How long a test waits for what must come true: only a failure lasts that long, however busy the machine."""
+
 MIDDLE = np.array([10.0, -20.0, 30.0])
 
 
@@ -104,7 +107,7 @@ def close(window) -> None:
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
-def settle(qtbot, window, seconds: float = 20.0) -> None:
+def settle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
     """Wait until all work is done, and all is drawn."""
     desk = window.workbench
     qtbot.waitUntil(lambda: not desk.jobs.running, timeout=int(1000 * seconds))

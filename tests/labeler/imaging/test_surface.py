@@ -230,16 +230,16 @@ def test_building_the_locator_lets_other_threads_run(mouse: Volume) -> None:
 
     thread = threading.Thread(target=tick)
     thread.start()
-    meanwhile = []
-    for _ in range(5):
-        before = ticks[0]
+    meanwhile, tries = 0, 0
+    while meanwhile <= 3 and tries < 100:  # a busy machine may give the other thread no turn at first
+        before, tries = ticks[0], tries + 1
         Surface(surface.mesh, surface.level, surface.T_voxel_scan, surface.region).prepare()
-        meanwhile.append(ticks[0] - before)
+        meanwhile = ticks[0] - before
     over.set()
     thread.join()
     assert not unprepared.ready
     assert unprepared.prepare().ready
-    assert max(meanwhile) > 3, "one or two may fall before and after a call that lets nobody run"
+    assert meanwhile > 3, "one or two may fall before and after a call that lets nobody run"
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".stl", ".vtp"])

@@ -83,7 +83,7 @@ def command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         env=env | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
     )
 
 

@@ -33,7 +33,7 @@ def test_real_mouse_and_keys_label_on_a_real_display() -> None:
         env=env,
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr[-3000:]
     found = json.loads(done.stdout.splitlines()[-1])

@@ -266,7 +266,7 @@ def test_everything_done_offers_the_export(desk, panel, qtbot):
             if not row.computed:
                 labelling.mark_unseen(desk.session, side=side, code=row.code)
     assert panel.card.content.name == "Everything is labelled"
-    with qtbot.waitSignal(panel.card.export_asked, timeout=1000):
+    with qtbot.waitSignal(panel.card.export_asked):
         qtbot.mouseClick(panel.card.primary, CLICK)
 
 
@@ -275,7 +275,7 @@ def test_without_a_scan_the_card_offers_to_open_one(qtbot):
     card = FeatureCard(desk)
     qtbot.addWidget(card)
     card.show()
-    with qtbot.waitSignal(card.open_asked, timeout=1000):
+    with qtbot.waitSignal(card.open_asked):
         qtbot.mouseClick(card.primary, CLICK)
     desk.close(discard=True)
 

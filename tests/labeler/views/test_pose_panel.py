@@ -313,14 +313,14 @@ def test_it_says_beforehand_what_leaving_out_changes(desk, panel, qtbot):
     touch(desk, *PROBE)
     moved, turned = desk.pose.estimating.without("MN")
     click(qtbot, panel, "MN", NAME)
-    qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()), timeout=2000)
+    qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()))
     said = panel.touches.change.toolTip()
     assert said == f"Without MN: CO {moved:.2f} mm, axis {turned:.1f}°"
     before = desk.pose.estimate.pose
     click(qtbot, panel, "MN", USE)
     after = desk.pose.estimate.pose
     assert np.linalg.norm(after.origin - before.origin) == pytest.approx(moved)
-    qtbot.waitUntil(lambda: panel.touches.change.toolTip().startswith("With MN"), timeout=2000)
+    qtbot.waitUntil(lambda: panel.touches.change.toolTip().startswith("With MN"))
 
 
 def test_one_touch_or_all_are_cleared_and_come_back(desk, panel, qtbot):
