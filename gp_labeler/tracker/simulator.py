@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -68,6 +69,8 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
     """
     args = make_parser(prog).parse_args(arguments)
     logging.getLogger("pyigtl").setLevel(logging.ERROR)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # it ends in good order
     try:
         points, truth = _points(args)
         simulator = _simulator(args, points)
