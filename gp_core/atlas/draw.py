@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
@@ -11,7 +13,7 @@ from gp_core.landmarks.anatomy import mirror_right, with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
-__all__ = ["draw_animal", "draw_sides", "mean_animal"]
+__all__ = ["draw_animal", "draw_sides", "mean_animal", "perturbed_atlas"]
 
 _PLACED = tuple(f.code for f in FEATURES if not f.computed)
 _SHARED = tuple(f.code for f in FEATURES if f.shared)
@@ -19,6 +21,9 @@ _MIDLINE = _SHARED[0]
 
 _SIDE_CORRELATION = 0.6
 """How alike the two ears of one animal are in what sets them apart from the mean."""
+
+_DEGREES, _MEAN_MOVES = 30, 0.3
+"""Of `perturbed_atlas`: degrees of freedom of its covariance, and how far its mean moves, in SDs."""
 
 _FARTHEST = 3.0
 """Standard deviations: a coordinate drawn beyond is brought back, so that no head is a monster."""
@@ -68,6 +73,20 @@ def mean_animal(atlas: Atlas, *, name: str = "mean") -> Specimen:
     """Return the symmetric animal that has the atlas' mean on both sides; see `draw_animal`."""
     mean = atlas.rows(_PLACED)
     return _in_head(atlas, mean, mean, name)
+
+
+def perturbed_atlas(atlas: Atlas, *, rng: np.random.Generator) -> Atlas:
+    """Return an atlas that differs from another as that of a different small herd would.
+
+    The mean is moved by 0.3 standard deviations; the covariance is half the old one and half a Wishart draw
+    of 30 degrees of freedom about it, so that features vary together, as they do in real animals.
+    """
+    size = len(atlas.covariance)
+    root = np.linalg.cholesky(atlas.covariance + 1e-9 * np.eye(size))
+    drawn = root @ rng.standard_normal((size, _DEGREES))
+    covariance = (atlas.covariance + drawn @ drawn.T / _DEGREES) / 2 + 1e-6 * np.eye(size)
+    mean = atlas.mean + _MEAN_MOVES * (root @ rng.standard_normal(size)).reshape(-1, 3)
+    return replace(atlas, name="perturbed", mean=mean, covariance=covariance, scatter=covariance)
 
 
 def draw_sides(atlas: Atlas, *, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:

@@ -51,6 +51,7 @@ __all__ = [
     "compile_if_repeated",
     "fit_named_points",
     "motion_jacobian",
+    "quick_misfit",
 ]
 
 _NO_TURN = (1.0, 0.0, 0.0, 0.0)
@@ -62,6 +63,7 @@ _MAX_ITERATIONS = 500
 _DOUBTFUL_WEIGHT = 0.5
 _LEFT_OUT = 1e-3
 _NEWTON_STEPS = 6
+_QUICK_ITERATIONS = 6
 _TINY = 1e-300
 
 
@@ -303,6 +305,21 @@ def careful_misfit(model: TouchModel, reading: FloatArray, noise: float) -> floa
     settled = _settle(model, reading, noise, n_iterations=0)
     squared = ((settled.points.reshape(-1, 3) - model.mean) ** 2).sum(axis=1)
     return float(settled.precision @ squared)
+
+
+def quick_misfit(model: TouchModel, touches: FloatArray, turn: FloatArray) -> float:
+    """Return about what the misfit of a reading will be, after a few iterations from a given turn.
+
+    Early on, the misfit is hardly ever above the one that a fit settles at.
+
+    Parameters
+    ----------
+    model : TouchModel
+    touches : (n, 3) array, mm
+    turn : (4,) array
+        A quaternion to start from.
+    """
+    return _settle(model, touches, model.noise, turn=turn, n_iterations=_QUICK_ITERATIONS).misfit
 
 
 def _settle(

@@ -9,6 +9,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.named_fit import NamedFit, TouchModel, fit_named_points
 from gp_core.atlas.robust_pose import defining_points, pose_covariance, touch_model
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM, Systematic
 from gp_core.atlas.uncertainty import cone_95, radius_95
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import EXTERNAL, Side
@@ -49,7 +50,13 @@ class TouchGain:
         return self.radius_95_now - self.radius_95 + MM_A_DEGREE * turn
 
 
-def gains(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = None) -> tuple[TouchGain, ...]:
+def gains(
+    touches: LandmarkSet,
+    atlas: Atlas,
+    *,
+    probe_noise: float | None = None,
+    shared_error: float = DEFAULT_SHARED_ERROR_MM,
+) -> tuple[TouchGain, ...]:
     """Return what each external feature not yet touched would gain, the best first.
 
     The new touch is supposed to be an ordinary one where the atlas has the feature; its error and the
@@ -64,6 +71,8 @@ def gains(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = Non
     atlas : Atlas
     probe_noise : float, optional
         Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+    shared_error : float
+        As of `gp_core.atlas.pose.estimate_pose`.
 
     Raises
     ------
@@ -79,19 +88,20 @@ def gains(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = Non
     """
     model = touch_model(touches, atlas, probe_noise)
     fit = fit_named_points(model, mirror_right(touches.array(model.codes), touches.side))
-    radius, cone = _regions(atlas, model, fit)
+    systematic = Systematic(shared_error)
+    radius, cone = _regions(atlas, model, fit, systematic)
     found = []
     for code in EXTERNAL:
         if code in atlas.codes and code not in model.codes:
-            after = _regions(atlas, *_with_touch(atlas, model, fit, code))
+            after = _regions(atlas, *_with_touch(atlas, model, fit, code), systematic)
             found.append(TouchGain(code, *after, radius, cone))
     return tuple(sorted(found, key=lambda gain: -gain.worth))
 
 
-def _regions(atlas: Atlas, model: TouchModel, fit: NamedFit) -> tuple[float, float]:
+def _regions(atlas: Atlas, model: TouchModel, fit: NamedFit, systematic: Systematic) -> tuple[float, float]:
     """Return radius and cone of the pose that a fit gives; both are the same in the mirror."""
     defining = defining_points(atlas, model, fit)
-    covariance = pose_covariance(atlas, model, fit, defining, Side.LEFT)
+    covariance = pose_covariance(atlas, model, fit, defining, Side.LEFT, systematic)
     axis = fit.rotation @ (defining[0] - defining[1])
     return radius_95(covariance), cone_95(covariance, axis / np.linalg.norm(axis))
 

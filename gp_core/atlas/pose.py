@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from os import PathLike
 from types import ModuleType
 from typing import Any
@@ -13,13 +14,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.mixture import UNDECIDED, Hypothesis, axis_part, holding_radius, origin_part
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.atlas.uncertainty import cone_95, radius_95
 from gp_core.checks import FloatArray, check_option
-from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import check_plausible_size
+from gp_core.landmarks.files import check_plausible_size, write_text
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["METHODS", "READING_STATES", "ROUND_WINDOWS", "CochleaPose", "estimate_pose"]
@@ -66,6 +68,12 @@ class CochleaPose:
         Of `READING_STATES`: whether the touches may be those of the other ear, and whether two of them may
         each have the other's name. Only a pose of which both are ``clear`` is for a robot; see
         `gp_core.atlas.pose_gate.PoseGate`.
+    shared_error : float or None
+        RMS length of the offset common to all touches that the regions allow for, mm; None: not considered.
+    probability : float
+        Of the touches as they are named, among all readings of them.
+    hypotheses : tuple of Hypothesis
+        Other readings that are not ruled out, the likeliest first.
     """
 
     side: Side
@@ -82,6 +90,9 @@ class CochleaPose:
     swapped: tuple[str, str] | None = None
     side_state: str = "unchecked"
     names_state: str = "unchecked"
+    shared_error: float | None = None
+    probability: float = 1.0
+    hypotheses: tuple[Hypothesis, ...] = ()
 
     def __post_init__(self) -> None:
         check_option(self.side_state, "state of the side", READING_STATES)
@@ -107,15 +118,40 @@ class CochleaPose:
         """Both states in words, such as ``side undecided, names clear``."""
         return f"side {self.side_state}, names {self.names_state}"
 
-    @property
+    @cached_property
     def radius_95(self) -> float:
-        """Radius of the ball about the origin that holds the true CO with 95 %, mm."""
+        """Radius of the ball about the origin that holds the true CO with 95 %, whatever the reading, mm."""
+        if not self.hypotheses:
+            return self.plain_radius_95
+        return holding_radius([origin_part(p, o, self.origin, c) for p, o, _, c in self._readings()])
+
+    @cached_property
+    def cone_95(self) -> float:
+        """Half-angle of the cone that holds the true axis with 95 %, whatever the reading, rad."""
+        if not self.hypotheses:
+            return self.plain_cone_95
+        parts = [axis_part(p, a, self.axis, c) for p, _, a, c in self._readings()]
+        return min(holding_radius(parts), np.pi)
+
+    @property
+    def plain_radius_95(self) -> float:
+        """The radius where the touches are taken as they are named, mm."""
         return radius_95(self.covariance)
 
     @property
-    def cone_95(self) -> float:
-        """Half-angle of the cone about the axis that holds the true axis with 95 %, rad."""
+    def plain_cone_95(self) -> float:
+        """The cone where the touches are taken as they are named, rad."""
         return cone_95(self.covariance, self.axis)
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether the 95 % region is of several parts, one a reading that is not ruled out."""
+        return any(h.probability >= UNDECIDED for h in self.hypotheses)
+
+    def _readings(self) -> Iterator[tuple[float, FloatArray, FloatArray, FloatArray]]:
+        yield self.probability, self.origin, self.axis, self.covariance
+        for h in self.hypotheses:
+            yield h.probability, h.origin, h.axis, h.covariance
 
     def as_dict(self) -> dict[str, Any]:
         """Return the pose as the JSON file holds it; lengths in mm, angles in degrees."""
@@ -131,13 +167,19 @@ class CochleaPose:
             "covariance": self.covariance.tolist(),
             "radius_95_mm": self.radius_95,
             "cone_95_deg": float(np.degrees(self.cone_95)),
+            "plain_radius_95_mm": self.plain_radius_95,
+            "plain_cone_95_deg": float(np.degrees(self.plain_cone_95)),
+            "shared_error_mm": self.shared_error,
             "residuals_mm": self.residuals,
             "probe_noise_mm": self.probe_noise,
             "round_window": self.round_window,
             "suspect": list(self.suspects),
             "swapped": None if self.swapped is None else list(self.swapped),
+            "state": self.state,
             "side_state": self.side_state,
             "names_state": self.names_state,
+            "probability": self.probability,
+            "hypotheses": [h.as_dict() for h in self.hypotheses],
             "warnings": list(self.warnings),
             "registered_atlas": None
             if self.T_touches_atlas is None
@@ -170,6 +212,8 @@ def estimate_pose(
     specimens: Sequence[Specimen] | None = None,
     probe_noise: float | None = None,
     round_window: str = "touched",
+    shared_error: float = DEFAULT_SHARED_ERROR_MM,
+    times: Mapping[str, float] | None = None,
 ) -> CochleaPose:
     """Estimate the pose of a cochlea from a few touched features, with no CT.
 
@@ -191,6 +235,13 @@ def estimate_pose(
         What y of the frame points to: the middle of the touched RWA and RWP, as the authors' robot had it,
         where both are touched and fit; or that of the fitted atlas, nearer the truth where touches are rough.
         Origin and axis are the same.
+    shared_error : float
+        RMS length of one offset common to all touches of the session, mm, in the frame of the touches: from
+        the covariance of the pivot calibration, the tracker's data sheet, soft tissue under the tip. It
+        widens the regions and moves nothing. With 0, touches err independently, and animals are like those
+        of the atlas.
+    times : mapping of str to float, optional
+        When each feature was touched, s. Where all have a time, a drift over the session is looked for.
 
     Returns
     -------
@@ -222,7 +273,13 @@ def estimate_pose(
     else:
         from gp_core.atlas.robust_pose import estimate_robust
 
-        pose = estimate_robust(landmarks, atlas or _default_atlas(specimens), probe_noise=probe_noise)
+        pose = estimate_robust(
+            landmarks,
+            atlas or _default_atlas(specimens),
+            probe_noise=probe_noise,
+            shared_error=shared_error,
+            times=times,
+        )
     if round_window == "expected":
         return pose
     from gp_core.atlas.touched_window import towards_touched_window

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose
 from gp_core.checks import FloatArray
-from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
 from gp_core.frames import FRAMES, RigidTransform
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import FileHeader, LabelledPoint
+from gp_core.landmarks.files import FileHeader, LabelledPoint, write_text
 from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.markups import write_point_lists
 from gp_core.landmarks.files.text import rows_text, shown
@@ -85,9 +85,7 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
     ):
         if not np.allclose(_numbers(content, key, (3,)), meant, rtol=0, atol=_AGREE):
             raise GpError(f"its {key} is not that of its transform")
-    covariance = _numbers(content, "covariance", (6, 6))
-    if not np.array_equal(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -_AGREE:
-        raise GpError("its covariance is none")
+    covariance = _covariance(content)
     round_window = content.get("round_window", "expected")
     if round_window not in ROUND_WINDOWS:
         raise GpError(f"unknown round window {shown(round_window)}")
@@ -109,7 +107,34 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         swapped=_pair(content.get("swapped")),
         side_state=_text(content.get("side_state", "unchecked")),
         names_state=_text(content.get("names_state", "unchecked")),
+        shared_error=None if content.get("shared_error_mm") is None else _number(content["shared_error_mm"]),
+        probability=_probability(content.get("probability", 1.0)),
+        hypotheses=tuple(_hypothesis(entry, frame) for entry in content.get("hypotheses", ())),
     )
+
+
+def _hypothesis(content: dict[str, Any], frame: str) -> Hypothesis:
+    return Hypothesis(
+        side=Side.parse(content["side"]),
+        exchanged=_pair(content["exchanged"]),
+        probability=_probability(content["probability"]),
+        transform_to_touches=RigidTransform(_numbers(content, "transform", (4, 4)), frame, "cochlea"),
+        covariance=_covariance(content),
+    )
+
+
+def _covariance(content: dict[str, Any]) -> FloatArray:
+    covariance = _numbers(content, "covariance", (6, 6))
+    if not np.array_equal(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -_AGREE:
+        raise GpError("its covariance is none")
+    return covariance
+
+
+def _probability(value: Any) -> float:
+    number = _number(value)
+    if not 0 <= number <= 1:
+        raise GpError(f"{shown(value)} stands for a probability")
+    return number
 
 
 def _numbers(content: dict[str, Any], key: str, shape: tuple[int, ...]) -> FloatArray:

@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import compress
 
 import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.hypotheses import Reading, readings
+from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.named_fit import (
     NamedFit,
     TouchModel,
     best_exchange,
-    careful_misfit,
     compile_if_repeated,
     fit_named_points,
     motion_jacobian,
 )
 from gp_core.atlas.pose import CochleaPose
+from gp_core.atlas.reading_state import decide, reading_warnings
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM, Systematic
 from gp_core.atlas.uncertainty import cochlea_jacobian
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GpError
-from gp_core.frames import RigidTransform, mirror_x
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.anatomy import axis_frame, cochlea_origin, mirror_right, touched_features
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
@@ -39,17 +43,21 @@ _ODD_SQUARED = 7.814727903251179
 _ENOUGH_TO_TELL = 5
 """Touches from which a mistouch can be told from an unusual animal."""
 
-_CLEAR_MISFIT = 6.0
-"""Difference in -2 log posterior, odds of 20 to 1, from which one side is told from the other."""
-
-_AGAINST_THE_USER = 12.0
-"""The same for saying that the user named the wrong side, or exchanged two names: odds of 400 to 1."""
+_MUCH_BETTER = 6.0
+"""Difference in log posterior, odds of 400 to 1, from which two names are said to be exchanged."""
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
 _MIRROR_POSE = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the other sign
 
 
-def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | None = None) -> CochleaPose:
+def estimate_robust(
+    touches: LandmarkSet,
+    atlas: Atlas,
+    *,
+    probe_noise: float | None = None,
+    shared_error: float = DEFAULT_SHARED_ERROR_MM,
+    times: Mapping[str, float] | None = None,
+) -> CochleaPose:
     """Estimate the pose of a cochlea from named touches; see `gp_core.atlas.pose.estimate_pose`.
 
     Parameters
@@ -59,6 +67,10 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
     atlas : Atlas
     probe_noise : float, optional
         Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+    shared_error : float
+        RMS length of one offset that all touches share, mm; see `gp_core.atlas.systematic`.
+    times : mapping of str to float, optional
+        When each feature was touched, s; then a drift is looked for.
 
     Raises
     ------
@@ -70,27 +82,56 @@ def estimate_robust(touches: LandmarkSet, atlas: Atlas, *, probe_noise: float | 
     compile_if_repeated()
     model = touch_model(touches, atlas, probe_noise)
     points = mirror_right(touches.array(model.codes), touches.side)
+    systematic = Systematic(shared_error, _elapsed(times, model))
     fit = fit_named_points(model, points)
+    named, *others = readings(model, points, fit)
+    better = _better_exchanged(model, points, fit, others) if fit.rough else None
     suspects = _suspects(model, fit)
-    defining = defining_points(atlas, model, fit)
-    frame = _cochlea_in_touches(defining, fit, touches)
-    worse = _other_side_worse(model, points, fit)
-    swapped = _swapped(model, points, fit, max(_AGAINST_THE_USER, -worse)) if fit.rough else None
-    return CochleaPose(
+    frame, covariance = _posed(atlas, model, fit, touches, systematic)
+    pose = CochleaPose(
         side=touches.side,
         method="robust",
         atlas=atlas.name,
         transform_to_touches=frame,
-        covariance=pose_covariance(atlas, model, fit, defining, touches.side),
+        covariance=covariance,
         residuals=_residuals(model, fit),
         suspects=suspects,
-        warnings=tuple(_warnings(fit, touches.side, suspects, worse, swapped)),
         probe_noise=fit.noise,
         T_touches_atlas=_atlas_in_touches(fit, touches),
-        swapped=swapped,
-        side_state=_side_state(worse) if swapped is None else "clear",
-        names_state="clear" if swapped is None else "wrong",
+        shared_error=shared_error,
+        probability=named.probability,
+        hypotheses=tuple(_hypothesis(atlas, model, reading, touches, systematic) for reading in others),
     )
+    decided = replace(pose, **decide(pose, better))
+    return replace(decided, warnings=tuple(_warnings(fit, decided)))
+
+
+def _elapsed(times: Mapping[str, float] | None, model: TouchModel) -> list[float] | None:
+    """Return the times of the model's touches; None unless all have one."""
+    if times is None or not all(code in times for code in model.codes):
+        return None
+    return [float(times[code]) for code in model.codes]
+
+
+def _posed(
+    atlas: Atlas, model: TouchModel, fit: NamedFit, touches: LandmarkSet, systematic: Systematic
+) -> tuple[RigidTransform, FloatArray]:
+    """Return ``T_touches_cochlea`` and its (6, 6) covariance of a fit."""
+    defining = defining_points(atlas, model, fit)
+    covariance = pose_covariance(atlas, model, fit, defining, touches.side, systematic)
+    return _cochlea_in_touches(defining, fit, touches), covariance
+
+
+def _hypothesis(
+    atlas: Atlas, model: TouchModel, reading: Reading, touches: LandmarkSet, systematic: Systematic
+) -> Hypothesis:
+    side = touches.side.other if reading.mirrored else touches.side
+    frame, covariance = _posed(atlas, model, reading.fit, replace(touches, side=side), systematic)
+    pair = None
+    if reading.exchanged is not None:
+        i, j = reading.exchanged
+        pair = model.codes[i], model.codes[j]
+    return Hypothesis(side, pair, reading.probability, frame, covariance)
 
 
 def locate_robust(touches: LandmarkSet, atlas: Atlas) -> RigidTransform:
@@ -162,11 +203,16 @@ def _atlas_in_touches(fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
 
 
 def pose_covariance(
-    atlas: Atlas, model: TouchModel, fit: NamedFit, defining: FloatArray, side: Side
+    atlas: Atlas,
+    model: TouchModel,
+    fit: NamedFit,
+    defining: FloatArray,
+    side: Side,
+    systematic: Systematic,
 ) -> FloatArray:
     """Return the (6, 6) covariance of the cochlea frame: origin (mm), rotation vector (rad).
 
-    `defining` are the `defining_points`.
+    `defining` are the `defining_points`, `systematic` what is added beyond independent errors.
 
     Near the solution the estimate is linear in the residuals, so its error is a linear map of the animal's
     shape and of the touch errors. The shape enters with all its correlations as measured: features taken one
@@ -186,7 +232,9 @@ def pose_covariance(
     of_shape[:, atlas.coordinates(DEFINING)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
     covariance = of_shape @ atlas.scatter @ of_shape.T
-    covariance += (of_touches * _touch_variances(fit)) @ of_touches.T
+    variances = np.maximum(_touch_variances(fit), systematic.noise_floor(len(model.codes)) ** 2)
+    covariance += (of_touches * variances) @ of_touches.T
+    covariance += systematic.covariance(atlas, fit, of_touches, of_shape)
     symmetric: FloatArray = (covariance + covariance.T) / 2
     return symmetric
 
@@ -217,51 +265,25 @@ def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
     return tuple(compress(model.codes, _suspicious(fit).tolist()))
 
 
-def _warnings(
-    fit: NamedFit, side: Side, suspects: tuple[str, ...], worse: float, swapped: tuple[str, str] | None
-) -> Iterator[str]:
-    if swapped is not None:
-        yield f"{' and '.join(swapped)} look swapped"
-    else:
-        yield from _side_warning(worse, side)
-    if suspects and swapped is None:
-        names = " and ".join(suspects)
-        verb, it = ("does", "it") if len(suspects) == 1 else ("do", "them")
+def _better_exchanged(
+    model: TouchModel, points: FloatArray, fit: NamedFit, others: Sequence[Reading]
+) -> tuple[str, str] | None:
+    """Return two features whose exchange fits much better than the names as given and than the other ear."""
+    below = min(
+        fit.misfit - _MUCH_BETTER, *(other.fit.misfit for other in others if other.mirrored), fit.misfit
+    )
+    i, j, misfit = best_exchange(model, points, fit, below)
+    return (model.codes[i], model.codes[j]) if misfit < below else None
+
+
+def _warnings(fit: NamedFit, pose: CochleaPose) -> Iterator[str]:
+    yield from reading_warnings(pose)
+    if pose.suspects and pose.names_state != "wrong":
+        names = " and ".join(pose.suspects)
+        verb, it = ("does", "it") if len(pose.suspects) == 1 else ("do", "them")
         yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
     n = len(fit.weights)
-    if n < _ENOUGH_TO_TELL and not suspects:
+    if n < _ENOUGH_TO_TELL and not pose.suspects:
         yield f"only {n} points: a mistouch cannot be told from an unusual animal"
     if not fit.converged:
         yield "the fit did not settle; check the touches"
-
-
-def _other_side_worse(model: TouchModel, points: FloatArray, fit: NamedFit) -> float:
-    """Return by how much the other side fits worse, in -2 log posterior."""
-    mirrored = mirror_x(points)
-    if fit.rough:
-        return 2 * (fit_named_points(model, mirrored).misfit - fit.misfit)
-    return careful_misfit(model, mirrored, fit.noise) - careful_misfit(model, points, fit.noise)
-
-
-def _side_state(worse: float) -> str:
-    if worse < -_AGAINST_THE_USER:
-        return "wrong"
-    return "undecided" if worse < _CLEAR_MISFIT else "clear"
-
-
-def _side_warning(worse: float, side: Side) -> Iterator[str]:
-    """Say so where the other side fits as well or better; `worse` is its misfit less this side's."""
-    if worse < -_AGAINST_THE_USER:
-        yield f"the {side.other.word} side fits these points better than the {side.word}: check the side"
-    elif worse < _CLEAR_MISFIT:
-        yield (
-            f"these points fit the {side.other.word} side about as well, so a wrong side would pass: "
-            "touch one more feature away from their plane"
-        )
-
-
-def _swapped(model: TouchModel, points: FloatArray, fit: NamedFit, least: float) -> tuple[str, str] | None:
-    """Return the two features whose exchange gains more than `least` in -2 log posterior, if any are such."""
-    below = fit.misfit - least / 2
-    i, j, misfit = best_exchange(model, points, fit, below)
-    return (model.codes[i], model.codes[j]) if misfit < below else None

@@ -311,13 +311,12 @@ class EditedSpecimen:
         return file
 
     def close(self, *, discard: bool = False) -> None:
-        """Let go of journal, locks and scan.
+        """Let go of journal and locks.
 
         Unsaved edits stay in the journal, and are offered at the next start, unless the user wants to
         `discard` them.
         """
         self._keeper.close(keep_journal=self.dirty and not discard)
-        self._volume = None
 
 
 def _details(state: SpecimenState) -> tuple[object, ...]:

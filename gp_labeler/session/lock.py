@@ -15,7 +15,6 @@ import sys
 from pathlib import Path
 from typing import IO
 
-from gp_core.disk import read_json
 from gp_core.errors import GpError
 
 if sys.platform == "win32":
@@ -104,7 +103,7 @@ def _lock(file: IO[str]) -> bool:
 
 def _holder(path: Path) -> str:
     try:
-        holder = read_json(path)
+        holder = json.loads(path.read_text(encoding="utf-8"))
         return f" (process {int(holder['pid'])} on {holder['host']})"
-    except (GpError, ValueError, TypeError, KeyError):
+    except (OSError, ValueError, TypeError, KeyError):
         return ""

@@ -42,9 +42,13 @@ def test_it_starts_from_the_pose_itself_and_names_every_other_feature(published:
 @pytest.mark.parametrize("n", [3, 4, 6, 8, 10])
 def test_more_touches_never_promise_a_larger_region(published: Atlas, n: int) -> None:
     for seed in range(12):
-        for gain in gains(_touches(published, seed, n)[0], published):
+        touches = _touches(published, seed, n)[0]
+        for gain in gains(touches, published, shared_error=0):
             assert gain.radius_95 <= gain.radius_95_now
             assert gain.cone_95 <= gain.cone_95_now
+        for gain in gains(touches, published):  # one more may make it surer that the animal is a large one
+            assert gain.radius_95 <= 1.05 * gain.radius_95_now
+            assert gain.cone_95 <= 1.05 * gain.cone_95_now
 
 
 def test_features_that_vary_together_may_do_a_little_harm_at_most(published: Atlas) -> None:
@@ -62,7 +66,7 @@ def test_the_promise_is_what_the_touch_then_gives(published: Atlas, n: int) -> N
         best = gains(touches, published)[0]
         after = estimate_pose(touches.with_point(best.code, every[best.code]), "L", published)
         promised.append((best.radius_95, best.cone_95))
-        given.append((after.radius_95, after.cone_95))
+        given.append((after.plain_radius_95, after.plain_cone_95))  # gains take the touches as named
     np.testing.assert_allclose(np.mean(given, axis=0), np.mean(promised, axis=0), rtol=0.2)
     np.testing.assert_allclose(np.median(np.divide(given, promised), axis=0), 1.0, atol=0.05)
 

@@ -20,6 +20,8 @@ from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.workbench import Workbench
 
+WAIT_MS = 30_000
+
 
 @pytest.fixture
 def desk():
@@ -49,7 +51,7 @@ def going(qtbot, desk, true):
         desk.tracker.poll()
         assert true()
 
-    qtbot.waitUntil(step)
+    qtbot.waitUntil(step, timeout=WAIT_MS)
 
 
 def connected(qtbot, desk, simulator):

@@ -1,0 +1,77 @@
+"""Whether side and names of a pose are clear, undecided or wrong: from the odds of the other readings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from gp_core.atlas.mixture import UNDECIDED, Hypothesis
+from gp_core.atlas.pose import CochleaPose
+
+__all__ = ["decide", "reading_warnings"]
+
+_WRONG = 0.5
+"""Probability of other readings from which the one given is called wrong."""
+
+_SAME_MM, _SAME_DEG = 0.25, 5.0
+"""Up to here an exchange of names changes nothing that matters: the two lie at nearly the same place."""
+
+
+def decide(pose: CochleaPose, better_exchanged: tuple[str, str] | None) -> dict[str, Any]:
+    """Return `side_state`, `names_state` and `swapped` of a pose.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        With its hypotheses.
+    better_exchanged : (str, str) or None
+        Two features whose touches fit much better with their names exchanged: that is told however little it
+        moves the pose, and however seldom names are exchanged.
+    """
+    others = [h for h in pose.hypotheses if h.exchanged is None]
+    exchanges = [h for h in pose.hypotheses if h.exchanged is not None]
+    side = _state(sum(h.probability for h in others))
+    told = [h for h in exchanges if _matters(pose, h)]
+    names = _state(sum(h.probability for h in told))
+    if sum(h.probability for h in exchanges) >= _WRONG:
+        names, told = "wrong", exchanges
+    if names != "wrong" and better_exchanged is not None:
+        return {"side_state": side, "names_state": "wrong", "swapped": better_exchanged}
+    heaviest = max(told, key=lambda h: h.probability, default=None)
+    return {
+        "side_state": side,
+        "names_state": names,
+        "swapped": None if names == "clear" or heaviest is None else heaviest.exchanged,
+    }
+
+
+def _state(probability: float) -> str:
+    if probability >= _WRONG:
+        return "wrong"
+    return "undecided" if probability >= UNDECIDED else "clear"
+
+
+def _matters(pose: CochleaPose, other: Hypothesis) -> bool:
+    """Whether an exchange moves the pose: then its names are not a matter of words."""
+    mm = float(np.linalg.norm(other.origin - pose.origin))
+    degrees = float(np.degrees(np.arccos(np.clip(other.axis @ pose.axis, -1, 1))))
+    return mm > _SAME_MM or degrees > _SAME_DEG
+
+
+def reading_warnings(pose: CochleaPose) -> Iterator[str]:
+    """Say so where the touches may be of the other ear, or two of them exchanged."""
+    names = " and ".join(pose.swapped or ())
+    this, other = pose.side.word, pose.side.other.word
+    if pose.names_state == "wrong":
+        yield f"{names} look swapped"
+    elif pose.names_state == "undecided":
+        yield f"{names} may be exchanged: touch both again"
+    if pose.side_state == "wrong":
+        yield f"the {other} side fits these points better than the {this}: check the side"
+    elif pose.side_state == "undecided":
+        yield (
+            f"these points fit the {other} side about as well, so a wrong side would pass: "
+            "touch one more feature away from their plane"
+        )
