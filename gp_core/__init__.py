@@ -14,12 +14,12 @@ Examples
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.insertion import carry_path, read_path
+from gp_core.atlas.label_check import Departure, Finding, SideCheck, check_side, check_specimen
 from gp_core.atlas.next_touch import TouchGain, gains
 from gp_core.atlas.pose import CochleaPose, estimate_pose
 from gp_core.atlas.pose_files import read_pose
 from gp_core.atlas.pose_gate import GateReason, PoseGate
 from gp_core.atlas.pose_quality import PoseQuality, pose_quality
-from gp_core.atlas.quality import Finding, check_specimen
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -30,6 +30,7 @@ from gp_core.landmarks.files import (
     read_landmarks,
     read_touches,
     write_markups,
+    write_suggestions,
 )
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
@@ -55,6 +56,7 @@ __all__ = [
     "Atlas",
     "CochleaPose",
     "ComparisonReport",
+    "Departure",
     "DistanceTable",
     "Feature",
     "FiducialRegistration",
@@ -73,6 +75,7 @@ __all__ = [
     "RigidTransform",
     "SearchReport",
     "Side",
+    "SideCheck",
     "SimulationReport",
     "Specimen",
     "Status",
@@ -81,6 +84,7 @@ __all__ = [
     "__version__",
     "calibrate_pivot",
     "carry_path",
+    "check_side",
     "check_specimen",
     "compare",
     "distances",
@@ -103,4 +107,5 @@ __all__ = [
     "search_features",
     "simulate",
     "write_markups",
+    "write_suggestions",
 ]

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import io
 import logging
-import os
 import sys
 from collections.abc import Sequence
 
 from gp_core import __version__
 from gp_core.commands import estimate, labels, study, study_errors, study_physical, study_search, tracking
-from gp_core.commands.options import keep_inputs
+from gp_core.commands.options import keeping_inputs
 from gp_core.errors import GpError
+from gp_core.terminal import leave_output, plain_terminal
 
 __all__ = ["main", "make_parser"]
 
@@ -42,21 +41,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
         pose was not written, since names or side look wrong; 130 where it was stopped and 141 where nobody
         reads on, as shells have it.
     """
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows a question mark
+    with plain_terminal():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
     args = make_parser().parse_args(arguments)
     try:
-        keep_inputs(args)
-        status: int = args.run(args)
+        with keeping_inputs(args):
+            status: int = args.run(args)
         sys.stdout.flush()
     except GpError as error:
         sys.stderr.write(f"gp-core: {error}\n")
         return 2
-    except BrokenPipeError:  # who reads has read enough, such as `head`; Python would complain at its end
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # who reads has read enough, such as `head`
+        leave_output()
         return 141
+    except MemoryError:
+        sys.stderr.write("gp-core: there is not enough memory for this; close other programs\n")
+        return 2
     except OSError as error:
         sys.stderr.write(f"gp-core: {error.filename or 'file'}: {error.strerror or error}\n")
         return 2

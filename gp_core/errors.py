@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from os import PathLike, fspath
 
+from gp_core.terminal import printable
+
 __all__ = ["FeatureError", "FileFormatError", "FrameError", "GeometryError", "GpError"]
 
 
@@ -45,7 +47,7 @@ class GpError(Exception):
         text = f"{where}: {self.problem}" if where else self.problem
         if self.remedy:
             text = f"{text.rstrip('.')}. {self.remedy}"
-        return " ".join(text.split())
+        return printable(" ".join(text.split()))
 
 
 class FileFormatError(GpError):

@@ -10,7 +10,10 @@ from pathlib import Path
 
 from gp_core import __version__
 from gp_core.errors import GpError
+from gp_core.terminal import leave_output, plain_terminal
+from gp_labeler.installation import explain_import
 from gp_labeler.mesh_command import run_mesh
+from gp_labeler.plain_numbers import use_plain_numbers
 
 __all__ = ["main", "make_parser"]
 
@@ -21,6 +24,7 @@ _EXAMPLE = """examples:
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
   gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
+  gp-labeler doctor                   what this machine has, and what it lacks
 """
 
 
@@ -52,8 +56,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0; 2 where the input is wrong, said in one line.
+        0; 2 where the input is wrong or the installation incomplete, said in one line.
     """
+    use_plain_numbers()
+    with plain_terminal():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
     logging.basicConfig(format="gp-labeler: %(message)s", level=logging.WARNING)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
@@ -63,16 +73,31 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from gp_labeler.tracker.simulator import main as simulate  # here: nothing else needs a server
 
             return simulate(given[1:], prog="gp-labeler simulate-tracker")
+        if given[:1] == ["doctor"]:
+            from gp_labeler.doctor import run_doctor
+
+            return run_doctor(given[1:])
         return _window(make_parser().parse_args(given))
     except GpError as error:
-        sys.stderr.write(f"gp-labeler: {error}\n")
-        return 2
+        return _refuse(error)
+    except ImportError as error:
+        return _refuse(explain_import(error))
+    except BrokenPipeError:  # who reads has read enough, such as `head`
+        leave_output()
+        return 141
+    except MemoryError:
+        return _refuse(GpError("there is not enough memory for this", remedy="Close other programs."))
     except OSError as error:
         sys.stderr.write(f"gp-labeler: {error.filename or 'file'}: {error.strerror or error}\n")
         return 2
     except KeyboardInterrupt:
         sys.stderr.write("gp-labeler: stopped\n")
         return 130
+
+
+def _refuse(error: GpError) -> int:
+    sys.stderr.write(f"gp-labeler: {error}\n")
+    return 2
 
 
 def _window(args: argparse.Namespace) -> int:

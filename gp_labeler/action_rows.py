@@ -82,6 +82,10 @@ def _has_ghost(desk: Workbench) -> bool:
 # What is done
 
 
+def _change_text_size(step: int) -> Run:
+    return lambda desk, ui: ui.change_text_size(step)
+
+
 def _toggle(field: str) -> Run:
     def change(desk: Workbench, ui: Ui) -> None:
         desk.session.view.update(**{field: not getattr(desk.session.view.state, field)})
@@ -244,11 +248,18 @@ def view_rows() -> Iterator[Action]:
               lambda d, ui: ui.toggle_projection(), group="bone")
     yield row("view.theme", "Dark or light", ("Ctrl+T",), lambda d, ui: ui.toggle_theme(), group="theme",
               icon="moon")
+    for title, id, step, keys in _TEXT_SIZES:
+        yield row(f"view.text_{id}", title, keys, _change_text_size(step), group="text",
+                  hint="Of the whole window, with what is written on slices and in 3D")
 
 
 _LAYOUTS = (
     ("Four views", "four-up", "V"), ("3D only", "3d", "D"), ("Axial only", "axial", "Z"),
     ("Sagittal only", "sagittal", "S"), ("Coronal only", "coronal", "C"),
+)
+_TEXT_SIZES = (
+    ("Larger text", "larger", 1, ("Ctrl+=", "Ctrl++")), ("Smaller text", "smaller", -1, ("Ctrl+-",)),
+    ("Normal text", "normal", 0, ("Ctrl+0",)),
 )
 _VIEWPOINTS = (
     ("anterior", "A", ("1", "Num+1")), ("left", "L", ("3", "Num+3")), ("superior", "S", ("7", "Num+7")),

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.label_check import Departure, SideCheck, check_side
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -28,12 +29,13 @@ from gp_labeler.atlas_work import (
 from gp_labeler.desk_signals import DeskSignals
 from gp_labeler.session.animals import Animals
 from gp_labeler.session.atlas_memory import AtlasMemory, AtlasSource
-from gp_labeler.session.ghosts import Departure, Predict
+from gp_labeler.session.ghosts import Predict
 from gp_labeler.session.jobs import Jobs, Task
+from gp_labeler.session.label_checks import Check
 from gp_labeler.session.session import Session
 from gp_labeler.work import LoadAtlas
 
-__all__ = ["AtlasDesk", "is_atlas_file"]
+__all__ = ["AtlasDesk", "expecting", "is_atlas_file"]
 
 _HEAD = 4096
 
@@ -93,7 +95,8 @@ class AtlasDesk(DeskSignals):
 
     def departures(self, side: Side) -> Mapping[str, Departure] | None:
         """Return how far the labels of one side are from where the atlas expects them; None while unknown."""
-        return self.session.judging(side).known
+        known = self.session.judging(side).known
+        return None if known is None else known.departures
 
     # Which atlas
 
@@ -190,7 +193,7 @@ class AtlasDesk(DeskSignals):
         self.atlas_source, self.trial = source, None
         self.atlas_file = None if source is None else source.file
         self.atlas_problem = ""
-        self.session.set_predict(self._predict)
+        self._expect_by(atlas)
         self.atlas_changed.emit()
         self._hold_against()
 
@@ -236,24 +239,22 @@ class AtlasDesk(DeskSignals):
         self.trial = trial
         self.atlas_details_changed.emit()
 
-    @property
-    def _predict(self) -> Predict | None:
-        """What the session expects features by."""
-        return None if self._atlas is None else partial(predict, self._atlas)
-
     def _hold_against(self, *_: object) -> None:
         """Judge the labels of the open specimen, by an atlas that does not know them."""
         self._cancel("atlas without")
         name = self.session.state.specimen
         others = tuple(animal for animal in self._atlas_specimens if animal.name != name)
         if self.is_held_out and sum(len(animal.sides) for animal in others) >= FEWEST_ANIMALS:
-            self.jobs.submit(RefitAtlas(others), self._expect_by, key="atlas without")
+            self.jobs.submit(RefitAtlas(others), self._hold_out, key="atlas without")
         else:
             self._judge(Side, after=0.0)
 
-    def _expect_by(self, atlas: Atlas) -> None:
-        self.session.set_predict(partial(predict, atlas))
+    def _hold_out(self, atlas: Atlas) -> None:
+        self._expect_by(atlas)
         self._judge(Side, after=0.0)
+
+    def _expect_by(self, atlas: Atlas) -> None:
+        self.session.set_predict(*expecting(atlas))
 
     def _judge(self, sides: Iterable[Side], *, after: float = _DRAWN_FIRST_S) -> None:
         """Find the doubts of some sides in the background, by default once what was clicked is drawn."""
@@ -262,15 +263,20 @@ class AtlasDesk(DeskSignals):
             done = partial(self._take_judged, bool(self.session.near_doubts(side)))
             self.jobs.submit(job, done, key=key, after=after)
 
-    def _take_judged(self, showed_doubts: bool, departures: Mapping[str, Departure]) -> None:
+    def _take_judged(self, showed_doubts: bool, found: SideCheck) -> None:
         self.judged.emit()
-        if showed_doubts or any(departure.is_doubtful for departure in departures.values()):
+        if showed_doubts or found.doubts:
             self.doubts_changed.emit()  # else all points look as they did
 
     def _cancel(self, key: str) -> None:
         for task in self.jobs.running:
             if task.key == key:
                 task.cancel()
+
+
+def expecting(atlas: Atlas) -> tuple[Predict, Check]:
+    """Return what a session expects features and checks labels by."""
+    return partial(predict, atlas), partial(check_side, atlas=atlas)
 
 
 def is_atlas_file(path: str | PathLike[str]) -> bool:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
 
 __all__ = ["make_mesh_parser", "run_mesh"]
@@ -100,10 +101,11 @@ def run_mesh(arguments: Sequence[str]) -> int:
     from gp_labeler.imaging.threshold import propose_threshold
 
     check_mesh_name(args.output)
-    volume = read_volume(args.volume, **options)
-    threshold = propose_threshold(volume) if args.threshold is None else args.threshold
-    surface = extract_isosurface(volume, threshold, **surface_options)
-    surface.save(args.output)
+    with protected_inputs([args.volume]):
+        volume = read_volume(args.volume, **options)
+        threshold = propose_threshold(volume) if args.threshold is None else args.threshold
+        surface = extract_isosurface(volume, threshold, **surface_options)
+        surface.save(args.output)
     for note in volume.notes:
         sys.stderr.write(f"gp-labeler: {volume.name}: {note}\n")
     sys.stdout.write(

@@ -18,7 +18,7 @@ from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
-from gp_labeler.atlas_desk import AtlasDesk, is_atlas_file
+from gp_labeler.atlas_desk import AtlasDesk, expecting, is_atlas_file
 from gp_labeler.bone_desk import BoneDesk
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
@@ -89,12 +89,20 @@ class Workbench(AtlasDesk, BoneDesk):
         self._abandoned: SpecimenState | None = None
         self._copied: str | None = None  # of what this is a copy
         super().__init__(atlas)
-        self.session: Session = new_session(directory, predict=self._predict, author=author)
+        self.session: Session = new_session(directory, **self._session_options)
         self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
         self.pose = PoseDesk(self)
         self.tracker = TrackerDesk(self)
+
+    @property
+    def _session_options(self) -> dict[str, Any]:
+        """What every session begins with."""
+        if self._atlas is None:
+            return {"author": self._author}
+        predicts, checks = expecting(self._atlas)
+        return {"author": self._author, "predict": predicts, "check": checks}
 
     # What is there
 
@@ -141,7 +149,7 @@ class Workbench(AtlasDesk, BoneDesk):
     ) -> None:
         """Open a specimen file, and its scan; raises as `session.opening.open_session` does."""
         session = open_session(
-            path, self.directory, unsaved=unsaved, as_copy=as_copy, predict=self._predict, author=self._author
+            path, self.directory, unsaved=unsaved, as_copy=as_copy, **self._session_options
         )
         self._remember(path)
         copied = _place(Path(path).absolute(), session.state.specimen) if as_copy else None
@@ -150,8 +158,7 @@ class Workbench(AtlasDesk, BoneDesk):
     def recover(self, recovery: Recovery) -> None:
         """Go on where a killed program stopped."""
         if self.directory is not None:
-            options = {"predict": self._predict, "author": self._author}
-            self._replace(recover_session(recovery, self.directory, **options))
+            self._replace(recover_session(recovery, self.directory, **self._session_options))
 
     def open_demo(self, seed: int = 0, spacing: float = 0.2) -> None:
         """Make the phantom and open it as a new specimen."""
@@ -163,7 +170,7 @@ class Workbench(AtlasDesk, BoneDesk):
 
     def begin(self) -> None:
         """Begin a new specimen without a scan, such as one that is only touched."""
-        self._replace(new_session(self.directory, predict=self._predict, author=self._author))
+        self._replace(new_session(self.directory, **self._session_options))
 
     def find_scan(self, path: str | PathLike[str]) -> None:
         """Say where the scan of this specimen is now, and read it from there."""
@@ -272,9 +279,8 @@ class Workbench(AtlasDesk, BoneDesk):
     def _begin_with(self, volume: Volume, *, join: bool = True) -> None:
         """Begin a specimen on a scan; one that was touched without a scan gets it, and goes on."""
         name = tidy_name(volume.name)
-        options = {"predict": self._predict, "author": self._author}
         if not (join and self.lacks_scan):
-            self._replace(new_session(self.directory, specimen=name, **options))
+            self._replace(new_session(self.directory, specimen=name, **self._session_options))
         elif self.session.state.specimen == SpecimenState().specimen:
             self.session.do(RenameSpecimen(name))
         self._attach(volume)

@@ -1,4 +1,4 @@
-"""The wheel and an editable install both carry the resources."""
+"""The wheel carries the resources; the tests' own settings do what they say."""
 
 from __future__ import annotations
 
@@ -31,3 +31,14 @@ def test_the_wheel_carries_the_resources_and_works(tmp_path: Path) -> None:
     )
     assert str(tmp_path) in run.stdout
     assert run.stdout.split()[-1] == "22"
+
+
+@pytest.mark.parametrize(("module", "passes"), [("gp_core.anything", False), ("numpy.linalg", True)])
+def test_a_warning_is_an_error_in_our_modules_only(tmp_path: Path, module: str, passes: bool) -> None:
+    warn = f"warnings.warn_explicit('old', DeprecationWarning, 'a.py', 1, module={module!r})"
+    file = tmp_path / "test_warning.py"
+    file.write_text(f"import warnings\n\ndef test_it():\n    {warn}\n")
+    config = ["-c", str(_ROOT / "pyproject.toml"), "--rootdir", str(tmp_path), "-p", "no:cacheprovider"]
+    command = [sys.executable, "-m", "pytest", "-q", *config, str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == (0 if passes else 1), done.stdout

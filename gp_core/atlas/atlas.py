@@ -8,17 +8,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache, cached_property
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
+from gp_core.disk import read_json, write_text
 from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.landmarks.anatomy import cochlea_frame, cochlea_origin
 from gp_core.landmarks.features import CODES, FEATURES, check_codes, index_of
-from gp_core.landmarks.files import check_plausible_size, write_text
+from gp_core.landmarks.files import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["DEFINING", "SCHEMA_VERSION", "Atlas"]
@@ -125,13 +125,7 @@ class Atlas:
             It cannot be read as an atlas of this schema version.
         """
         remedy = "Make it with: gp-core fit SPECIMENS... -o ATLAS"
-        try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
-        except OSError as error:
-            raise FileFormatError(f"cannot be read ({error.strerror})", file=path) from None
-        except (ValueError, RecursionError):
-            raise FileFormatError("is not an atlas: not valid JSON", file=path, remedy=remedy) from None
-        return cls._from_content(content, path, remedy)
+        return cls._from_content(read_json(path, what="atlas file", remedy=remedy), path, remedy)
 
     @classmethod
     def _from_content(cls, content: Any, path: str | PathLike[str], remedy: str) -> Atlas:

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from gp_core.atlas.pose import CochleaPose
 from gp_core.checks import FloatArray, as_points, check_option
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import write_text
 from gp_core.landmarks.files.table import read_rows
 from gp_core.landmarks.files.text import parse_position, rows_text, shown
 

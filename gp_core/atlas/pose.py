@@ -18,10 +18,11 @@ from gp_core.atlas.mixture import UNDECIDED, Hypothesis, axis_part, holding_radi
 from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.atlas.uncertainty import cone_95, radius_95
 from gp_core.checks import FloatArray, check_option
+from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import check_plausible_size, write_text
+from gp_core.landmarks.files import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["METHODS", "READING_STATES", "ROUND_WINDOWS", "CochleaPose", "estimate_pose"]

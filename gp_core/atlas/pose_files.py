@@ -11,10 +11,11 @@ import numpy as np
 from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose
 from gp_core.checks import FloatArray
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
 from gp_core.frames import FRAMES, RigidTransform
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import FileHeader, LabelledPoint, write_text
+from gp_core.landmarks.files import FileHeader, LabelledPoint
 from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.markups import write_point_lists
 from gp_core.landmarks.files.text import rows_text, shown

@@ -1,12 +1,11 @@
-"""What an atlas says of a labelled side: where features should be, and which labels look wrong."""
+"""Where an atlas expects the features of a labelled side that are not placed."""
 
 from __future__ import annotations
-
-from dataclasses import dataclass
 
 import numpy as np
 
 from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
 from gp_core.atlas.named_fit import NamedFit, TouchModel, fit_named_points, motion_jacobian
 from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GeometryError
@@ -14,29 +13,10 @@ from gp_core.landmarks.anatomy import cochlea_origin, mirror_right
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["Departure", "departures", "predict"]
-
-LABELLING_NOISE_MM = 0.1
-"""Scale of a placed label's error: about a voxel, mm a coordinate."""
+__all__ = ["predict"]
 
 UNKNOWN_ANGLE_SD = np.pi / np.sqrt(3)
 """Standard deviation of an angle of which nothing is known, rad."""
-
-
-@dataclass(frozen=True)
-class Departure:
-    """How far a labelled point is from where the atlas expects it, given the other points.
-
-    Attributes
-    ----------
-    distance : float
-        mm.
-    mahalanobis : float
-        The same in standard deviations; 4 is about one in 10 000 for a point labelled well.
-    """
-
-    distance: float
-    mahalanobis: float
 
 
 def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -71,31 +51,6 @@ def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray,
     if "CO" not in landmarks:
         found["CO"] = _predict_origin(landmarks, found)
     return found
-
-
-def departures(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, Departure]:
-    """Hold every placed feature against where the other ones put it.
-
-    Raises
-    ------
-    FeatureError
-        Fewer than four usable features.
-    """
-    known = _known(atlas, landmarks)
-    if len(known) < 4:
-        raise FeatureError(
-            f"at least four placed features are needed to check one against the rest, got {len(known)}"
-        )
-    return {code: _departure(atlas, landmarks, known, code) for code in known}
-
-
-def _departure(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...], code: str) -> Departure:
-    others = tuple(other for other in known if other != code)
-    fit = _fit(atlas, landmarks, others)
-    mean, covariance = _to_frame(*_given(atlas, others, fit, (code,)), fit, landmarks.side)
-    away = landmarks[code] - mean[0]
-    spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
-    return Departure(float(np.linalg.norm(away)), float(np.sqrt(away @ np.linalg.solve(spread, away))))
 
 
 def _known(atlas: Atlas, landmarks: LandmarkSet) -> tuple[str, ...]:

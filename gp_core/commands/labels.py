@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict
-from typing import Any
 
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
-from gp_core.atlas.quality import Finding, check_specimen
+from gp_core.atlas.label_check import Finding, check_specimen
 from gp_core.commands.options import (
     Subparsers,
     add_command,
@@ -33,8 +31,6 @@ from gp_core.landmarks.files import (
 from gp_core.landmarks.sets import Specimen
 
 __all__ = ["add"]
-
-_HARMLESS = ("missing", "unseen")
 
 
 def add(commands: Subparsers) -> None:
@@ -101,14 +97,14 @@ def run_check(args: argparse.Namespace) -> int:
     )
     atlas, others = read_atlas(args.atlas)
     report = {s.name: check_specimen(s, _atlas_for(s, atlas, others)) for s in specimens}
-    save_json(args.json, {name: [_as_dict(f) for f in findings] for name, findings in report.items()})
+    save_json(args.json, {name: [f.as_dict() for f in findings] for name, findings in report.items()})
     for name, findings in report.items():
         say(f"{name}: {_verdict(findings)}")
         for finding in findings:
-            mark = " " if finding.kind in _HARMLESS else "!"
+            mark = "!" if finding.is_doubt else " "
             codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
             say(f"  {mark} {finding.side.word:<5} {codes:<8} {finding.text}")
-    return int(any(f.kind not in _HARMLESS for findings in report.values() for f in findings))
+    return int(any(f.is_doubt for findings in report.values() for f in findings))
 
 
 def _one_side(files: list[str], side: str) -> Specimen:
@@ -127,14 +123,8 @@ def _atlas_for(specimen: Specimen, atlas: Atlas | None, others: list[Specimen] |
 
 
 def _verdict(findings: list[Finding]) -> str:
-    doubtful = sum(f.kind not in _HARMLESS for f in findings)
-    absent = len(findings) - doubtful
+    doubtful = sum(f.is_doubt for f in findings)
+    absent = sum(f.kind in ("missing", "suggested", "unseen") for f in findings)
     if not findings:
         return "all labels placed, none doubtful"
     return f"{doubtful} to look at, {absent} not placed"
-
-
-def _as_dict(finding: Finding) -> dict[str, Any]:
-    content = asdict(finding)
-    content["side"] = finding.side.value
-    return content

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.disk import is_protected, is_stream, protected_inputs, read_head, write_text
 from gp_core.errors import GpError
-from gp_core.landmarks.files import load_specimens, write_text
+from gp_core.landmarks.files import landmark_files, load_specimens
 from gp_core.landmarks.sets import Specimen
 
 __all__ = [
@@ -23,7 +24,7 @@ __all__ = [
     "add_json",
     "add_specimens",
     "blaming",
-    "keep_inputs",
+    "keeping_inputs",
     "read_atlas",
     "save_json",
     "say",
@@ -32,7 +33,7 @@ __all__ = [
 Subparsers = Any
 """What `argparse.ArgumentParser.add_subparsers` returns; its class is private."""
 
-_WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output")
+_WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output", "checkpoint")
 """Names of the options whose files are written; every other word that is a file is read."""
 
 _ANOTHER = "Name another file."
@@ -70,26 +71,38 @@ def add_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", metavar="FILE", help="write the full result here")
 
 
-def keep_inputs(args: argparse.Namespace) -> None:
-    """Refuse to write over a file that is read, or two results to one file.
+@contextmanager
+def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
+    """Refuse to write over what is read, under any name, or two results to one file, while a command runs.
 
     Raises
     ------
     GpError
-        Two options name the same file.
+        An output is an input, also one in a folder of landmark files, or two outputs are one file.
     """
-    read = {os.path.realpath(word) for word in _words_read(args) if Path(word).is_file()}
-    written: dict[str, str] = {}
-    for name in _WRITTEN:
-        word = getattr(args, name, None)
-        if word is None:
-            continue
-        path, option = os.path.realpath(word), f"--{name.replace('_', '-')}"
-        if path in read:
-            raise GpError(f"is read, and {option} would write over it", file=word, remedy=_ANOTHER)
-        if path in written:
-            raise GpError(f"would be written by {written[path]} and {option}", file=word, remedy=_ANOTHER)
-        written[path] = option
+    with protected_inputs(_files_read(args)):
+        written: dict[str, str] = {}
+        for name in _WRITTEN:
+            word = getattr(args, name, None)
+            if word is None:
+                continue
+            path, option = os.path.realpath(word), f"--{name.replace('_', '-')}"
+            if is_protected(word):
+                raise GpError(f"is read, and {option} would write over it", file=word, remedy=_ANOTHER)
+            if path in written and not is_stream(word):
+                problem = f"would be written by {written[path]} and {option}"
+                raise GpError(problem, file=word, remedy=_ANOTHER)
+            written[path] = option
+        yield
+
+
+def _files_read(args: argparse.Namespace) -> Iterator[str | Path]:
+    """Yield every word that is no output, and the landmark files of those that are folders."""
+    for word in _words_read(args):
+        yield word
+        if Path(word).is_dir():
+            with suppress(GpError):  # a folder without any, which the command itself may complain about
+                yield from landmark_files(word)
 
 
 def _words_read(args: argparse.Namespace) -> Iterator[str]:
@@ -119,9 +132,8 @@ def _is_atlas_file(word: str) -> bool:
     path, name = Path(word), word.lower()
     if path.is_dir():
         return False
-    with suppress(OSError), path.open("rb") as file:
-        if b'"gpAtlas"' in file.read(1000):
-            return True
+    if b'"gpAtlas"' in read_head(path, 1000):
+        return True
     return name.endswith(".json") and not name.endswith(".mrk.json")
 
 
@@ -138,12 +150,8 @@ def blaming(file: str) -> Iterator[None]:
 
 def save_json(path: str | None, content: Any) -> None:
     """Write a result where ``--json`` was given."""
-    if path is None:
-        return
-    try:
+    if path is not None:
         write_text(path, json.dumps(content, indent=1) + "\n")
-    except OSError as error:
-        raise GpError(f"cannot be written ({error.strerror})", file=path) from None
 
 
 def say(text: str = "") -> None:

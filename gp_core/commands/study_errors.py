@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
-from pathlib import Path
 
 from gp_core.commands.options import Subparsers, add_command, add_json, add_specimens, save_json, say
 from gp_core.commands.study_options import (
@@ -21,6 +19,7 @@ from gp_core.commands.study_options import (
     save_figure_of,
     settings_of,
 )
+from gp_core.disk import read_json
 from gp_core.errors import FileFormatError
 from gp_core.landmarks.files import load_specimens
 from gp_core.registration.jrmpc import ESTIMATION
@@ -114,17 +113,17 @@ def run_simulate(args: argparse.Namespace) -> int:
 
 def _physical_errors(file: str, method: str) -> list[tuple[float, float]]:
     """Return E_CO and E_MA by ICP, the paper's way, of a result of ``physical``."""
+    remedy = "Make it with: gp-core physical ... --json"
+    content = read_json(file, what="result of a physical test", remedy=remedy)
     try:
-        rows = json.loads(Path(file).read_text(encoding="utf-8"))["rows"]
+        rows = content["rows"]
         return [
             (float(row["e_co_mm"]), float(row["e_ma_deg"]))
             for row in rows
             if (row["registration"], row["method"]) == ("icp", method)
         ]
-    except (OSError, ValueError, KeyError, TypeError):
-        raise FileFormatError(
-            "is no result of a physical test", file=file, remedy="Make it with: gp-core physical ... --json"
-        ) from None
+    except (ValueError, KeyError, TypeError, OverflowError):
+        raise FileFormatError("is no result of a physical test", file=file, remedy=remedy) from None
 
 
 def _simulation_lines(report: SimulationReport) -> Iterator[str]:

@@ -9,8 +9,9 @@ from typing import Any
 
 from gp_core.atlas.pose_files import tfm_text
 from gp_core.commands.options import Subparsers, add_command, add_json, blaming, save_json, say
+from gp_core.disk import write_text
 from gp_core.landmarks.anatomy import with_cochlea_origin
-from gp_core.landmarks.files import read_landmarks, read_touches, write_text
+from gp_core.landmarks.files import read_landmarks, read_touches
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.fiducials import FiducialRegistration, named_points, register_fiducials
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot, read_marker_poses

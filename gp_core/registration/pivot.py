@@ -35,6 +35,7 @@ _KEEP_STILL = (
 _FARTHEST_MM = 1e5
 _N_REWEIGHTED = 40
 _N_ROUNDS = 5
+_MAX_ROWS = 200_000  # an hour at 60 Hz
 _NOT_SEEN = ("", "na", "nan", "null")
 _COLUMNS = {16: 0, 17: 1, 12: 0, 13: 1}
 """Numbers in a row that holds a whole pose, and how many before it are a time stamp."""
@@ -300,7 +301,7 @@ def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
 
 def _read_rows(path: str | PathLike[str]) -> list[list[float]]:
     found = []
-    for i, (number, fields) in enumerate(read_rows(path, aligned=True)):
+    for i, (number, fields) in enumerate(read_rows(path, aligned=True, at_most=_MAX_ROWS)):
         try:
             found.append([float(field) if field.lower() not in _NOT_SEEN else np.nan for field in fields])
         except ValueError:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
 from gp_core.checks import FloatArray
+from gp_core.disk import read_bytes
 from gp_core.errors import FileFormatError
 from gp_core.registration.targets import Surface
 
 __all__ = ["read_stl"]
 
 _REMEDY = "Export the mesh as STL, in mm, in the frame of the landmarks."
+_MAX_BYTES = 1_000_000_000  # 20 million triangles
 _HEADER = 80
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
@@ -31,11 +32,7 @@ def read_stl(path: str | PathLike[str]) -> Surface:
     FileFormatError
         Missing, not STL, damaged, or without a triangle.
     """
-    try:
-        raw = Path(path).read_bytes()
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileFormatError(f"cannot be read ({reason})", file=path, remedy="Check the name.") from None
+    raw = read_bytes(path, what="surface in STL", max_bytes=_MAX_BYTES)
     corners = _binary(raw)
     if corners is None:
         corners = _text(raw)

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.disk import read_json, write_text
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.files import write_text
 from gp_core.landmarks.sets import Specimen
 from gp_core.registration.jrmpc import JrmpcSettings
 
@@ -47,10 +47,10 @@ class Checkpoint:
             self._results = self._read(path)
 
     def _read(self, path: str | PathLike[str]) -> dict[str, Any]:
+        content = read_json(path, what="checkpoint of a study", remedy=_REMEDY)
         try:
-            content = json.loads(Path(path).read_text(encoding="utf-8"))
             version, key, results = content["gpCheckpoint"], content["key"], content["results"]
-        except (OSError, ValueError, KeyError, TypeError):
+        except (KeyError, TypeError):
             raise FileFormatError("is not a checkpoint of a study", file=path, remedy=_REMEDY) from None
         if (version, key) != (_VERSION, self._key) or not isinstance(results, dict):
             raise FileFormatError(

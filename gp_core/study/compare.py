@@ -16,9 +16,9 @@ from gp_core.atlas.draw import draw_animal
 from gp_core.atlas.jrmpc_pose import training_sides
 from gp_core.atlas.pose import METHODS
 from gp_core.checks import FloatArray, check_option
+from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import EXTERNAL, PROBE, TRAINING
-from gp_core.landmarks.files import write_text
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
 from gp_core.study.leave_one_out import held_out_sides

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Sequence
 from itertools import pairwise
 from os import PathLike
@@ -14,6 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
 from gp_core.checks import FloatArray
+from gp_core.disk import write_bytes
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, PROBE
 from gp_core.study.compare import PROBES, ComparisonReport, ComparisonRow
@@ -63,10 +65,9 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
     name = str(path)
     if not name.lower().endswith(_SUFFIXES):
         raise GpError("is no kind of figure that can be written", file=path, remedy="Use .png, .pdf or .svg.")
-    try:
-        figure.savefig(name, dpi=_DPI)
-    except OSError as error:
-        raise GpError(f"cannot be written ({error.strerror})", file=path) from None
+    drawn = io.BytesIO()
+    figure.savefig(drawn, dpi=_DPI, format=name.lower().rpartition(".")[2])
+    write_bytes(path, drawn.getvalue())
 
 
 def new_figure(n_rows: int, n_columns: int, size_in: tuple[float, float]) -> tuple[Figure, list[Axes]]:

@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import os
-import signal
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures import (
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    as_completed,
+)
 from contextlib import contextmanager
 from importlib import import_module
 from typing import Any, TypeVar
@@ -55,6 +61,10 @@ def run_map(
         raise GpError(
             "a worker process died", remedy="Free some memory, or try again with fewer workers."
         ) from None
+    except CancelledError:  # Dask cancels what it cannot reach any more
+        raise GpError(
+            "the Dask scheduler is gone", remedy="Start it again; with --checkpoint, what was done is kept."
+        ) from None
     finally:
         for future in futures:
             future.cancel()
@@ -92,12 +102,9 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
     elif count == 1:
         yield None
     else:
-        # Started afresh, not forked: a fork copies the locks of threads that do not come along.
-        from multiprocessing import get_context
+        from gp_core.study.workers import worker_context  # here: most commands need no processes
 
-        with ProcessPoolExecutor(
-            count, mp_context=get_context("spawn"), initializer=_leave_interrupts_to_the_parent
-        ) as executor:
+        with ProcessPoolExecutor(count, mp_context=worker_context()) as executor:
             yield executor
 
 
@@ -105,10 +112,6 @@ def n_cores() -> int:
     """Return how many cores this process may use."""
     usable = getattr(os, "sched_getaffinity", None)
     return len(usable(0)) if usable else os.cpu_count() or 1
-
-
-def _leave_interrupts_to_the_parent() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import vtkSMPTools
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
@@ -19,8 +19,8 @@ from gp_core.errors import GpError
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import surface_level
-from gp_labeler.imaging.volume import Volume
-from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple, vtk_ready
+from gp_labeler.imaging.volume import GreyArray, Volume
+from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple
 
 __all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
 
@@ -29,6 +29,12 @@ OVERVIEW_VOXELS = 256**3
 
 SMALLEST_PART_MM = 1.0
 """Ossicles are larger than this across; specks of noise are smaller."""
+
+_CUT_BY_VTK = ("int8", "uint8", "int16", "uint16", "float32")
+"""Flying edges subtracts neighbours in the voxels' own type (VTK 9.7): wider integers wrap around."""
+
+_FLOAT32_MAX = 1e30
+"""Far beyond all grey values, and small enough for a difference of two to be finite."""
 
 
 def overview_stride(volume: Volume, n_voxels: int = OVERVIEW_VOXELS) -> int:
@@ -97,7 +103,7 @@ def extract_isosurface(
     report(0.0)
     region = _region(volume, box)
     level = surface_level(threshold, volume.array)
-    mesh = _contour(_image(volume, region, stride), level)
+    mesh = _contour(*_image(volume, region, stride, level))
     if volume.is_mirrored:
         _turn_over(mesh)
     surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
@@ -139,22 +145,36 @@ def _region(volume: Volume, box: ArrayLike | None) -> FloatArray:
     return region
 
 
-def _image(volume: Volume, region: FloatArray, stride: int) -> vtkImageData:
-    """Wrap (a part of) the voxels as VTK sees them; whole volumes are not copied at full resolution."""
+def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tuple[vtkImageData, float]:
+    """Wrap (a part of) the voxels for VTK, with the level to cut them at.
+
+    Narrow types are not copied at full resolution. Others, and means, become heights above the level.
+    """
     (i0, j0, k0), (i1, j1, k1) = region.astype(int)
     part = volume.array[k0 : k1 + 1, j0 : j1 + 1, i0 : i1 + 1]
     first = region[:1]
     if stride > 1:
         from gp_labeler.imaging.coarse import means_of_cubes  # numba, as above
 
-        part, first = means_of_cubes(part, stride), first + (stride - 1) / 2
+        part, first = means_of_cubes(part, stride, level), first + (stride - 1) / 2
+        level = 0.0
+    elif part.dtype.name not in _CUT_BY_VTK:
+        part, level = _heights(part, level), 0.0
     image = vtkImageData()
     image.SetDimensions(part.shape[::-1])
     image.SetOrigin(triple(volume.voxel_to_scan(first)[0]))
     image.SetSpacing(triple(np.array(volume.spacing) * stride))
     image.SetDirectionMatrix(volume.direction.ravel().tolist())
-    image.GetPointData().SetScalars(to_vtk(vtk_ready(part).ravel(), share=True))
-    return image
+    image.GetPointData().SetScalars(to_vtk(np.ascontiguousarray(part).ravel(), share=True))
+    return image, level
+
+
+def _heights(values: GreyArray, level: float) -> NDArray[np.float32]:
+    """Return (z, y, x) values above a level as float32, plane by plane; exact where the surface runs."""
+    heights = np.empty(values.shape, np.float32)
+    for plane, out in zip(values, heights, strict=True):
+        np.clip(plane.astype(np.float64) - level, -_FLOAT32_MAX, _FLOAT32_MAX, out=out, casting="same_kind")
+    return heights
 
 
 def _contour(image: vtkImageData, level: float) -> vtkPolyData:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
+import os
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +12,15 @@ from vtkmodules.vtkIOGeometry import vtkSTLWriter
 from vtkmodules.vtkIOPLY import vtkPLYWriter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
+from gp_core.disk import atomic_file
 from gp_core.errors import FileFormatError, GpError
 
 __all__ = ["check_mesh_name", "write_mesh"]
 
 _SPACE = "SPACE=LPS"
+_STL_HEADER, _STL_TRIANGLE = 84, 50  # bytes
+_PLY_TRIANGLE = 13
+_PLY_END, _PLY_HEADER_MAX = b"end_header\n", 2000
 
 
 def _ply(mesh: vtkPolyData) -> Any:
@@ -74,16 +78,29 @@ def write_mesh(mesh: vtkPolyData, path: Path) -> None:
         Another suffix, or the file cannot be written.
     """
     check_mesh_name(path)
-    try:
-        with tempfile.TemporaryDirectory(dir=path.parent, prefix=".mesh-") as folder:
-            part = Path(folder, f"mesh{path.suffix.lower()}")
-            writer = _WRITERS[path.suffix.lower()](mesh)
-            writer.SetFileName(str(part))
-            if not writer.Write() or not part.is_file():
-                raise OSError("VTK could not write it")
-            part.replace(path)
-    except OSError as error:
-        reason = error.strerror or error
-        raise GpError(
-            f"the mesh cannot be written ({reason})", file=path, remedy="Choose another folder."
-        ) from None
+    writer = _WRITERS[path.suffix.lower()](mesh)
+    complaints: list[str] = []
+    for teller in (writer, writer.GetExecutive()):  # what VTK would print
+        teller.AddObserver("ErrorEvent", lambda *_: complaints.append("error"))
+    with atomic_file(path) as draft:
+        writer.SetFileName(os.fsencode(draft))  # as bytes: a name need not be UTF-8
+        done = writer.Write() and not complaints and not writer.GetErrorCode()
+        if not done or not _is_whole(draft, mesh):
+            remedy = "Free some space, or choose another folder. The file is as it was."
+            raise GpError("the mesh cannot be written whole", file=path, remedy=remedy)
+
+
+def _is_whole(file: Path, mesh: vtkPolyData) -> bool:
+    """Whether all of a mesh is in the file; VTK does not say of PLY that the disk was full."""
+    if not file.is_file():
+        return False
+    n_bytes = file.stat().st_size
+    if file.suffix.lower() == ".stl":
+        return n_bytes == _STL_HEADER + _STL_TRIANGLE * mesh.GetNumberOfPolys()
+    if file.suffix.lower() == ".ply":
+        with file.open("rb") as stream:
+            header, mark, _ = stream.read(_PLY_HEADER_MAX).partition(_PLY_END)
+        point = 4 * header.count(b"property float ")  # position and normal
+        body = point * mesh.GetNumberOfPoints() + _PLY_TRIANGLE * mesh.GetNumberOfPolys()
+        return n_bytes == len(header) + len(mark) + body
+    return n_bytes > 0  # VTK notices it itself

@@ -8,8 +8,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import write_text
 from gp_core.errors import GpError
-from gp_core.landmarks.files import write_text
+from gp_core.landmarks.files.text import as_csv_cell
 from gp_labeler.offscreen.report import Report
 from gp_labeler.offscreen.runner import Tell, run_script
 from gp_labeler.offscreen.script import Script
@@ -97,7 +98,9 @@ def _table(reports: Mapping[str, Report]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
     writer.writeheader()
-    writer.writerows(_row(name, report) for name, report in reports.items())
+    for name, report in reports.items():
+        row = _row(as_csv_cell(name), report)
+        writer.writerow(row | {"error": as_csv_cell(row["error"])})
     return text.getvalue()
 
 

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
 from gp_labeler.offscreen.rig import use_no_display
 
@@ -32,6 +33,11 @@ def run_offscreen(script: str, output: Path | None, specimens: Sequence[str] = (
     if output is None:
         raise GpError("--offscreen needs --output DIR")
     use_no_display()  # before anything of Qt is made
+    with protected_inputs([script]):
+        return _run(script, output, specimens)
+
+
+def _run(script: str, output: Path, specimens: Sequence[str]) -> int:
     from gp_labeler.offscreen.batch import run_batch, summary_lines
     from gp_labeler.offscreen.demo import demo_script
     from gp_labeler.offscreen.runner import run_script

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.disk import write_text
 from gp_core.landmarks.features import CODES, Side
-from gp_core.landmarks.files import write_text
 from gp_labeler.offscreen.rig import Rig
 
 __all__ = ["Report", "StepRecord", "feature_rows", "pose_rows"]

@@ -16,11 +16,13 @@ from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtTest import QTest
 
 from gp_core.checks import FloatArray
+from gp_core.disk import protect
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature, index_of
 from gp_labeler.offscreen.events import click
 from gp_labeler.offscreen.prompts import ScriptPrompts
 from gp_labeler.scene.planes import Plane
+from gp_labeler.session.animals import labelled_files
 from gp_labeler.session.workflow import Active
 
 if TYPE_CHECKING:
@@ -82,8 +84,13 @@ class Rig:
     # Paths
 
     def to_read(self, path: str) -> Path:
-        """Return a path to read, relative to the script's folder."""
-        return self.folder / path
+        """Return a path to read, relative to the script's folder; no step writes over it."""
+        file = self.folder / path
+        own = {written.resolve() for written in self.files}
+        for read in labelled_files(file) if file.is_dir() else [file]:
+            if read.resolve() not in own:  # a step may read what an earlier one wrote
+                protect(read)
+        return file
 
     def to_write(self, path: str) -> Path:
         """Return a path to write, relative to the output folder, which is made if need be."""

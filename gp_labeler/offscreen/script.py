@@ -12,6 +12,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import read_bytes
 from gp_core.errors import GpError
 from gp_labeler.offscreen.step import Step, make_step
 from gp_labeler.offscreen.steps import STEPS
@@ -88,9 +89,7 @@ def read_script(path: str | PathLike[str]) -> Script:
     """
     file = Path(path)
     try:
-        text = file.read_text(encoding="utf-8")
-    except OSError as error:
-        raise GpError(f"cannot be read: {error.strerror or error}", file=file) from None
+        text = read_bytes(file, what="script").decode()
     except UnicodeDecodeError:
         raise GpError("is not a text file", file=file, remedy="Scripts are TOML or JSON.") from None
     content = _parsed(text, file)

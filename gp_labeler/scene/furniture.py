@@ -9,6 +9,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 from gp_labeler.imaging.vtk_arrays import triple
 from gp_labeler.scene.camera import SceneCamera, Viewpoint
 from gp_labeler.scene.colours import rgb
+from gp_labeler.scene.labels import LABEL_PIXELS
 from gp_labeler.scene.lines2d import PixelLines
 from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.sprites import SpriteSheet, Text
@@ -19,6 +20,8 @@ __all__ = ["OrientationCube", "ScaleBar"]
 _CUBE_PIXELS = 76
 _MARGIN_PIXELS = 14
 _BAR_PIXELS = 110
+_CUBE_SHARE, _BAR_SHARE = 0.35, 0.45
+"""Of the width of a small view: there neither lies on the other."""
 
 
 class ScaleBar:
@@ -46,14 +49,16 @@ class ScaleBar:
             self._drawn = ()
             return
         colours, scale = self._stage.colours, self._stage.scale
-        now = (view.matrix.tobytes(), view.size, scale, colours)
+        height = LABEL_PIXELS * scale * self._stage.text_scale
+        now = (view.matrix.tobytes(), view.size, scale, height, colours)
         if now == self._drawn:
             return
         self._drawn = now
-        length, pixels = scale_bar_length(float(view.pixel_sizes(camera.focus[None])[0]), _BAR_PIXELS * scale)
-        wanted = (length, scale, colours)
+        longest = min(_BAR_PIXELS * scale, _BAR_SHARE * view.size[0])
+        length, pixels = scale_bar_length(float(view.pixel_sizes(camera.focus[None])[0]), longest)
+        wanted = (length, height, colours)
         if wanted != self._written:
-            self._sheet.write([Text(f"{length:g} mm", colours.text, bold=False)], 13 * scale, colours.halo)
+            self._sheet.write([Text(f"{length:g} mm", colours.text, bold=False)], height, colours.halo)
             self._written = wanted
         right, bottom = np.array(view.size) - (_MARGIN_PIXELS + 2) * scale
         left = right - pixels
@@ -64,7 +69,8 @@ class ScaleBar:
             [4.5 * scale, 2.5 * scale],
         )
         width, height = self._sheet.sizes[0]
-        self._sheet.draw([0], [[(left + right - width) / 2, bottom - height - 2 * scale]])
+        begin = min((left + right - width) / 2, view.size[0] - width)
+        self._sheet.draw([0], [[begin, bottom - height - 2 * scale]])
 
     def close(self) -> None:
         """Let go of the bar."""
@@ -123,7 +129,8 @@ class OrientationCube:
     def refresh(self, view: Viewpoint, camera: SceneCamera) -> None:
         """Turn with the camera, and keep the size in pixels."""
         width, height = view.size
-        side, margin = _CUBE_PIXELS * self._stage.scale, _MARGIN_PIXELS * self._stage.scale / 2
+        scale = self._stage.scale
+        side, margin = min(_CUBE_PIXELS * scale, _CUBE_SHARE * width), _MARGIN_PIXELS * scale / 2
         self.renderer.SetViewport(
             margin / width,
             margin / height,

@@ -79,7 +79,8 @@ class LabelActor:
         self._sheet.close()
 
     def _write(self, texts: tuple[Text, ...]) -> None:
-        wanted = (texts, self._stage.scale, self._stage.colours.halo)
+        height = LABEL_PIXELS * self._stage.scale * self._stage.text_scale
+        wanted = (texts, height, self._stage.colours.halo)
         if wanted != self._written:
-            self._sheet.write(texts, LABEL_PIXELS * self._stage.scale, self._stage.colours.halo)
+            self._sheet.write(texts, height, self._stage.colours.halo)
             self._written = wanted

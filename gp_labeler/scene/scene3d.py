@@ -97,6 +97,15 @@ class Scene3D:
     def scale(self, value: float) -> None:
         self._stage.scale = float(value)
 
+    @property
+    def text_scale(self) -> float:
+        """How much larger than normal text is."""
+        return self._stage.text_scale
+
+    @text_scale.setter
+    def text_scale(self, value: float) -> None:
+        self._stage.text_scale = float(value)
+
     def set_colours(self, colours: SceneColours) -> None:
         """Take a theme; lines and ghosts take it when they are shown next."""
         self._stage.colours = colours

@@ -24,11 +24,14 @@ from vtkmodules.vtkRenderingCore import (
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_numpy, to_vtk
 from gp_labeler.scene.colours import rgb
+from gp_labeler.scene.typeface import font_file
 
 __all__ = ["SpriteSheet", "Text", "text_image"]
 
 _HALO_PIXELS = 2.0
 _FAINT = 0.45
+_FONT_FILE = 4
+"""VTK_FONT_FILE of vtkTextProperty.h, which Python does not name."""
 
 
 @dataclass(frozen=True)
@@ -80,9 +83,8 @@ def text_image(text: Text, height: float, halo: str) -> NDArray[np.float32]:
 def _ink(text: Text, height: float) -> NDArray[np.float32]:
     """Coverage of the letters alone, from 0 to 1; as high as a line, so that baselines agree."""
     style = vtkTextProperty()
-    style.SetFontFamilyToArial()
+    _set_font(style, bold=text.bold)
     style.SetFontSize(max(6, round(height)))
-    style.SetBold(text.bold)
     image, size = vtkImageData(), [0, 0]
     if not vtkTextRenderer.GetInstance().RenderString(style, text.text, image, size, 72) or not min(size):
         return np.zeros((1, 1), dtype=np.float32)
@@ -94,6 +96,17 @@ def _ink(text: Text, height: float) -> NDArray[np.float32]:
         return np.zeros((1, 1), dtype=np.float32)
     cut = alpha[lines[0] : lines[-1] + 1, used[0] : used[-1] + 1]
     return (cut / 255).astype(np.float32)
+
+
+def _set_font(style: vtkTextProperty, *, bold: bool) -> None:
+    """Write in the program's font; in VTK's own where the package with it is missing."""
+    path = font_file("Bold" if bold else "Regular")
+    if path is None:
+        style.SetFontFamilyToArial()
+        style.SetBold(bold)
+    else:
+        style.SetFontFamily(_FONT_FILE)
+        style.SetFontFile(str(path))
 
 
 class SpriteSheet:

@@ -28,6 +28,8 @@ class Stage:
         Theme.
     scale : float
         Device pixels per logical pixel (high-DPI), by which texts and lines grow.
+    text_scale : float
+        How much larger than normal text is, by the user's choice.
     """
 
     bone: vtkRenderer
@@ -35,6 +37,7 @@ class Stage:
     overlay: vtkRenderer
     colours: SceneColours = DARK
     scale: float = 1.0
+    text_scale: float = 1.0
 
 
 def solid_actor(data: Any, colour: str, opacity: float = 1.0) -> vtkActor:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.quality import Finding, check_specimen
+from gp_core.atlas.label_check import Finding, check_specimen
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.files import load_specimens
@@ -18,14 +18,13 @@ from gp_core.landmarks.files.naming import natural_key
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.session.specimen_file import SUFFIX, read_specimen
 
-__all__ = ["Animals", "Skipped", "may_hold_labels", "read_animals"]
+__all__ = ["Animals", "Skipped", "labelled_files", "may_hold_labels", "read_animals"]
 
 FEWEST_PLACED = 4
 """A side with fewer says nothing that an atlas could learn from."""
 
 _IN_FOLDERS = (".mrk.json", ".fcsv", SUFFIX)
 _SAME_MM = 1e-3
-_HARMLESS = ("missing", "unseen", "unchecked")
 
 
 @dataclass(frozen=True)
@@ -138,7 +137,7 @@ class _Reading:
     def checked(self, name: str) -> Specimen:
         """Return an animal with the sides that can be used, and note what to look at."""
         animal = Specimen(name, self.sides[name])
-        findings = [f for f in check_specimen(animal, Atlas.published()) if f.kind not in _HARMLESS]
+        findings = [f for f in check_specimen(animal, Atlas.published()) if f.is_doubt]
         exchanged = {finding.side: finding for finding in findings if finding.kind == "other side"}
         for side, finding in exchanged.items():
             self.skipped.append(Skipped(f"{name} {side.word}", finding.text))
@@ -184,8 +183,8 @@ def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
 def _files_at(path: Path) -> list[Path]:
     if not path.is_dir():
         return [path]
-    here = list(_labelled_files(path))
-    found = here or [file for folder in sorted(path.iterdir()) for file in _labelled_files(folder)]
+    here = list(labelled_files(path))
+    found = here or [file for folder in sorted(path.iterdir()) for file in labelled_files(folder)]
     if not found:
         raise GpError(
             f"holds no labelled animals ({', '.join('*' + suffix for suffix in _IN_FOLDERS)})",
@@ -195,7 +194,8 @@ def _files_at(path: Path) -> list[Path]:
     return found
 
 
-def _labelled_files(folder: Path) -> Iterator[Path]:
+def labelled_files(folder: Path) -> Iterator[Path]:
+    """Yield the landmark and specimen files of a folder, not deeper."""
     if folder.is_dir():
         for file in sorted(folder.iterdir()):
             if file.name.lower().endswith(_IN_FOLDERS) and not file.name.startswith("."):

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import read_json, write_text
 from gp_core.errors import GpError
 from gp_labeler.session.places import absolute_path
-from gp_labeler.session.specimen_file import write_durably
 
 __all__ = ["AtlasMemory", "AtlasSource"]
 
@@ -53,8 +53,8 @@ class AtlasMemory:
     def recall(self) -> AtlasSource | None:
         """Return the source; None for the published atlas."""
         try:
-            content = json.loads(self._path.read_bytes())
-        except (OSError, ValueError, RecursionError):
+            content = read_json(self._path)
+        except GpError:
             return None
         if not isinstance(content, dict):
             return None
@@ -74,6 +74,6 @@ class AtlasMemory:
             elif source is not None:
                 content = {"animals": [str(absolute_path(path)) for path in source.animals]}
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            write_durably(self._path, json.dumps(content, indent=1))
+            write_text(self._path, json.dumps(content, indent=1))
         except (OSError, GpError):
             return

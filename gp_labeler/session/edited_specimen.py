@@ -311,12 +311,13 @@ class EditedSpecimen:
         return file
 
     def close(self, *, discard: bool = False) -> None:
-        """Let go of journal and locks.
+        """Let go of journal, locks and scan.
 
         Unsaved edits stay in the journal, and are offered at the next start, unless the user wants to
         `discard` them.
         """
         self._keeper.close(keep_journal=self.dirty and not discard)
+        self._volume = None
 
 
 def _details(state: SpecimenState) -> tuple[object, ...]:

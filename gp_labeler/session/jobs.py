@@ -10,6 +10,7 @@ import logging
 import queue
 import threading
 import time
+import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
@@ -103,7 +104,15 @@ class Task(Generic[R]):
         self.text = ""
         self.result: R | None = None
         self.error: Exception | None = None
-        self.progress = Progress(lambda fraction, text: report(self, fraction, text))
+        this = weakref.ref(
+            self
+        )  # else task and progress would hold each other, and scan and meshes with them
+
+        def tell(fraction: float, text: str) -> None:
+            if (task := this()) is not None:
+                report(task, fraction, text)
+
+        self.progress = Progress(tell)
 
     def cancel(self) -> None:
         """Ask it to stop; its result is not delivered from now on."""
@@ -203,9 +212,9 @@ class Jobs:
         except Cancelled:
             state = TaskState.CANCELLED
         except Exception as caught:
-            state, error = TaskState.FAILED, caught
             if not isinstance(caught, GpError):
                 _log.exception("%s failed", task.job.title)
+            state, error = TaskState.FAILED, _without_frames(caught)
         self._dispatch(lambda: self._finish(task, state, result, error, done))
 
     def _finish(
@@ -233,6 +242,15 @@ class Jobs:
                 self.progressed.emit(task)
 
         self._dispatch(tell)
+
+
+def _without_frames(error: Exception) -> Exception:
+    """Return an error, and those behind it, without the frames that they hold, and so the voxels in them."""
+    behind: BaseException | None = error
+    while behind is not None:
+        behind.__traceback__ = None
+        behind = behind.__cause__ or behind.__context__
+    return error
 
 
 class QueueDispatcher:

@@ -20,14 +20,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from gp_core.disk import read_bytes, write_bytes
 from gp_core.errors import FileFormatError, GpError
 from gp_labeler.session.changes import difference, dumped, patched
 from gp_labeler.session.document import Document
-from gp_labeler.session.specimen_file import application, write_durably
+from gp_labeler.session.specimen_file import application
 
 __all__ = ["Entry", "Journal", "JournalContent", "read_journal"]
 
 VERSION = 1
+_MAX_BYTES = 1_000_000_000
 _LINE = re.compile(rb'\{"record":(.*),"crc32":([0-9]{1,10})\}\n', re.DOTALL)
 
 
@@ -122,7 +124,7 @@ class Journal:
         except OSError as error:
             raise GpError(f"cannot be made: {error.strerror}", file=path.parent) from None
         line = _base_line(base, specimen_file, saved)
-        write_durably(path, line.decode())
+        write_bytes(path, line)
         return cls(path, n_bytes=len(line), n_records=1, document=base)
 
     @classmethod
@@ -183,7 +185,7 @@ class Journal:
         line = _base_line(base, specimen_file, saved)
         self.close()
         try:
-            write_durably(self.path, line.decode())
+            write_bytes(self.path, line)
         finally:
             self._file = _opened(self.path)
         self._end, self._n_records, self._document = len(line), 1, base
@@ -221,10 +223,7 @@ def read_journal(path: Path) -> JournalContent:
     GpError
         It cannot be opened, its first record is damaged, or it is of a newer version.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise GpError(f"cannot be opened: {error.strerror}", file=path) from None
+    content = read_bytes(path, what="journal", max_bytes=_MAX_BYTES)
     records = _whole_records(content)
     header, end = next(records, ({}, 0))
     if header.get("kind") != "base" or not isinstance(header.get("document"), dict):

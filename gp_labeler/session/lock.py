@@ -15,6 +15,7 @@ import sys
 from pathlib import Path
 from typing import IO
 
+from gp_core.disk import read_json
 from gp_core.errors import GpError
 
 if sys.platform == "win32":
@@ -103,7 +104,7 @@ def _lock(file: IO[str]) -> bool:
 
 def _holder(path: Path) -> str:
     try:
-        holder = json.loads(path.read_text(encoding="utf-8"))
+        holder = read_json(path)
         return f" (process {int(holder['pid'])} on {holder['host']})"
-    except (OSError, ValueError, TypeError, KeyError):
+    except (GpError, ValueError, TypeError, KeyError):
         return ""

@@ -6,9 +6,9 @@ import json
 from os import PathLike
 from pathlib import Path
 
+from gp_core.disk import read_json, write_text
 from gp_core.errors import GpError
 from gp_labeler.session.places import absolute_path
-from gp_labeler.session.specimen_file import write_durably
 
 __all__ = ["RecentFiles"]
 
@@ -34,8 +34,8 @@ class RecentFiles:
     def all(self) -> tuple[Path, ...]:
         """Return the remembered files, also those that are gone now."""
         try:
-            content = json.loads(self._path.read_bytes())
-        except (OSError, ValueError, RecursionError):
+            content = read_json(self._path)
+        except GpError:
             return ()
         paths = content.get("files") if isinstance(content, dict) else None
         if not isinstance(paths, list):
@@ -60,6 +60,6 @@ class RecentFiles:
         content = {"files": [str(p) for p in paths[: self._limit]]}
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            write_durably(self._path, json.dumps(content, indent=1))
+            write_text(self._path, json.dumps(content, indent=1))
         except (OSError, GpError):
             return

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
+from gp_core.atlas.label_check import Finding
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.session.edited_specimen import EditedSpecimen, utc_now
 from gp_labeler.session.edits import as_position
-from gp_labeler.session.ghosts import Doubt, Expectations, Ghost, Judging, Predict
+from gp_labeler.session.ghosts import Expectations, Ghost, Predict
 from gp_labeler.session.history import History
 from gp_labeler.session.keeper import Keeper
+from gp_labeler.session.label_checks import Check, CheckLabels, LabelChecks
 from gp_labeler.session.state import SpecimenState, point_key
 from gp_labeler.session.view import View
 from gp_labeler.session.workflow import (
@@ -46,7 +48,9 @@ class Session(EditedSpecimen):
     saved : SpecimenState, optional
         What is saved, where that is not where it stands.
     predict : callable, optional
-        The atlas, for ghosts and doubts; see `ghosts.Predict`.
+        The atlas, for ghosts; see `ghosts.Predict`.
+    check : callable, optional
+        The checker, for doubts; see `label_checks.Check`.
     author : str, optional
         Who labels; by default the name the user is logged in with.
     clock : callable
@@ -66,6 +70,7 @@ class Session(EditedSpecimen):
         keeper: Keeper | None = None,
         saved: SpecimenState | None = None,
         predict: Predict | None = None,
+        check: Check | None = None,
         author: str | None = None,
         clock: Callable[[], str] = utc_now,
     ) -> None:
@@ -73,7 +78,7 @@ class Session(EditedSpecimen):
         super().__init__(history, keeper or Keeper(), saved=saved, clock=clock)
         self.author = _user() if author is None else author
         self.view = View()
-        self._expectations = Expectations(predict)
+        self._expectations, self._checks = Expectations(predict), LabelChecks(check)
         self._crosshair: FloatArray = _read_only([0.0, 0.0, 0.0])
         self._active = next_point(self.state, Active(Side.LEFT), self.ghosts)
 
@@ -96,21 +101,21 @@ class Session(EditedSpecimen):
         """Return where the points to do of one side are expected."""
         return self._expectations.ghosts(self.landmarks(side), self.landmarks(side.other))
 
-    def doubts(self, side: Side) -> Mapping[str, Doubt]:
-        """Return the points of one side that are far from where they are expected; this may take 150 ms."""
-        return self._expectations.doubts(self.landmarks(side))
+    def doubts(self, side: Side) -> Mapping[str, Finding]:
+        """Return what is doubted of the points of one side, by feature; this may take some 50 ms."""
+        return self._checks.found(self.landmarks(side)).doubts
 
     def is_other_side(self, side: Side) -> bool:
         """Whether one side is known to be labelled under the name of the other; at once, see `judging`."""
-        return self._expectations.known_other_side(self.landmarks(side))
+        return any(doubt.kind == "other side" for doubt in self.near_doubts(side).values())
 
-    def near_doubts(self, side: Side) -> Mapping[str, Doubt]:
+    def near_doubts(self, side: Side) -> Mapping[str, Finding]:
         """Return `doubts` as far as they can be told at once."""
-        return self._expectations.near_doubts(self.landmarks(side))
+        return self._checks.near_doubts(self.landmarks(side))
 
-    def judging(self, side: Side) -> Judging:
-        """Return the job that finds the doubts of one side as it stands, for `point_states` to know them."""
-        return Judging(self._expectations, self.landmarks(side))
+    def judging(self, side: Side) -> CheckLabels:
+        """Return the job that checks one side as it stands, for `point_states` to know its doubts."""
+        return CheckLabels(self._checks, self.landmarks(side))
 
     def point_states(self, side: Side, *, wait: bool = True) -> dict[str, PointState]:
         """Return how far every feature of one side is, in the table's order.
@@ -140,9 +145,9 @@ class Session(EditedSpecimen):
             self._crosshair = crosshair
             self.crosshair_changed.emit(crosshair)
 
-    def set_predict(self, predict: Predict | None) -> None:
+    def set_predict(self, predict: Predict | None, check: Check | None = None) -> None:
         """Take another atlas for ghosts and doubts, or none."""
-        self._expectations = Expectations(predict)
+        self._expectations, self._checks = Expectations(predict), LabelChecks(check)
         self.ghosts_changed.emit()
 
     def _focus(self) -> object:

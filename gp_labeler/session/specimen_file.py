@@ -8,7 +8,6 @@ code: position in scan mm, LPS; unseen, locked, checked; provenance), ``threshol
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
 import os
@@ -18,12 +17,12 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import read_bytes, read_json, write_text
 from gp_core.errors import FileFormatError, GpError
-from gp_core.landmarks.files import write_text
 from gp_labeler.session.document import Document, document_of, state_of
 from gp_labeler.session.state import SpecimenState
 
-__all__ = ["SUFFIX", "application", "digest", "read_specimen", "write_durably", "write_specimen"]
+__all__ = ["SUFFIX", "application", "digest", "read_specimen", "write_specimen"]
 
 SUFFIX = ".gpspecimen.json"
 FORMAT = "gp-labeler specimen"
@@ -50,7 +49,7 @@ def write_specimen(path: str | PathLike[str], state: SpecimenState) -> None:
     document = {"format": FORMAT, "version": VERSION, "application": application(), **document_of(state)}
     document = _with_relative_path(document, target.absolute().parent)
     text = json.dumps(document, indent=1, allow_nan=False) + "\n"
-    write_durably(target, text)
+    write_text(target, text)
 
 
 def read_specimen(path: str | PathLike[str]) -> SpecimenState:
@@ -65,12 +64,7 @@ def read_specimen(path: str | PathLike[str]) -> SpecimenState:
         It cannot be opened, is no specimen file, is of a newer version, or an entry is not what it should be.
     """
     source = Path(path)
-    try:
-        content = json.loads(source.read_bytes())
-    except OSError as error:
-        raise GpError(f"cannot be opened: {error.strerror}", file=source) from None
-    except (ValueError, RecursionError):
-        raise FileFormatError("is not a JSON file", file=source, remedy=f"Choose a *{SUFFIX} file.") from None
+    content = read_json(source, what="specimen file", remedy=f"Choose a *{SUFFIX} file.")
     _check_header(content, source)
     try:
         return state_of(_with_found_volume(content, source.absolute().parent))
@@ -121,23 +115,6 @@ def _with_found_volume(document: Mapping[str, Any], folder: Path) -> Mapping[str
 def digest(path: str | PathLike[str]) -> str | None:
     """Return a checksum of a file's bytes; None where there is no such file."""
     try:
-        return hashlib.blake2b(Path(path).read_bytes(), digest_size=16).hexdigest()
-    except OSError:
+        return hashlib.blake2b(read_bytes(path), digest_size=16).hexdigest()
+    except GpError:
         return None
-
-
-def write_durably(path: Path, text: str) -> None:
-    """Write a file so that after a crash or a power cut it holds either the old or the new text.
-
-    Raises
-    ------
-    GpError
-        It cannot be written; the old text is still there.
-    """
-    write_text(path, text)
-    with contextlib.suppress(OSError):  # make its name last too, where the system can
-        folder = os.open(path.parent, os.O_RDONLY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.labels import same_label
 from gp_labeler.session.edits import as_position
 from gp_labeler.session.state import Position, SpecimenState
 from gp_labeler.session.touches import Touch, touch_name
@@ -43,8 +44,11 @@ class RecordTouch:
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the touch; raises `GpError` where the others are in another frame."""
-        others = {key: touch for key, touch in state.touches.items() if key != (self.side, self.name)}
+        others = {key: touch for key, touch in state.touches.items() if not self._replaces(key)}
         return replace(state, touches={**others, (self.side, self.name): self.touch})
+
+    def _replaces(self, key: tuple[Side, str]) -> bool:
+        return key[0] is self.side and same_label(key[1], self.name)
 
 
 @dataclass(frozen=True)

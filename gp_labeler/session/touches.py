@@ -15,6 +15,7 @@ import numpy as np
 
 from gp_core.errors import FeatureError
 from gp_core.landmarks.features import CODES, EXTERNAL, Side
+from gp_core.landmarks.labels import tidy_label
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["Touch", "TouchHow", "TouchKey", "Touches", "frame_of", "touch_name", "touched_set"]
@@ -75,14 +76,11 @@ def touch_name(name: str) -> str:
     FeatureError
         The feature is inside the bone, or the name is empty.
     """
-    text = name.strip()
-    code = text.upper()
-    if code in EXTERNAL:
-        return code
-    if code in CODES:
+    text = tidy_label(name)
+    if text in CODES and text not in EXTERNAL:
         raise FeatureError(
-            f"{code} is inside the bone and cannot be touched",
-            landmark=code,
+            f"{text} is inside the bone and cannot be touched",
+            landmark=text,
             remedy=f"Touch any of {' '.join(EXTERNAL)}.",
         )
     if not text:

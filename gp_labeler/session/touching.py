@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, Side
-from gp_core.landmarks.files import read_points, read_touches
+from gp_core.landmarks.files import label_names, read_points, read_touches
 from gp_core.landmarks.files.naming import named_side
+from gp_core.landmarks.labels import same_label, tidy_label
 from gp_labeler.session.edits import as_position
 from gp_labeler.session.session import Session
 from gp_labeler.session.touch_edits import (
@@ -132,9 +133,8 @@ def load_skull(session: Session, path: str | PathLike[str]) -> tuple[str, ...]:
         The file cannot be read, or names nothing beside the 20 features.
     """
     points = read_points(path)
-    skull = {
-        p.label: p.position for p in points.points if p.position is not None and p.label.upper() not in CODES
-    }
+    named = zip(label_names(points), points.points, strict=True)
+    skull = {name: p.position for name, p in named if p.position is not None and name not in CODES}
     if not skull:
         raise GpError(
             "names no skull feature", file=path, remedy="Name them as the touches do, such as S1 to S8."
@@ -145,7 +145,8 @@ def load_skull(session: Session, path: str | PathLike[str]) -> tuple[str, ...]:
 
 def mark_skull(session: Session, name: str, position: ArrayLike | None) -> bool:
     """Say where one skull feature is on the scan, (3,) mm, or forget it (None)."""
-    skull = {n: p for n, p in session.state.skull.items() if n != name}
+    name = tidy_label(name)
+    skull = {n: p for n, p in session.state.skull.items() if not same_label(n, name)}
     if position is not None:
         skull[name] = as_position(position, name)
     return session.do(SetSkull(skull))

@@ -6,9 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+from gp_core.atlas.label_check import Finding
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.session.edits import point_text
-from gp_labeler.session.ghosts import Doubt, Ghost
+from gp_labeler.session.ghosts import Ghost
 from gp_labeler.session.state import SpecimenState
 
 __all__ = [
@@ -73,7 +74,7 @@ def progress(state: SpecimenState, side: Side) -> Progress:
 
 
 def point_state(
-    state: SpecimenState, side: Side, code: str, *, ghosts: Mapping[str, Ghost], doubts: Mapping[str, Doubt]
+    state: SpecimenState, side: Side, code: str, *, ghosts: Mapping[str, Ghost], doubts: Mapping[str, Finding]
 ) -> PointState:
     """Return how far a point is; a point that a person checked is not doubted."""
     if feature(code).computed:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import signal
 import sys
 import threading
 from collections.abc import Sequence
@@ -19,6 +20,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.draw import draw_animal
 from gp_core.checks import FloatArray
+from gp_core.disk import read_bytes, write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import EXTERNAL, PROBE, Side
@@ -67,11 +69,13 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
     """
     args = make_parser(prog).parse_args(arguments)
     logging.getLogger("pyigtl").setLevel(logging.ERROR)
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGINT, signal.default_int_handler)  # it ends in good order
     try:
         points, truth = _points(args)
         simulator = _simulator(args, points)
         if args.truth is not None:
-            args.truth.write_text(json.dumps({**truth, "port": simulator.port}, indent=2), encoding="utf-8")
+            write_text(args.truth, json.dumps({**truth, "port": simulator.port}, indent=2))
         _say(f"listening on 127.0.0.1:{simulator.port}")
         return _serve(simulator, args, list(points))
     except (GpError, OSError) as error:
@@ -85,7 +89,7 @@ def _serve(simulator: Simulator, args: argparse.Namespace, names: list[str]) -> 
     if args.live:
         threading.Thread(target=_listen, args=(commands,), daemon=True).start()
     elif args.script is not None:
-        loop = args.script.read_text(encoding="utf-8").splitlines()
+        loop = read_bytes(args.script, what="script").decode(errors="replace").splitlines()
     else:
         loop = [step for name in names for step in (f"go {name} 1.2", "wait 1.5", "lift 30 0.6")]
     try:

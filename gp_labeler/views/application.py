@@ -10,10 +10,12 @@ import traceback
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import Qt, QTimer
+from PySide6.QtCore import QLocale, Qt, QTimer
 from PySide6.QtWidgets import QApplication
 
 from gp_core.errors import GpError
+from gp_labeler.installation import check_display
+from gp_labeler.plain_numbers import use_plain_numbers
 from gp_labeler.session.places import default_directory
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.views.dispatch import QtDispatcher
@@ -27,14 +29,24 @@ _log = logging.getLogger(__name__)
 
 
 def make_application() -> QApplication:
-    """Return the one Qt application, made if need be; without a display, off screen."""
+    """Return the one Qt application, made if need be; without a display, off screen.
+
+    Raises
+    ------
+    GpError
+        Qt cannot draw on the display, or the platform, that the environment names.
+    """
+    use_plain_numbers()
+    QLocale.setDefault(QLocale.c())
     existing = QApplication.instance()
     if isinstance(existing, QApplication):
         return existing
     if not _has_display():
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+    check_display()
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     app = QApplication(["gp-labeler"])
+    use_plain_numbers()  # Qt has just taken the locale from the environment
     app.setApplicationName("gp-labeler")
     app.setApplicationDisplayName("gp-labeler")
     app.setStyle("Fusion")
@@ -83,7 +95,7 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
     Raises
     ------
     GpError
-        There is no display.
+        There is no display that Qt can draw on.
     """
     if not _has_display():
         raise GpError(

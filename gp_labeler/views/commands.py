@@ -20,8 +20,17 @@ __all__ = ["Commands"]
 _VIEW_KEYS = {"Return", "Enter", "Space", "Delete", "Backspace"}
 """Keys that buttons, tables and text fields need themselves: they act while the pointer is in a view."""
 
-_FOLDED = {"from": "Look from", "cut": "Cut bone"}
-"""Groups that have a menu of their own: else the menu View is higher than a small screen."""
+_FOLDED = {
+    "layout": "Views",
+    "from": "Look from",
+    "tool": "Tools",
+    "what": "Show",
+    "text": "Text size",
+    "cut": "Cut bone",
+    "estimate": "Method",
+    "out": "Export and report",
+}
+"""Groups that have a menu of their own: else the menus are higher than a small screen."""
 
 
 class Commands(QObject):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from gp_core.atlas.label_check import HEAD_MM
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
@@ -69,7 +70,10 @@ def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
     ghost = session.ghosts(side).get(code)
     doubt = session.near_doubts(side).get(code)
     if doubt is not None and session.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
-        ghost = doubt.ghost
+        away = doubt.departure_of(code)
+        if away is None or away.distance > HEAD_MM:  # such a place would mean nothing
+            return []
+        return [Ghost(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]
     if ghost is None:
         return []
     return [Ghost(key_of(side, code), ghost.position, ghost.covariance, f"{code}?", active=True)]

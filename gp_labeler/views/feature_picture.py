@@ -23,8 +23,9 @@ from PySide6.QtWidgets import QWidget
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.scene.schematic import FAR, Schematic, schematic_of
+from gp_labeler.views.fonts import CAPTION, HEADING, base_font, family, text_scale
 from gp_labeler.views.strokes import beside, round_pen, smooth
-from gp_labeler.views.theme import Theme, base_font, theme_of
+from gp_labeler.views.theme import Theme, theme_of
 
 __all__ = ["FeaturePicture", "feature_picture"]
 
@@ -39,6 +40,7 @@ _OSSICLES = (("DTM", "MH"), ("DTM", "LLI"), ("DTM", "DTL"))
 _ORBIT = 2
 """Which outline of the head is a hole."""
 
+_SCHEMATIC = "schematic"
 _WORDS = {
     "coronal": "coronal, from the front",
     "axial": "axial, from below",
@@ -47,7 +49,9 @@ _WORDS = {
 }
 
 
-def feature_picture(code: str, side: Side | str, size: QSize, theme: Theme, *, ratio: float = 2.0) -> QPixmap:
+def feature_picture(
+    code: str, side: Side | str, size: QSize, theme: Theme, *, ratio: float = 2.0, scale: float = 1.0
+) -> QPixmap:
     """Draw the picture of a feature: it, among the others, in the view in which it is found best.
 
     Parameters
@@ -62,13 +66,15 @@ def feature_picture(code: str, side: Side | str, size: QSize, theme: Theme, *, r
         Its colours.
     ratio : float
         Device pixels for each logical one.
+    scale : float
+        How much larger than normal text is.
     """
     side, frame = Side.parse(side), QRectF(0, 0, size.width(), size.height())
     ground = _ground(_like(code, side), side, size.width(), size.height(), theme, ratio)
     pixmap = QPixmap.fromImage(ground)
     painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _Picture(painter, schematic_of(code, side), frame, theme).draw_feature()
+    _Picture(painter, schematic_of(code, side), frame, theme, scale).draw_feature()
     painter.end()
     return pixmap
 
@@ -93,7 +99,7 @@ def _ground(code: str, side: Side, width: int, height: int, theme: Theme, ratio:
     image.fill(Qt.GlobalColor.transparent)
     painter = QPainter(image)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-    _Picture(painter, schematic_of(code, side), QRectF(0, 0, width, height), theme).draw_ground()
+    _Picture(painter, schematic_of(code, side), QRectF(0, 0, width, height), theme, 1.0).draw_ground()
     painter.end()
     return image
 
@@ -124,9 +130,11 @@ class FeaturePicture(QWidget):
         if self._shown is None:
             return
         ratio, theme = self.devicePixelRatioF(), theme_of(self)
-        key = (self._shown, self.size(), theme.name, ratio)
+        scale = text_scale(self)
+        key = (self._shown, self.size(), theme.name, ratio, scale, family())
         if key != self._drawn_for:  # it is drawn anew only where it changes: that takes some 10 ms
-            self._drawn, self._drawn_for = feature_picture(*self._shown, self.size(), theme, ratio=ratio), key
+            self._drawn_for = key
+            self._drawn = feature_picture(*self._shown, self.size(), theme, ratio=ratio, scale=scale)
         painter = QPainter(self)
         painter.drawPixmap(0, 0, self._drawn)
         painter.end()
@@ -135,8 +143,11 @@ class FeaturePicture(QWidget):
 class _Picture:
     """One drawing under way."""
 
-    def __init__(self, painter: QPainter, schematic: Schematic, frame: QRectF, theme: Theme) -> None:
+    def __init__(
+        self, painter: QPainter, schematic: Schematic, frame: QRectF, theme: Theme, text_scale: float
+    ) -> None:
         self._painter, self._it, self._frame, self._theme = painter, schematic, frame, theme
+        self._text_scale = text_scale
         low, high = schematic.box
         room = frame.adjusted(_MARGIN, _MARGIN, -_MARGIN, -_MARGIN)
         self._scale = float(min(room.width() / (high - low)[0], room.height() / (high - low)[1]))
@@ -262,7 +273,7 @@ class _Picture:
             self._painter.drawEllipse(self._of(code), 2.4, 2.4)
         self._target()
         for code in near if self._frame.width() >= _ROOMY and not self._it.head else ():
-            self._label(code, self._font(9), QColor(self._theme.muted), 4.0, must=False)
+            self._label(code, self._font(CAPTION - 1), QColor(self._theme.muted), 4.0, must=False)
 
     def _target(self) -> None:
         colour, where = QColor(self._theme.states["placed"]), self._of(self._it.code)
@@ -274,7 +285,7 @@ class _Picture:
         self._painter.setBrush(colour)
         self._painter.drawEllipse(where, 4.6, 4.6)
         self._taken.append(QRectF(where.x() - 10, where.y() - 10, 20, 20))
-        self._label(self._it.code, self._font(13, bold=True), colour, 12.0, must=True)
+        self._label(self._it.code, self._font(HEADING, bold=True), colour, 12.0, must=True)
 
     def _label(self, code: str, font: QFont, colour: QColor, gap: float, *, must: bool) -> None:
         """Write a feature's code beside it, where there is room."""
@@ -297,7 +308,7 @@ class _Picture:
 
     def _words(self) -> None:
         """Write the directions at the edges, and from where it is seen."""
-        self._painter.setFont(self._font(10, bold=True))
+        self._painter.setFont(self._font(CAPTION, bold=True))
         self._painter.setPen(QColor(self._theme.muted))
         inner, flag = self._frame.adjusted(5, 3, -5, -3), Qt.AlignmentFlag
         left, right, below, above = tuple(self._it.letters)
@@ -308,15 +319,17 @@ class _Picture:
         ):
             self._painter.drawText(inner, where, letter)
         if self._frame.width() >= _ROOMY:
-            self._painter.setFont(self._font(10))
+            font = self._font(CAPTION)
+            self._painter.setFont(font)
             text = "from the side" if self._it.head else _WORDS[self._it.view]
             self._painter.drawText(inner, flag.AlignLeft | flag.AlignBottom, text)
-            self._painter.drawText(inner, flag.AlignRight | flag.AlignBottom, "schematic")
+            if QFontMetricsF(font).horizontalAdvance(f"{text}  {_SCHEMATIC}") <= inner.width():
+                self._painter.drawText(inner, flag.AlignRight | flag.AlignBottom, _SCHEMATIC)
         else:
             self._painter.drawText(inner, flag.AlignHCenter | flag.AlignBottom, below)
 
     def _font(self, pixels: int, *, bold: bool = False) -> QFont:
         font = base_font()
-        font.setPixelSize(pixels)
+        font.setPixelSize(round(pixels * self._text_scale))
         font.setBold(bold)
         return font

@@ -8,13 +8,12 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
-from PySide6.QtCore import QByteArray, QSize
+from PySide6.QtCore import QByteArray, QEvent, QSize
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
     QHBoxLayout,
     QMainWindow,
-    QSizePolicy,
     QStackedWidget,
     QVBoxLayout,
     QWidget,
@@ -25,8 +24,10 @@ from gp_labeler.session.view import View as SessionView
 from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
+from gp_labeler.views.fonts import desktop_scale, nearest_text_size
 from gp_labeler.views.panels.atlas_panel import AtlasPanel
 from gp_labeler.views.panels.label_panel import LabelPanel
+from gp_labeler.views.panels.panel_stack import PanelStack
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.panels.scan_panel import ScanPanel
@@ -54,6 +55,9 @@ _ALONE = MappingProxyType(
     }
 )
 """Steps that need no scan, and what the line at the bottom says then."""
+
+_GAP = 6
+"""Between rail, views and panel, logical pixels."""
 
 _LIKED = (
     "outline_visible",
@@ -86,17 +90,17 @@ class MainWindow(QMainWindow):
         self.workbench, self.memory = workbench, memory or WindowState()
         self.ui = WindowUi(self, workbench, prompts or Prompts(self))
         self.setAcceptDrops(True)
-        self.setMinimumSize(900, 600)
         self._recall_view(workbench.session.view)
         self.theme_name = self.memory.get("theme", str, "dark")
-        apply_theme(self, THEMES.get(self.theme_name, THEMES["dark"]))
+        self.text_size = nearest_text_size(self.memory.get("text_size", int, 100))
+        self._restyle()
         self.grid = ViewGrid(workbench)
         self.pose_display = PoseDisplay(workbench, self.grid)
         self.tracker_display = TrackerDisplay(workbench, self.pose_display)
         self.tracker_display.audible = self.memory.get("audible", bool, False)
         self.commands = Commands(workbench, self.ui, self, self.grid)
         self.commands.fill(self.menuBar())
-        self.rail, self.panels = Rail(workbench), QStackedWidget()
+        self.rail, self.panels = Rail(workbench), PanelStack()
         self.pages, self.welcome = QStackedWidget(), Welcome(workbench)
         self.status = StatusLine(workbench)
         self._dock()
@@ -108,8 +112,19 @@ class MainWindow(QMainWindow):
     def set_theme(self, name: str) -> None:
         """Look dark or light."""
         self.theme_name = name
-        apply_theme(self, THEMES[name])
         self.memory.set(theme=name)
+        self._restyle()
+
+    def set_text_size(self, percent: int) -> None:
+        """Draw text so much larger or smaller than the desktop's, percent, in one of `TEXT_SIZES`."""
+        self.text_size = nearest_text_size(percent)
+        self.memory.set(text_size=self.text_size)
+        self._restyle()
+
+    def _restyle(self) -> None:
+        """Take the theme and the text size, the user's and the desktop's."""
+        theme = THEMES.get(self.theme_name, THEMES["dark"])
+        apply_theme(self, theme, text_scale=desktop_scale() * self.text_size / 100)
 
     def set_step(self, step: str) -> None:
         """Show the panel of a step: ``scan``, ``label``, ``atlas`` or ``pose``."""
@@ -144,14 +159,13 @@ class MainWindow(QMainWindow):
         }
         for panel in self.steps.values():
             self.panels.addWidget(panel)
-        self.panels.setSizePolicy(QSizePolicy.Policy.Fixed, QSizePolicy.Policy.Expanding)
         desk = QWidget()
-        middle = _tight(QHBoxLayout(desk), spacing=6)
+        middle = _tight(QHBoxLayout(desk), spacing=_GAP)
         middle.addWidget(self.grid, 1)
         middle.addWidget(self.panels)
         self.pages.addWidget(self.welcome)
         self.pages.addWidget(desk)
-        sides = _tight(QHBoxLayout(), spacing=6)
+        sides = _tight(QHBoxLayout(), spacing=_GAP)
         sides.addWidget(self.rail)
         sides.addWidget(self.pages, 1)
         centre = QWidget()
@@ -219,8 +233,7 @@ class MainWindow(QMainWindow):
         self.grid.setVisible(not alone)
         for panel in (self._atlas, self._pose):
             panel.set_wide(alone)
-        wide = QSizePolicy.Policy.Expanding
-        self.panels.setSizePolicy(wide if alone else QSizePolicy.Policy.Fixed, wide)
+        self.panels.set_alone(alone)
         self.pages.setCurrentIndex(int(is_open or alone))
         self.status.set_without_scan(_ALONE[step] if alone else "")
 
@@ -256,11 +269,17 @@ class MainWindow(QMainWindow):
         self.memory.set(
             geometry=bytes(self.saveGeometry().toBase64().data()).decode(),
             theme=self.theme_name,
+            text_size=self.text_size,
             view={name: getattr(view, name) for name in _LIKED},
         )
         self.memory.save()
 
     # Qt's events
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
+        super().changeEvent(event)
+        if event.type() is QEvent.Type.ApplicationFontChange:  # the desktop's text became larger or smaller
+            self._restyle()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if not self.ui.settle():

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QSize
-from PySide6.QtGui import QImage, QPainter
+from PySide6.QtCore import QBuffer, QIODevice, QSize
+from PySide6.QtGui import QImage, QPainter, QPixmap
 from PySide6.QtWidgets import QApplication, QWidget
 
+from gp_core.disk import write_bytes
+from gp_core.errors import GpError
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.slice_view import SliceView
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
 
-__all__ = ["PICTURES", "picture"]
+__all__ = ["PICTURES", "picture", "picture_bytes", "write_picture"]
 
 PICTURES = ("window", "views", "slices", "3d", *(plane.value for plane in Plane))
 
@@ -89,3 +92,25 @@ def _slices(views: list[SliceView], size: tuple[int, int] | None) -> QImage:
         painter.drawImage(n * (each + _GAP), 0, _slice(view, (each, height)))
     painter.end()
     return whole
+
+
+def picture_bytes(image: QImage | QPixmap, suffix: str = ".png") -> bytes:
+    """Return a picture as the content of a file with this suffix; nothing where Qt knows no such pictures."""
+    buffer = QBuffer()
+    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
+    image.save(buffer, suffix[1:].upper())  # type: ignore[call-overload]  # the stubs know no buffers
+    return bytes(buffer.data().data())
+
+
+def write_picture(image: QImage | QPixmap, path: Path) -> None:
+    """Write a picture, whole or not at all, in the format that the file's name says.
+
+    Raises
+    ------
+    GpError
+        There is no such format, or the file cannot be written.
+    """
+    content = picture_bytes(image, path.suffix)
+    if not content:
+        raise GpError("cannot be written as a picture", file=path, remedy="Give a path that ends with .png.")
+    write_bytes(path, content)

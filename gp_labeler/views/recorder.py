@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 
-from gp_core.landmarks.files import write_text
+from gp_core.disk import write_text
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import PARTS
@@ -133,8 +133,9 @@ class Recorder(QObject):
         window, state = self._window, self._window.workbench.session.view.state
         differing = {name for name in vars(state) if getattr(state, name) != getattr(ViewState, name)}
         theme = None if window.theme_name == "dark" else window.theme_name
+        text_size = None if window.text_size == 100 else window.text_size
         size = [window.width(), window.height()]
-        self.tables.append(step("view", size=size, theme=theme) | self._seen(differing))
+        self.tables.append(step("view", size=size, theme=theme, text_size=text_size) | self._seen(differing))
 
     def _take_as_here(self) -> None:
         """Write which atlas is in use, and which insertion path is carried."""
@@ -203,6 +204,8 @@ class Recorder(QObject):
             self.tables.append(step("action", id=id))
         elif id == "view.theme":
             self.tables.append(step("view", theme=self._window.theme_name))
+        elif id.startswith("view.text_"):
+            self.tables.append(step("view", text_size=self._window.text_size))
 
     def _on_tool(self, tool: str) -> None:
         self.tables.append(step("action", id="pose.touch" if tool == "touch" else f"tool.{tool}"))

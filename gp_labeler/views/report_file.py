@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING
 from PySide6.QtCore import QBuffer, QIODevice, QMarginsF, QSizeF, QUrl
 from PySide6.QtGui import QImage, QPageLayout, QPageSize, QPdfWriter, QTextDocument
 
+from gp_core.disk import write_bytes, write_text
 from gp_core.errors import GpError
-from gp_core.landmarks.files import write_text
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.pose_report import PoseReport
 from gp_labeler.views.drawn_pose import pose_scene
-from gp_labeler.views.pictures import picture
+from gp_labeler.views.pictures import picture, picture_bytes
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -90,11 +90,9 @@ def save_report(report: PoseReport, path: Path) -> Path:
 
 
 def _save_pdf(report: PoseReport, path: Path) -> None:
-    try:
-        path.open("ab").close()
-    except OSError as error:  # Qt would say nothing
-        raise GpError(f"cannot be written: {error.strerror}", file=path) from None
-    document, writer = QTextDocument(), QPdfWriter(str(path))
+    drawn = QBuffer()
+    drawn.open(QIODevice.OpenModeFlag.WriteOnly)
+    document, writer = QTextDocument(), QPdfWriter(drawn)
     writer.setTitle(f"{report.state.specimen}: pose of the {report.estimate.side.word} cochlea")
     writer.setResolution(_DPI)
     writer.setPageSize(QPageSize(QPageSize.PageSizeId.A4))
@@ -107,6 +105,8 @@ def _save_pdf(report: PoseReport, path: Path) -> None:
     document.setHtml(report.html(embed=False))
     document.setPageSize(QSizeF(writer.width(), writer.height()))
     document.print_(writer)
+    del writer  # which ends the file
+    write_bytes(path, bytes(drawn.data().data()))
 
 
 def _bone_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
@@ -114,10 +114,10 @@ def _bone_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
     camera, found = view.scene.camera, {}
     camera.view_from(pose.side.value)
     view.scene.fit()
-    found[f"From the {pose.side.word}"] = _png(picture(window, "3d", _PICTURE_SIZE))
+    found[f"From the {pose.side.word}"] = picture_bytes(picture(window, "3d", _PICTURE_SIZE))
     for caption, placement in _LOOKS.items():
         place_camera(camera, placement(pose))
-        found[caption] = _png(picture(window, "3d", _PICTURE_SIZE))
+        found[caption] = picture_bytes(picture(window, "3d", _PICTURE_SIZE))
     return found
 
 
@@ -128,16 +128,9 @@ def _slice_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
     session.set_crosshair(pose.origin)
     for plane in Plane:
         views[plane].zoom_to(pose.origin, _SLICE_MM)
-        found[plane.value.capitalize()] = _png(picture(window, plane.value, _PICTURE_SIZE))
+        found[plane.value.capitalize()] = picture_bytes(picture(window, plane.value, _PICTURE_SIZE))
     session.set_crosshair(crosshair)
     for plane in Plane:
         views[plane].shown = before[plane]
         views[plane].update()
     return found
-
-
-def _png(image: QImage) -> bytes:
-    buffer = QBuffer()
-    buffer.open(QIODevice.OpenModeFlag.WriteOnly)
-    image.save(buffer, "PNG")  # type: ignore[call-overload]  # the stubs know no buffers
-    return bytes(buffer.data().data())

@@ -11,8 +11,9 @@ from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import Plane, letter_of, position_text
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.session.view import Cut
+from gp_labeler.views.fonts import font_of
 from gp_labeler.views.mouse import painted
-from gp_labeler.views.theme import base_font, theme_of
+from gp_labeler.views.theme import theme_of
 
 __all__ = ["cut_text", "paint_crosshair", "paint_cut", "paint_pointer"]
 
@@ -43,8 +44,7 @@ def paint_cut(painter: QPainter, view: QWidget, cut: Cut | None) -> None:
     """Say in the upper left corner that bone is cut open, and where."""
     if cut is None:
         return
-    theme, font = theme_of(view), base_font()
-    font.setPixelSize(12)
+    theme, font = theme_of(view), font_of(view)
     painter.setFont(font)
     text = cut_text(cut)
     words = QFontMetricsF(font).boundingRect(text)

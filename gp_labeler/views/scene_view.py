@@ -35,6 +35,7 @@ from gp_labeler.session.state import How
 from gp_labeler.session.view import Cut
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments, key_of
+from gp_labeler.views.fonts import text_scale
 from gp_labeler.views.greys import greys_of
 from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
@@ -80,7 +81,7 @@ class SceneView(QWidget):
 
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setMinimumSize(120, 90)
+        self.setMinimumSize(140, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -159,6 +160,7 @@ class SceneView(QWidget):
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
         self.scene.set_colours(theme_of(self).scene)
+        self.scene.text_scale = text_scale(self)
         self._show_points()
 
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
@@ -214,6 +216,7 @@ class SceneView(QWidget):
 
     def _on_session_replaced(self, _: object) -> None:
         self._fitted = False
+        self._source = None
         self._on_view_changed(frozenset({"mesh_opacity", "cut", "slices_visible"}))
         self._show_points()
 

@@ -20,11 +20,12 @@ from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+from gp_labeler.views.fonts import TEXT, base_font, text_scale
 from gp_labeler.views.marker_pictures import marker_picture
 from gp_labeler.views.qt_paths import segments_path
 from gp_labeler.views.slice_layers import SliceName
 from gp_labeler.views.slice_lines import paint_lines
-from gp_labeler.views.theme import Theme, base_font, theme_of
+from gp_labeler.views.theme import Theme, theme_of
 from gp_labeler.views.word_pictures import word_picture
 from gp_labeler.workbench import Workbench
 
@@ -37,8 +38,10 @@ _REACH_MM = 1.0
 _CLOSE_PIXELS = 12.0
 """From so many logical pixels a millimetre on, points beside the slice are named too."""
 
+_BAR_SHARE = 0.3
+"""Of the width of a small view: there the scale bar leaves the letter at the lower edge alone."""
+
 _TEXT, _HALO = "#E8EDF2", "#0B0F14"
-_NAME_SIZE = 12
 """Slices are black in every theme, and what is written on them light."""
 
 
@@ -77,6 +80,7 @@ class SlicePainter:
         self._desk, self._view = workbench, view
         self._preview: float | None = None
         self._slice: SliceImage | None = None
+        self._where: tuple[SliceSource | None, float] = (None, 0.0)
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
@@ -86,6 +90,7 @@ class SlicePainter:
     def forget(self) -> None:
         """Let go of the pictures."""
         self._slice, self._picture, self._outline, self._ground = None, None, None, None
+        self._where = (None, 0.0)
         self.forget_points()
 
     def forget_points(self) -> None:
@@ -117,7 +122,12 @@ class SlicePainter:
         names += self._paint_marks(painter, points, view.source, view.shown, ratio)
         if self._desk.session.view.state.labels_visible:
             names += [name for layer in view.layers for name in layer.names(view.shown, ratio)]
-            _draw_names(painter, names, view.shown.size, ratio)
+            _draw_names(painter, names, view.shown.size, ratio, self._text)
+
+    @property
+    def _text(self) -> float:
+        """Size of words, logical pixels."""
+        return TEXT * text_scale(self._view)
 
     def _on_preview(self, threshold: float | None) -> None:
         self._preview = threshold
@@ -189,24 +199,25 @@ class SlicePainter:
     def _paint_letters(self, painter: QPainter, shown: Shown, ratio: float) -> None:
         width, height = shown.size
         left, right, top, bottom = shown.plane.letters
-        inset = 12 * ratio
+        inset = self._text * ratio
         for letter, x, y in (
             (left, inset, height / 2),
             (right, width - inset, height / 2),
             (top, width / 2, inset),
             (bottom, width / 2, height - inset),
         ):
-            word_picture(letter, 13, _TEXT, ratio).draw_about(painter, x, y)
+            word_picture(letter, self._text, _TEXT, ratio).draw_about(painter, x, y)
 
     def _paint_scale_bar(self, painter: QPainter, shown: Shown, ratio: float) -> None:
-        length, pixels = scale_bar_length(shown.mm_per_pixel, 90 * ratio)
         width, height = shown.size
-        right, y = width - 14 * ratio, height - 12 * ratio
+        length, pixels = scale_bar_length(shown.mm_per_pixel, min(90 * ratio, _BAR_SHARE * width))
+        right, y = width - min(14 * ratio, 0.05 * width), height - 12 * ratio
         for colour, thick in ((_HALO, 4.5), (_TEXT, 2.5)):
             painter.setPen(QPen(QColor(colour), thick * ratio))
             painter.drawLine(QPointF(right - pixels, y), QPointF(right, y))
-        word = word_picture(f"{length:g} mm", 12, _TEXT, ratio, bold=False)
-        word.draw(painter, right - pixels / 2 - word.box.center().x(), y - 6 * ratio - word.box.bottom())
+        word = word_picture(f"{length:g} mm", self._text, _TEXT, ratio, bold=False)
+        x = min(right - pixels / 2, width - word.box.width() / 2 - 4 * ratio) - word.box.center().x()
+        word.draw(painter, x, y - 6 * ratio - word.box.bottom())
 
     def _paint_ghosts(
         self, painter: QPainter, ghosts: list[Ghost], shown: Shown, ratio: float
@@ -296,9 +307,11 @@ def _name(mark: Mark, pixel: FloatArray) -> SliceName:
     return SliceName(mark.label, pixel, _on_black(mark.state), gap, rank)
 
 
-def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int], ratio: float) -> None:
+def _draw_names(
+    painter: QPainter, names: list[SliceName], size: tuple[int, int], ratio: float, text: float
+) -> None:
     font = base_font()
-    font.setPixelSize(round(_NAME_SIZE * ratio))
+    font.setPixelSize(round(text * ratio))
     font.setBold(True)
     metrics = QFontMetricsF(font)
     high = metrics.capHeight() + 4 * ratio
@@ -310,5 +323,5 @@ def _draw_names(painter: QPainter, names: list[SliceName], size: tuple[int, int]
         ranks=[name.rank for name in names],
     )
     for n in np.flatnonzero(shown):
-        word = word_picture(names[n].text, _NAME_SIZE, names[n].colour, ratio)
+        word = word_picture(names[n].text, text, names[n].colour, ratio)
         word.draw(painter, corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)

@@ -11,6 +11,8 @@ from gp_labeler.views.slice_view import SliceView
 
 __all__ = ["SliceSlider"]
 
+_WIDTH = 110
+
 
 class SliceSlider(QSlider):
     """Goes through the slices of one view, and follows it.
@@ -25,12 +27,18 @@ class SliceSlider(QSlider):
         super().__init__(Qt.Orientation.Horizontal, parent)
         self._view = view
         self.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys belong to the view
-        self.setFixedWidth(110)
+        self._has_room = True
+        self.setFixedWidth(_WIDTH)
         self.setToolTip("Which slice is shown (wheel over the view)")
         self.setAccessibleName(f"{view.plane.value} slice")
         self.valueChanged.connect(self._on_value)
         view.moved.connect(self._on_moved)
         self.hide()
+
+    def set_room(self, has_room: bool) -> None:
+        """Say whether there is room for it; it shows itself once there is a scan, too."""
+        self._has_room = has_room
+        self.setVisible(has_room and self._view.source is not None)
 
     def _on_value(self, n: int) -> None:
         source, plane = self._view.source, self._view.plane
@@ -45,7 +53,7 @@ class SliceSlider(QSlider):
         with blocked(self):
             self.setRange(0, round((high - low) / source.step(plane)))
             self.setValue(round((position - low) / source.step(plane)))
-        self.show()
+        self.setVisible(self._has_room)
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
         self._view.step(1 if event.angleDelta().y() > 0 else -1)

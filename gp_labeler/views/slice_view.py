@@ -62,7 +62,7 @@ class SliceView(QWidget):
 
     def __init__(self, workbench: Workbench, plane: Plane, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setMinimumSize(120, 90)
+        self.setMinimumSize(140, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
@@ -152,10 +152,10 @@ class SliceView(QWidget):
         self._on_crosshair(self._desk.session.crosshair)
 
     def _on_session_replaced(self, _: object) -> None:
-        self._repaint()
+        self._painter.forget()  # also where it is not painted: else it would keep the scan before
+        self.update()
         if self._desk.volume is None:
-            self.source = self.shown = None
-            self._painter.forget()
+            self.source = self.shown = self._edge = None
             if self._pointer is not None:
                 self.hovered.emit(None)
 

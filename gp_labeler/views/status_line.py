@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
@@ -14,6 +14,7 @@ from gp_labeler.scene.planes import LETTERS
 from gp_labeler.session.edits import point_text
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import follow
+from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.theme import theme_of
@@ -21,13 +22,16 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["StatusLine", "where_text"]
 
+_LEAST_WORDS = 240
+"""Room for the words in the middle, below which running work is not shown; at the normal text size."""
+
 _SHOWN_AFTER_MS = 150
 """Work that is done sooner does not flicker by."""
 
-_HEIGHT, _MARGIN, _MOST_LINES = 30, 12, 3
-_MESSAGES = ("good", "warning", "danger")
-"""Looks of what was said, not of what comes next."""
+_MARGIN, _ROOM = 12, 8
+"""Beside the words, and above and below them, logical pixels."""
 
+_WIDEST_PLACE = "L 00.00  P 00.00  S 00.00 mm  ·  voxel 0000, 0000, 0000  ·  -32768"
 _MESSAGE_MS = {"info": 5000, "warning": 12000, "error": 0}
 
 
@@ -49,7 +53,6 @@ class StatusLine(QWidget):
     def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._desk = workbench
-        self.setFixedHeight(_HEIGHT)
         self._role = "hint"
         self.where, self.next_click = QLabel(), QLabel()
         self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
@@ -59,9 +62,9 @@ class StatusLine(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
         row.setSpacing(_MARGIN)
-        row.addWidget(self.where, 3)
-        row.addWidget(self.next_click, 4)
-        row.addWidget(self.work, 3)
+        row.addWidget(self.where)
+        row.addWidget(self.next_click, 1)
+        row.addWidget(self.work)
         self.without_scan = ""
         self._message_timer = QTimer(self, singleShot=True)
         self._message_timer.timeout.connect(self._say_next)
@@ -76,6 +79,7 @@ class StatusLine(QWidget):
         ):
             follow(self, signal, self._on_changed)
         follow(self, workbench.message, self.say)
+        fit(self, self._make_room)
         self._say_next()
 
     def show_position(self, position: FloatArray | None) -> None:
@@ -143,16 +147,25 @@ class StatusLine(QWidget):
         self._make_room()
 
     def _make_room(self) -> None:
-        """Give a long message the whole width, and more lines where that is not enough."""
+        """Show the words in the middle whole: at need without the place, over several lines, without work."""
         text, whole = self.next_click, self.width() - 2 * _MARGIN
-        need = text.fontMetrics().horizontalAdvance(text.text()) + 8
-        is_long = self._role in _MESSAGES and need > 0.4 * (whole - 2 * _MARGIN)
-        self.where.setVisible(not is_long)
-        self.work.setVisible(not is_long or self.work.is_busy)
-        text.setWordWrap(is_long)
-        room = whole - (self.work.sizeHint().width() + _MARGIN if self.work.is_busy else 0)
-        lines = min(-(-need // max(room - 40, 200)), _MOST_LINES) if is_long else 1
-        self.setFixedHeight(_HEIGHT + (lines - 1) * text.fontMetrics().lineSpacing())
+        need = text_width(self, text.text()) + 4
+        place, work = text_width(self, _WIDEST_PLACE), self.work.needed_width
+        beside = work + _MARGIN if self.work.is_busy else 0
+        has_place = self._desk.volume is not None and whole - beside - place - _MARGIN >= need
+        self.where.setVisible(has_place)
+        self.where.setFixedWidth(place)
+        if self.work.is_busy and whole - beside < min(need, pixels(self, _LEAST_WORDS)):
+            beside = 0
+        self.work.setVisible(beside > 0)
+        self.work.setFixedWidth(max(work, 1))
+        room = max(whole - beside, 1)
+        text.setWordWrap(need > room)
+        lines = text.heightForWidth(room) if need > room else line_height(self)
+        self.setFixedHeight(max(lines, line_height(self)) + 2 * _ROOM)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802
+        return QSize(pixels(self, _LEAST_WORDS), self.minimumHeight())
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
         super().resizeEvent(event)
@@ -177,17 +190,16 @@ class _Work(QWidget):
         self.text, self.bar, self.stop = QLabel(), QProgressBar(), QToolButton()
         self.text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.bar.setTextVisible(False)
-        self.bar.setFixedWidth(110)
         self.stop.setProperty("role", "quiet")
         self.stop.setToolTip("Stop this work")
         self.stop.setAccessibleName("Stop the work in the background")
-        self.stop.setFixedSize(22, 22)
-        row = QHBoxLayout(self)
+        self._row = row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)
         row.addStretch(1)
         for widget in (self.text, self.bar, self.stop):
             row.addWidget(widget)
+        fit(self, self._fit)
         self._timer = QTimer(self, interval=_SHOWN_AFTER_MS, singleShot=True)
         self._timer.timeout.connect(self._refresh)
         self.stop.clicked.connect(self._stop)
@@ -196,6 +208,15 @@ class _Work(QWidget):
             follow(self, signal, self._on_task)
         self.stop.setIcon(icon("close", theme_of(self).muted, size=12))
         self._refresh()
+
+    def _fit(self) -> None:
+        self.bar.setFixedWidth(pixels(self, 110))
+        self.stop.setFixedSize(pixels(self, 22), pixels(self, 22))
+
+    @property
+    def needed_width(self) -> int:
+        """What it takes to show all of it, logical pixels; 0 where there is no work."""
+        return self._row.minimumSize().width() if self.is_busy else 0
 
     @property
     def is_busy(self) -> bool:

@@ -6,6 +6,7 @@ from string import Template
 from typing import TYPE_CHECKING
 
 from gp_core.resources import resource_path
+from gp_labeler.views.fonts import BIG, CAPTION, HEADING, TEXT, TITLE, families
 
 if TYPE_CHECKING:
     from gp_labeler.views.theme import Theme
@@ -14,7 +15,7 @@ __all__ = ["stylesheet"]
 
 _TEMPLATE = Template("""
 QMainWindow, QDialog { background: $panel; }
-QWidget { color: $text; font-size: 12px; }
+QWidget { color: $text; font-size: $text_px; font-family: $families; }
 QWidget:disabled { color: $faint; }
 QLabel { background: transparent; }
 QToolTip { background: $raised; color: $text; border: 1px solid $border_strong; padding: 4px 6px; }
@@ -22,9 +23,9 @@ QToolTip { background: $raised; color: $text; border: 1px solid $border_strong; 
 *[role="panel"] { background: $panel; }
 *[role="card"] { background: $card; border: 1px solid $border; border-radius: 8px; }
 *[role="rail"] { background: $window; border-right: 1px solid $border; }
-QLabel[role="title"] { font-size: 17px; font-weight: 600; }
-QLabel[role="hero"] { font-size: 24px; font-weight: 600; }
-QLabel[role="heading"] { font-size: 13px; font-weight: 600; }
+QLabel[role="title"] { font-size: $title_px; font-weight: 600; }
+QLabel[role="hero"] { font-size: $hero_px; font-weight: 600; }
+QLabel[role="heading"] { font-size: $heading_px; font-weight: 600; }
 QLabel[role="eyebrow"] { color: $muted; }
 QLabel[role="hint"] { color: $muted; }
 QLabel[role="ghost"] { color: $ghost; }
@@ -32,16 +33,15 @@ QLabel[role="shared"] { color: $good; }
 QLabel[role="good"] { color: $good; }
 QLabel[role="warning"] { color: $warning; }
 QLabel[role="danger"] { color: $danger; }
-QLabel[role="mono"], QPlainTextEdit[role="mono"] { font-family: "DejaVu Sans Mono", "Consolas", monospace; }
 
-QLabel[role="huge"] { font-size: 64px; font-weight: 700; }
-QLabel[role="large"] { font-size: 28px; font-weight: 600; }
-QLabel[role="big"] { font-size: 20px; }
-QLabel[role="big-warning"] { font-size: 20px; color: $warning; }
-QLabel[role="large-hint"] { font-size: 20px; color: $muted; }
-QLabel[role="large-good"] { font-size: 20px; color: $good; }
-QLabel[role="large-warning"] { font-size: 20px; color: $warning; }
-QLabel[role="large-danger"] { font-size: 20px; color: $danger; }
+QLabel[role="huge"] { font-size: $px64; font-weight: 700; }
+QLabel[role="large"] { font-size: $px28; font-weight: 600; }
+QLabel[role="big"] { font-size: $px20; }
+QLabel[role="big-warning"] { font-size: $px20; color: $warning; }
+QLabel[role="large-hint"] { font-size: $px20; color: $muted; }
+QLabel[role="large-good"] { font-size: $px20; color: $good; }
+QLabel[role="large-warning"] { font-size: $px20; color: $warning; }
+QLabel[role="large-danger"] { font-size: $px20; color: $danger; }
 
 QPushButton, QToolButton {
     background: $raised; border: 1px solid $border_strong; border-radius: 6px; padding: 5px 12px;
@@ -58,9 +58,9 @@ QPushButton[role="primary"] {
 QPushButton[role="primary"]:hover { background: $accent_hover; }
 QPushButton[role="primary"]:focus { border: 2px solid $accent_text; padding: 4px 11px; }
 QPushButton[role="primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
-QPushButton[role="huge"] { font-size: 22px; padding: 8px 20px; }
+QPushButton[role="huge"] { font-size: $px22; padding: 8px 20px; }
 QPushButton[role="huge-primary"] {
-    font-size: 28px; font-weight: 600; background: $accent; border-color: $accent; color: $on_accent;
+    font-size: $px28; font-weight: 600; background: $accent; border-color: $accent; color: $on_accent;
 }
 QPushButton[role="huge-primary"]:hover { background: $accent_hover; }
 QPushButton[role="huge-primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
@@ -83,7 +83,7 @@ QLineEdit, QPlainTextEdit, QTextEdit, QComboBox {
 QLineEdit:focus, QPlainTextEdit:focus, QTextEdit:focus, QComboBox:focus { border-color: $accent_text; }
 QLineEdit[wrong="true"] { border-color: $danger; }
 QComboBox::drop-down { border: none; width: 22px; }
-QComboBox::down-arrow { image: url("$icons/down.png"); width: 12px; height: 12px; }
+QComboBox::down-arrow { image: url("$icons/down.png"); width: $px12; height: $px12; }
 QComboBox QAbstractItemView {
     background: $card; border: 1px solid $border_strong; selection-background-color: $selected;
     selection-color: $text; outline: none;
@@ -91,16 +91,16 @@ QComboBox QAbstractItemView {
 QCheckBox, QRadioButton { spacing: 6px; background: transparent; padding: 2px; }
 QCheckBox:focus, QRadioButton:focus { color: $accent_text; }
 QCheckBox::indicator {
-    width: 14px; height: 14px; background: $field; border: 1px solid $border_strong; border-radius: 4px;
+    width: $px14; height: $px14; background: $field; border: 1px solid $border_strong; border-radius: 4px;
 }
 QCheckBox::indicator:hover { border-color: $accent_text; }
 QCheckBox::indicator:checked { background: $accent; border-color: $accent; image: url("$icons/tick.png"); }
 QCheckBox::indicator:disabled { border-color: $border; }
 QRadioButton::indicator {
-    width: 14px; height: 14px; background: $field; border: 1px solid $border_strong; border-radius: 8px;
+    width: $px14; height: $px14; background: $field; border: 1px solid $border_strong; border-radius: $ring;
 }
 QRadioButton::indicator:checked {
-    width: 6px; height: 6px; background: $on_accent; border: 5px solid $accent; border-radius: 8px;
+    width: $dot; height: $dot; background: $on_accent; border: 5px solid $accent; border-radius: $ring;
 }
 
 QTableView, QListView, QTreeView {
@@ -163,8 +163,24 @@ QGroupBox::title { subcontrol-origin: margin; left: 0; }
 """)
 
 
-def stylesheet(theme: Theme) -> str:
-    """Return the style sheet for a window in this theme."""
+def stylesheet(theme: Theme, text_scale: float = 1.0) -> str:
+    """Return the style sheet for a window in this theme, with text that is so much larger than normal."""
     colours = {name: value for name, value in vars(theme).items() if isinstance(value, str)}
     icons = resource_path("icons/tick.png").parent.as_posix()
-    return _TEMPLATE.substitute(colours, ghost=theme.states["ghost"], icons=icons)
+    quoted = ", ".join(f'"{name}"' for name in families())
+    return _TEMPLATE.substitute(
+        colours | _sizes(text_scale), ghost=theme.states["ghost"], icons=icons, families=quoted
+    )
+
+
+def _sizes(scale: float) -> dict[str, str]:
+    """Return lengths that grow with the text, as the template names them."""
+    named = {"caption_px": CAPTION, "text_px": TEXT, "heading_px": HEADING, "title_px": TITLE, "hero_px": BIG}
+    sizes = {name: max(round(size * scale), 1) for name, size in named.items()}
+    sizes |= {f"px{size}": round(size * scale) for size in _LENGTHS}
+    box = sizes["px14"]
+    sizes |= {"dot": box - 8, "ring": box // 2 + 1}
+    return {name: f"{size}px" for name, size in sizes.items()}
+
+
+_LENGTHS = (12, 14, 20, 22, 28, 64)

@@ -11,30 +11,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from PySide6.QtGui import QColor, QFont, QPalette
+from PySide6.QtGui import QColor, QPalette
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gp_labeler.scene.colours import DARK as DARK_SCENE
 from gp_labeler.scene.colours import LIGHT as LIGHT_SCENE
 from gp_labeler.scene.colours import SceneColours
+from gp_labeler.views.fonts import base_font, set_text_scale
 from gp_labeler.views.stylesheet import stylesheet
 
 __all__ = [
-    "CAPTION_PX",
     "DARK",
-    "FONT_PX",
     "LIGHT",
     "THEMES",
-    "TITLE_PX",
     "Theme",
     "apply_theme",
-    "base_font",
     "contrast",
     "theme_of",
 ]
-
-CAPTION_PX, FONT_PX, TITLE_PX = 11, 12, 17
-FAMILIES = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")
 
 _PROPERTY = "gpTheme"
 
@@ -209,20 +203,21 @@ LIGHT = Theme(
 THEMES: Mapping[str, Theme] = MappingProxyType({theme.name: theme for theme in (DARK, LIGHT)})
 
 
-def apply_theme(target: QWidget | QApplication, theme: Theme) -> None:
-    """Give a window, with all that it holds and opens, the look of a theme."""
+def apply_theme(target: QWidget | QApplication, theme: Theme, *, text_scale: float = 1.0) -> None:
+    """Give a window, with all that it holds and opens, the look of a theme.
+
+    Parameters
+    ----------
+    target : QWidget or QApplication
+    theme : Theme
+    text_scale : float
+        How large text is drawn, 1 for normal; see `fonts`.
+    """
     target.setProperty(_PROPERTY, theme.name)
-    target.setFont(base_font())
+    set_text_scale(target, text_scale)
+    target.setFont(base_font(text_scale))
     target.setPalette(theme.palette())
-    target.setStyleSheet(stylesheet(theme))
-
-
-def base_font() -> QFont:
-    """Return the font of all text that says nothing else."""
-    font = QFont()
-    font.setFamilies(list(FAMILIES))
-    font.setPixelSize(FONT_PX)
-    return font
+    target.setStyleSheet(stylesheet(theme, text_scale))
 
 
 def theme_of(widget: QWidget | None) -> Theme:

@@ -6,16 +6,22 @@ from collections.abc import Mapping
 
 from PySide6.QtCore import QEvent, QSize, Qt
 from PySide6.QtGui import QAction, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QToolButton, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.views.bind import follow, set_role, size_text, spacing_text
+from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
+from gp_labeler.views.panels.parts import ElidedLabel
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
 __all__ = ["TopBar"]
 
-_LONGEST_UNDO, _GAP = 26, 6
+_GAP = 6
+_UNSAVED, _SAVED, _COPY = "\N{BULLET} not saved", "\N{BULLET} saved", "\N{BULLET} a copy"
+_SHORTEST_NAME, _FRAME, _AROUND = 60, 14, 76
+"""Least width of the name; what a button has around its icon; margins and gaps of the bar."""
+
 _TOOLS = (
     ("tool.place", "label", "Place"),
     ("tool.look", "axis", "Crosshair"),
@@ -39,11 +45,12 @@ class TopBar(QWidget):
     ) -> None:
         super().__init__(parent)
         self._desk, self._actions = workbench, actions
-        self.setFixedHeight(44)
-        self.name, self.about, self.saved = QLabel(), QLabel(), QLabel()
-        self.name.setProperty("role", "heading")
+        self.name, self.about, self.saved = ElidedLabel("", "heading"), QLabel(), QLabel()
+        self.name.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
+        self.name.setMinimumWidth(_SHORTEST_NAME)
         self.about.setProperty("role", "hint")
         self._icons: list[tuple[QToolButton, str]] = []
+        self._widths: dict[QToolButton, int] = {}
         self._working: list[tuple[QToolButton, str]] = []  # mean nothing before a scan is open
         self._lay_out()
         for signal in (
@@ -61,24 +68,21 @@ class TopBar(QWidget):
     def refresh(self, *_: object) -> None:
         """Show the specimen as it stands."""
         session, volume = self._desk.session, self._desk.volume
-        self.name.setText(session.state.specimen if self._desk.in_use else "gp-labeler")
+        self.name.set_words(session.state.specimen if self._desk.in_use else "gp-labeler")
         about = (
             "" if volume is None else f"{size_text(volume.size)}  ·  {spacing_text(volume.spacing)}  ·  LPS"
         )
         self.about.setText(about)
         place = self._desk.place if self._desk.in_use else ""
-        self.name.setToolTip(place)
+        self.name.setToolTip(place or self.name.toolTip())
         set_role(self.saved, "warning" if session.dirty or session.path is None else "good")
-        kept = "● saved" if session.path is not None else "● a copy" if place else ""
-        self.saved.setText("● not saved" if session.dirty else kept)
+        kept = _SAVED if session.path is not None else _COPY if place else ""
+        self.saved.setText(_UNSAVED if session.dirty else kept)
         self.saved.setToolTip("Every edit is kept in a journal at once; Ctrl+S writes the specimen file")
         for button, id in self._working:
             is_edit = id.startswith("edit.") and self._desk.in_use
             button.setVisible(session.state.volume is not None or is_edit)
-        undo = session.undo_text or ""
-        short = undo if len(undo) <= _LONGEST_UNDO else undo[: _LONGEST_UNDO - 1] + "…"
-        self._undo.setText(f"Undo {short}" if undo else "Undo")
-        self._fit()
+        self._make_room()
 
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
@@ -88,7 +92,7 @@ class TopBar(QWidget):
             button.setIcon(icon(shown, theme.text, disabled=theme.faint))
 
     def _lay_out(self) -> None:
-        row = QHBoxLayout(self)
+        self._row = row = QHBoxLayout(self)
         row.setContentsMargins(14, 4, 12, 4)
         row.setSpacing(_GAP)
         row.addWidget(self.name)
@@ -106,6 +110,18 @@ class TopBar(QWidget):
         row.addWidget(self._button("view.theme", "moon"))
         row.addSpacing(8)
         row.addWidget(self.saved)
+        fit(self, self._fit)
+
+    def _fit(self) -> None:
+        """Keep the place of what changes, so that nothing beside it moves."""
+        self.setFixedHeight(line_height(self) + pixels(self, 26))
+        self.saved.setFixedWidth(text_width(self, _UNSAVED, _SAVED, _COPY))
+        for button, _ in self._icons:
+            button.setIconSize(QSize(pixels(self, 16), pixels(self, 16)))
+            if button.text():
+                button.setToolButtonStyle(Qt.ToolButtonStyle.ToolButtonTextBesideIcon)
+            self._widths[button] = button.sizeHint().width()
+        self._make_room()
 
     def _button(self, id: str, picture: str, word: str = "") -> QToolButton:
         action, button = self._actions[id], QToolButton()
@@ -132,18 +148,33 @@ class TopBar(QWidget):
             self._working.append((button, id))
         return button
 
+    def minimumSizeHint(self) -> QSize:  # noqa: N802
+        """Return the room that name, icons and what is saved take, without words on the buttons."""
+        icons = len(self._icons) * (pixels(self, 16) + _FRAME + _GAP)
+        width = self.name.minimumWidth() + icons + self.saved.minimumWidth() + _AROUND
+        return QSize(width, self.minimumHeight())
+
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
         super().resizeEvent(event)
-        self._fit()
+        self._make_room()
 
-    def _fit(self) -> None:
-        """Leave out what the scan is like where there is no room for it.
+    def _make_room(self) -> None:
+        """Leave out what the scan is like where there is no room for it, and then the words of the buttons.
 
-        It is not hidden to measure the others: that would lay out the bar anew at every edit.
+        Nothing is hidden to measure it: that would lay out the bar anew at every edit.
         """
-        about, shown = self.about.sizeHint().width(), not self.about.isHidden()
-        others = self.sizeHint().width() - (about + _GAP if shown else 0)
-        self.about.setVisible(others + about + 2 * _GAP <= self.width())
+        shown = [button for button, _ in self._icons if not button.isHidden()]
+        about = self.about.sizeHint().width() + _GAP
+        rest = self._row.minimumSize().width() - sum(button.sizeHint().width() for button in shown)
+        rest -= 0 if self.about.isHidden() else about
+        with_words = rest + sum(self._widths[button] for button in shown)
+        longer = max(self.name.sizeHint().width() - self.name.minimumWidth(), 0)
+        self.about.setVisible(with_words + longer + about <= self.width())
+        style = Qt.ToolButtonStyle
+        wanted = style.ToolButtonTextBesideIcon if with_words <= self.width() else style.ToolButtonIconOnly
+        for button, _ in self._icons:
+            if button.text() and button.toolButtonStyle() is not wanted:
+                button.setToolButtonStyle(wanted)
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         if event.type() == QEvent.Type.StyleChange:

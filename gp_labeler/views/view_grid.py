@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
-from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSplitter, QToolButton, QVBoxLayout, QWidget
+from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
+from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.slice_slider import SliceSlider
@@ -17,7 +18,7 @@ from gp_labeler.workbench import Workbench
 
 __all__ = ["ViewFrame", "ViewGrid"]
 
-_HEADER_HEIGHT = 24
+_HEADER_HEIGHT, _GAP = 24, 6
 
 
 class ViewHeader(QWidget):
@@ -33,17 +34,15 @@ class ViewHeader(QWidget):
 
     def __init__(self, name: str, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setFixedHeight(_HEADER_HEIGHT)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
         self._name = name
-        title = QLabel("3D" if name == "3d" else name.capitalize())
+        self.title = title = QLabel("3D" if name == "3d" else name.capitalize())
         title.setProperty("role", "heading")
         self.where = QLabel()
         self.where.setProperty("role", "hint")
         self._button = QToolButton()
         self._button.setProperty("role", "quiet")
-        self._button.setFixedSize(24, 20)
         self._button.setStyleSheet("padding: 0")
-        self._button.setIconSize(QSize(14, 14))
         self._button.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         self._button.setToolTip("Maximise or restore this view (double click)")
         self._button.setAccessibleName(f"Maximise the {name} view")
@@ -55,11 +54,39 @@ class ViewHeader(QWidget):
         self._row.addWidget(self.where)
         self._row.addStretch(1)
         self._row.addWidget(self._button)
+        self._slider: SliceSlider | None = None
+        fit(self, self._fit)
         self.take_theme()
 
-    def add(self, widget: QWidget) -> None:
-        """Put something before the button."""
-        self._row.insertWidget(self._row.count() - 1, widget)
+    def add(self, slider: SliceSlider) -> None:
+        """Put a slider before the button, where there is room for it."""
+        self._slider = slider
+        self._row.insertWidget(self._row.count() - 1, slider)
+
+    def say_where(self, words: str) -> None:
+        """Say beside the name where the view is."""
+        self.where.setText(words)
+        self._leave_out()
+
+    def _fit(self) -> None:
+        """Give bar and button a size that goes with the text."""
+        self.setFixedHeight(max(pixels(self, _HEADER_HEIGHT), line_height(self, HEADING) + 4))
+        self._button.setFixedSize(pixels(self, 24), self.height() - 4)
+        self._button.setIconSize(QSize(pixels(self, 14), pixels(self, 14)))
+        self._leave_out()
+
+    def _leave_out(self) -> None:
+        """In a narrow view leave out the slider, and then where it is, rather than cut a word."""
+        room = self.width() - self.title.sizeHint().width() - self._button.width() - 3 * self._row.spacing()
+        room -= self._row.contentsMargins().left() + self._row.contentsMargins().right()
+        words = self.where.sizeHint().width() if self.where.text() else 0
+        self.where.setVisible(words <= room)
+        if self._slider is not None:
+            self._slider.set_room(words + self._row.spacing() + self._slider.minimumWidth() <= room)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
+        super().resizeEvent(event)
+        self._leave_out()
 
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
@@ -139,6 +166,8 @@ class ViewGrid(QWidget):
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(self._column)
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
+        self.setMinimumWidth(2 * self.scene_view.minimumWidth() + _GAP)
         self._listen()
         self._lay_out()
 
@@ -163,12 +192,12 @@ class ViewGrid(QWidget):
             row.addWidget(self.frames[name])
         row.setSizes([1000, 1000])
         row.setChildrenCollapsible(False)
-        row.setHandleWidth(6)
+        row.setHandleWidth(_GAP)
         return row
 
     def _listen(self) -> None:
         self._column.setChildrenCollapsible(False)
-        self._column.setHandleWidth(6)
+        self._column.setHandleWidth(_GAP)
         for frame in self.frames.values():
             frame.maximise_asked.connect(self._maximise)
             frame.view.hovered.connect(self.hovered)
@@ -189,7 +218,7 @@ class ViewGrid(QWidget):
     def _on_session_replaced(self, _: object) -> None:
         self._lay_out()
         for frame in self.frames.values():
-            frame.header.where.setText("")
+            frame.header.say_where("")
 
     def _lay_out(self) -> None:
         layout = self._desk.session.view.state.layout
@@ -199,9 +228,7 @@ class ViewGrid(QWidget):
             row.setVisible(layout == "four-up" or layout in names)
 
     def _say_where(self, plane: Plane, position: float) -> None:
-        self.frames[plane.value].header.where.setText(position_text(plane, position))
+        self.frames[plane.value].header.say_where(position_text(plane, position))
 
     def _say_threshold(self, threshold: float | None) -> None:
-        self.frames["3d"].header.where.setText(
-            "" if threshold is None else f"bone from {value_text(threshold)}"
-        )
+        self.frames["3d"].header.say_where("" if threshold is None else f"bone from {value_text(threshold)}")

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import read_json, write_text
 from gp_core.errors import GpError
-from gp_labeler.session.specimen_file import write_durably
 
 __all__ = ["WindowState"]
 
@@ -46,7 +46,7 @@ class WindowState:
             return
         try:
             self._path.parent.mkdir(parents=True, exist_ok=True)
-            write_durably(self._path, json.dumps(self._values, indent=1))
+            write_text(self._path, json.dumps(self._values, indent=1))
         except (OSError, GpError):
             return
 
@@ -55,7 +55,7 @@ def _read(path: Path | None) -> dict[str, Any]:
     if path is None:
         return {}
     try:
-        content = json.loads(path.read_bytes())
-    except (OSError, ValueError, RecursionError):
+        content = read_json(path)
+    except GpError:
         return {}
     return content if isinstance(content, dict) else {}

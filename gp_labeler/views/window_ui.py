@@ -17,10 +17,12 @@ from gp_labeler.session.opening import UnsavedEditsError
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.specimen_file import SUFFIX
 from gp_labeler.views.atlas_ui import AtlasUi
+from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.panels.export_dialog import ExportDialog
 from gp_labeler.views.panels.import_dialog import ImportDialog
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.recover_dialog import RecoverDialog
+from gp_labeler.views.pictures import write_picture
 from gp_labeler.views.pose_ui import PoseUi
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_about, export_asking, import_asking
@@ -175,8 +177,7 @@ class WindowUi(AtlasUi, PoseUi):
         )
         if path is None:
             return
-        if not self._window.grab().save(str(path)):
-            raise GpError("cannot be written", file=path)
+        write_picture(self._window.grab(), path)
         self._desk.say(f"Wrote {path.name}")
         self._desk.pictured.emit(path)
 
@@ -261,6 +262,11 @@ class WindowUi(AtlasUi, PoseUi):
     def toggle_theme(self) -> None:
         """Change between dark and light."""
         self._window.set_theme("light" if self._window.theme_name == "dark" else "dark")
+
+    def change_text_size(self, step: int) -> None:
+        """Draw text larger (1) or smaller (-1), or as large as the desktop's (0)."""
+        size = nearest_text_size(self._window.text_size, step=step) if step else 100
+        self._window.set_text_size(size)
 
     def toggle_projection(self) -> None:
         """Change between parallel and perspective."""

@@ -10,7 +10,7 @@ from PySide6.QtCore import QPointF, QRectF, Qt
 from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter
 
 from gp_labeler.scene.colours import DARK
-from gp_labeler.views.theme import base_font
+from gp_labeler.views.fonts import base_font, family
 
 __all__ = ["WordPicture", "word_picture"]
 
@@ -36,7 +36,6 @@ class WordPicture(NamedTuple):
         self.draw(painter, x - self.box.center().x(), y - self.box.center().y())
 
 
-@lru_cache(_KEPT)
 def word_picture(text: str, size: float, colour: str, ratio: float, *, bold: bool = True) -> WordPicture:
     """Return the picture of a word.
 
@@ -50,6 +49,13 @@ def word_picture(text: str, size: float, colour: str, ratio: float, *, bold: boo
         Device pixels for each logical one.
     bold : bool
     """
+    return _word_picture(text, size, colour, ratio, bold, family())
+
+
+@lru_cache(_KEPT)
+def _word_picture(
+    text: str, size: float, colour: str, ratio: float, bold: bool, family_name: str
+) -> WordPicture:
     font = base_font()
     font.setPixelSize(round(size * ratio))
     font.setBold(bold)

@@ -14,6 +14,8 @@ import gp_core
 from gp_core.cli import main
 from gp_core.landmarks.files import write_csv
 
+pytestmark = pytest.mark.machine
+
 _KEYS = {
     "method",
     "side",

@@ -10,9 +10,25 @@ import pytest
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
-from window_cases import Answers, ball_volume, close, settle
+from pytestqt.qtbot import QtBot
+from window_cases import PATIENCE_MS, Answers, ball_volume, close, settle
 
 from gp_labeler.imaging.volume import Volume
+
+
+class PatientBot(QtBot):
+    """pytest-qt's own, which waits for what must come true however busy the machine is."""
+
+    def waitUntil(self, callback, *, timeout=PATIENCE_MS):  # noqa: N802
+        return super().waitUntil(callback, timeout=timeout)
+
+    def waitSignal(self, signal, *, timeout=PATIENCE_MS, **options):  # noqa: N802
+        return super().waitSignal(signal, timeout=timeout, **options)
+
+
+@pytest.fixture
+def qtbot(qapp, request) -> QtBot:
+    return PatientBot(request)
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,12 +11,12 @@ from test_workbench import Desk
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.label_check import Finding, SideCheck
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import load_specimens
 from gp_core.study.leave_one_out import leave_one_out
 from gp_labeler.atlas_desk import is_atlas_file
-from gp_labeler.session.ghosts import Departure
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.session.state import How, Provenance
@@ -283,10 +282,11 @@ def test_stopping_the_atlas_of_the_last_time_leaves_the_published_one(start, fol
 def test_views_are_told_of_a_judgement_that_changes_what_they_show(desk) -> None:
     told = []
     desk.doubts_changed.connect(lambda: told.append(1))
-    fine = Departure("CA", 0.1, np.zeros(3), np.eye(3), 0.2)
-    desk._take_judged(False, {"CA": fine})
+    fine = SideCheck((Finding("", L, "missing", ("CB",), "not placed"),))
+    doubtful = SideCheck((Finding("", L, "swapped", ("CA", "CB"), "CA and CB look exchanged"),))
+    desk._take_judged(False, fine)
     assert told == [], "no point looks otherwise than before"
-    desk._take_judged(True, {"CA": fine})
+    desk._take_judged(True, fine)
     assert told == [1], "a doubt shown until now is gone"
-    desk._take_judged(False, {"CA": replace(fine, n_sd=9.0)})
+    desk._take_judged(False, doubtful)
     assert told == [1, 1]

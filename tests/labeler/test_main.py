@@ -13,6 +13,8 @@ from window_cases import BALL_MM, MIDDLE, write_ball
 
 from gp_labeler.__main__ import main
 
+pytestmark = pytest.mark.machine
+
 
 @pytest.fixture
 def ball_file(tmp_path) -> Path:
@@ -86,7 +88,7 @@ def test_the_window_opens_from_the_command_line_and_says_what_is_wrong(ball_file
         [sys.executable, "-W", "error", "-c", code, str(ball_file), str(tmp_path / "state")],
         capture_output=True,
         text=True,
-        timeout=90,
+        timeout=600,
         env=dict(os.environ, QT_QPA_PLATFORM="offscreen"),
         check=False,
     )

@@ -128,7 +128,7 @@ def test_both_methods_come_once_jrmpc_is_compiled(desk, dispatcher, animal):
         desk.pose.record(animal[code], TouchHow.TYPED)
     desk.pose.choose(methods=("robust", "jrmpc"))
     assert set(desk.pose.estimate.poses) == {"robust"}
-    dispatcher.deliver_until_idle(desk.jobs, timeout=60)
+    dispatcher.deliver_until_idle(desk.jobs, timeout=600)
     assert set(desk.pose.estimate.poses) == {"robust", "jrmpc"}
 
 

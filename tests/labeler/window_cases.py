@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,9 @@ import numpy as np
 from gp_labeler.imaging.volume import Volume
 
 BALL_MM, VOXEL_MM = 6.0, 0.25
+PATIENCE_MS = 120_000
+"""How long a test waits for what must come true: only a failure lasts that long, however busy the machine."""
+
 MIDDLE = np.array([10.0, -20.0, 30.0])
 
 
@@ -70,6 +74,26 @@ class Answers:
         return value
 
 
+def drop_file(widget, path: Path, x: float = 9, y: float = 9, entered: Callable[[], object] = bool) -> None:
+    """Drag a file onto a widget and let it go; `entered` is called while it hovers."""
+    from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+    from PySide6.QtGui import QDragEnterEvent, QDropEvent
+    from PySide6.QtWidgets import QApplication
+
+    data = QMimeData()
+    data.setUrls([QUrl.fromLocalFile(str(path))])
+    where = QPointF(x, y)
+    how = (Qt.DropAction.CopyAction, data, Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier)
+    try:
+        entering = QDragEnterEvent(where, *how)
+    except TypeError:  # PySide6 before 6.12; from there on, whole pixels are deprecated
+        entering = QDragEnterEvent(where.toPoint(), *how)
+    QApplication.sendEvent(widget, entering)
+    assert entering.isAccepted()
+    entered()
+    QApplication.sendEvent(widget, QDropEvent(where, *how))
+
+
 def close(window) -> None:
     """Close a window and let Qt delete it."""
     from PySide6.QtCore import QCoreApplication, QEvent
@@ -83,7 +107,7 @@ def close(window) -> None:
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
-def settle(qtbot, window, seconds: float = 20.0) -> None:
+def settle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
     """Wait until all work is done, and all is drawn."""
     desk = window.workbench
     qtbot.waitUntil(lambda: not desk.jobs.running, timeout=int(1000 * seconds))

@@ -64,7 +64,7 @@ def read_dat(path: str | PathLike[str]) -> PointList:
     FileFormatError
         Another number of rows or columns, or not finite numbers.
     """
-    lines = dict(split_lines(read_text(path)))
+    lines = dict(split_lines(read_text(path), path))
     rows = [(number, re.split(r"[\s,;]+", line.strip())) for number, line in lines.items()]
     layout = _LAYOUTS.get(len(rows))
     for number, fields in rows:

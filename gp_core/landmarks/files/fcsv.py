@@ -9,8 +9,9 @@ import re
 from os import PathLike
 from pathlib import Path
 
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.points import (
     STATUS_WORDS,
     LabelledPoint,
@@ -49,7 +50,7 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
     FileFormatError
         Wrong number of columns, an unknown status or system, or a position that is not three finite numbers.
     """
-    lines = split_lines(read_text(path))
+    lines = split_lines(read_text(path), path)
     system = next((m[1].strip() for _, line in lines if (m := _SYSTEM.match(line))), None)
     rows = [
         (number, split_fields(line, ",", number, path)) for number, line in lines if not line.startswith("#")

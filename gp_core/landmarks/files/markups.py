@@ -12,21 +12,24 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
-from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.header import FileHeader
 from gp_core.landmarks.files.points import (
     STATUS_WORDS,
     LabelledPoint,
     PointList,
+    as_suggested,
     is_computed,
     labelled_point,
     points_of,
+    suggestions_of,
 )
-from gp_core.landmarks.files.text import flips_xy, shown
+from gp_core.landmarks.files.text import check_count, flips_xy, shown
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["read_markups", "write_markups", "write_point_lists"]
+__all__ = ["read_markups", "write_markups", "write_point_lists", "write_suggestions"]
 
 _log = logging.getLogger(__name__)
 
@@ -34,6 +37,9 @@ _SCHEMA = (
     "https://raw.githubusercontent.com/slicer/slicer/master/"
     "Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#"
 )
+ACCEPTED = "accepted ghost"
+"""The provenance of a point that was put, and not looked at, where the atlas expected it."""
+
 _LINES = ("Line",)
 """What this program writes beside point lists: through points of the lists, so that nothing is lost."""
 
@@ -62,8 +68,30 @@ def read_markups(path: str | PathLike[str]) -> PointList:
     content = _load(path)
     header = FileHeader.from_json(content["gpLabeler"], path) if "gpLabeler" in content else None
     lists = _point_lists(content, path, told=_LINES if header else ())
-    points = tuple(point for markup in lists for point in _points(markup, path))
-    return PointList(points, Path(path), "scan" if header is None else header.frame, header)
+    listed = (markup.get("controlPoints") for markup in lists)
+    check_count(sum(len(points) for points in listed if isinstance(points, list)), "points", path)
+    points = [point for markup in lists for point in _points(markup, path)]
+    if header is not None:
+        points = _without_accepted_ghosts(points, header, path)
+    return PointList(tuple(points), Path(path), "scan" if header is None else header.frame, header)
+
+
+def _without_accepted_ghosts(
+    points: list[LabelledPoint], header: FileHeader, file: str | PathLike[str]
+) -> list[LabelledPoint]:
+    """Take what earlier versions placed unseen, where the atlas expected it, as the suggestions they are."""
+    accepted = {
+        label
+        for label, how in header.provenance.items()
+        if isinstance(how, dict) and how.get("how") == ACCEPTED
+    }
+    found = [as_suggested(p, source="atlas") if p.label in accepted else p for p in points]
+    taken = [new.label for old, new in zip(points, found, strict=True) if new is not old]
+    if taken:
+        _log.warning(
+            "%s: accepted ghosts that nobody confirmed are taken as suggestions: %s", file, " ".join(taken)
+        )
+    return found
 
 
 def _load(path: str | PathLike[str]) -> dict[str, Any]:
@@ -187,6 +215,38 @@ def write_markups(
         extra=tuple(landmarks.extra),
     )
     write_point_lists(path, {"Fiducial": points_of(landmarks)}, header)
+
+
+def write_suggestions(
+    path: str | PathLike[str],
+    landmarks: LandmarkSet,
+    *,
+    specimen: str,
+    volume: Mapping[str, Any] | None = None,
+) -> None:
+    """Write what is suggested on one side of a specimen, which `write_markups` leaves out.
+
+    3D Slicer shows such points like any others. So each description says that the point is suggested, and
+    every reader of this library takes it as a suggestion, also after Slicer has saved the file.
+
+    Parameters
+    ----------
+    path : path
+        ``<specimen>_L_suggested.mrk.json`` or ``<specimen>_R_suggested.mrk.json``.
+    landmarks : LandmarkSet
+        Suggested positions in mm, LPS.
+    specimen, volume
+        As for `write_markups`.
+
+    Raises
+    ------
+    GpError
+        Nothing is suggested, or the file cannot be written.
+    """
+    if not landmarks.suggested:
+        raise GpError(f"nothing is suggested on the {landmarks.side.word} side", specimen=specimen)
+    header = FileHeader(specimen=specimen, side=landmarks.side, frame=landmarks.frame, volume=volume)
+    write_point_lists(path, {"Fiducial": suggestions_of(landmarks)}, header)
 
 
 def write_point_lists(

@@ -14,13 +14,12 @@ import struct
 import zlib
 from collections.abc import Iterator
 from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
 from gp_core.checks import FloatArray
+from gp_core.disk import read_bytes
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.files.disk import check_file
 
 __all__ = ["read_mat5"]
 
@@ -46,10 +45,10 @@ def read_mat5(path: str | PathLike[str]) -> dict[str, FloatArray | None]:
     FileFormatError
         Not such a file, or a damaged one.
     """
-    check_file(path)
+    content = read_bytes(path, what="MATLAB file")
     try:
-        return dict(_variables(Path(path).read_bytes()))
-    except (OSError, ValueError, OverflowError, struct.error, zlib.error):
+        return dict(_variables(content))
+    except (ValueError, OverflowError, struct.error, zlib.error):
         raise FileFormatError(
             "is not a MATLAB file of version 5 to 7, or is damaged",
             file=path,

@@ -8,17 +8,23 @@ from pathlib import Path
 
 from gp_core.landmarks.features import Side
 
-__all__ = ["landmark_file_name", "name_parts", "named_side", "natural_key"]
+__all__ = ["is_named_suggested", "landmark_file_name", "name_parts", "named_side", "natural_key"]
 
+_SUGGESTED_ENDING = re.compile(r"[ _.\-]+suggested$", re.IGNORECASE)
 # GP01_L, GP01-left, "GP01 right", GP01.R
 _SIDE_ENDING = re.compile(
     r"(?P<specimen>.*[^ _.\-])[ _.\-]+(?P<side>l|r|left|right)", re.IGNORECASE | re.DOTALL
 )
 
 
-def landmark_file_name(specimen: str, side: Side) -> str:
-    """Return the name of the file that holds one side of a specimen."""
-    return f"{specimen}_{side.value}.mrk.json"
+def landmark_file_name(specimen: str, side: Side, *, suggested: bool = False) -> str:
+    """Return the name of the file that holds one side of a specimen, or what is only suggested there."""
+    return f"{specimen}_{side.value}{'_suggested' if suggested else ''}.mrk.json"
+
+
+def is_named_suggested(path: str | PathLike[str], suffix: str) -> bool:
+    """Return whether a file is named as one that holds suggestions, such as ``GP01_L_suggested.mrk.json``."""
+    return _SUGGESTED_ENDING.search(Path(path).name[: -len(suffix)]) is not None
 
 
 def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None]:
@@ -28,9 +34,11 @@ def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None
     --------
     >>> name_parts("scans/LG.J_7-left.mrk.json", ".mrk.json")
     ('LG.J_7', <Side.LEFT: 'L'>)
+    >>> name_parts("GP01_R_suggested.mrk.json", ".mrk.json")
+    ('GP01', <Side.RIGHT: 'R'>)
     """
     name = Path(path).name
-    stem = name[: len(name) - len(suffix)]
+    stem = _SUGGESTED_ENDING.sub("", name[: len(name) - len(suffix)])
     match = _SIDE_ENDING.fullmatch(stem)
     if match is None:
         return stem, None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike
@@ -17,8 +18,18 @@ from gp_core.landmarks.features import FEATURES, Feature
 from gp_core.landmarks.files.header import FileHeader
 from gp_core.landmarks.files.text import parse_position
 from gp_core.landmarks.sets import LandmarkSet, Status
+from gp_core.landmarks.suggestion import Suggestion
 
-__all__ = ["STATUS_WORDS", "LabelledPoint", "PointList", "is_computed", "labelled_point", "points_of"]
+__all__ = [
+    "STATUS_WORDS",
+    "LabelledPoint",
+    "PointList",
+    "as_suggested",
+    "is_computed",
+    "labelled_point",
+    "points_of",
+    "suggestions_of",
+]
 
 _log = logging.getLogger(__name__)
 
@@ -30,14 +41,25 @@ STATUS_WORDS: Mapping[str, Status] = {
     "missing": Status.UNSEEN,
 }
 
+# What marks a suggestion in the one text that 3D Slicer shows of a point, and keeps when it saves.
+_SUGGESTED = re.compile(
+    r"suggested, not confirmed"
+    r"(?: \((?P<source>.*?)(?:; 95 % within (?P<radius>[0-9]{1,6}\.?[0-9]*) mm)?\)(?=\.|$))?",
+    re.IGNORECASE,
+)
+
 
 class LabelledPoint(NamedTuple):
-    """One point of a file: label, (3,) position in mm or None, how far it is, free text."""
+    """One point of a file: label, (3,) position in mm or None, how far it is, free text.
+
+    A suggested point has no `position`, which would be an observation, but a `suggestion`.
+    """
 
     label: str
     position: FloatArray | None
     status: Status
     description: str = ""
+    suggestion: Suggestion | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +155,19 @@ def labelled_point(
         return LabelledPoint(label, None, Status.TO_DO, description)
     if flip_xy:
         position[:2] *= -1.0
-    return LabelledPoint(label, position, status, description)
+    point = LabelledPoint(label, position, status, description)
+    return as_suggested(point) if _SUGGESTED.match(description) else point
+
+
+def as_suggested(point: LabelledPoint, source: str = "") -> LabelledPoint:
+    """Return a placed point as a suggestion; its description may say of what, else it is of `source`."""
+    if point.position is None:
+        return point
+    said = _SUGGESTED.match(point.description)
+    radius = float(said["radius"]) if said and said["radius"] else 0.0
+    x, y, z = point.position.tolist()
+    suggestion = Suggestion((x, y, z), radius or None, (said["source"] if said else "") or source)
+    return point._replace(position=None, status=Status.SUGGESTED, suggestion=suggestion)
 
 
 def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
@@ -149,6 +183,24 @@ def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
     ]
     extra = [LabelledPoint(name, position, Status.PLACED) for name, position in landmarks.extra.items()]
     return (*features, *extra)
+
+
+def suggestions_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
+    """Return the suggestions of a set as a file of their own is to hold them.
+
+    Every feature is there, in the table's order. The suggested ones have positions, for 3D Slicer to show;
+    each description says that nobody has confirmed the point.
+    """
+    return tuple(_suggested_point(f, landmarks.suggested.get(f.code)) for f in FEATURES)
+
+
+def _suggested_point(feature: Feature, suggestion: Suggestion | None) -> LabelledPoint:
+    if suggestion is None:
+        return LabelledPoint(feature.code, None, Status.TO_DO, _description(feature))
+    radius = "" if suggestion.radius_95 is None else f"; 95 % within {suggestion.radius_95:.3f} mm"
+    origin = f" ({suggestion.source}{radius})" if suggestion.source or radius else ""
+    text = f"Suggested, not confirmed{origin}. {_description(feature)}"
+    return LabelledPoint(feature.code, np.array(suggestion.position), Status.PLACED, text)
 
 
 def _description(feature: Feature) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 from os import PathLike, fspath
 from types import MappingProxyType
@@ -10,21 +9,22 @@ from typing import Literal
 
 import numpy as np
 
-from gp_core.checks import check_option, near_matches
+from gp_core.checks import FloatArray, check_option, near_matches
 from gp_core.errors import FeatureError, FileFormatError, GeometryError
-from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.files.dat import is_sentinel, read_dat
 from gp_core.landmarks.files.disk import check_file
 from gp_core.landmarks.files.fcsv import read_fcsv
 from gp_core.landmarks.files.markups import read_markups
-from gp_core.landmarks.files.naming import name_parts
-from gp_core.landmarks.files.points import LabelledPoint, PointList
+from gp_core.landmarks.files.naming import is_named_suggested, name_parts
+from gp_core.landmarks.files.points import LabelledPoint, PointList, as_suggested
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.files.table import read_table
 from gp_core.landmarks.files.text import shown
+from gp_core.landmarks.labels import is_skull_feature, tidy_label
 from gp_core.landmarks.sets import LandmarkSet, Status
 
-__all__ = ["landmarks_of", "read_landmarks", "read_points", "read_touches", "specimen_of"]
+__all__ = ["label_names", "landmarks_of", "read_landmarks", "read_points", "read_touches", "specimen_of"]
 
 Unknown = Literal["error", "extra"]
 
@@ -36,7 +36,7 @@ _READERS = {
     ".tsv": read_table,
     ".dat": read_dat,
 }
-_SKULL_FEATURE = re.compile(r"S[0-9]{1,2}", re.IGNORECASE)
+_SAME_PLACE_MM = 1e-3  # far below a voxel, and still right for a file in metres, which is told elsewhere
 _MIN_TO_TELL_A_POINT_FROM_A_SHAPE = 3
 
 
@@ -62,14 +62,19 @@ def read_points(path: str | PathLike[str]) -> PointList:
     Returns
     -------
     PointList
-        Positions in mm; LPS, but of a ``.dat`` in the tracker frame.
+        Positions in mm; LPS, but of a ``.dat`` in the tracker frame. Points that the file marks as suggested,
+        in their description or because its name ends in ``_suggested``, have no position but a suggestion.
 
     Raises
     ------
     FileFormatError
         Another kind of file, or one that cannot be read.
     """
-    return _READERS[_suffix(path)](path)
+    suffix = _suffix(path)
+    points = _READERS[suffix](path)
+    if not is_named_suggested(path, suffix):
+        return points
+    return replace(points, points=tuple(as_suggested(point) for point in points.points))
 
 
 def read_landmarks(
@@ -91,7 +96,8 @@ def read_landmarks(
     Returns
     -------
     LandmarkSet
-        In the frame that the file names, else ``scan`` (``.dat``: ``tracker``).
+        In the frame that the file names, else ``scan`` (``.dat``: ``tracker``). What the file marks as
+        suggested is in `LandmarkSet.suggested`.
 
     Raises
     ------
@@ -190,7 +196,7 @@ def _check_side(wanted: Side, said: Side | None, points: PointList) -> None:
 
 def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -> LandmarkSet:
     check_option(unknown, "unknown", ("error", "extra"))
-    names = _names(points, unknown)
+    names = label_names(points, unknown=unknown)
     positions = dict(zip(names, points.positions, strict=True))
     placed = np.array([p.position for p in points.points if p.position is not None])
     if len(placed) >= _MIN_TO_TELL_A_POINT_FROM_A_SHAPE and (placed == placed[0]).all():
@@ -202,22 +208,53 @@ def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -
     rows = np.array([positions.get(code, np.full(3, np.nan)) for code in CODES])
     unseen = {name for name, status in zip(names, points.statuses, strict=True) if status is Status.UNSEEN}
     extra = {name: p for name, p in positions.items() if name not in CODES and np.isfinite(p).all()}
-    return LandmarkSet(rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra))
+    suggested = {
+        name: point.suggestion
+        for name, point in zip(names, points.points, strict=True)
+        if point.suggestion is not None and name in CODES and not feature(name).computed
+    }
+    _check_axis(positions, points)
+    found = LandmarkSet(rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra))
+    return found.with_suggestions(suggested)
 
 
-def _names(points: PointList, unknown: Unknown) -> list[str]:
+def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:
+    """Refuse an axis without a direction, whatever else is placed."""
+    ca, cb = (positions.get(code, np.full(3, np.nan)) for code in ("CA", "CB"))
+    if np.linalg.norm(ca - cb) < _SAME_PLACE_MM:
+        raise GeometryError(
+            "CA and CB are at the same place, so they give no axis",
+            file=points.source,
+            landmark="CA",
+            remedy="Place one of them again.",
+        )
+
+
+def label_names(points: PointList, *, unknown: Unknown = "extra") -> list[str]:
+    """Return the names that the labels of a file stand for, in its order.
+
+    Raises
+    ------
+    FeatureError
+        A label is unknown, where `unknown` says that it is an error, or two of them name one point.
+    """
     known = set(points.header.extra) if points.header else set()
-    names: dict[str, None] = {}
+    names: dict[str, str] = {}
     for label in points.labels:
-        name = label.upper() if label.upper() in CODES or _SKULL_FEATURE.fullmatch(label) else label
-        if not (name in CODES or name in known or _SKULL_FEATURE.fullmatch(name) or unknown == "extra"):
+        name = tidy_label(label)
+        if not (name in CODES or name in known or is_skull_feature(name) or unknown == "extra"):
             raise _unknown(label, points)
-        if name in names:
+        if name.casefold() in names:
+            other = names[name.casefold()]
+            also = "" if other == label else f", as {shown(label)} too"
             raise FeatureError(
-                "is in the file twice", file=points.source, landmark=name[:40], remedy="Remove one of them."
+                f"is in the file twice{also}",
+                file=points.source,
+                landmark=other[:40],
+                remedy="Remove one of them.",
             )
-        names[name] = None
-    return list(names)
+        names[name.casefold()] = name
+    return list(names.values())
 
 
 def _unknown(label: str, points: PointList) -> FeatureError:

@@ -16,7 +16,7 @@ from gp_core.landmarks.files.reading import landmarks_of, read_points, specimen_
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
-__all__ = ["load_specimens"]
+__all__ = ["landmark_files", "load_specimens"]
 
 _SAME_MM = 1e-6
 _IN_FOLDERS = (".mrk.json", ".fcsv")
@@ -38,6 +38,7 @@ def load_specimens(
     list of Specimen
         By name, GP2 before GP10. Files belong together by the specimen in their ``gpLabeler`` object,
         else by their name without ``_L`` or ``_R``. CO is computed where a file lacks it or differs.
+        A file of suggestions (``_L_suggested``) adds to the file of that side.
 
     Raises
     ------
@@ -50,12 +51,13 @@ def load_specimens(
     """
     files = _files([paths] if isinstance(paths, (str, PathLike)) else list(paths))
     sides: dict[str, dict[Side, LandmarkSet]] = {}
-    sources: dict[tuple[str, Side], Path] = {}
+    sources: dict[tuple[str, Side, bool], Path] = {}
     for file in files:
         points = read_points(file)
         name, landmarks = specimen_of(points), landmarks_of(points)
         check_plausible_size(landmarks, file)
-        earlier = sources.setdefault((name, landmarks.side), file)
+        only_suggested = bool(landmarks.suggested) and not landmarks.placed
+        earlier = sources.setdefault((name, landmarks.side, only_suggested), file)
         if earlier is not file:
             raise FeatureError(
                 f"the {landmarks.side.word} side is in {fspath(earlier)} too",
@@ -63,8 +65,23 @@ def load_specimens(
                 specimen=name,
                 remedy="Give one file a side, or name the specimens apart.",
             )
-        sides.setdefault(name, {})[landmarks.side] = _with_true_origin(landmarks)
+        known = sides.setdefault(name, {})
+        known[landmarks.side] = _together(known.get(landmarks.side), _with_true_origin(landmarks), file)
     return [Specimen(name, sides[name]) for name in sorted(sides, key=natural_key)]
+
+
+def _together(known: LandmarkSet | None, read: LandmarkSet, file: Path) -> LandmarkSet:
+    """Add the suggestions of one file to the observations of another of the same side."""
+    if known is None:
+        return read
+    if known.frame != read.frame:
+        raise FeatureError(
+            f"is in the frame {read.frame}, but the other file of the {read.side.word} side in {known.frame}",
+            file=file,
+            remedy="Leave out one of them.",
+        )
+    observed, other = (known, read) if known.placed else (read, known)
+    return observed.with_suggestions({**other.suggested, **observed.suggested})
 
 
 def _with_true_origin(landmarks: LandmarkSet) -> LandmarkSet:
@@ -77,13 +94,21 @@ def _with_true_origin(landmarks: LandmarkSet) -> LandmarkSet:
 def _files(paths: list[str | PathLike[str]]) -> list[Path]:
     if not paths:
         raise FileFormatError("no landmark files were given", remedy="Name files, or folders of them.")
-    found = [file for path in paths for file in _files_at(Path(path))]
+    found = [file for path in paths for file in landmark_files(path)]
     return list(
         {file.absolute(): file for file in found}.values()
     )  # a file may be named along with its folder
 
 
-def _files_at(path: Path) -> list[Path]:
+def landmark_files(place: str | PathLike[str]) -> list[Path]:
+    """Return the landmark files of a folder, not deeper, or the one file that is named.
+
+    Raises
+    ------
+    FileFormatError
+        The folder holds none, or cannot be searched.
+    """
+    path = Path(place)
     try:
         if not path.is_dir():
             return [path]

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
+from gp_core.disk import write_text
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.files.disk import read_text, write_text
+from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.points import (
     STATUS_WORDS,
     LabelledPoint,
@@ -20,7 +21,15 @@ from gp_core.landmarks.files.points import (
     labelled_point,
     points_of,
 )
-from gp_core.landmarks.files.text import has_decimal_comma, shown, split_fields, split_lines
+from gp_core.landmarks.files.text import (
+    MAX_POINTS,
+    as_csv_cell,
+    has_decimal_comma,
+    of_csv_cell,
+    shown,
+    split_fields,
+    split_lines,
+)
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["read_rows", "read_table", "write_csv"]
@@ -68,7 +77,9 @@ def read_table(path: str | PathLike[str]) -> PointList:
     return PointList(points, Path(path))
 
 
-def read_rows(path: str | PathLike[str], *, aligned: bool = False) -> list[tuple[int, list[str]]]:
+def read_rows(
+    path: str | PathLike[str], *, aligned: bool = False, at_most: int = MAX_POINTS
+) -> list[tuple[int, list[str]]]:
     """Return the numbered rows of a table, split into fields, without comments (``#``) and blank lines.
 
     Parameters
@@ -77,13 +88,19 @@ def read_rows(path: str | PathLike[str], *, aligned: bool = False) -> list[tuple
         Text with commas, semicolons, tabs or blanks between the columns.
     aligned : bool
         Whether many blanks are one, as where they align the columns; then no field can be empty.
+    at_most : int
+        How many lines there may be.
 
     Raises
     ------
     FileFormatError
         Not such a text, or quotes that do not close.
     """
-    lines = [(number, line) for number, line in split_lines(read_text(path)) if not line.startswith("#")]
+    lines = [
+        (number, line)
+        for number, line in split_lines(read_text(path), path, at_most=at_most)
+        if not line.startswith("#")
+    ]
     delimiter = _delimiter_of(lines[0][1]) if lines else ","
     if aligned and delimiter == " ":
         lines = [(number, " ".join(line.split())) for number, line in lines]
@@ -123,13 +140,13 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         i = columns.others.get(name, len(fields))
         return fields[i] if i < len(fields) else ""
 
-    label = fields[columns.label]
+    label = of_csv_cell(fields[columns.label])
     return labelled_point(
         label,
         [fields[i] for i in columns.axes],
         _status(other("status"), other("defined"), label, file),
         file=file,
-        description=other("description"),
+        description=of_csv_cell(other("description")),
         flip_xy=columns.flip_xy,
     )
 
@@ -163,5 +180,6 @@ def write_csv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
         lps = ["", "", ""] if point.position is None else point.position.tolist()
         defined = int(point.position is not None)
         locked = int(is_computed(point.label))
-        writer.writerow([point.label, *lps, defined, 1, 1, locked, point.description, point.status.value])
+        label, description = as_csv_cell(point.label), as_csv_cell(point.description)
+        writer.writerow([label, *lps, defined, 1, 1, locked, description, point.status.value])
     write_text(path, stream.getvalue())

@@ -15,8 +15,12 @@ from gp_core.errors import FileFormatError
 
 __all__ = [
     "DECIMAL_POINTS",
+    "MAX_POINTS",
+    "as_csv_cell",
+    "check_count",
     "flips_xy",
     "has_decimal_comma",
+    "of_csv_cell",
     "parse_position",
     "rows_text",
     "shown",
@@ -24,16 +28,28 @@ __all__ = [
     "split_lines",
 ]
 
+MAX_POINTS = 10_000
+"""What one landmark file may hold; more is refused before any of it is looked at."""
+
 _MAX_COORDINATE_MM = 1e9  # beyond nanometres of a large head: keeps squares and sums finite
 
 # What stands for "no number": R writes NA, or null through its JSON writer.
 _MISSING_WORDS = frozenset({"", "na", "null"})
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 _NUMBER_WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
 DECIMAL_POINTS = "Write decimal points, not commas."
 
 # 3D Slicer's words, and the numbers that old files have instead.
 _FLIPS_XY = {"LPS": False, "1": False, "RAS": True, "0": True, "": False}
+
+
+def check_count(n: int, what: str, file: str | PathLike[str], *, at_most: int = MAX_POINTS) -> None:
+    """Raise `FileFormatError` where a file holds more than `at_most` of something."""
+    if n > at_most:
+        raise FileFormatError(
+            f"holds {n} {what}, more than {at_most}", file=file, remedy=f"Give at most {at_most}."
+        )
 
 
 def shown(value: object) -> str:
@@ -42,9 +58,17 @@ def shown(value: object) -> str:
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
-def split_lines(text: str) -> list[tuple[int, str]]:
-    r"""Return the numbered lines that are not blank; stray carriage returns go, whoever wrote them."""
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+def split_lines(text: str, file: str | PathLike[str], *, at_most: int = MAX_POINTS) -> list[tuple[int, str]]:
+    r"""Return the numbered lines that are not blank; stray carriage returns go, whoever wrote them.
+
+    Raises
+    ------
+    FileFormatError
+        There are more than `at_most` lines.
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    check_count(text.count("\n"), "lines", file, at_most=at_most)
+    lines = text.split("\n")
     return [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
 
 
@@ -62,6 +86,16 @@ def split_fields(line: str, delimiter: str, number: int, file: str | PathLike[st
         raise FileFormatError(
             f"line {number} cannot be split into columns ({error})", file=file, remedy="Mend its quotes."
         ) from None
+
+
+def as_csv_cell(text: str) -> str:
+    """Return a text as a cell of a CSV file, which no spreadsheet takes for a formula."""
+    return f"'{text}" if text.lstrip("'").startswith(_FORMULA) else text
+
+
+def of_csv_cell(cell: str) -> str:
+    """Return the text that `as_csv_cell` made a cell of."""
+    return cell[1:] if cell.startswith("'") and cell.lstrip("'").startswith(_FORMULA) else cell
 
 
 def rows_text(rows: FloatArray) -> str:

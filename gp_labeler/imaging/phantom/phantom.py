@@ -13,6 +13,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.draw import draw_animal
 from gp_core.checks import FloatArray
+from gp_core.disk import atomic_file
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.markups import write_markups
@@ -176,4 +177,8 @@ def _write_volume(volume: Volume, path: Path) -> None:
     image.SetSpacing(volume.spacing)
     image.SetOrigin(volume.origin.tolist())
     image.SetDirection(volume.direction.ravel().tolist())
-    SimpleITK.WriteImage(image, str(path), useCompression=True)
+    with atomic_file(path) as draft:
+        try:
+            SimpleITK.WriteImage(image, str(draft), useCompression=True)
+        except RuntimeError as error:
+            raise OSError(str(error).strip().splitlines()[-1]) from None

@@ -1,4 +1,4 @@
-"""The tags of DICOM files that say what a slice is and where it lies."""
+"""The tags of DICOM files that say what a slice is, where it lies, and how its pixels are stored."""
 
 from __future__ import annotations
 
@@ -12,43 +12,51 @@ from typing import Any
 import numpy as np
 import pydicom
 from pydicom.errors import InvalidDicomError
-from pydicom.uid import ExplicitVRBigEndian, ExplicitVRLittleEndian, ImplicitVRLittleEndian
+from pydicom.uid import DeflatedExplicitVRLittleEndian
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.progress import Report
 
-__all__ = ["Frame", "Pixels", "is_dicom", "scan_dicom"]
+__all__ = ["DicomFile", "DicomSlice", "Stored", "is_dicom", "is_dicomdir", "scan_dicom"]
 
 _TAGS = [
     "SOPClassUID", "ImageType", "SeriesInstanceUID", "SeriesNumber", "SeriesDescription", "InstanceNumber",
+    "ConcatenationUID", "AcquisitionNumber", "TemporalPositionIdentifier", "EchoNumbers", "SliceLocation",
     "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness",
-    "NominalScannedPixelSpacing",
-    "SpacingBetweenSlices", "Rows", "Columns", "NumberOfFrames", "SamplesPerPixel", "BitsAllocated",
-    "BitsStored", "HighBit", "PixelRepresentation", "RescaleSlope", "RescaleIntercept",
-    "SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence",
+    "NominalScannedPixelSpacing", "GridFrameOffsetVector", "SpacingBetweenSlices", "Rows", "Columns",
+    "NumberOfFrames", "SamplesPerPixel", "PhotometricInterpretation", "PixelPaddingValue",
+    "BitsAllocated", "BitsStored", "HighBit", "PixelRepresentation", "RescaleSlope", "RescaleIntercept",
+    "ModalityLUTSequence", "SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence",
 ]  # fmt: skip
+_NUMBERS = {
+    (8, 0): "u1", (8, 1): "i1", (16, 0): "u2", (16, 1): "i2", (32, 0): "u4", (32, 1): "i4",
+    (64, 0): "u8", (64, 1): "i8",
+}  # fmt: skip
+_PIXEL_DATA = {0x0010: "", 0x0008: "f4", 0x0009: "f8"}
+"""Elements of group 7FE0, and the type of the floats in them."""
 
-
-_NUMBERS = {(8, 0): "u1", (8, 1): "i1", (16, 0): "u2", (16, 1): "i2", (32, 0): "u4", (32, 1): "i4"}
+_LARGEST_SKEW = 0.1
+_FIRST_VRS = (b"UL", b"UI", b"OB", b"CS", b"DA", b"TM", b"SH", b"LO", b"DT")
 
 
 @dataclass(frozen=True)
-class Pixels:
-    """Where the unpacked pixels of a file begin, and how they are stored: then no library need decode them.
+class Stored:
+    """Where the unpacked pixels of a file begin, and how they are stored.
 
-    `dtype` has its byte order, `bits` of each number count; values are scaled and shifted.
+    Of each number of `dtype`, which has its byte order, `bits` count, up to the bit `high`. In `exchanged`
+    data the bytes of each pair are exchanged: 8-bit pixels that were written as big-endian words.
     """
 
     offset: int
     dtype: np.dtype[Any]
     bits: int
-    slope: float
-    intercept: float
+    high: int
+    exchanged: bool = False
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
-    """One slice, or one file of many frames.
+class DicomFile:
+    """What holds for all slices of a file.
 
     Parameters
     ----------
@@ -56,59 +64,123 @@ class Frame:
         File.
     series, description : str
         Series UID, and what people call it.
+    volume : str
+        Parts the slices of a series that cannot be one volume: the file, where it holds many frames.
     number : int
         Instance number.
     shape : (2,) int
         Rows and columns.
-    n_frames : int
-        Frames in the file.
-    positions : (n, 3) array, mm
-        Centre of the first pixel of each frame; empty where the file does not say.
-    axes : (3, 3) array, optional
-        Columns: where x, y of the image and its normal point in LPS; None where the file does not say.
-    pixel : (2,) float, mm, optional
-        Pixel size along x, y.
-    thickness : float, mm, optional
-        Distance of slices if given, else their thickness.
-    value_range : (2,) float
-        Lowest and highest value that a pixel can have.
+    n_frames, channels : int
+        Frames, and samples of a pixel.
+    between, thickness : float, mm, optional
+        SpacingBetweenSlices, and SliceThickness, which is no distance.
+    stored_range : (2,) float
+        Lowest and highest number that a pixel can be stored as.
     integral : bool
-        Whether all values are integers.
-    channels : int
-        Samples of a pixel.
+        Whether pixels are stored as whole numbers.
+    inverted : bool
+        Whether low numbers are bright (MONOCHROME1).
     localizer : bool
         Whether it calls itself a scout image.
-    pixels : Pixels, optional
+    stored : Stored, optional
         Where its pixels lie; None where they are packed or in colour.
+    padding : float, optional
+        PixelPaddingValue, as stored.
     """
 
     path: Path
     series: str
     description: str
+    volume: str
     number: int
     shape: tuple[int, int]
     n_frames: int
-    positions: FloatArray
-    axes: FloatArray | None
-    pixel: tuple[float, float] | None
-    thickness: float | None
-    value_range: tuple[float, float]
-    integral: bool
     channels: int
+    between: float | None
+    thickness: float | None
+    stored_range: tuple[float, float]
+    integral: bool
+    inverted: bool
     localizer: bool
-    pixels: Pixels | None
+    stored: Stored | None
+    padding: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class DicomSlice:
+    """One slice: a file, or a frame of one.
+
+    Parameters
+    ----------
+    file : DicomFile
+        What it shares with the other frames.
+    frame, number : int
+        Which frame it is, and which number it counts by.
+    position : (3,) array, mm, optional
+        Centre of the first pixel, LPS.
+    axes : (3, 3) array, optional
+        Columns: where x, y of the image and its normal point in LPS.
+    skew : float
+        Cosine between rows and columns as the file gives them; 0 but for rounding.
+    pixel : (2,) float, mm, optional
+        Pixel size along x, y.
+    location : float, optional
+        SliceLocation.
+    slope, intercept : float
+        From stored numbers to values.
+    trouble : str
+        What is wrong with these two.
+    parts : dict
+        Tags by which slices at one place may differ.
+    """
+
+    file: DicomFile
+    frame: int
+    number: int
+    position: FloatArray | None
+    axes: FloatArray | None
+    skew: float
+    pixel: tuple[float, float] | None
+    location: float | None
+    slope: float
+    intercept: float
+    trouble: str
+    parts: dict[str, str]
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        name = self.file.path.name
+        return name if self.file.n_frames == 1 else f"frame {self.frame + 1} of {name}"
 
 
 def is_dicom(path: Path) -> bool:
-    """Return whether a file begins as DICOM files do."""
+    """Return whether a file begins as DICOM files do, or as their data do without the preamble."""
     with path.open("rb") as file:
-        return file.read(132)[128:] == b"DICM"
+        head = file.read(132)
+    return head[128:] == b"DICM" or _begins_bare(head)
 
 
-def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[Frame], list[Path], list[Path]]:
+def is_dicomdir(path: Path) -> bool:
+    """Return whether a file is the directory of a DICOM disc."""
+    return path.name.upper() == "DICOMDIR"
+
+
+def _begins_bare(head: bytes) -> bool:
+    """Return whether the first element is one of those that a data set begins with."""
+    if len(head) < 16:
+        return False
+    for order in "<>":
+        group, element, length = struct.unpack(order + "2HI", head[:8])
+        if group in (0x0002, 0x0008) and element <= 0x0018:
+            return head[4:6] in _FIRST_VRS or (order == "<" and 0 < length <= 64)
+    return False
+
+
+def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[DicomSlice], list[Path], list[Path]]:
     """Read the tags of all DICOM images; what is none comes back as junk, what is damaged by itself."""
-    every = list(files)
-    frames: list[Frame] = []
+    every = [file for file in files if not is_dicomdir(file)]
+    slices: list[DicomSlice] = []
     junk: list[Path] = []
     damaged: list[Path] = []
     for n, file in enumerate(every):
@@ -117,123 +189,210 @@ def scan_dicom(files: Iterable[Path], report: Report) -> tuple[list[Frame], list
             junk.append(file)
             continue
         try:
-            frame = _read(file)
+            slices += _read(file)
         except (InvalidDicomError, EOFError, OSError, ValueError, KeyError, TypeError, NotImplementedError):
             damaged.append(file)
-            continue
-        if frame is not None:
-            frames.append(frame)
-    return frames, [file for file in junk if file.name.upper() != "DICOMDIR"], damaged
+    return slices, junk, damaged
 
 
-def _read(path: Path) -> Frame | None:
+def _read(path: Path) -> list[DicomSlice]:
     with path.open("rb") as file:
-        tags = pydicom.dcmread(file, stop_before_pixels=True, specific_tags=_TAGS)
+        tags = pydicom.dcmread(file, stop_before_pixels=True, specific_tags=_TAGS, force=True)
         pixel_header = file.read(12)
         offset = file.tell()
-    rows, columns = _whole(tags, "Rows"), _whole(tags, "Columns")
-    if not rows or not columns:
+    if not _whole(tags, "Rows") or not _whole(tags, "Columns"):
         if "SOPClassUID" not in tags:
             raise InvalidDicomError("it has neither pixels nor a class")
-        return None  # a report, a directory: no image
-    shared = _first(tags.get("SharedFunctionalGroupsSequence"))
+        return []  # a report: no image
     each = list(tags.get("PerFrameFunctionalGroupsSequence") or [])
-    measures = _group("PixelMeasuresSequence", shared, each, tags)
-    # A secondary capture, as SimpleITK writes it, keeps its pixel size under another name.
-    pixel = _numbers(measures, "PixelSpacing", 2) or _numbers(tags, "NominalScannedPixelSpacing", 2)
-    distance = _numbers(measures, "SpacingBetweenSlices", 1) or _numbers(measures, "SliceThickness", 1)
-    orientation = _numbers(
-        _group("PlaneOrientationSequence", shared, each, tags), "ImageOrientationPatient", 6
-    )
-    rescale = _group("PixelValueTransformationSequence", shared, each, tags)
-    values, integral = _values(tags, rescale)
-    return Frame(
+    shared = _first(tags.get("SharedFunctionalGroupsSequence"))
+    measures = _group("PixelMeasuresSequence", _first(each), shared, tags)
+    known = _file(path, tags, measures, pixel_header, offset)
+    if len(each) != known.n_frames:
+        each = [None] * known.n_frames
+    positions = _positions(tags, known)
+    return [
+        _slice(known, n, tags, frame, shared, position)
+        for n, (frame, position) in enumerate(zip(each, positions, strict=True))
+    ]
+
+
+def _file(path: Path, tags: Any, measures: Any, pixel_header: bytes, offset: int) -> DicomFile:
+    n_frames = max(1, _whole(tags, "NumberOfFrames"))
+    element = _element(tags, pixel_header)
+    bits = _whole(tags, "BitsStored") or _whole(tags, "BitsAllocated") or 16
+    signed = _whole(tags, "PixelRepresentation") == 1
+    low, high = (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) if signed else (0.0, 2.0**bits - 1)
+    alone = n_frames > 1 and not tags.get("ConcatenationUID")
+    return DicomFile(
         path=path,
         series=str(tags.get("SeriesInstanceUID", "")),
         description=_description(tags),
+        volume=str(path) if alone else str(tags.get("ConcatenationUID", "")),
         number=_whole(tags, "InstanceNumber"),
-        shape=(rows, columns),
-        n_frames=max(1, _whole(tags, "NumberOfFrames")),
-        positions=_positions(tags, each),
-        axes=None if orientation is None else _axes(orientation),
-        pixel=None
-        if pixel is None or min(pixel) <= 0
-        else (float(pixel[1]), float(pixel[0])),  # rows come first
-        thickness=None if distance is None or distance[0] <= 0 else float(distance[0]),
-        value_range=values,
-        integral=integral,
+        shape=(_whole(tags, "Rows"), _whole(tags, "Columns")),
+        n_frames=n_frames,
         channels=max(1, _whole(tags, "SamplesPerPixel")),
-        pixels=_pixels(tags, rescale, pixel_header, offset),
+        between=_length(measures, "SpacingBetweenSlices") or _length(tags, "SpacingBetweenSlices"),
+        thickness=_length(measures, "SliceThickness"),
+        stored_range=(low, high),
+        integral=not _PIXEL_DATA.get(element, ""),
+        inverted=str(tags.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
         localizer="LOCALIZER" in [str(word).upper() for word in _listed(tags.get("ImageType"))],
+        stored=_stored(tags, element, pixel_header, offset),
+        padding=(_numbers(tags, "PixelPaddingValue", 1) or (None,))[0],
     )
+
+
+def _slice(
+    file: DicomFile, n: int, tags: Any, frame: Any, shared: Any, position: FloatArray | None
+) -> DicomSlice:
+    """Put together what the frame's own groups, the shared ones and the plain tags say of a slice."""
+    measures = _group("PixelMeasuresSequence", frame, shared, tags)
+    # A secondary capture, as SimpleITK writes it, keeps its pixel size under another name.
+    pixel = _numbers(measures, "PixelSpacing", 2) or _numbers(tags, "NominalScannedPixelSpacing", 2)
+    place = _first(frame.get("PlanePositionSequence")) if frame is not None else None
+    own = None if place is None else _numbers(place, "ImagePositionPatient", 3)
+    plane = _group("PlaneOrientationSequence", frame, shared, tags)
+    axes, skew = _axes(_numbers(plane, "ImageOrientationPatient", 6))
+    rescale = _group("PixelValueTransformationSequence", frame, shared, tags)
+    slope, intercept, trouble = _rescaling(rescale, tags)
+    content = _first(frame.get("FrameContentSequence")) if frame is not None else None
+    return DicomSlice(
+        file=file,
+        frame=n,
+        number=(_whole(content, "InStackPositionNumber") or n) if file.n_frames > 1 else file.number,
+        position=position if own is None else np.array(own),
+        axes=axes,
+        skew=skew,
+        pixel=(pixel[1], pixel[0]) if pixel is not None and min(pixel) > 0 else None,  # rows come first
+        location=(_numbers(tags, "SliceLocation", 1) or (None,))[0] if file.n_frames == 1 else None,
+        slope=slope,
+        intercept=intercept,
+        trouble=trouble,
+        parts=_parts(tags, content),
+    )
+
+
+def _parts(tags: Any, content: Any) -> dict[str, str]:
+    """Return the tags by which slices at one place may differ, with words for them."""
+    of_frame = {
+        "stack": "StackID",
+        "temporal position": "TemporalPositionIndex",
+        "frame acquisition": "FrameAcquisitionNumber",
+    }
+    of_file = {
+        "time point": "TemporalPositionIdentifier",
+        "acquisition": "AcquisitionNumber",
+        "echo": "EchoNumbers",
+        "image type": "ImageType",
+    }
+    parts = {word: "" if content is None else str(content.get(name, "")) for word, name in of_frame.items()}
+    return parts | {word: str(tags.get(name, "")) for word, name in of_file.items()}
 
 
 def _first(sequence: Any) -> Any:
     return sequence[0] if sequence else None
 
 
-def _group(name: str, shared: Any, each: list[Any], tags: Any) -> Any:
-    """Return the functional group that holds for all frames, or the plain tags of a single-frame file."""
-    for holder in (shared, _first(each)):
+def _group(name: str, frame: Any, shared: Any, tags: Any) -> Any:
+    """Return the frame's own functional group, the one that holds for all, or the plain tags."""
+    for holder in (frame, shared):
         group = _first(holder.get(name)) if holder is not None else None
         if group is not None:
             return group
     return tags
 
 
-def _positions(tags: Any, each: list[Any]) -> FloatArray:
-    if not each:
-        position = _numbers(tags, "ImagePositionPatient", 3)
-        return np.empty((0, 3)) if position is None else np.array([position])
-    found = [_first(frame.get("PlanePositionSequence")) for frame in each]
-    positions = [None if plane is None else _numbers(plane, "ImagePositionPatient", 3) for plane in found]
-    known = [position for position in positions if position is not None]
-    return np.array(known) if known and len(known) == len(each) else np.empty((0, 3))
+def _positions(tags: Any, file: DicomFile) -> list[FloatArray | None]:
+    """Return where frames lie by the plain tags: one position, and perhaps offsets along the normal."""
+    first = _numbers(tags, "ImagePositionPatient", 3)
+    if first is None:
+        return [None] * file.n_frames
+    if file.n_frames == 1:
+        return [np.array(first)]
+    offsets = _numbers(tags, "GridFrameOffsetVector", file.n_frames)
+    axes, _ = _axes(_numbers(tags, "ImageOrientationPatient", 6))
+    if offsets is None or axes is None:
+        return [None] * file.n_frames
+    return [np.array(first) + (offset - offsets[0]) * axes[:, 2] for offset in offsets]
 
 
-@lru_cache(maxsize=64)
-def _axes(orientation: tuple[float, ...]) -> FloatArray | None:
+@lru_cache(maxsize=256)
+def _axes(orientation: tuple[float, ...] | None) -> tuple[FloatArray | None, float]:
+    """Return x, y and the normal as columns, at right angles, and the cosine between x and y in the file."""
+    if orientation is None:
+        return None, 0.0
     x, y = np.array(orientation[:3]), np.array(orientation[3:])
-    if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.5 or abs(x @ y) > 1e-3:
-        return None
-    x = x / np.linalg.norm(x)
-    y = y - (y @ x) * x
-    y = y / np.linalg.norm(y)
-    return np.column_stack([x, y, np.cross(x, y)])
+    if min(np.linalg.norm(x), np.linalg.norm(y)) < 0.5:
+        return None, 0.0
+    x, y = x / np.linalg.norm(x), y / np.linalg.norm(y)
+    skew = float(x @ y)
+    if abs(skew) > _LARGEST_SKEW:
+        return None, skew
+    middle, across = (x + y) / np.linalg.norm(x + y), (x - y) / np.linalg.norm(x - y)
+    x, y = (middle + across) / np.sqrt(2), (middle - across) / np.sqrt(2)
+    return np.column_stack([x, y, np.cross(x, y)]), skew
 
 
-def _pixels(tags: Any, rescale: Any, header: bytes, offset: int) -> Pixels | None:
-    """Find the pixels behind the tag (7FE0,0010) and its length, if they are plain numbers."""
-    syntax = tags.file_meta.get("TransferSyntaxUID")
-    if syntax not in (ImplicitVRLittleEndian, ExplicitVRLittleEndian, ExplicitVRBigEndian):
+def _element(tags: Any, header: bytes) -> int:
+    """Return which element of group 7FE0 the pixels are, 0 where none follows."""
+    if len(header) < 12:
+        return 0
+    group, element = struct.unpack(("<" if _encoding(tags)[1] else ">") + "2H", header[:4])
+    return element if group == 0x7FE0 and element in _PIXEL_DATA else 0
+
+
+def _encoding(tags: Any) -> tuple[bool, bool]:
+    """Return whether a file has implicit VRs, and whether it is little-endian."""
+    implicit, little = tags.original_encoding
+    return bool(implicit), little is not False
+
+
+def _stored(tags: Any, element: int, header: bytes, offset: int) -> Stored | None:
+    """Find the pixels behind their tag and its length, if they are plain numbers."""
+    syntax = tags.file_meta.get("TransferSyntaxUID") if "file_meta" in tags.__dict__ else None
+    packed = syntax is not None and (syntax.is_compressed or syntax == DeflatedExplicitVRLittleEndian)
+    if packed or not element or _whole(tags, "SamplesPerPixel") > 1:
         return None
-    order = ">" if syntax == ExplicitVRBigEndian else "<"
-    implicit = syntax == ImplicitVRLittleEndian
-    start = offset - 4 if implicit else offset
-    tag = struct.unpack(order + "2H", header[:4]) if len(header) == 12 else None
-    length = struct.unpack(order + "I", header[4:8] if implicit else header[8:12])[0] if tag else 0
+    implicit, little = _encoding(tags)
+    order = "<" if little else ">"
+    length = struct.unpack(order + "I", header[4:8] if implicit else header[8:12])[0]
     allocated, code = _whole(tags, "BitsAllocated"), _whole(tags, "PixelRepresentation")
-    number, bits = _NUMBERS.get((allocated, code)), _whole(tags, "BitsStored")
+    number = _PIXEL_DATA[element] or _NUMBERS.get((allocated, code))
     n_pixels = _whole(tags, "Rows") * _whole(tags, "Columns") * max(1, _whole(tags, "NumberOfFrames"))
-    plain = _whole(tags, "SamplesPerPixel") <= 1 and _whole(tags, "HighBit") == bits - 1
-    if tag != (0x7FE0, 0x0010) or number is None or not plain or length < n_pixels * allocated // 8:
+    if number is None or str(tags.get("PhotometricInterpretation", "MONOCHROME2"))[:10] != "MONOCHROME":
         return None
-    slope, intercept = _rescaling(rescale)
-    return Pixels(start, np.dtype(order + number), bits, slope, intercept)
+    dtype = np.dtype(order + number)
+    if length < n_pixels * dtype.itemsize:
+        return None
+    bits = _whole(tags, "BitsStored") or allocated
+    high = _whole(tags, "HighBit") or bits - 1
+    words = not little and allocated == 8 and header[4:6] == b"OW"
+    return Stored(offset - 4 if implicit else offset, dtype, bits, high, words)
 
 
-def _rescaling(rescale: Any) -> tuple[float, float]:
-    slope = (_numbers(rescale, "RescaleSlope", 1) or (1.0,))[0] or 1.0
-    return slope, (_numbers(rescale, "RescaleIntercept", 1) or (0.0,))[0]
+def _rescaling(rescale: Any, tags: Any) -> tuple[float, float, str]:
+    """Return slope and intercept, as 1 and 0 where they are no numbers, and what is wrong with them."""
+    trouble = []
+    values = []
+    for name, missing in (("RescaleSlope", 1.0), ("RescaleIntercept", 0.0)):
+        said = _listed(rescale.get(name))
+        number = _number(said[0]) if len(said) == 1 else None
+        wrong = bool(said) and (number is None or not np.isfinite(number) or (missing and number == 0))
+        if wrong:
+            trouble.append(f"{name} is {' '.join(map(str, said))}")
+        values.append(missing if wrong or number is None else number)
+    if "ModalityLUTSequence" in tags:
+        trouble.append("it has a ModalityLUTSequence, which is not applied")
+    return values[0], values[1], " and ".join(trouble)
 
 
-def _values(tags: Any, rescale: Any) -> tuple[tuple[float, float], bool]:
-    bits = _whole(tags, "BitsStored") or _whole(tags, "BitsAllocated") or 16
-    signed = _whole(tags, "PixelRepresentation") == 1
-    low, high = (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) if signed else (0.0, 2.0**bits - 1)
-    slope, shift = _rescaling(rescale)
-    ends = sorted((low * slope + shift, high * slope + shift))
-    return (ends[0], ends[1]), float(slope).is_integer() and float(shift).is_integer()
+def _number(said: Any) -> float | None:
+    try:
+        return float(said)
+    except (TypeError, ValueError):
+        return None
 
 
 def _description(tags: Any) -> str:
@@ -244,8 +403,13 @@ def _description(tags: Any) -> str:
     )
 
 
+def _length(tags: Any, name: str) -> float | None:
+    length = _numbers(tags, name, 1)
+    return abs(length[0]) if length is not None and length[0] != 0 else None
+
+
 def _whole(tags: Any, name: str) -> int:
-    numbers = _numbers(tags, name, 1)
+    numbers = None if tags is None else _numbers(tags, name, 1)
     return 0 if numbers is None else int(numbers[0])
 
 

@@ -30,6 +30,8 @@ VOLUME_SUFFIXES = {
     ".nii.gz": "NIfTI",
     ".hdr": "Analyze",
     ".img": "Analyze",
+    ".hdr.gz": "Analyze",
+    ".img.gz": "Analyze",
     ".gipl": "GIPL",
     ".vtk": "VTK image",
 }

@@ -1,320 +1,245 @@
-"""What SimpleITK does not say of NRRD, MetaImage and NIfTI files: units, and where the voxels begin."""
+"""What the readers of NRRD, MetaImage and NIfTI share: a header's result, its text, the layout of voxels.
+
+These formats are read without ITK: its libraries write to the terminal, read numbers by the locale, and end
+the process on headers and names that they do not expect.
+"""
 
 from __future__ import annotations
 
 import re
-import struct
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gp_labeler.imaging.readers.grey import to_grey
-from gp_labeler.imaging.readers.problems import VolumeError
-from gp_labeler.imaging.readers.source import Compression, Plane, RawSource, open_stream
+from gp_labeler.imaging.readers.plan import Geometry
+from gp_labeler.imaging.readers.problems import Problem, VolumeError
+from gp_labeler.imaging.readers.source import Plane, SliceSource
 from gp_labeler.imaging.readers.spacing import unit_in_mm
 
-__all__ = ["Header", "nifti_head", "read_meta_header", "read_nifti_header", "read_nrrd_header"]
+__all__ = [
+    "HEADER_BYTES",
+    "Header",
+    "Layout",
+    "beside",
+    "decoded",
+    "file_series",
+    "lengths_in_mm",
+    "not_a",
+    "numbers",
+    "text_fields",
+]
 
-_NRRD_TYPES = {
-    "i1": ("signed char", "int8", "int8_t"),
-    "u1": ("uchar", "unsigned char", "uint8", "uint8_t"),
-    "i2": ("short", "short int", "signed short", "signed short int", "int16", "int16_t"),
-    "u2": ("ushort", "unsigned short", "unsigned short int", "uint16", "uint16_t"),
-    "i4": ("int", "signed int", "int32", "int32_t"),
-    "u4": ("uint", "unsigned int", "uint32", "uint32_t"),
-    "i8": ("longlong", "long long", "long long int", "signed long long", "int64", "int64_t"),
-    "u8": ("ulonglong", "unsigned long long", "unsigned long long int", "uint64", "uint64_t"),
-    "f4": ("float",),
-    "f8": ("double",),
-}
-_NRRD_PACKING: dict[str, Compression] = {
-    "raw": "none",
-    "gz": "gzip",
-    "gzip": "gzip",
-    "bz2": "bzip2",
-    "bzip2": "bzip2",
-}
-_META_TYPES = {
-    "MET_CHAR": "i1",
-    "MET_UCHAR": "u1",
-    "MET_SHORT": "i2",
-    "MET_USHORT": "u2",
-    "MET_INT": "i4",
-    "MET_UINT": "u4",
-    "MET_LONG_LONG": "i8",
-    "MET_ULONG_LONG": "u8",
-    "MET_FLOAT": "f4",
-    "MET_DOUBLE": "f8",
-}
-_NIFTI_TYPES = {
-    2: "u1",
-    4: "i2",
-    8: "i4",
-    16: "f4",
-    64: "f8",
-    256: "i1",
-    512: "u2",
-    768: "u4",
-    1024: "i8",
-    1280: "u8",
-}
-_NIFTI_COLOURS = {128: 3, 2304: 4}
-_HEADER_BYTES = 1 << 20
+HEADER_BYTES = 1 << 20
+_PATTERN = re.compile(r"(.*%0?\d{0,2}[diu].*?)((?:\s+-?\d+)*)\s*")
+_COUNTER = re.compile(r"%(0?)(\d{0,2})[diu]")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Header:
-    """What a header says beyond what SimpleITK reads from it.
+    """All that a header says.
 
     Parameters
     ----------
-    source : RawSource, optional
-        Where the voxels lie; None where only SimpleITK can tell.
+    size : (3,) int
+        Voxels along x, y, z.
+    dtype : dtype
+        Of the grey values; float32 where they are scaled while they are read.
+    source : SliceSource
+        Where the planes come from.
     files : tuple of Path
-        The file, and the one beside it that holds the voxels.
-    unit_mm : float
-        Length in mm of the unit of spacing and origin that SimpleITK leaves out of account.
-    sides_known : bool
-        Whether the header says how the grid lies in the head.
-    notes : tuple of str
-        What was decided.
-    scaled : bool
-        Whether the values are scaled while they are read, and so become floats.
+        The file, and those beside it that hold the voxels.
+    geometry : Geometry
+        Where the voxels lie.
+    found, notes : tuple
+        What stands against loading it, and what was decided.
+    channels, n_volumes : int
+        Values of a voxel, and volumes in the file.
+    format : str, optional
+        For people, where it is not the one that the name speaks of.
     """
 
-    source: RawSource | None
+    size: tuple[int, int, int]
+    dtype: np.dtype[Any]
+    source: SliceSource
     files: tuple[Path, ...]
-    unit_mm: float = 1.0
-    sides_known: bool = True
+    geometry: Geometry
+    found: tuple[Problem, ...] = ()
     notes: tuple[str, ...] = ()
-    scaled: bool = False
+    channels: int = 1
+    n_volumes: int = 1
+    format: str | None = None
 
 
-def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
-    """Read the text header of an NRRD or NHDR file.
+@dataclass(frozen=True)
+class Layout:
+    """In which order values follow each other in a file.
 
-    Raises
-    ------
-    VolumeError
-        Not NRRD, or the file with the voxels is missing.
+    Parameters
+    ----------
+    sizes : tuple of int
+        Values along each axis, the fastest first.
+    space : (3,) int
+        Which of the axes are x, y and z.
+    listed : bool
+        Whether the values of a voxel are volumes of a list, not colours.
     """
-    with path.open("rb") as file:
-        head = file.read(_HEADER_BYTES)
-    if not head.startswith(b"NRRD"):
-        raise _not_a("NRRD", path)
-    end = re.search(rb"\r?\n\r?\n", head)
-    fields = _fields(_text(head[: end.start() if end else len(head)]), ":")
-    data_file = fields.get("data file") or fields.get("datafile")
-    source = _nrrd_source(path, fields, data_file, end.end() if end else len(head), channel)
-    unit, notes = _stated_unit(fields.get("space units") or fields.get("units") or "")
-    files = (path,) if source is None or source.path == path else (path, source.path)
-    return Header(source, files, unit, "space" in fields, notes)
+
+    sizes: tuple[int, ...]
+    space: tuple[int, int, int]
+    listed: bool = False
+
+    @property
+    def size(self) -> tuple[int, int, int]:
+        """Voxels along x, y, z."""
+        x, y, z = (self.sizes[axis] for axis in self.space)
+        return x, y, z
+
+    @property
+    def plane_shape(self) -> tuple[int, ...]:
+        """Shape of what is stored of one plane, the slowest axis first."""
+        return tuple(reversed(self.sizes[: self.space[2]]))
+
+    @property
+    def channels(self) -> int:
+        """Values of one voxel."""
+        return int(np.prod(self.plane_shape)) // (self.size[0] * self.size[1])
+
+    @property
+    def n_volumes(self) -> int:
+        """Volumes that follow each other."""
+        return int(np.prod(self.sizes[self.space[2] + 1 :], dtype=np.int64))
+
+    @property
+    def n_planes(self) -> int:
+        """Planes of all volumes."""
+        return self.size[2] * self.n_volumes
+
+    def finish(self, channel: int | None) -> Callable[[Plane], Plane]:
+        """Return what makes the (y, x) grey plane of a stored one."""
+        more = [axis for axis in range(self.space[2]) if axis not in self.space]
+        if not more:
+            return lambda plane: to_grey(plane, channel)
+        last = self.space[2] - 1
+        taken = 0 if channel is None and self.listed else channel
+        return lambda plane: to_grey(np.moveaxis(plane, last - more[0], -1), taken)
 
 
-def _nrrd_source(
-    path: Path, fields: dict[str, str], data_file: str | None, header_bytes: int, channel: int | None
-) -> RawSource | None:
-    sizes = [int(n) for n in fields.get("sizes", "").split()]
-    code = next(
-        (code for code, words in _NRRD_TYPES.items() if fields.get("type", "").lower() in words), None
-    )
-    packing = _NRRD_PACKING.get(fields.get("encoding", "").lower())
-    odd = len(sizes) < 3 or fields.get("line skip", "0") != "0" or _is_many_files(data_file)
-    if code is None or packing is None or odd:
-        return None
-    kinds = fields.get("kinds", "domain").split()
-    colours = len(sizes) == 4 and sizes[0] <= 4 and kinds[0] not in ("domain", "space")
-    channels = sizes.pop(0) if colours else 1
-    skip = int(fields.get("byte skip", "0"))
-    file = path if data_file is None else _beside(path, data_file)
-    return _from_end(
-        RawSource(
-            path=file,
-            offset=header_bytes if data_file is None else 0,
-            dtype=np.dtype((">" if fields.get("endian", "").lower() == "big" else "<") + code),
-            plane_shape=_plane_shape(sizes, channels),
-            n_planes=sizes[2],
-            compression=packing,
-            finish=_picking(channel),
-            skip=max(skip, 0),
-        ),
-        from_end=skip == -1,
-    )
-
-
-def read_meta_header(path: Path, channel: int | None = None) -> Header:
-    """Read the text header of an MHA or MHD file.
-
-    Raises
-    ------
-    VolumeError
-        Not MetaImage, or the file with the voxels is missing.
-    """
-    with path.open("rb") as file:
-        head = file.read(_HEADER_BYTES)
-    end = re.search(rb"^[ \t]*ElementDataFile[^\n]*\n?", head, re.MULTILINE)
-    fields = _fields(_text(head[: end.end() if end else len(head)]), "=")
-    if end is None or not {"ndims", "dimsize", "elementtype"} <= fields.keys():
-        raise _not_a("MetaImage", path)
-    source = _meta_source(path, fields, end.end(), channel)
-    unit, notes = _stated_unit(fields.get("distanceunits", ""))
-    files = (path,) if source is None or source.path == path else (path, source.path)
-    return Header(source, files, unit, True, notes)
-
-
-def _meta_source(
-    path: Path, fields: dict[str, str], header_bytes: int, channel: int | None
-) -> RawSource | None:
-    data_file = fields["elementdatafile"]
-    sizes = [int(n) for n in fields.get("dimsize", "").split()]
-    code = _META_TYPES.get(fields.get("elementtype", "").upper())
-    text_data = fields.get("binarydata", "true").lower() != "true"
-    if code is None or text_data or len(sizes) < 3 or _is_many_files(data_file):
-        return None
-    big = (
-        fields.get("binarydatabyteordermsb") or fields.get("elementbyteordermsb") or "false"
-    ).lower() == "true"
-    local = data_file.upper() == "LOCAL"
-    skip = int(fields.get("headersize", "0"))
-    source = RawSource(
-        path=path if local else _beside(path, data_file),
-        offset=header_bytes if local else max(skip, 0),
-        dtype=np.dtype((">" if big else "<") + code),
-        plane_shape=_plane_shape(sizes, int(fields.get("elementnumberofchannels", "1"))),
-        n_planes=sizes[2],
-        compression="zlib" if fields.get("compresseddata", "false").lower() == "true" else "none",
-        finish=_picking(channel),
-    )
-    return _from_end(source, from_end=skip == -1 and not local)
-
-
-def read_nifti_header(path: Path, channel: int | None = None) -> Header:
-    """Read the binary header of a NIfTI-1 file, packed or not.
-
-    Raises
-    ------
-    VolumeError
-        Not NIfTI-1.
-    """
-    head = nifti_head(path)
-    order = next((o for o in "<>" if len(head) >= 348 and struct.unpack(o + "i", head[:4])[0] == 348), None)
-    if order is None or head[344:348] not in (b"n+1\0", b"ni1\0"):
-        raise _not_a("NIfTI", path)
-    dim = struct.unpack(order + "8h", head[40:56])
-    datatype = struct.unpack(order + "h", head[70:72])[0]
-    offset, slope, intercept = struct.unpack(order + "3f", head[108:120])
-    codes = struct.unpack(order + "2h", head[252:256])
-    code = _NIFTI_TYPES.get(datatype, "u1" if datatype in _NIFTI_COLOURS else None)
-    sides_known = any(codes)
-    if code is None or head[344:348] == b"ni1\0" or dim[0] < 3:
-        return Header(None, (path,), sides_known=sides_known)
-    scaled = bool(np.isfinite(slope) and slope != 0 and (slope, intercept) != (1.0, 0.0))
-    source = RawSource(
-        path=path,
-        offset=0,
-        dtype=np.dtype(order + code),
-        plane_shape=_plane_shape(list(dim[1:4]), _NIFTI_COLOURS.get(datatype, 1)),
-        n_planes=dim[3],
-        compression="gzip" if _is_gzip(path) else "none",
-        finish=_scaling(slope, intercept) if scaled else _picking(channel),
-        skip=int(offset),
-    )
-    notes = (f"values were scaled by {slope:g} and shifted by {intercept:g}",) if scaled else ()
-    return Header(source, (path,), sides_known=sides_known, notes=notes, scaled=scaled)
-
-
-def nifti_head(path: Path) -> bytes:
-    """Return the header of a NIfTI file with its extensions, unpacked, up to 1 MB."""
-    with open_stream(path, "gzip" if _is_gzip(path) else "none") as stream:
-        head: bytes = _read(stream, 352)
-        if len(head) == 352 and head[344:347] == b"n+1":
-            order = "<" if struct.unpack("<i", head[:4])[0] == 348 else ">"
-            more = int(struct.unpack(order + "f", head[108:112])[0]) - 352
-            head += _read(stream, min(max(more, 0), _HEADER_BYTES))
-    return head
-
-
-def _read(stream: object, n: int) -> bytes:
-    parts = b""
-    while len(parts) < n and (part := stream.read(n - len(parts))):  # type: ignore[attr-defined]
-        parts += part
-    return parts
-
-
-def _is_gzip(path: Path) -> bool:
-    with path.open("rb") as file:
-        return file.read(2) == b"\x1f\x8b"
-
-
-def _text(raw: bytes) -> str:
-    try:
-        return raw.decode("utf-8")
-    except UnicodeDecodeError:
-        return raw.decode("latin-1")
-
-
-def _fields(text: str, separator: str) -> dict[str, str]:
-    """Return the fields of a text header, names in lower case."""
+def text_fields(text: str, separators: str) -> dict[str, str]:
+    """Return the fields of a text header; names in lower case and without blanks: writers differ."""
     fields: dict[str, str] = {}
     for line in text.splitlines():
-        name, mark, value = line.partition(separator)
-        if mark and not line.startswith("#") and not value.startswith("="):
-            fields[name.strip().lower()] = value.strip()
+        match = re.match(rf"([^{separators}]*)[{separators}](?!=)(.*)", line)
+        if match and not line.startswith("#"):
+            fields["".join(match[1].lower().split())] = match[2].strip()
     return fields
 
 
-def _stated_unit(text: str) -> tuple[float, tuple[str, ...]]:
-    """Return the unit in mm of a field like ``'"um" "um" "um"'`` and a note where it is not mm."""
-    words = [word.strip('"') for word in text.split() if word.strip('"')]
-    units = {unit_in_mm(word) for word in words} - {None}
-    unit = units.pop() if len(units) == 1 else None
-    if unit is None or unit == 1.0:
-        return 1.0, ()
-    return unit, (f"lengths were converted from {words[0]} to mm",)
+def numbers(fields: dict[str, str], name: str, n: int | None = None, *, whole: bool = False) -> list[float]:
+    """Return the numbers of a field, which must be there.
+
+    Raises
+    ------
+    VolumeError
+        They are not `n` (whole) numbers.
+    """
+    said = fields.get("".join(name.lower().split()), "")
+    try:
+        values = [float(int(word) if whole else float(word)) for word in re.split(r"[\s,()]+", said) if word]
+    except ValueError:
+        values = []
+    if not values or (n is not None and len(values) != n):
+        needed = f"{n or 'some'} {'whole ' if whole else ''}number{'' if n == 1 else 's'}"
+        raise VolumeError(f"its {name} is {said!r}, where {needed} must be", remedy="Correct its header.")
+    return values
 
 
-def _plane_shape(sizes: list[int], channels: int) -> tuple[int, ...]:
-    return (sizes[1], sizes[0]) if channels == 1 else (sizes[1], sizes[0], channels)
+def lengths_in_mm(units: Sequence[str]) -> tuple[list[float], str, tuple[str, ...]]:
+    """Return each unit's length in mm, the unit that is none (or ``""``), and a note where one is not mm."""
+    factors = [unit_in_mm(unit) for unit in units]
+    unknown = next((u for u, f in zip(units, factors, strict=True) if f is None and u.strip(" ?")), "")
+    other = dict.fromkeys(u for u, f in zip(units, factors, strict=True) if f not in (None, 1.0))
+    note = (f"lengths were converted from {', '.join(other)} to mm",) if other else ()
+    return [1.0 if f is None else f for f in factors], unknown, note
 
 
-def _is_many_files(data_file: str | None) -> bool:
-    return data_file is not None and (data_file.upper().startswith("LIST") or "%" in data_file)
+def decoded(head: bytes) -> str:
+    """Return the text of a header; bytes that are not UTF-8 are kept, as in the names of files."""
+    return head.decode("utf-8", "surrogateescape")
 
 
-def _picking(channel: int | None) -> Callable[[Plane], Plane]:
-    return lambda plane: to_grey(plane, channel)
+def in_latin(text: str) -> str:
+    """Return text whose bytes were not UTF-8 as Latin-1."""
+    return text.encode("utf-8", "surrogateescape").decode("latin-1") if _is_escaped(text) else text
 
 
-def _scaling(slope: float, intercept: float) -> Callable[[Plane], Plane]:
-    def scale(plane: Plane) -> Plane:
-        return (plane * np.float64(slope) + intercept).astype(np.float32)
-
-    return scale
+def _is_escaped(text: str) -> bool:
+    return any("\udc80" <= letter <= "\udcff" for letter in text)
 
 
-def _from_end(source: RawSource, *, from_end: bool) -> RawSource:
-    """Let the voxels end where the file ends, for headers of unknown length."""
-    if not from_end:
-        return source
-    return replace(
-        source, offset=max(0, source.path.stat().st_size - source.plane_bytes * source.n_planes), skip=0
+def beside(path: Path, name: str) -> Path:
+    """Return the file that holds the voxels of a detached header.
+
+    Raises
+    ------
+    VolumeError
+        It is not there.
+    """
+    for spelling in (name, name.replace("\\", "/"), in_latin(name).replace("\\", "/")):
+        file = path.parent / spelling
+        if file.is_file():
+            return file
+    raise VolumeError(
+        f"the voxels should be in {name}, which is not there",
+        file=path,
+        remedy=f"Put {Path(name.replace(chr(92), '/')).name} into the folder of the header.",
     )
 
 
-def _beside(path: Path, name: str) -> Path:
-    file = path.parent / name.replace("\\", "/")
-    if not file.is_file():
+def file_series(path: Path, said: str, listed: Sequence[str], most: int) -> list[Path] | None:
+    """Return the files of a detached header that names several, or None where it names one.
+
+    Parameters
+    ----------
+    path : Path
+        The header.
+    said : str
+        What stands where the name should: ``LIST``, or a pattern such as ``slice%03d.raw 1 40 1``.
+    listed : sequence of str
+        The lines after it.
+    most : int
+        Planes that there are; more files than that cannot be.
+
+    Raises
+    ------
+    VolumeError
+        One is missing, or there are too many.
+    """
+    if re.match(r"LIST\b", said, re.IGNORECASE):
+        return [beside(path, name.strip()) for name in listed[: most + 1] if name.strip()]
+    match = _PATTERN.fullmatch(said)
+    if match is None:
+        return None
+    given = [int(n) for n in match[2].split()]
+    first, last, step = (*given[:3], *(1, most, 1)[len(given) :])
+    counted = range(first, last + (1 if step > 0 else -1), step) if step else range(0)
+    if not 0 < len(counted) <= most:
         raise VolumeError(
-            f"the voxels should be in {name}, which is not there",
-            file=path,
-            remedy=f"Put {Path(name).name} into the folder of the header.",
+            f"its pattern {said!r} names {len(counted)} files for {most} slices", remedy="Correct its header."
         )
-    return file
+    return [beside(path, _COUNTER.sub(partial(_padded, n), match[1])) for n in counted]
 
 
-def _not_a(kind: str, path: Path) -> VolumeError:
+def _padded(number: int, counter: re.Match[str]) -> str:
+    return str(number).rjust(int(counter[2] or 0), counter[1] or " ")
+
+
+def not_a(kind: str, path: Path) -> VolumeError:
+    """Return the error that a file is not what its name says."""
     return VolumeError(
         f"it is not a {kind} file, though its name says so", file=path, remedy="Check what it is."
     )

@@ -1,26 +1,23 @@
-"""NRRD, MetaImage, NIfTI and their kin: geometry as SimpleITK reads it, voxels streamed."""
+"""NRRD, MetaImage, NIfTI and their kin: the volume formats of ITK, one file or a header with its voxels."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.readers.formats import volume_stem
-from gp_labeler.imaging.readers.headers import (
-    Header,
-    nifti_head,
-    read_meta_header,
-    read_nifti_header,
-    read_nrrd_header,
-)
-from gp_labeler.imaging.readers.options import ImportOptions, Spacing
-from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
+from gp_labeler.imaging.readers.headers import Header
+from gp_labeler.imaging.readers.metaimage_header import read_meta_header
+from gp_labeler.imaging.readers.nifti_header import read_nifti_header
+from gp_labeler.imaging.readers.nrrd_header import read_nrrd_header
+from gp_labeler.imaging.readers.options import ImportOptions
+from gp_labeler.imaging.readers.plan import ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
-from gp_labeler.imaging.readers.simpleitk import ItkHeader, ItkSource, read_itk_header
+from gp_labeler.imaging.readers.simpleitk import read_itk_header
 
 __all__ = ["inspect_itk_image"]
 
@@ -28,6 +25,7 @@ _HEADERS: dict[str, Callable[[Path, int | None], Header]] = {
     "NRRD": read_nrrd_header,
     "MetaImage": read_meta_header,
     "NIfTI": read_nifti_header,
+    "Analyze": read_nifti_header,
 }
 
 
@@ -39,71 +37,41 @@ def inspect_itk_image(path: Path, options: ImportOptions, kind: str) -> ImportPl
     VolumeError
         It is not what its name says, or cannot be read.
     """
-    header = (
-        _HEADERS[kind](path, options.channel)
-        if kind in _HEADERS
-        else Header(None, (path,), sides_known=False)
-    )
-    itk = _nifti_geometry(path) if kind == "NIfTI" else read_itk_header(path, kind)
-    if itk.dtype.kind not in "iuf":
+    header = _HEADERS.get(kind, partial(read_itk_header, kind=kind))(path, options.channel)
+    if header.dtype.kind not in "iuf":
         raise VolumeError("its voxels are not plain numbers", file=path, remedy="Save the grey values only.")
-    source = header.source
-    if source is not None and (source.plane_shape[1::-1], source.n_planes) != (itk.size[:2], itk.size[2]):
-        source = None  # an arrangement that only SimpleITK understands
-    found, notes = _findings(path, header, itk, options)
-    unit = header.unit_mm
+    found, notes = _findings(path, header, options)
     return ImportPlan(
         path=path,
-        format=kind,
+        format=header.format or kind,
         files=header.files,
-        size=itk.size,
-        stored_dtype=_stored_dtype(header, itk),
-        source=source or ItkSource(path, options.channel),
-        geometry=Geometry(
-            spacing=_scaled(itk.spacing, unit),
-            origin=_scaled(itk.origin, unit),
-            direction=itk.direction,
-            sides_known=header.sides_known,
-        ),
-        found=found,
+        size=header.size,
+        stored_dtype=header.dtype,
+        source=header.source,
+        geometry=header.geometry,
+        found=(*header.found, *found),
         notes=(*header.notes, *notes),
         options=options,
         name=volume_stem(path),
     )
 
 
-def _nifti_geometry(path: Path) -> ItkHeader:
-    """Read the geometry from a copy of the header, alone in a folder.
-
-    Asked for ``a.nii.gz``, the NIfTI library silently takes ``a.nii`` if that lies beside it.
-    """
-    with TemporaryDirectory(prefix="gp-labeler-") as folder:
-        copy = Path(folder) / "header.nii"
-        copy.write_bytes(nifti_head(path))
-        return read_itk_header(copy, "NIfTI", shown_path=path)
-
-
-def _stored_dtype(header: Header, itk: ItkHeader) -> np.dtype[np.generic]:
-    """Return the type of the grey values; scaled ones are floats."""
-    if header.source is None:
-        return itk.dtype
-    return np.dtype(np.float32) if header.scaled else header.source.dtype
-
-
 def _findings(
-    path: Path, header: Header, itk: ItkHeader, options: ImportOptions
+    path: Path, header: Header, options: ImportOptions
 ) -> tuple[tuple[Problem, ...], tuple[str, ...]]:
-    problems = [] if header.source is None else list(header.source.shortage())
+    problems: list[Problem] = []
     notes: list[str] = []
-    if itk.n_volumes > 1:
-        problems.append(warning("many-volumes", f"it holds {itk.n_volumes} volumes; the first is taken"))
-    if itk.channels > 1:
+    if header.n_volumes > 1:
+        problems.append(warning("many-volumes", f"it holds {header.n_volumes} volumes; the first is taken"))
+    if header.channels > 1:
         taken = (
-            "luminance" if options.channel is None and itk.channels > 2 else f"channel {options.channel or 0}"
+            "luminance"
+            if options.channel is None and header.channels > 2
+            else f"channel {options.channel or 0}"
         )
-        problems.append(warning("colour", f"its voxels have {itk.channels} channels; {taken} is taken"))
-        _check_channel(options.channel, itk.channels)
-    if np.linalg.det(itk.direction) < 0:
+        problems.append(warning("colour", f"its voxels have {header.channels} channels; {taken} is taken"))
+        _check_channel(options.channel, header.channels)
+    if np.linalg.det(header.geometry.direction) < 0:
         notes.append("the voxel axes are left-handed; positions are kept as the file gives them")
     twin = path.with_suffix("") if path.name.lower().endswith(".nii.gz") else None
     if twin is not None and twin.exists():
@@ -114,8 +82,3 @@ def _findings(
 def _check_channel(channel: int | None, channels: int) -> None:
     if channel is not None and not 0 <= channel < channels:
         raise GpError(f"channel must be 0 to {channels - 1}, got {channel}")
-
-
-def _scaled(values: Spacing, unit: float) -> Spacing:
-    x, y, z = values
-    return x * unit, y * unit, z * unit

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import tifffile
 
+from gp_labeler.imaging.readers.ome import OmeImage
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.spacing import is_screen_resolution, shown, unit_in_mm
@@ -27,12 +29,22 @@ class PixelSize:
         Pixel size, and the distance of slices.
     said_by : str
         Which part of the file says so.
+    reason : str
+        Why a length is not known, where the file says something else in its place.
+    doubts : tuple of str
+        What a person should know of how the lengths were read.
     """
 
     x: float | None = None
     y: float | None = None
     z: float | None = None
     said_by: str = ""
+    reason: str = ""
+    doubts: tuple[str, ...] = ()
+
+    def turned(self) -> PixelSize:
+        """Return the size of pixels whose rows and columns are exchanged."""
+        return replace(self, x=self.y, y=self.x)
 
 
 UNKNOWN = PixelSize()
@@ -45,41 +57,59 @@ def dots_per_inch(x: float, y: float) -> PixelSize:
     return PixelSize(25.4 / x, 25.4 / y, None, "the resolution tag")
 
 
-def tiff_pixel_size(tif: tifffile.TiffFile) -> PixelSize:
-    """Return what an open TIFF says: in its OME or ImageJ description, else in its resolution tags."""
-    if tif.ome_metadata and (size := _ome(tif.ome_metadata)) != UNKNOWN:
+def tiff_pixel_size(
+    tif: tifffile.TiffFile, page: tifffile.TiffPage, ome: OmeImage | None = None, axis: str = "Z"
+) -> PixelSize:
+    """Return what an open TIFF says: in its OME or ImageJ description, else in its resolution tags.
+
+    Parameters
+    ----------
+    tif : TiffFile
+        The file.
+    page : TiffPage
+        A page of the volume that is meant; an overview in the same file has other pixels.
+    ome : OmeImage, optional
+        What the OME description says of that volume.
+    axis : str
+        Letter of the axis that the slices run along; along times no distance is given.
+    """
+    if ome is not None and (size := _ome(ome)) != UNKNOWN:
         return size
-    page = tif.pages.first
-    assert isinstance(page, tifffile.TiffPage)
     x, y = page.resolution
     if tif.imagej_metadata and x > 0 and y > 0:
-        unit = unit_in_mm(str(tif.imagej_metadata.get("unit", "")))
-        depth = tif.imagej_metadata.get("spacing")
-        if unit is not None:
-            z = None if depth is None or float(depth) <= 0 else float(depth) * unit
-            return PixelSize(unit / x, unit / y, z, "ImageJ's description")
+        size = _imagej(tif.imagej_metadata, x, y)
+        if size.x is not None:
+            return size if axis != "T" else replace(size, z=None)
     factor = {_INCH: 1.0, _CENTIMETRE: 2.54}.get(int(page.resolutionunit))
     return UNKNOWN if factor is None else dots_per_inch(x * factor, y * factor)
 
 
-def _ome(text: str) -> PixelSize:
+def _imagej(meta: Mapping[str, Any], x: float, y: float) -> PixelSize:
+    """Read ImageJ's description; `x` and `y` are pixels per unit. `yunit` and `zunit` may be left out."""
+    words = [str(meta.get("unit", ""))]
+    words += [str(meta.get(name) or words[0]) for name in ("yunit", "zunit")]
+    unit_x, unit_y, unit_z = (unit_in_mm(word) for word in words)
+    if unit_x is None or unit_y is None:
+        return UNKNOWN
+    doubts: tuple[str, ...] = ()
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError:
-        return UNKNOWN
-    pixels = next((element for element in root.iter() if element.tag.endswith("Pixels")), None)
-    if pixels is None:
-        return UNKNOWN
+        depth = float(meta.get("spacing", 0))
+    except (TypeError, ValueError):
+        depth = 0.0
+    if depth < 0:
+        doubts = (f"ImageJ's description gives a spacing of {depth:g}; its size counts, as in ImageJ",)
+    z = None if depth == 0 or unit_z is None or not np.isfinite(depth) else abs(depth) * unit_z
+    reason = "" if unit_z is not None else f"ImageJ's description gives the slice distance in {words[2]!r}"
+    return PixelSize(unit_x / x, unit_y / y, z, "ImageJ's description", reason, doubts)
 
-    def length(axis: str) -> float | None:
-        unit = unit_in_mm(pixels.get(f"PhysicalSize{axis}Unit", "µm"))
-        try:
-            value = float(pixels.get(f"PhysicalSize{axis}", ""))
-        except ValueError:
-            return None
-        return value * unit if unit is not None and value > 0 else None
 
-    x, y, z = length("X"), length("Y"), length("Z")
+def _ome(image: OmeImage) -> PixelSize:
+    x, y, z = image.pixel_mm
+    if image.units:
+        reason = (
+            f"its OME description gives the voxel size in {' and '.join(image.units)}, which is no length"
+        )
+        return PixelSize(x, y, z, "its OME description", reason)
     return UNKNOWN if x is None or y is None else PixelSize(x, y, z, "its OME description")
 
 
@@ -94,7 +124,7 @@ def stack_geometry(size: PixelSize, z_factor: float = 1.0) -> Geometry:
         Numbers from one slice to the next.
     """
     if size.x is None or size.y is None:
-        return Geometry(sides_known=False)
+        return Geometry(sides_known=False, reason=size.reason)
     if size.z is not None:
         return Geometry((size.x, size.y, size.z * z_factor), sides_known=False)
     if is_screen_resolution(size.x):
@@ -102,7 +132,7 @@ def stack_geometry(size: PixelSize, z_factor: float = 1.0) -> Geometry:
         reason = f"the voxel size is not in the file: its {dpi} dpi are a screen's or printer's"
         return Geometry(sides_known=False, reason=reason)
     suggested: Spacing = (size.x, size.y, size.x * z_factor)
-    reason = (
+    reason = size.reason or (
         f"{size.said_by} gives pixels of {shown((size.x, size.y))}, but nothing gives the distance of slices"
     )
     return Geometry(sides_known=False, suggested=suggested, reason=reason)

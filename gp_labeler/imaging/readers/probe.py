@@ -8,7 +8,7 @@ from pathlib import Path
 
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.dicom import inspect_dicom
-from gp_labeler.imaging.readers.dicom_tags import is_dicom
+from gp_labeler.imaging.readers.dicom_tags import is_dicom, is_dicomdir
 from gp_labeler.imaging.readers.formats import (
     DICOM_SUFFIXES,
     READABLE,
@@ -48,6 +48,8 @@ def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Repo
     with quiet(), failing_as_volume_error(where):
         if where.is_dir():
             return _inspect_folder(where, options, report)
+        if not where.is_file():
+            raise VolumeError("it is no plain file", file=where, remedy="Give a scan or its folder.")
         if where.stat().st_size == 0:
             raise VolumeError("it is empty", file=where, remedy="Copy it again.")
         return _inspect_file(where, options, report)
@@ -57,6 +59,8 @@ def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportP
     kind, suffix = volume_kind(path) or _kind_by_content(path), path.suffix.lower()
     if kind is not None:
         return inspect_itk_image(path, options, kind)
+    if is_dicomdir(path):
+        return _inspect_folder(path.parent, options, report)
     if is_dicom(path) or suffix in DICOM_SUFFIXES:
         return inspect_dicom(path.parent, _siblings(path), options, report, chosen=path)
     if suffix in TIFF_SUFFIXES and is_multi_page(path):
@@ -76,9 +80,11 @@ def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> Imp
     files = _files(folder)
     images = _images(files)
     others = [file for file in files if file.suffix.lower() not in SLICE_SUFFIXES]
-    n_dicom = sum(map(is_dicom, others))
+    n_dicom = sum(is_dicom(file) for file in others if not is_dicomdir(file))
     if n_dicom and n_dicom >= len(images):
         return inspect_dicom(folder, others, options, report)
+    if any(map(is_dicomdir, files)) and (disc := _dicom_below(folder)):
+        return inspect_dicom(folder, disc, options, report)
     few = images if len(images) <= _FEW_IMAGES else []
     volumes = [file for file in (*others, *few) if _is_volume(file)]
     n_slices = len(images) - sum(file in volumes for file in images)
@@ -100,6 +106,8 @@ def _inspect_below(folder: Path, files: Sequence[Path], options: ImportOptions, 
         for sub in _subfolders(folder)
         if any(is_readable_name(file) or is_dicom(file) for file in _files(sub))
     ]
+    if len(below) > 1 and all(any(map(is_dicom, _files(sub))) for sub in below):
+        return inspect_dicom(folder, _dicom_below(folder), options, report)
     if len(below) == 1:
         return _inspect_folder(below[0], options, report)
     if below:
@@ -107,6 +115,11 @@ def _inspect_below(folder: Path, files: Sequence[Path], options: ImportOptions, 
         raise VolumeError(text, file=folder, remedy="Give one of these folders.")
     holds = f"only {names(files)}" if files else "nothing"
     raise VolumeError(f"it holds no scan, {holds}", file=folder, remedy=f"Readable are {READABLE}.")
+
+
+def _dicom_below(folder: Path) -> list[Path]:
+    """Return the DICOM files of all subfolders, where discs and exports keep a folder for each series."""
+    return [file for sub in _subfolders(folder) for file in _files(sub) if is_dicom(file)]
 
 
 def _is_volume(path: Path) -> bool:
@@ -128,7 +141,7 @@ def _kind_by_content(path: Path) -> str | None:
         head = file.read(352)
     if head.startswith(b"NRRD000"):
         return "NRRD"
-    if head[344:348] == b"n+1\0":
+    if head[344:348] == b"n+1\0" or head[4:8] == b"n+2\0":
         return "NIfTI"
     return "MetaImage" if head.startswith((b"ObjectType", b"NDims")) else None
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import bz2
 import io
 import zlib
-from collections.abc import Callable, Iterator, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any, Literal, Protocol
@@ -19,10 +21,22 @@ from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.options import ImportOptions, Region
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error
 
-__all__ = ["Compression", "FileSource", "RawSource", "SliceSource", "assemble", "open_stream", "window"]
+__all__ = [
+    "Compression",
+    "FileSource",
+    "RawSource",
+    "SliceSource",
+    "assemble",
+    "in_threads",
+    "open_stream",
+    "window",
+]
 
 Plane = NDArray[Any]
 _CHUNK = 1 << 18
+_DECODERS = 4
+_DEFLATE_AT_MOST = 1032
+"""How many times deflate can shrink data (RFC 1951: 258 bytes in two bits)."""
 
 Compression = Literal["none", "gzip", "zlib", "bzip2"]
 
@@ -87,10 +101,18 @@ class RawSource:
         )
 
     def shortage(self) -> tuple[Problem, ...]:
-        """Return the problem that the file is too short, if it is and is not packed."""
+        """Return the problem that the file is too short for its voxels, if it is, packed or not."""
         have, need = self.path.stat().st_size, self.bytes_needed
-        if self.compression != "none" or have >= need:
+        if self.compression in ("gzip", "zlib"):
+            have = self.offset + _DEFLATE_AT_MOST * max(0, have - self.offset)
+        if self.compression == "bzip2" or have >= need:
             return ()
+        if self.compression != "none":
+            have = self.path.stat().st_size
+            text = (
+                f"{self.path.name} holds {have:,} packed bytes, which cannot make {need:,}: it is incomplete"
+            )
+            return (Problem("short-file", text, remedy="Copy it again."),)
         text = f"{self.path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete"
         return (Problem("short-file", text, remedy="Copy it again."),)
 
@@ -133,16 +155,34 @@ class FileSource:
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
         there = np.array([n for n, file in enumerate(self.files) if file is not None])
+        nearest = [self.files[there[np.abs(there - number).argmin()]] for number in wanted]
         shape: tuple[int, ...] | None = None
-        for number in wanted:
-            file = self.files[there[np.abs(there - number).argmin()]]
-            assert file is not None
-            with failing_as_volume_error(file):
-                plane = self.decode(file)
+        for file, plane in zip(nearest, in_threads(self._decode, nearest), strict=True):
             shape = shape or plane.shape
             if plane.shape != shape:
                 raise VolumeError(f"it is {_times(plane.shape)}, the other slices {_times(shape)}", file=file)
             yield plane
+
+    def _decode(self, file: Path | None) -> Plane:
+        assert file is not None
+        with failing_as_volume_error(file):
+            return self.decode(file)
+
+
+def in_threads(make: Callable[[Any], Plane], things: Iterable[Any]) -> Iterator[Plane]:
+    """Yield ``make(thing)`` for each thing in order, a few of them made ahead by other threads."""
+    with ThreadPoolExecutor(_DECODERS, thread_name_prefix="gp-decode") as pool:
+        ahead: deque[Future[Plane]] = deque()
+        try:
+            for thing in things:
+                ahead.append(pool.submit(make, thing))
+                if len(ahead) > 2 * _DECODERS:
+                    yield ahead.popleft().result()
+            while ahead:
+                yield ahead.popleft().result()
+        finally:
+            for future in ahead:
+                future.cancel()
 
 
 def assemble(

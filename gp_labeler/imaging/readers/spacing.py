@@ -16,12 +16,17 @@ SMALLEST_MM, LARGEST_MM = 8.0, 250.0
 
 _SCREEN_DPI = (72, 90, 96, 150, 300, 600)
 _UNITS = {
+    "pm": 1e-9,
+    "å": 1e-7,
+    "angstrom": 1e-7,
+    "ångström": 1e-7,
     "nm": 1e-6,
     "nanometer": 1e-6,
     "nanometre": 1e-6,
     "um": 1e-3,
     "µm": 1e-3,
     "\u03bcm": 1e-3,  # the Greek letter, not the micro sign
+    "â\u00b5m": 1e-3,  # UTF-8 read as Latin-1
     "micron": 1e-3,
     "micrometer": 1e-3,
     "micrometre": 1e-3,
@@ -31,11 +36,17 @@ _UNITS = {
     "cm": 10.0,
     "centimeter": 10.0,
     "centimetre": 10.0,
+    "dm": 100.0,
+    "decimeter": 100.0,
+    "decimetre": 100.0,
     "m": 1000.0,
     "meter": 1000.0,
     "metre": 1000.0,
     "in": 25.4,
     "inch": 25.4,
+    "inche": 25.4,  # "inches" without its s
+    "mil": 0.0254,
+    "thou": 0.0254,
     '"': 25.4,
 }
 

@@ -18,7 +18,9 @@ from gp_labeler.imaging.readers.choosing import FEW, Choice, choose
 from gp_labeler.imaging.readers.formats import TIFF_SUFFIXES
 from gp_labeler.imaging.readers.grey import palette_as_grey, to_grey
 from gp_labeler.imaging.readers.naming import Numbering, SliceGroup, group_slices, number_slices
+from gp_labeler.imaging.readers.ome import ome_images
 from gp_labeler.imaging.readers.options import ImportOptions
+from gp_labeler.imaging.readers.orientation import ORIENTATION_TAG, oriented, swaps_axes
 from gp_labeler.imaging.readers.pixel_size import (
     UNKNOWN,
     PixelSize,
@@ -28,14 +30,19 @@ from gp_labeler.imaging.readers.pixel_size import (
 )
 from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
-from gp_labeler.imaging.readers.skyscan import SkyScanLog, find_log
+from gp_labeler.imaging.readers.skyscan import SkyScanLog, find_log, log_geometry
 from gp_labeler.imaging.readers.source import FileSource, Plane
-from gp_labeler.imaging.readers.spacing import shown
-from gp_labeler.imaging.readers.tiff import finishing, page_array
+from gp_labeler.imaging.readers.tiff_pages import (
+    PALETTE,
+    check_page,
+    finishing,
+    full_page,
+    orientation_of,
+    orientation_problems,
+    page_shape,
+)
 
 __all__ = ["inspect_stack"]
-
-_PALETTE = 3
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,7 @@ class _Slice:
     dtype: np.dtype[np.generic]
     channels: int
     palette: bool
+    orientation: int = 1
 
 
 def inspect_stack(
@@ -123,25 +131,40 @@ def _read_headers(files: Sequence[Path], report: Report) -> dict[Path, _Slice]:
 
 def _tiff_slice(path: Path) -> _Slice:
     with tifffile.TiffFile(path) as tif:
-        page = tif.pages.first
-        assert isinstance(page, tifffile.TiffPage)
-        shape = (page.imagelength, page.imagewidth)
-        palette = page.photometric == _PALETTE
-        return _Slice(shape, np.dtype(page.dtype), page.samplesperpixel, palette)
+        page = full_page(tif)
+        check_page(page, path)
+        return _Slice(
+            page_shape(page),
+            np.dtype(page.dtype),
+            page.samplesperpixel,
+            page.photometric == PALETTE,
+            orientation_of(page),
+        )
 
 
 def _image_slice(path: Path) -> _Slice:
     with Image.open(path) as image:
         wide = {"I": "int32", "F": "float32"}
         dtype = np.dtype(wide.get(image.mode, "uint16" if ";16" in image.mode else "uint8"))
-        shape = (image.height, image.width)
-        return _Slice(shape, dtype, len(image.getbands()), image.mode in ("P", "PA"))
+        orientation = _exif_orientation(image)
+        stored = (image.height, image.width)
+        shape = stored[::-1] if swaps_axes(orientation) else stored
+        return _Slice(shape, dtype, len(image.getbands()), image.mode in ("P", "PA"), orientation)
 
 
-def _pixel_size(path: Path) -> PixelSize:
+def _pixel_size(path: Path, orientation: int) -> PixelSize:
+    size = _stored_pixel_size(path)
+    return size.turned() if swaps_axes(orientation) else size
+
+
+def _stored_pixel_size(path: Path) -> PixelSize:
     if path.suffix.lower() in TIFF_SUFFIXES:
         with tifffile.TiffFile(path) as tif:
-            return tiff_pixel_size(tif)
+            page = full_page(tif)
+            images, _ = ome_images(tif.ome_metadata or "", path.parent) if tif.is_ome else ((), "")
+            shape = {"X": page.imagewidth, "Y": page.imagelength}
+            fitting = (image for image in images if all(image.sizes[a] == n for a, n in shape.items()))
+            return tiff_pixel_size(tif, page, next(fitting, None))
     with Image.open(path) as image:
         dpi = image.info.get("dpi")
         return dots_per_inch(float(dpi[0]), float(dpi[1])) if dpi else UNKNOWN
@@ -168,7 +191,9 @@ def _plan(
     found += _numbering_problems(group, numbering)
     found += _odd_sizes(strays, odd, headers, shape)
     found += _mixtures(usable, options)
-    size = _pixel_size(next(iter(usable)))
+    found += orientation_problems({header.orientation for header in usable.values()})
+    first = next(iter(usable))
+    size = _pixel_size(first, usable[first].orientation)
     geometry, log_problems = _geometry(size, numbering, log, shape, group)
     dtypes = [np.dtype(np.uint8) if header.palette else header.dtype for header in usable.values()]
     return ImportPlan(
@@ -279,23 +304,9 @@ def _check_channel(channel: int | None, channels: int) -> None:
 def _geometry(
     size: PixelSize, numbering: Numbering, log: SkyScanLog | None, shape: tuple[int, int], group: SliceGroup
 ) -> tuple[Geometry, list[Problem]]:
-    if log is None or log.pixel_mm is None:
+    if log is None or (log.pixel_mm is None and log.projection_mm is None):
         return stack_geometry(size, numbering.step), []
-    mm, found = log.pixel_mm, []
-    if log.prefix and not group.pattern.lower().startswith(log.prefix.lower()):
-        text = f"{log.path.name} speaks of slices {log.prefix}..., these are {group.pattern}; it is believed"
-        found.append(warning("log-prefix", text))
-    ends = (min(group.numbers), max(group.numbers))
-    if log.first is not None and log.last is not None and ends != (log.first, log.last):
-        text = f"{log.path.name} speaks of slices {log.first} to {log.last}, there are {ends[0]} to {ends[1]}"
-        found.append(warning("log-sections", text))
-    if log.width and log.height and (log.height, log.width) != shape:
-        reason = (
-            f"{log.path.name} speaks of {log.width} x {log.height} pixels, the slices have {_times(shape)}: "
-            f"if they were made smaller, its voxel size of {shown((mm,))} is wrong for them"
-        )
-        return Geometry(sides_known=False, suggested=(mm, mm, mm * numbering.step), reason=reason), found
-    return Geometry((mm, mm, mm * numbering.step), sides_known=False), found
+    return log_geometry(log, group.pattern, group.numbers, numbering.step, shape)
 
 
 def _decoder(channel: int | None) -> Callable[[Path], Plane]:
@@ -305,17 +316,30 @@ def _decoder(channel: int | None) -> Callable[[Path], Plane]:
 def _decode(path: Path, channel: int | None) -> Plane:
     if path.suffix.lower() in TIFF_SUFFIXES:
         with tifffile.TiffFile(path) as tif:
-            page = tif.pages.first
-            assert isinstance(page, tifffile.TiffPage)
-            plane = page_array(page, path, 0)
-            return finishing(page, channel if page.samplesperpixel > 1 else None)(plane)
+            page = full_page(tif)
+            return finishing(page, channel if page.samplesperpixel > 1 else None)(page.asarray(maxworkers=1))
     with Image.open(path) as image:
-        if image.mode in ("P", "PA"):
-            colours = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-            indices = np.asarray(image)
-            return palette_as_grey(indices if indices.ndim == 2 else indices[..., 0], colours, channel)
-        usual = image.convert("RGB") if image.mode in ("CMYK", "YCbCr", "LAB", "HSV") else image
-        return to_grey(np.asarray(usual), channel)
+        return np.asarray(oriented(_grey(image, channel), _exif_orientation(image)))
+
+
+def _grey(image: Image.Image, channel: int | None) -> Plane:
+    if image.mode in ("P", "PA"):
+        colours = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
+        indices = np.asarray(image)
+        return palette_as_grey(indices if indices.ndim == 2 else indices[..., 0], colours, channel)
+    usual = image.convert("RGB") if image.mode in ("CMYK", "YCbCr", "LAB", "HSV") else image
+    return to_grey(np.asarray(usual), channel)
+
+
+def _exif_orientation(image: Image.Image) -> int:
+    """Return the tag Orientation of an open image, 1 where it has none; reads no pixels."""
+    raw = image.info.get("exif")
+    if not raw:
+        return 1
+    exif = Image.Exif()
+    exif.load(raw)
+    value = exif.get(ORIENTATION_TAG, 1)
+    return value if isinstance(value, int) and 1 <= value <= 8 else 1
 
 
 def _times(shape: tuple[int, int]) -> str:

@@ -2,38 +2,53 @@
 
 from __future__ import annotations
 
-import math
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tifffile
-from PIL import Image
 
-from gp_core.errors import GpError
+from gp_labeler.imaging.readers.choosing import Choice, choose
 from gp_labeler.imaging.readers.formats import volume_stem
-from gp_labeler.imaging.readers.grey import palette_as_grey, to_grey
 from gp_labeler.imaging.readers.options import ImportOptions
+from gp_labeler.imaging.readers.orientation import swaps_axes
 from gp_labeler.imaging.readers.pixel_size import stack_geometry, tiff_pixel_size
 from gp_labeler.imaging.readers.plan import ImportPlan
-from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
-from gp_labeler.imaging.readers.source import Plane, RawSource, SliceSource
+from gp_labeler.imaging.readers.problems import Problem, names, warning
+from gp_labeler.imaging.readers.source import Plane, RawSource, SliceSource, in_threads
+from gp_labeler.imaging.readers.tiff_pages import (
+    check_page,
+    finishing,
+    grey_dtype,
+    is_reduced,
+    orientation_of,
+    page_problems,
+    page_shape,
+)
+from gp_labeler.imaging.readers.tiff_stacks import PageStack, page_stacks
 
-__all__ = ["finishing", "inspect_tiff", "is_multi_page", "page_array"]
-
-_MIN_IS_WHITE, _PALETTE = 0, 3
+__all__ = ["inspect_tiff", "is_multi_page"]
 
 
 def is_multi_page(path: Path) -> bool:
-    """Return whether a TIFF file holds more than one page, or one with depth."""
+    """Return whether a TIFF file holds several slices: smaller copies and masks of a slice are none."""
     with tifffile.TiffFile(path) as tif:
         first = tif.pages.first
-        deep = isinstance(first, tifffile.TiffPage) and first.imagedepth > 1
-        return deep or len(tif.pages) > 1 or bool(tif.is_imagej and tif.series[0].ndim > 2)
+        if isinstance(first, tifffile.TiffPage) and first.imagedepth > 1:
+            return True
+        if len(tif.pages) == 1:
+            imagej = tif.imagej_metadata or {}
+            return bool(imagej.get("images", 1) > 1 or tif.is_stk)
+        shapes = set()
+        for page in tif.pages:
+            if is_reduced(page):
+                continue
+            if page.shape in shapes:
+                return True
+            shapes.add(page.shape)
+        return False
 
 
 def inspect_tiff(path: Path, options: ImportOptions) -> ImportPlan:
@@ -42,112 +57,103 @@ def inspect_tiff(path: Path, options: ImportOptions) -> ImportPlan:
     Raises
     ------
     VolumeError
-        It holds no volume.
+        It holds no volume, or none that can be read.
     """
-    with tifffile.TiffFile(path) as tif:
-        stack = _Stack.of(tif, options.channel, path)
-        source = stack.source(path, tif, options.channel)
-        first = stack.first
+    with tifffile.TiffFile(path) as tif, tifffile.TiffFile(path) as pages:
+        stacks = page_stacks(tif, pages, options.channel, path)
+        choices = tuple(Choice(stack.name, stack.text, len(stack.pages)) for stack in stacks)
+        index, rivals = choose(choices, options, None, path)
+        stack = stacks[index]
+        check_page(stack.first, path)
+        source = _source(stack, path, tif, options.channel)
+        size = tiff_pixel_size(tif, stack.first, stack.ome, stack.axis)
+        rows, columns = page_shape(stack.first)
         return ImportPlan(
             path=path,
             format="OME-TIFF" if tif.is_ome else "ImageJ TIFF" if tif.is_imagej else "multi-page TIFF",
             files=(path,),
-            size=(first.imagewidth, first.imagelength, len(stack.numbers)),
-            stored_dtype=np.dtype(np.uint8 if first.photometric == _PALETTE else first.dtype),
+            size=(columns, rows, len(stack.pages)),
+            stored_dtype=grey_dtype(stack.first),
             source=source,
-            geometry=stack_geometry(tiff_pixel_size(tif)),
+            geometry=stack_geometry(size.turned() if swaps_axes(orientation_of(stack.first)) else size),
             found=(
+                *rivals,
                 *(source.shortage() if isinstance(source, RawSource) else ()),
-                *_findings(stack, options),
+                *_findings(stack, path),
+                *(warning("pixel-size", text) for text in size.doubts),
+                *page_problems(stack.first, options.channel),
             ),
+            choices=choices if len(choices) > 1 else (),
+            choice=stack.name if len(choices) > 1 else None,
             options=options,
             name=volume_stem(path),
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _Stack:
-    """The pages that are slices.
-
-    `series` counts among the file's series; None where pages of one kind were gathered one by one. `numbers`
-    count within it, or in the file. `offset` is where its voxels begin, if they lie in one piece.
-    """
-
-    series: int | None
-    numbers: tuple[int, ...]
-    first: tifffile.TiffPage
-    offset: int | None = None
-    aside: str = ""
-    n_others: int = 0
-
-    @classmethod
-    def of(cls, tif: tifffile.TiffFile, channel: int | None, path: Path) -> _Stack:
-        """Find the slices: the largest series, or, where no series has depth, all pages like the most."""
-        series = max(tif.series, key=lambda one: math.prod(one.shape))
-        first = series.keyframe
-        shape = series.shape[: len(series.axes) - len(first.axes)]
-        if math.prod(shape) < 2:
-            return cls._gathered(tif, path)
-        numbers, aside = _slices_of(series.axes, shape, channel)
-        n_others = len(tif.pages) - len(series.pages) if len(tif.series) > 1 else 0
-        return cls(tif.series.index(series), numbers, first, series.dataoffset, aside, max(0, n_others))
-
-    @classmethod
-    def _gathered(cls, tif: tifffile.TiffFile, path: Path) -> _Stack:
-        """Gather pages of the same size and type, as programs leave them that write page by page."""
-        kinds: dict[tuple[object, ...], list[int]] = defaultdict(list)
-        for number, page in enumerate(tif.pages):
-            photometric = None if page.keyframe is None else page.keyframe.photometric
-            kinds[page.shape, page.dtype, photometric].append(number)
-        numbers = max(kinds.values(), key=len)
-        if len(numbers) < 2:
-            raise VolumeError(
-                f"it holds no stack of slices, but {len(tif.pages)} pages that differ",
-                file=path,
-                remedy="Give the folder of a stack, or a file of several pages.",
-            )
-        first = tif.pages[numbers[0]].keyframe
-        assert first is not None
-        return cls(None, tuple(numbers), first, n_others=len(tif.pages) - len(numbers))
-
-    def source(self, path: Path, tif: tifffile.TiffFile, channel: int | None) -> SliceSource:
-        """Return where the slices are read."""
-        finish = finishing(self.first, channel)
-        if self.offset is None or self.first.dtype is None:
-            return _PageSource(path, self.series, self.numbers, finish)
-        page_bytes = math.prod(self.first.shape) * self.first.dtype.itemsize
-        return RawSource(
-            path=path,
-            offset=self.offset + self.numbers[0] * page_bytes,
-            dtype=np.dtype(self.first.dtype).newbyteorder(tif.byteorder),
-            plane_shape=self.first.shape,
-            n_planes=len(self.numbers),
-            plane_step=(self.numbers[1] - self.numbers[0]) * page_bytes,
-            finish=finish,
-        )
+def _findings(stack: PageStack, path: Path) -> list[Problem]:
+    found = []
+    if stack.aside:
+        found.append(warning("channel", f"of several volumes in it, one is taken: {stack.aside}"))
+    if stack.n_others:
+        found.append(warning("stray-pages", f"{stack.n_others} pages of another size or type are left out"))
+    gone = [
+        name for name in (stack.ome.files if stack.ome else ()) if name and not (path.parent / name).is_file()
+    ]
+    missing = [n + 1 for n, page in enumerate(stack.pages) if page is None]
+    if missing and gone and not stack.odd:
+        text = f"its OME description puts slices into files that are not there: {names(gone)}"
+        found.append(Problem("missing-file", text, remedy="Put them into its folder."))
+    elif missing:
+        which = names([*stack.odd] or [f"page {number}" for number in missing], 6)
+        text = f"pages between its slices are missing or differ from them in size or type: {which}"
+        remedy = "Save it again, or accept copies of the neighbouring slices (--accept slice-size)."
+        found.append(Problem("slice-size", text, remedy=remedy, resolved_by=("accept",)))
+    return found
 
 
-def _slices_of(axes: str, shape: tuple[int, ...], channel: int | None) -> tuple[tuple[int, ...], str]:
-    """Return the pages along Z, else along the longest axis, at the start (or the channel) of all others."""
-    stack = (
-        axes.index("Z") if "Z" in axes[: len(shape)] else max(range(len(shape)), key=lambda axis: shape[axis])
+def _source(stack: PageStack, path: Path, tif: tifffile.TiffFile, channel: int | None) -> SliceSource:
+    """Return where the slices are read: in one piece where they lie so, else page by page."""
+    finish = finishing(stack.first, channel)
+    if stack.deep:
+        return _DeepPage(path, finish)
+    if stack.offset is None:
+        return _PageSource(path, stack.series, _nearest(stack.pages), finish)
+    first = stack.first
+    dtype = np.dtype(first.dtype).newbyteorder(tif.byteorder)
+    page_bytes = int(np.prod(first.shape)) * dtype.itemsize
+    numbers = [page or 0 for page in stack.pages]
+    return RawSource(
+        path=path,
+        offset=stack.offset + numbers[0] * page_bytes,
+        dtype=dtype,
+        plane_shape=first.shape,
+        n_planes=len(numbers),
+        plane_step=(numbers[1] - numbers[0]) * page_bytes,
+        finish=finish,
     )
-    others = [axis for axis in range(len(shape)) if axis != stack and shape[axis] > 1]
-    index = [0] * len(shape)
-    for axis in others:
-        if axes[axis] == "C" and channel is not None:
-            if not 0 <= channel < shape[axis]:
-                raise GpError(f"channel must be 0 to {shape[axis] - 1}, got {channel}")
-            index[axis] = channel
-    step = math.prod(shape[stack + 1 :])
-    first = int(np.ravel_multi_index(index, shape))
-    aside = ", ".join(f"{index[axis] + 1} of {shape[axis]} along {axes[axis]}" for axis in others)
-    return tuple(range(first, first + step * shape[stack], step)), aside
+
+
+def _nearest(pages: Sequence[int | None]) -> tuple[int, ...]:
+    """Return the pages of all slices, the nearest one for each that is missing."""
+    there = np.array([(n, page) for n, page in enumerate(pages) if page is not None])
+    return tuple(int(there[np.abs(there[:, 0] - n).argmin(), 1]) for n in range(len(pages)))
 
 
 @dataclass(frozen=True)
 class _PageSource:
-    """Slices that are pages, each packed or placed for itself."""
+    """Slices that are pages, each packed or placed for itself.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    series : int, optional
+        Which of its series `numbers` count in; None where they count all pages of the file.
+    numbers : tuple of int
+        One for each slice.
+    finish : callable
+        Makes a page grey.
+    """
 
     path: Path
     series: int | None
@@ -155,62 +161,32 @@ class _PageSource:
     finish: Callable[[Plane], Plane]
 
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
-        """Yield the (y, x) grey planes with the numbers `wanted`."""
+        """Yield the (y, x) grey planes with the numbers `wanted`; pages are unpacked by several threads."""
         with tifffile.TiffFile(self.path) as tif:
             pages: Any = tif.pages if self.series is None else tif.series[self.series].pages
-            for number in wanted:
-                page = pages[self.numbers[number]]
-                if page is None:
-                    raise VolumeError(f"slice {number + 1} is missing in it", file=self.path)
-                yield self.finish(page_array(page, self.path, page.index))
+            tif.filehandle.set_lock(True)
+            chosen = (self._page(tif, pages, self.numbers[number]) for number in wanted)
+            one_file = self.series is None or all(page is None or page.parent is tif for page in pages)
+            yield from in_threads(self._plane, chosen) if one_file else map(self._plane, chosen)
+
+    @staticmethod
+    def _page(tif: tifffile.TiffFile, pages: Any, number: int) -> Any:
+        with tif.filehandle.lock:  # other threads read from the same file
+            return pages[number]
+
+    def _plane(self, page: Any) -> Plane:
+        return self.finish(page.asarray(maxworkers=1))
 
 
-def page_array(page: Any, path: Path, number: int) -> Plane:
-    """Return the values of a TIFF page, by Pillow where tifffile lacks the decoder (LZW, JPEG)."""
-    try:
-        plane: Plane = page.asarray()
-    except ValueError as problem:
-        if "imagecodecs" not in str(problem):
-            raise
-        with Image.open(path) as image:
-            image.seek(number)
-            plane = np.asarray(image)
-    return plane
+@dataclass(frozen=True)
+class _DeepPage:
+    """All slices in one page with depth (tag ImageDepth)."""
 
+    path: Path
+    finish: Callable[[Plane], Plane]
 
-def finishing(page: tifffile.TiffPage, channel: int | None) -> Callable[[Plane], Plane]:
-    """Return what makes the values of a page grey: palette, inverted, planar and interleaved colours."""
-    if page.photometric == _PALETTE and page.colormap is not None:
-        return partial(_finish_palette, colours=page.colormap.T, channel=channel)
-    return partial(
-        _finish,
-        planar=page.axes.startswith("S"),
-        inverted=page.photometric == _MIN_IS_WHITE and page.dtype is not None and page.dtype.kind == "u",
-        channel=channel,
-    )
-
-
-def _finish_palette(plane: Plane, colours: Plane, channel: int | None) -> Plane:
-    return palette_as_grey(plane, colours, channel)
-
-
-def _finish(plane: Plane, planar: bool, inverted: bool, channel: int | None) -> Plane:
-    grey = to_grey(np.moveaxis(plane, 0, -1) if planar and plane.ndim == 3 else plane, channel)
-    return np.iinfo(grey.dtype).max - grey if inverted else grey
-
-
-def _findings(stack: _Stack, options: ImportOptions) -> tuple[Problem, ...]:
-    page = stack.first
-    found = []
-    if stack.aside:
-        found.append(warning("channel", f"of several volumes in it, one is taken: {stack.aside}"))
-    if page.photometric == _PALETTE:
-        found.append(warning("palette", "its colours come from a palette and become grey"))
-    elif page.samplesperpixel > 1:
-        taken = "luminance" if options.channel is None and page.samplesperpixel > 2 else "one channel"
-        found.append(warning("colour", f"its pixels have {page.samplesperpixel} channels; {taken} is taken"))
-    if page.photometric == _MIN_IS_WHITE:
-        found.append(warning("inverted", "its values run from white to black and are inverted"))
-    if stack.n_others:
-        found.append(warning("stray-pages", f"{stack.n_others} pages of another size or type are left out"))
-    return tuple(found)
+    def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
+        """Yield the (y, x) grey planes with the numbers `wanted`."""
+        with tifffile.TiffFile(self.path) as tif:
+            volume = tif.pages[0].asarray()
+        yield from (self.finish(volume[number]) for number in wanted)

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from gp_core import Atlas, Specimen, check_specimen, fit_atlas, load_specimens
+from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import write_text
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 
 __all__ = ["Check", "Fit", "UseAtlas"]
-
-_HARMLESS = ("missing", "unseen")
 
 
 @dataclass(frozen=True)
@@ -92,17 +89,12 @@ class Check(Step):
         state = rig.desk.session.state
         sides = {side: state.side(side) for side in Side if state.side(side).placed}
         findings = check_specimen(Specimen(state.specimen, sides), rig.desk.atlas or Atlas.published())
-        doubtful = [finding for finding in findings if finding.kind not in _HARMLESS]
+        doubtful = [finding for finding in findings if finding.is_doubt]
         if self.path is not None:
-            file, rows = rig.to_write(self.path), [_row(finding) for finding in findings]
+            file, rows = rig.to_write(self.path), [finding.as_dict() for finding in findings]
             write_text(file, json.dumps(rows, indent=1) + "\n")
             rig.wrote(file)
         text = " ".join(f"{finding.side.word}: {finding.text}." for finding in doubtful)
         if doubtful and self.strict:
             raise GpError(text)
         return text or f"{len(findings)} not placed, none doubtful"
-
-
-def _row(finding: Any) -> Mapping[str, Any]:
-    names = ("kind", "landmarks", "text")
-    return {"side": finding.side.value, **{name: getattr(finding, name) for name in names}}

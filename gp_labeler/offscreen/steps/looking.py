@@ -14,7 +14,8 @@ from gp_labeler.offscreen.events import leave, press_keys
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Pair, Step, Triple
 from gp_labeler.scene.planes import Plane
-from gp_labeler.views.pictures import PICTURES, picture
+from gp_labeler.views.fonts import TEXT_SIZES
+from gp_labeler.views.pictures import PICTURES, picture, write_picture
 from gp_labeler.views.theme import THEMES
 
 __all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]
@@ -45,6 +46,8 @@ class Look(Step):
         Width and height of the window, logical pixels.
     theme : str, optional
         ``dark`` or ``light``.
+    text_size : int, optional
+        Of all words, percent of the desktop's: one of 85, 100, 115, 130, 150, 175, 200.
     panel : str, optional
         ``scan`` or ``label``: the panel beside the views.
     layout : str, optional
@@ -75,6 +78,7 @@ class Look(Step):
     do: ClassVar[str] = "view"
     size: Pair | None = None
     theme: str | None = None
+    text_size: int | None = None
     panel: str | None = None
     layout: str | None = None
     reset: bool = False
@@ -134,6 +138,9 @@ class Look(Step):
         if self.theme is not None:
             _check(self.theme, "theme", tuple(THEMES))
             rig.window.set_theme(self.theme)
+        if self.text_size is not None:
+            _check(str(self.text_size), "text_size", tuple(map(str, TEXT_SIZES)))
+            rig.window.set_text_size(self.text_size)
         if self.panel is not None:
             _check(self.panel, "panel", tuple(rig.window.steps))
             rig.window.set_step(self.panel)
@@ -196,8 +203,7 @@ class Screenshot(Step):
             leave(view)
         size = None if self.size is None else _pixels(self.size)
         image, file = picture(rig.window, self.what, size), rig.to_write(self.path)
-        if not image.save(str(file)):
-            raise GpError("cannot be written", file=file, remedy="Give a path that ends with .png.")
+        write_picture(image, file)
         return f"{rig.wrote(file)}, {image.width()} x {image.height()}"
 
 

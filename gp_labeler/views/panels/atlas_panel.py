@@ -19,16 +19,15 @@ from gp_labeler.atlas_work import FEWEST_ANIMALS, FitAtlas
 from gp_labeler.session.animals import Animals
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import follow
+from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.atlas_table import AtlasTable
 from gp_labeler.views.panels.import_words import sentence
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.views.panels.pose_parts import Notices
 from gp_labeler.workbench import Workbench
 
 __all__ = ["AtlasPanel"]
 
-_ANY = 16_777_215
 _WIDEST = 1000
 _N_NOTICES = 4
 _METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
@@ -58,7 +57,7 @@ class AtlasPanel(QWidget):
             asking.asked.connect(self.asked)
         content = QWidget()
         content.setProperty("role", "panel")
-        content.setMaximumWidth(_WIDEST)
+        fit(content, lambda: content.setMaximumWidth(pixels(content, _WIDEST)))
         self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom, content)
         self._columns.setContentsMargins(4, 8, 8, 8)
         self._columns.setSpacing(6)
@@ -67,15 +66,13 @@ class AtlasPanel(QWidget):
             self._columns.addLayout(column, 1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        area = scrolled(content)
-        area.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
-        layout.addWidget(area)
+        self._area = scrolled(content)
+        self._area.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
+        layout.addWidget(self._area)
         self.set_wide(False)
 
     def set_wide(self, wide: bool) -> None:
         """Take all the width there is, in two columns, where there is no scan beside."""
-        self.setMinimumWidth(PANEL_WIDTH)
-        self.setMaximumWidth(_ANY if wide else PANEL_WIDTH)
         ways = QBoxLayout.Direction
         self._columns.setDirection(ways.LeftToRight if wide else ways.TopToBottom)
         column = self._left if wide else self._right
@@ -83,9 +80,12 @@ class AtlasPanel(QWidget):
             for other in (self._left, self._right):
                 other.removeWidget(card)
             column.insertWidget(column.count() - 1, card)  # before the stretch
+        self._area.updateGeometry()  # which no layout asks for while the panel is hidden
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(PANEL_WIDTH, super().sizeHint().height())
+        least, table = self.minimumSizeHint(), self.labels.table
+        names = table.sizeHint().width() - table.minimumSizeHint().width()
+        return QSize(least.width() + names, super().sizeHint().height())
 
 
 def _column(*cards: QWidget) -> QVBoxLayout:
@@ -228,7 +228,7 @@ class OwnCard(_AskingCard):
         self.progress, self.stop = QProgressBar(), QPushButton("Stop")
         self.progress.setRange(0, 100)
         self.progress.setTextVisible(False)
-        self.progress.setFixedHeight(8)
+        fit(self.progress, lambda: self.progress.setFixedHeight(pixels(self, 8)))
         self.stop.clicked.connect(self._stop)
         self._work = QWidget()
         line = QHBoxLayout(self._work)
@@ -289,7 +289,7 @@ class LabelsCard(Card):
         """Say in a sentence what the table shows."""
         rows = self.table.rows
         if not rows.n_judged:
-            words = "Once five points of a side are placed, this shows how well they fit the atlas."
+            words = "Once four points of a side are placed, this shows how well they fit the atlas."
         elif rows.n_doubtful:
             words = f"{rows.n_doubtful} of {rows.n_judged} labels should be looked at again."
         else:

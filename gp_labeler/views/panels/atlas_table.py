@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QPainter
+from PySide6.QtGui import QColor, QPainter
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -18,11 +18,12 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_core.landmarks.features import Side, feature
-from gp_labeler.session.ghosts import Departure
+from gp_core.atlas.label_check import Departure
+from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
-from gp_labeler.views.theme import FONT_PX, theme_of
+from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
+from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
 __all__ = ["AtlasModel", "AtlasTable"]
@@ -34,9 +35,9 @@ _HINTS = (
     "How much the feature varies between animals: standard deviation of a coordinate, mm",
     "How far the label is from where the others make the atlas expect it: mm, and in standard deviations",
 )
-_ROW_PX, _CODE_PX, _CHIP = 22, 39, 11
-_WIDTHS = (54, 92, 96)
-_FEWEST_PX = 80
+_ROW, _CHIP, _PAD = 22, 11, 8
+_WIDEST = ("0.00", "10.00 · 10.0", "10.00 · 10.0")
+"""The longest text below each heading after the first."""
 DOUBTFUL_ROLE = int(Qt.ItemDataRole.UserRole) + 1
 
 Index = QModelIndex | QPersistentModelIndex
@@ -167,24 +168,42 @@ class AtlasTable(QTableView):
             follow(self, signal, self._on_labels)
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(330, 30 + _ROW_PX * max(len(self.rows.codes), 1))
+        least = self.minimumSizeHint()
+        return QSize(least.width() + names_width(self), least.height())
 
-    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return self.sizeHint()
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room that all but the names take: in a narrow window the codes alone are shown."""
+        row = self.verticalHeader().defaultSectionSize()
+        height = self.horizontalHeader().height() + row * max(len(self.rows.codes), 1) + 4
+        first = max(_PAD + _code_width(self), text_width(self, _HEADINGS[0]) + 2 * _PAD)
+        return QSize(first + sum(self._widths()) + 4, height)
 
     def _arrange(self) -> None:
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setDefaultSectionSize(_ROW_PX)
         header = self.horizontalHeader()
-        header.setFixedHeight(28)
         header.setHighlightSections(False)
         header.setSectionsClickable(False)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        for column, width in enumerate(_WIDTHS, 1):
+        fit(self, self._fit)
+
+    def _fit(self) -> None:
+        """Give columns and rows the room that their words take."""
+        self.horizontalHeader().setFixedHeight(line_height(self) + 10)
+        self.verticalHeader().setDefaultSectionSize(max(pixels(self, _ROW), line_height(self)))
+        for column, width in enumerate(self._widths(), 1):
             self.setColumnWidth(column, width)
+        self.updateGeometry()
+
+    def _widths(self) -> list[int]:
+        chip = pixels(self, _CHIP) + 5
+        needed = [text_width(self, words) + (chip if n else 0) for n, words in enumerate(_WIDEST)]
+        return [
+            max(text_width(self, heading), words) + 2 * _PAD
+            for heading, words in zip(_HEADINGS[1:], needed, strict=True)
+        ]
 
     def _on_atlas(self, *_: object) -> None:
         self.rows.refresh_atlas()
@@ -209,11 +228,10 @@ class _Cells(QStyledItemDelegate):
         painter.save()
         if option.state & QStyle.StateFlag.State_MouseOver:
             painter.fillRect(box, QColor(theme.hover))
-        font = QFont(view.font())
-        font.setPixelSize(FONT_PX)
+        font = font_of(view)
         words, middle = str(index.data()), Qt.AlignmentFlag.AlignVCenter
         if index.column() == 0:
-            self._name(painter, font, box.adjusted(8, 0, -2, 0), words, theme.text, theme.muted)
+            self._name(painter, view, box.adjusted(_PAD, 0, 0, 0), words)
         else:
             doubtful = bool(index.data(DOUBTFUL_ROLE))
             painter.setFont(font)
@@ -222,25 +240,28 @@ class _Cells(QStyledItemDelegate):
                 painter.setPen(QColor(theme.faint))
             painter.drawText(box.adjusted(0, 0, -7, 0), middle | Qt.AlignmentFlag.AlignRight, words)
             if doubtful:
-                width = QFontMetrics(font).horizontalAdvance(words)
-                left = box.right() - 7 - width - _CHIP - 5
-                draw_chip(
-                    painter, "doubtful", QRectF(left, box.center().y() - _CHIP / 2, _CHIP, _CHIP), theme
-                )
+                side = pixels(view, _CHIP)
+                left = box.right() - 7 - text_width(view, words) - side - 4
+                chip = QRectF(left, box.center().y() - side / 2, side, side)
+                draw_chip(painter, "doubtful", chip, theme)
         painter.restore()
 
-    def _name(self, painter: QPainter, font: QFont, box: QRectF, code: str, bright: str, dim: str) -> None:
-        bold = QFont(font)
-        bold.setBold(True)
-        painter.setFont(bold)
-        painter.setPen(QColor(bright))
-        painter.drawText(box, Qt.AlignmentFlag.AlignVCenter, code)
-        painter.setFont(font)
-        painter.setPen(QColor(dim))
-        rest = box.adjusted(_CODE_PX, 0, 0, 0)
-        if rest.width() < _FEWEST_PX:
-            return
-        name = QFontMetrics(font).elidedText(
-            feature(code).name, Qt.TextElideMode.ElideRight, round(rest.width())
-        )
-        painter.drawText(rest, Qt.AlignmentFlag.AlignVCenter, name)
+    def _name(self, painter: QPainter, view: QTableView, box: QRectF, code: str) -> None:
+        theme, middle = theme_of(view), Qt.AlignmentFlag.AlignVCenter
+        painter.setFont(font_of(view, bold=True))
+        painter.setPen(QColor(theme.text))
+        painter.drawText(box, middle, code)
+        words = box.adjusted(_code_width(view), 0, 0, 0)
+        if words.width() >= names_width(view):
+            painter.setFont(font_of(view))
+            painter.setPen(QColor(theme.muted))
+            painter.drawText(words, middle, feature(code).name)
+
+
+def names_width(view: QWidget) -> int:
+    """Return what the longest name of a feature takes, logical pixels."""
+    return text_width(view, *(row.name for row in FEATURES))
+
+
+def _code_width(view: QWidget) -> int:
+    return text_width(view, *CODES, bold=True) + pixels(view, 6)

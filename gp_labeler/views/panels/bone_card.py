@@ -41,16 +41,16 @@ class BoneCard(Card):
         row.addWidget(self.box, 1)
         row.addWidget(self.propose)
         self.add(row)
-        self.smallest = NumberField("Smallest part of the bone that is kept, mm")
+        self.smallest = NumberField("Smallest part of the bone that is kept, mm", widest="100.00")
         self.smallest.step = 0.1
-        self.smallest.setFixedWidth(70)
         self.smallest.setToolTip("Specks of noise are smaller than ossicles, which are more than 1 mm across")
         self.smallest.value_chosen.connect(self._choose_smallest)
         row = QHBoxLayout()
         row.setSpacing(8)
         row.addWidget(text_label("Leave out parts below", "hint"))
         row.addWidget(self.smallest)
-        row.addWidget(text_label("mm", "hint"), 1)
+        row.addWidget(text_label("mm", "hint"))
+        row.addStretch(1)
         self.add(row)
         self.add(
             text_label(

@@ -78,8 +78,7 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     side, row = active.side, feature(active.code)
     state, mark = session.point_states(side, wait=False)[row.code], session.state.landmark(side, row.code)
     status, role = _status(session, side, row.code, state)
-    is_other = state is PointState.DOUBTFUL and session.is_other_side(side)
-    action, words = ("unlock", "Unlock") if mark.locked else _SWAP if is_other else _ACTIONS[state]
+    action, words = ("unlock", "Unlock") if mark.locked else _next_action(session, side, row.code, state)
     aside, hint = _SHARED if row.shared else _EXTERNAL if row.external else ("", "")
     return CardContent(
         eyebrow=f"{_VERBS[state]} · {side.word} · {session.progress(side).text}",
@@ -110,7 +109,6 @@ _VERBS = {
     PointState.DOUBTFUL: "Look again",
     PointState.UNSEEN: "Not seen",
 }
-_SWAP = ("swap_sides", "Swap left and right")
 _ACTIONS = {
     PointState.TO_DO: ("crosshair", "Place at crosshair"),
     PointState.GHOST: ("ghost", "Accept ghost"),
@@ -121,14 +119,22 @@ _ACTIONS = {
 }
 
 
+def _next_action(session: Session, side: Side, code: str, state: PointState) -> tuple[str, str]:
+    """Return id and words of the one next action: for a doubt that has a remedy, that remedy."""
+    doubt = session.near_doubts(side).get(code) if state is PointState.DOUBTFUL else None
+    if doubt is not None and doubt.kind == "other side":
+        return "swap_sides", "Swap left and right"
+    if doubt is not None and doubt.kind == "swapped":
+        return "swap_names", "Exchange " + " and ".join(doubt.landmarks)
+    return _ACTIONS[state]
+
+
 def _status(session: Session, side: Side, code: str, state: PointState) -> tuple[str, str]:
     """Return one sentence on how far the point is, and its look."""
     if state is PointState.GHOST:
         ghost = session.ghosts(side)[code]
         who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
-    if state is PointState.DOUBTFUL and session.is_other_side(side):
-        return f"These labels fit the {side.other.word} side.", "danger"
     doubt = session.near_doubts(side).get(code)
     if state is PointState.DOUBTFUL and doubt is not None:
         words = doubt.text

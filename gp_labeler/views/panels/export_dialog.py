@@ -91,7 +91,7 @@ class ExportDialog(QDialog):
         self.browse = QPushButton("Browse…")
         self.browse.clicked.connect(self._browse)
         self.formats = {suffix: self._format_box(suffix) for suffix in FORMATS}
-        self.files = text_label("", "mono", wrap=True)
+        self.files = text_label("", "", wrap=True)
         self.replace = QCheckBox()
         self.replace.toggled.connect(self.refresh)
         self._findings = QVBoxLayout()
@@ -165,20 +165,25 @@ class ExportDialog(QDialog):
         return found
 
     def _doubts(self, side: Side) -> list[tuple[str, str]]:
-        states = self._workbench.session.point_states(side, wait=False)
-        doubtful = [code for code, state in states.items() if state is PointState.DOUBTFUL]
-        if not doubtful:
-            return []
-        if self._workbench.session.is_other_side(side):
-            other = f"{side.other.word}: left and right are exchanged."
-            words = f"The labels of the {side.word} side fit the {other}"
-            return [("warning", words)]
-        many = len(doubtful) > 1
-        far = f"lie far from where the atlas expects {'them' if many else 'it'}"
-        words = (
-            f"On the {side.word} side {' '.join(doubtful)} {far if many else far.replace('lie', 'lies', 1)}"
-        )
-        return [("warning", f"{words}: look again, or mark as checked.")]
+        """Return what is doubted of a side: one notice for each kind of mistake."""
+        session = self._workbench.session
+        states = session.point_states(side, wait=False)
+        doubts = {
+            code: doubt
+            for code, doubt in session.near_doubts(side).items()
+            if states[code] is PointState.DOUBTFUL
+        }
+        far = [code for code, doubt in doubts.items() if doubt.kind == "far"]
+        others = dict.fromkeys(doubt for doubt in doubts.values() if doubt.kind != "far")
+        words = [f"On the {side.word} side {doubt.text}. {doubt.remedy}" for doubt in others]
+        if far:
+            many = (
+                "lie far from where the atlas expects them"
+                if len(far) > 1
+                else "lies far from where the atlas expects it"
+            )
+            words.append(f"On the {side.word} side {' '.join(far)} {many}: look again, or mark as checked.")
+        return [("warning", each) for each in words]
 
     def _suffixes(self) -> list[str]:
         return [suffix for suffix, box in self.formats.items() if box.isChecked()]

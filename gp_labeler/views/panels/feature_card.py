@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from PySide6.QtCore import QEvent, QSize, Qt, Signal
+from PySide6.QtCore import QEvent, Qt, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QBoxLayout,
@@ -20,20 +20,23 @@ from PySide6.QtWidgets import (
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import ACTIONS
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, SwapSides
+from gp_labeler.session.edits import CheckPoint, SwapPoints, SwapSides
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
+from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.card_content import CardContent, content_of
+from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
 __all__ = ["FeatureCard"]
 
+_CHIP = 14
 _TALL = 350
-"""From this height on, logical pixels, the picture stands above the words; below, beside them."""
+"""From this height on the picture stands above the words, not beside; at the normal text size."""
 
 
 class FeatureCard(QWidget):
@@ -90,7 +93,6 @@ class FeatureCard(QWidget):
         self._aside, self._definition = _label("shared"), _label("", wrap=True)
         self._where, self._status = _label("hint", wrap=True), _label("hint", wrap=True)
         self._chip = QLabel()
-        self._chip.setFixedSize(14, 14)
         self.picture = FeaturePicture()
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.primary = QPushButton()
@@ -104,13 +106,21 @@ class FeatureCard(QWidget):
         self.unseen.setToolTip("It was looked for and cannot be seen in this scan")
         self.unseen.clicked.connect(lambda: self._do(lambda: labelling.mark_unseen(self._workbench.session)))
         self.sides = {side: self._side_button(side) for side in Side}
+        fit(self, self._fit)
+
+    def _fit(self) -> None:
+        """Give chip and picture a size that goes with the text."""
+        self._chip.setFixedSize(pixels(self, _CHIP), pixels(self, _CHIP))
+        for button in self.sides.values():
+            button.setMinimumWidth(pixels(self, 28))
+        self.picture.setMinimumSize(pixels(self, 96), pixels(self, 72))
+        self._show_chip()
 
     def _side_button(self, side: Side) -> QToolButton:
         button = QToolButton()
         button.setText(side.value)
         button.setCheckable(True)
         button.setAutoExclusive(True)
-        button.setFixedSize(QSize(28, 24))
         button.setToolTip(f"Label the {side.word} side")
         button.setAccessibleName(f"{side.word} side")
         button.clicked.connect(lambda: self._go_to_side(side))
@@ -137,15 +147,15 @@ class FeatureCard(QWidget):
         self._body.addLayout(words, 3)
         buttons = QHBoxLayout()
         buttons.setSpacing(6)
-        buttons.addWidget(self.primary, 2)
-        buttons.addWidget(self.skip, 1)
-        buttons.addWidget(self.unseen, 1)
+        buttons.addWidget(self.primary, 1)
+        buttons.addWidget(self.skip)
+        buttons.addWidget(self.unseen)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(12, 8, 12, 12)
         layout.setSpacing(5)
-        heading = QHBoxLayout()
-        heading.addWidget(self._title, 1)
-        heading.addWidget(self._aside, 0, Qt.AlignmentFlag.AlignBottom)
+        heading = FlowLayout()
+        heading.addWidget(self._title)
+        heading.addWidget(self._aside)
         layout.addLayout(top)
         layout.addLayout(heading)
         layout.addLayout(self._body, 1)
@@ -181,7 +191,9 @@ class FeatureCard(QWidget):
     def _show_chip(self) -> None:
         state = self._content.state
         if state in SHAPES:
-            self._chip.setPixmap(chip_pixmap(state, 14, theme_of(self), self.devicePixelRatioF()))
+            self._chip.setPixmap(
+                chip_pixmap(state, pixels(self, _CHIP), theme_of(self), self.devicePixelRatioF())
+            )
 
     def _on_primary(self) -> None:
         """Do the one next thing."""
@@ -211,7 +223,7 @@ class FeatureCard(QWidget):
             self.picture.update()
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
-        tall = event.size().height() >= _TALL
+        tall = event.size().height() >= pixels(self, _TALL)
         way = QBoxLayout.Direction.TopToBottom if tall else QBoxLayout.Direction.LeftToRight
         if self._body.direction() is not way:
             self._body.setDirection(way)
@@ -227,6 +239,15 @@ def _check(workbench: Workbench) -> None:
         session.do(CheckPoint(active.side, active.code))
 
 
+def _swap_names(workbench: Workbench) -> None:
+    """Exchange the active point with the one that seems to have its name."""
+    session = workbench.session
+    side, code = session.active.side, session.active.code
+    doubt = session.near_doubts(side).get(code or "")
+    if doubt is not None and doubt.kind == "swapped":
+        session.do(SwapPoints(side, *doubt.landmarks))
+
+
 def _place_at_crosshair(workbench: Workbench) -> None:
     labelling.place(workbench.session, workbench.session.crosshair, How.SLICE)
 
@@ -238,6 +259,7 @@ _EDITS: Mapping[str, Callable[[Workbench], object]] = {
     "unlock": lambda desk: labelling.lock(desk.session, False),
     "next": lambda desk: labelling.skip(desk.session),
     "swap_sides": lambda desk: desk.session.do(SwapSides()),
+    "swap_names": _swap_names,
 }
 
 
@@ -248,6 +270,7 @@ _COMMANDS: Mapping[str, str] = {
     "unlock": "point.lock",
     "next": "point.skip",
     "swap_sides": "edit.swap_sides",
+    "swap_names": "edit.swap",
 }
 """The commands that do the same as the one next action."""
 
@@ -258,7 +281,7 @@ def _with_key(text: str, command: str) -> str:
     return f"{text}   {_SYMBOLS.get(keys[0], keys_text(keys[0]))}" if keys else text
 
 
-_SYMBOLS = {"Return": "\N{RETURN SYMBOL}", "Space": "\N{OPEN BOX}"}
+_SYMBOLS = {"Return": "Enter"}
 
 
 def _label(role: str, *, wrap: bool = False) -> QLabel:

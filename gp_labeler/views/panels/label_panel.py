@@ -2,24 +2,23 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
+from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.feature_card import FeatureCard
 from gp_labeler.views.panels.landmark_table import LandmarkTable
+from gp_labeler.views.panels.parts import Scrolled
 from gp_labeler.workbench import Workbench
 
-__all__ = ["PANEL_WIDTH", "LabelPanel"]
-
-PANEL_WIDTH = 372
-"""Logical pixels; all names and states of the table fit into it."""
+__all__ = ["LabelPanel"]
 
 _TALLEST_CARD = 540
-"""Logical pixels; a picture that is much taller than wide shows nothing more."""
+"""Logical pixels at the normal text size; a picture that is much taller than wide shows nothing more."""
 
 
 class LabelPanel(QWidget):
-    """Card and table; the card gets what the table leaves.
+    """Card and table; the card gets what the table leaves. In a low window the table scrolls.
 
     Parameters
     ----------
@@ -33,16 +32,17 @@ class LabelPanel(QWidget):
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
-        self.setFixedWidth(PANEL_WIDTH)
         self.card = FeatureCard(workbench, actions)
         self.table = LandmarkTable(workbench, actions)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        column = QVBoxLayout(content)
+        column.setContentsMargins(4, 8, 8, 8)
+        column.setSpacing(6)
+        fit(self, lambda: self.card.setMaximumHeight(pixels(self, _TALLEST_CARD)))
+        column.addWidget(self.card, 1)
+        column.addWidget(self.table, 2)
+        column.addStretch(0)
         layout = QVBoxLayout(self)
-        layout.setContentsMargins(4, 8, 8, 8)
-        layout.setSpacing(6)
-        self.card.setMaximumHeight(_TALLEST_CARD)
-        layout.addWidget(self.card, 1)
-        layout.addWidget(self.table, 2)
-        layout.addStretch(0)
-
-    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(PANEL_WIDTH, super().sizeHint().height())
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(Scrolled(content))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetrics, QKeyEvent, QPainter, QPen, QResizeEvent
+from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen, QResizeEvent
 from PySide6.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
@@ -19,6 +19,7 @@ from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.session.edits import ClearPoint
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
+from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
 from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.views.panels.landmark_model import (
     ACTIVE_ROLE,
@@ -28,14 +29,20 @@ from gp_labeler.views.panels.landmark_model import (
     STATE_ROLE,
     LandmarkModel,
 )
-from gp_labeler.views.theme import FONT_PX, Theme, theme_of
+from gp_labeler.views.theme import Theme, theme_of
 from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkTable"]
 
-_LOWEST, _HIGHEST = 18, 24
-_WIDEST = "Right 20/20"
-_CHIP, _CODE_WIDTH, _PAD = 12, 35, 8
+_ROOMY_ROW = 24
+"""Height of a row where there is room, logical pixels at the normal text size."""
+
+_FEWEST_ROWS = 6
+"""Shown in a low window, which scrolls the table."""
+
+_WIDEST_HEADING = "Right 20/20"
+_WIDEST_STATES = ("computed", "checked", "doubtful", "unseen", "0.99 mm")
+_CHIP, _PAD = 12, 8
 
 
 class LandmarkTable(QWidget):
@@ -57,7 +64,7 @@ class LandmarkTable(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(self.view)
-        self.setMaximumHeight(34 + _HIGHEST * len(CODES))
+        fit(self, lambda: self.setMaximumHeight(self.view.height_of(len(CODES), roomy=True)))
         self.view.selectionModel().currentChanged.connect(self._on_current)
         self.view.clicked.connect(self._on_clicked)
         self.view.customContextMenuRequested.connect(self._open_menu)
@@ -128,9 +135,9 @@ class _TableView(QTableView):
         self.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
+        self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setMinimumSectionSize(_LOWEST)
         header = self.horizontalHeader()
         header.setHighlightSections(False)
         header.setSectionsClickable(False)
@@ -138,27 +145,42 @@ class _TableView(QTableView):
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
         model.headings_changed.connect(header.viewport().update)
-        self._fit_columns()
+        fit(self, self._fit)
 
-    def _fit_columns(self) -> None:
-        self.horizontalHeader().setFixedHeight(28)
-        font = self.font()
-        font.setPixelSize(FONT_PX)
-        words = QFontMetrics(font)
-        width = max(words.horizontalAdvance(text) for text in ("computed", "checked", "0.99 mm"))
-        for column in (1, 2):
-            self.setColumnWidth(column, max(_PAD + _CHIP + 8 + width, words.horizontalAdvance(_WIDEST) + 14))
+    def height_of(self, rows: int, *, roomy: bool = False) -> int:
+        """Return how high it is with so many rows, logical pixels."""
+        row = pixels(self, _ROOMY_ROW) if roomy else self._lowest_row
+        return self.horizontalHeader().height() + max(row, self._lowest_row) * rows + 4
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         return self.minimumSizeHint()
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        return QSize(340, 32 + _LOWEST * len(CODES))
+        names = _PAD + _code_width(self) + text_width(self, *(row.name for row in FEATURES)) + _PAD
+        bar = self.verticalScrollBar().sizeHint().width()
+        return QSize(names + 2 * _state_width(self) + bar + 4, self.height_of(_FEWEST_ROWS))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
-        height = (self.viewport().height() - 2) // len(CODES)
-        self.verticalHeader().setDefaultSectionSize(min(max(height, _LOWEST), _HIGHEST))
+        self._share_height()
         super().resizeEvent(event)
+
+    @property
+    def _lowest_row(self) -> int:
+        return line_height(self)
+
+    def _fit(self) -> None:
+        """Give columns and rows the room that their words take."""
+        self.horizontalHeader().setFixedHeight(line_height(self) + 10)
+        self.verticalHeader().setMinimumSectionSize(self._lowest_row)
+        for column in (1, 2):
+            self.setColumnWidth(column, _state_width(self))
+        self._share_height()
+        self.updateGeometry()
+
+    def _share_height(self) -> None:
+        height = (self.viewport().height() - 2) // len(CODES)
+        highest = max(pixels(self, _ROOMY_ROW), self._lowest_row)
+        self.verticalHeader().setDefaultSectionSize(min(max(height, self._lowest_row), highest))
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         if event.key() in (Qt.Key.Key_Delete, Qt.Key.Key_Backspace):
@@ -181,6 +203,18 @@ class _TableView(QTableView):
         self.viewport().update()
 
 
+def _code_width(view: QWidget) -> int:
+    """Return how much the codes take, with the gap behind them."""
+    return text_width(view, *CODES, bold=True) + pixels(view, 6)
+
+
+def _state_width(view: QWidget) -> int:
+    """Return how much a column of states takes: chip, word and lock."""
+    chip = _PAD + pixels(view, _CHIP) + 4
+    words = chip + text_width(view, *_WIDEST_STATES) + pixels(view, _CHIP) + 4
+    return max(words, text_width(view, _WIDEST_HEADING) + 2 * _PAD)
+
+
 class _ChipDelegate(QStyledItemDelegate):
     """Paints a feature's code and name, or the state of a point as a chip and a word."""
 
@@ -193,12 +227,10 @@ class _ChipDelegate(QStyledItemDelegate):
         painter.save()
         self._ground(painter, option, index, theme, view)
         painter.setClipRect(box)
-        font = QFont(view.font())
-        font.setPixelSize(FONT_PX)
         if index.column() == 0:
-            self._name(painter, font, box, index, theme)
+            self._name(painter, view, box, index, theme)
         else:
-            self._state(painter, font, box, index, theme)
+            self._state(painter, view, box, index, theme)
         painter.restore()
 
     def _ground(
@@ -223,29 +255,23 @@ class _ChipDelegate(QStyledItemDelegate):
     def _name(
         self,
         painter: QPainter,
-        font: QFont,
+        view: QTableView,
         box: QRectF,
         index: QModelIndex | QPersistentModelIndex,
         theme: Theme,
     ) -> None:
-        bold = QFont(font)
-        bold.setBold(True)
-        painter.setFont(bold)
+        painter.setFont(font_of(view, bold=True))
         painter.setPen(QColor(theme.text))
         middle = Qt.AlignmentFlag.AlignVCenter
         painter.drawText(box.adjusted(_PAD, 0, 0, 0), middle, str(index.data(CODE_ROLE)))
-        painter.setFont(font)
+        painter.setFont(font_of(view))
         painter.setPen(QColor(theme.muted))
-        words = box.adjusted(_PAD + _CODE_WIDTH, 0, -1, 0)
-        name = QFontMetrics(font).elidedText(
-            str(index.data()), Qt.TextElideMode.ElideRight, round(words.width())
-        )
-        painter.drawText(words, middle, name)
+        painter.drawText(box.adjusted(_PAD + _code_width(view), 0, 0, 0), middle, str(index.data()))
 
     def _state(
         self,
         painter: QPainter,
-        font: QFont,
+        view: QTableView,
         box: QRectF,
         index: QModelIndex | QPersistentModelIndex,
         theme: Theme,
@@ -253,11 +279,12 @@ class _ChipDelegate(QStyledItemDelegate):
         state, active = str(index.data(STATE_ROLE)), bool(index.data(ACTIVE_ROLE))
         waiting = state in ("to do", "ghost")
         shape = "active" if active and waiting else state
-        chip = QRectF(box.left() + _PAD - 2, box.center().y() - _CHIP / 2, _CHIP, _CHIP)
+        side = pixels(view, _CHIP)
+        chip = QRectF(box.left() + _PAD - 2, box.center().y() - side / 2, side, side)
         draw_chip(painter, shape, chip, theme)
-        painter.setFont(font)
+        painter.setFont(font_of(view))
         painter.setPen(theme.state(shape))
-        words = box.adjusted(_PAD + _CHIP + 4, 0, 0, 0)
+        words = box.adjusted(_PAD + side + 4, 0, 0, 0)
         painter.drawText(words, Qt.AlignmentFlag.AlignVCenter, str(index.data()))
         if index.data(LOCKED_ROLE):
-            draw_chip(painter, "locked", QRectF(box.right() - 13, box.center().y() - 5.5, 11, 11), theme)
+            draw_chip(painter, "locked", chip.translated(box.right() - side - chip.left(), 0), theme)

@@ -9,7 +9,9 @@ from PySide6.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton,
 
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import blocked, follow, mm_text
+from gp_labeler.views.fonts import fit, pixels, text_width
 from gp_labeler.views.panels.cut_row import CutRow
+from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.workbench import Workbench
 
@@ -45,19 +47,16 @@ class MeshCard(Card):
         self.opacity.setAccessibleName("Opacity of the bone surface")
         self.opacity.valueChanged.connect(lambda value: self._update(mesh_opacity=value / 100))
         self._percent = text_label("100 %")
-        self._percent.setFixedWidth(44)
+        fit(self._percent, lambda: self._percent.setFixedWidth(text_width(self._percent, "100 %")))
         self._percent.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         row = QHBoxLayout()
         row.addWidget(text_label("Opacity", "hint"))
         row.addWidget(self.opacity, 1)
         row.addWidget(self._percent)
         self.add(row)
-        checks = QHBoxLayout()
-        self.checks = {name: self._check(name, checks) for name in _SHOWN if name != "slices_visible"}
+        checks = FlowLayout(spacing=8)
+        self.checks = {name: self._check(name, checks) for name in _SHOWN}
         self.add(checks)
-        slices = QHBoxLayout()
-        self.checks["slices_visible"] = self._check("slices_visible", slices)
-        self.add(slices)
         self.cut = CutRow(workbench)
         self.cut.action_asked.connect(self.action_asked)
         self.add(self.cut)
@@ -87,7 +86,7 @@ class MeshCard(Card):
         count = f"{n / 1e6:.1f} million" if n >= 1e6 else f"{n / 1e3:.0f} thousand"
         return f"{count} triangles; voxels of {voxels}."
 
-    def _check(self, name: str, row: QHBoxLayout) -> QCheckBox:
+    def _check(self, name: str, row: FlowLayout) -> QCheckBox:
         text, hint = _SHOWN[name]
         check = QCheckBox(text)
         check.setToolTip(hint)
@@ -110,13 +109,13 @@ class MeshCard(Card):
         self.progress = QProgressBar()
         self.progress.setRange(0, 100)
         self.progress.setTextVisible(False)
-        self.progress.setFixedHeight(8)
+        fit(self.progress, lambda: self.progress.setFixedHeight(pixels(self, 8)))
         self.stop = QPushButton("Stop")
         self._work = QWidget()
         line = QHBoxLayout(self._work)
         line.setContentsMargins(0, 0, 0, 0)
-        self._doing = text_label("", "hint")
-        line.addWidget(self._doing)
+        self._doing = text_label("", "hint", wrap=True)
+        line.addWidget(self._doing, 1)
         line.addWidget(self.progress, 1)
         line.addWidget(self.stop)
         self.stop.clicked.connect(self._stop)

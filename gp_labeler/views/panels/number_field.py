@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QDoubleValidator, QKeyEvent, QWheelEvent
+from PySide6.QtCore import QRegularExpression, QSize, Qt, Signal
+from PySide6.QtGui import QKeyEvent, QRegularExpressionValidator, QWheelEvent
 from PySide6.QtWidgets import QLineEdit, QWidget
 
 from gp_labeler.views.bind import value_text
+from gp_labeler.views.fonts import field_width, fit
 
 __all__ = ["NumberField"]
+
+_NUMBER = QRegularExpression(r"[-+]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][-+]?[0-9]+)?")
+"""In every locale: a keyboard's number block may write a comma for the point."""
 
 
 class NumberField(QLineEdit):
@@ -18,17 +22,23 @@ class NumberField(QLineEdit):
     ----------
     name : str
         What the number is, for those who cannot see the caption.
+    widest : str
+        The longest text that it has to show.
     """
 
     value_chosen = Signal(float)
 
-    def __init__(self, name: str, parent: QWidget | None = None) -> None:
+    def __init__(self, name: str, parent: QWidget | None = None, *, widest: str = "-32768") -> None:
         super().__init__(parent)
         self._value = 0.0
         self.step = 1.0
         self.setAccessibleName(name)
-        self.setValidator(QDoubleValidator(self))
+        self.setValidator(QRegularExpressionValidator(_NUMBER, self))
         self.editingFinished.connect(self._on_typed)
+        fit(self, lambda: self.setMinimumWidth(field_width(self, widest)))
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(self.minimumWidth(), super().sizeHint().height())
 
     @property
     def value(self) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
-from PySide6.QtCore import QEvent, Qt
+from PySide6.QtCore import QEvent, QObject, QSize, Qt
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import (
     QFrame,
@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_labeler.views.fonts import elided, fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon_pixmap
 from gp_labeler.views.theme import theme_of
 
@@ -26,6 +27,7 @@ __all__ = [
     "Facts",
     "IconLabel",
     "Notice",
+    "Scrolled",
     "breakable",
     "emptied",
     "scrolled",
@@ -62,7 +64,10 @@ _LONGEST_WORD = 34
 
 
 class ElidedLabel(QLabel):
-    """One line that is shortened in its middle where there is no room; the whole is in its tool tip."""
+    """A file name, or what a user typed: one line, shortened in its middle where there is no room.
+
+    The whole is in its tool tip. Words of the program itself are never shortened: let them wrap.
+    """
 
     def __init__(self, words: str = "", role: str = "", parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -81,23 +86,67 @@ class ElidedLabel(QLabel):
         self._shorten()
 
     def _shorten(self) -> None:
-        middle = Qt.TextElideMode.ElideMiddle
-        self.setText(self.fontMetrics().elidedText(self._words, middle, max(self.width() - 2, 40)))
+        self.setText(elided(self.font(), self._words, max(self.width() - 2, 40)))
+
+    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().changeEvent(event)
+        if event.type() in (QEvent.Type.FontChange, QEvent.Type.StyleChange):
+            self._shorten()
+
+    def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room that the whole takes."""
+        metrics = self.fontMetrics()
+        return QSize(metrics.horizontalAdvance(self._words) + 4, super().sizeHint().height())
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().resizeEvent(event)
         self._shorten()
 
 
-def scrolled(content: QWidget) -> QScrollArea:
-    """Return a scroll area that is as wide as what it holds allows, and scrolls up and down only."""
-    area = QScrollArea()
-    area.setWidgetResizable(True)
-    area.setFrameShape(QFrame.Shape.NoFrame)
-    area.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
-    area.setFocusPolicy(Qt.FocusPolicy.NoFocus)
-    area.setWidget(content)
-    return area
+class Scrolled(QScrollArea):
+    """Scrolls what it holds up and down; sideways only in a window too small for the longest word.
+
+    It asks for the width that its content needs, with the scroll bar, so that nothing is cut at the side.
+
+    Parameters
+    ----------
+    content : QWidget
+        What it holds.
+    """
+
+    def __init__(self, content: QWidget, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self.setWidgetResizable(True)
+        self.setFrameShape(QFrame.Shape.NoFrame)
+        self.setFocusPolicy(Qt.FocusPolicy.NoFocus)
+        self._content = content
+        self.setWidget(content)
+
+    @property
+    def needed_width(self) -> int:
+        """The least width, logical pixels, at which nothing has to scroll sideways."""
+        return self._content.minimumSizeHint().width() + self.verticalScrollBar().sizeHint().width()
+
+    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(self.needed_width, self._content.sizeHint().height())
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(self.needed_width, line_height(self) * _FEWEST_LINES)
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102, N802 - Qt's name
+        if watched is self._content and event.type() is QEvent.Type.LayoutRequest:
+            self.updateGeometry()
+        return super().eventFilter(watched, event)
+
+
+_FEWEST_LINES = 4
+_LONGEST_FACT = "Which scan"
+"""The longest name of a fact: values of all lists begin at the same place."""
+
+
+def scrolled(content: QWidget) -> Scrolled:
+    """Return a scroll area that asks for the width its content needs."""
+    return Scrolled(content)
 
 
 class Card(QWidget):
@@ -156,7 +205,7 @@ class Facts(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(8)
         caption = text_label(name, "hint")
-        caption.setFixedWidth(80)
+        fit(caption, lambda: caption.setFixedWidth(text_width(caption, _LONGEST_FACT) + 4))
         is_long = max(map(len, value.split()), default=0) > _LONGEST_WORD
         words = ElidedLabel(value) if is_long else text_label(value, wrap=True)
         words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -176,13 +225,18 @@ class IconLabel(QLabel):
     colour : str
         Name of a field of `Theme`, such as ``warning``.
     size : int
-        Logical pixels.
+        Logical pixels at the normal text size.
     """
 
     def __init__(self, name: str, colour: str, size: int = 16, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._name, self._colour, self._size = name, colour, size
-        self.setFixedSize(size, size)
+        self._name, self._colour, self._base = name, colour, size
+        self._size = size
+        fit(self, self._fit)
+
+    def _fit(self) -> None:
+        self._size = pixels(self, self._base)
+        self.setFixedSize(self._size, self._size)
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().changeEvent(event)

@@ -18,8 +18,7 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_core.errors import GpError
-from gp_core.landmarks.files import write_text
+from gp_core.disk import write_bytes, write_text
 from gp_labeler.physical_work import PhysicalResult, PhysicalTest
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import attempt
@@ -160,7 +159,4 @@ class PhysicalDialog(QDialog):
 
 def _write(path: Path, result: PhysicalResult | None) -> None:
     assert result is not None
-    try:
-        Path(path).write_bytes(result.figure)
-    except OSError as error:
-        raise GpError(f"cannot be written: {error.strerror}", file=path) from None
+    write_bytes(path, result.figure)

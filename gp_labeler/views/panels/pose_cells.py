@@ -2,32 +2,72 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QPointF, QRectF, Qt
-from PySide6.QtGui import QColor, QFont, QFontMetricsF, QPainter
+from collections.abc import Mapping
 
+from PySide6.QtCore import QPointF, QRectF, Qt
+from PySide6.QtGui import QColor, QFont, QPainter
+from PySide6.QtWidgets import QWidget
+
+from gp_core.landmarks.features import FEATURES
 from gp_labeler.views.chips import draw_chip
+from gp_labeler.views.fonts import pixels, text_width
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.panels.pose_model import CLEAR, MISFIT, NAME, USE, XYZ, TouchRow
 from gp_labeler.views.panels.pose_words import name_of
 from gp_labeler.views.strokes import round_pen
 from gp_labeler.views.theme import Theme
 
-__all__ = ["column_widths", "paint_cell", "paint_ground"]
+__all__ = ["column_widths", "names_width", "paint_cell", "paint_ground"]
 
-_ROOMY = 520
-
-_PAD, _CHIP, _CODE = 8, 12, 34
-_MISFIT = 36
+_PAD, _CHIP, _BAR, _WIDE_BAR, _GAP = 8, 12, 20, 50, 6
+_WIDEST_NUMBER, _WIDEST_MISFIT, _WIDEST_CODE = "\N{MINUS SIGN}1000.00", "10.00", "RWM"
+_ASKED = "touch, or type x y z"
 _MIDDLE = Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | _MIDDLE
 _MINUS = "\N{MINUS SIGN}"
 
 
-def column_widths(width: int) -> dict[int, int]:
-    """Return the widths of the columns in a table so wide, logical pixels; the name gets the rest."""
-    if width < _ROOMY:
-        return {XYZ: 174, MISFIT: 66, USE: 32, CLEAR: 16}
-    return {XYZ: 196, MISFIT: 100, USE: 40, CLEAR: 20}
+def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) -> dict[int, int]:
+    """Return the widths of the columns in a table so wide, logical pixels; `NAME` gets the rest.
+
+    Parameters
+    ----------
+    view : QWidget
+        The table.
+    headings : mapping of int to str
+        What stands above each column.
+    width : int
+        Of the table; 0 for the least that it needs.
+    """
+    heads = {column: text_width(view, words) + 2 * _PAD for column, words in headings.items()}
+    number = text_width(view, _WIDEST_NUMBER) + _GAP
+    misfit = _misfit_width(view) + pixels(view, _BAR) + 2 * _GAP
+    columns = {
+        NAME: _left(view) + text_width(view, _WIDEST_CODE, bold=True) + _GAP,
+        XYZ: max(3 * number, text_width(view, _ASKED) + _GAP),
+        MISFIT: misfit,
+        USE: pixels(view, 13) + 2 * _PAD,
+        CLEAR: pixels(view, 16),
+    }
+    columns = {column: max(least, heads.get(column, 0)) for column, least in columns.items()}
+    spare = width - sum(columns.values()) - names_width(view)
+    if spare > pixels(view, _WIDE_BAR):
+        columns[MISFIT] += pixels(view, _WIDE_BAR)
+    return columns
+
+
+def names_width(view: QWidget) -> int:
+    """Return what the longest name of a feature takes behind its code, logical pixels."""
+    return text_width(view, *(row.name for row in FEATURES if row.external)) + _GAP
+
+
+def _left(view: QWidget) -> int:
+    """Return where the code begins: behind the chip."""
+    return _PAD + pixels(view, _CHIP) + 5
+
+
+def _misfit_width(view: QWidget) -> int:
+    return text_width(view, _WIDEST_MISFIT)
 
 
 def paint_ground(
@@ -42,6 +82,7 @@ def paint_ground(
 
 def paint_cell(
     painter: QPainter,
+    view: QWidget,
     column: int,
     box: QRectF,
     row: TouchRow,
@@ -50,22 +91,25 @@ def paint_cell(
     longest: float,
     over: bool,
 ) -> None:
-    """Paint one cell; bars are `longest` mm at full length."""
+    """Paint one cell of the table `view`; bars are `longest` mm at full length."""
     if column == NAME:
-        _paint_name(painter, box, row, theme)
+        _paint_name(painter, view, box, row, theme)
     elif column == XYZ:
         _paint_position(painter, box, row, theme)
     elif column == MISFIT:
-        _paint_misfit(painter, box, row, theme, longest)
+        _paint_misfit(painter, view, box, row, theme, longest)
     elif row.touch is not None and column == USE:
-        _paint_use(painter, box, row, theme)
+        _paint_use(painter, view, box, row, theme)
     elif row.touch is not None and column == CLEAR and over:
-        side = QRectF(box.center().x() - 6, box.center().y() - 6, 12, 12)
+        half = pixels(view, 6)
+        side = QRectF(box.center().x() - half, box.center().y() - half, 2 * half, 2 * half)
         draw_icon(painter, "close", side, QColor(theme.muted))
 
 
-def _paint_name(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme) -> None:
-    chip = QRectF(box.left() + _PAD - 2, box.center().y() - _CHIP / 2, _CHIP, _CHIP)
+def _paint_name(painter: QPainter, view: QWidget, box: QRectF, row: TouchRow, theme: Theme) -> None:
+    """Paint chip and code, and the name where there is room for the longest: all rows alike."""
+    side = pixels(view, _CHIP)
+    chip = QRectF(box.left() + _PAD - 2, box.center().y() - side / 2, side, side)
     draw_chip(painter, row.state, chip, theme)
     plain = painter.font()
     bold = QFont(plain)
@@ -73,22 +117,19 @@ def _paint_name(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme) -> 
     bold.setStrikeOut(_is_out(row))
     painter.setFont(bold)
     painter.setPen(QColor(theme.faint if _is_out(row) else theme.text))
-    left = _PAD + _CHIP + 5
+    left = _left(view)
     painter.drawText(box.adjusted(left, 0, 0, 0), _MIDDLE, row.name)
     painter.setFont(plain)
-    words = box.adjusted(left + _CODE, 0, -4, 0)
-    if words.width() > 60:
+    words = box.adjusted(left + text_width(view, _WIDEST_CODE, bold=True) + _GAP, 0, 0, 0)
+    if words.width() >= names_width(view):
         painter.setPen(QColor(theme.muted))
-        elided = QFontMetricsF(plain).elidedText(
-            name_of(row.name), Qt.TextElideMode.ElideRight, words.width()
-        )
-        painter.drawText(words, _MIDDLE, elided)
+        painter.drawText(words, _MIDDLE, name_of(row.name))
 
 
 def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme) -> None:
     if row.touch is None:
         painter.setPen(QColor(theme.accent_text))
-        painter.drawText(box, _RIGHT, "touch, or type x y z" if row.target else "")
+        painter.drawText(box, _RIGHT, _ASKED if row.target else "")
         return
     painter.setPen(QColor(theme.faint if _is_out(row) else theme.text))
     font = QFont(painter.font())
@@ -100,15 +141,18 @@ def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme)
         painter.drawText(cell, _RIGHT, f"{value:.2f}".replace("-", _MINUS))
 
 
-def _paint_misfit(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme, longest: float) -> None:
+def _paint_misfit(
+    painter: QPainter, view: QWidget, box: QRectF, row: TouchRow, theme: Theme, longest: float
+) -> None:
     if row.misfit is None:
         return
     colour = QColor(theme.danger if row.suspect else theme.accent_text)
-    words = QRectF(box.left(), box.top(), _MISFIT, box.height())
+    left = _misfit_width(view) + _GAP
+    words = QRectF(box.left(), box.top(), left, box.height())
     painter.setPen(colour if row.suspect else QColor(theme.text))
     painter.drawText(words, _RIGHT, f"{row.misfit:.2f}")
-    full = box.width() - _MISFIT - 8
-    track = QRectF(box.left() + _MISFIT + 5, box.center().y() - 2.5, full, 5)
+    full = box.width() - left - 2 * _GAP
+    track = QRectF(box.left() + left + _GAP, box.center().y() - 2.5, full, 5)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.border))
     painter.drawRoundedRect(track, 2.5, 2.5)
@@ -117,16 +161,18 @@ def _paint_misfit(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme, l
     painter.drawRoundedRect(track, 2.5, 2.5)
 
 
-def _paint_use(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme) -> None:
-    square = QRectF(box.center().x() - 6.5, box.center().y() - 6.5, 13, 13)
+def _paint_use(painter: QPainter, view: QWidget, box: QRectF, row: TouchRow, theme: Theme) -> None:
+    side = pixels(view, 13)
+    square = QRectF(box.center().x() - side / 2, box.center().y() - side / 2, side, side)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
     painter.setPen(round_pen(QColor(theme.border_strong), 1.2))
     painter.setBrush(QColor(theme.field if _is_out(row) else theme.accent))
     painter.drawRoundedRect(square, 3, 3)
     if not _is_out(row):
         painter.setPen(round_pen(QColor(theme.on_accent), 1.7))
-        c = square.center()
-        painter.drawPolyline([c + QPointF(-3.2, 0.2), c + QPointF(-0.9, 2.6), c + QPointF(3.3, -2.6)])
+        c, u = square.center(), side / 13
+        tick = (QPointF(-3.2, 0.2), QPointF(-0.9, 2.6), QPointF(3.3, -2.6))
+        painter.drawPolyline([c + corner * u for corner in tick])
 
 
 def _is_out(row: TouchRow) -> bool:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QWidget
+from PySide6.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from gp_core.landmarks.features import Side
 from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.views.bind import attempt, follow
+from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
 from gp_labeler.views.panels.pose_parts import Segments, link
@@ -44,13 +45,12 @@ class HeadCard(Card):
         self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
         self.method = Segments({"robust": "Robust", "jrmpc": "JRMPC", "both": "Both"}, _HINTS)
-        self.noise = NumberField("Probe noise")
+        self.noise = NumberField("Probe noise", widest="found")
         self.noise.step = 0.05
         self.noise.setPlaceholderText("found")
         self.noise.setToolTip(
             "Ordinary error of a touch in mm a coordinate; empty: found from the touches themselves"
         )
-        self.noise.setFixedWidth(64)
         self.found = text_label("", "hint")
         self.atlas = ElidedLabel()
         self.problem = text_label("", "warning", wrap=True)
@@ -99,13 +99,12 @@ class HeadCard(Card):
         name.setContentsMargins(0, 0, 0, 0)
         for row, caption in ((name, "Specimen"), (noise, "Probe noise"), (atlas, "Atlas")):
             row.setSpacing(6)
-            words = text_label(caption, "hint")
-            words.setFixedWidth(72)
-            row.addWidget(words)
+            row.addWidget(_caption(caption))
         name.addWidget(self.specimen, 1)
         name.addWidget(self.new)
         noise.addWidget(self.noise)
-        noise.addWidget(self.found, 1)
+        noise.addWidget(self.found)
+        noise.addStretch(1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
         for what in (self._named, choices, noise, atlas, self.problem):
@@ -125,3 +124,10 @@ class HeadCard(Card):
     def _choose(self, **fields: object) -> None:
         attempt(self._desk, lambda: self._desk.pose.choose(**fields))
         self.refresh()
+
+
+def _caption(name: str) -> QLabel:
+    """Return what stands before a field: all as wide as the longest."""
+    words = text_label(name, "hint")
+    fit(words, lambda: words.setFixedWidth(text_width(words, "Probe noise")))
+    return words

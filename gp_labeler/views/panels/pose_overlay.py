@@ -9,6 +9,8 @@ from PySide6.QtGui import QAction
 from PySide6.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
 
 from gp_labeler.views.bind import blocked, follow
+from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import link
 from gp_labeler.workbench import Workbench
@@ -87,10 +89,9 @@ class OverlayCard(Card):
         row.addWidget(text_label("Opacity", "hint"))
         row.addWidget(self.opacity, 1)
         row.addWidget(self.percent)
-        self.percent.setFixedWidth(self.percent.fontMetrics().horizontalAdvance("100 %") + 4)
+        fit(self.percent, lambda: self.percent.setFixedWidth(text_width(self.percent, "100 %")))
         self.add(row)
-        looks = QHBoxLayout()
-        looks.setSpacing(2)
+        looks = FlowLayout(spacing=2)
         for name, button in self.cameras.items():
             action = actions.get(name)
             button.setVisible(action is not None)
@@ -98,7 +99,6 @@ class OverlayCard(Card):
                 button.clicked.connect(action.trigger)
                 button.setToolTip(action.toolTip())
             looks.addWidget(button)
-        looks.addStretch(1)
         self.add(looks)
 
 

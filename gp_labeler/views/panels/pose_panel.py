@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from PySide6.QtCore import QSize, Qt, QTimer, Signal
+from PySide6.QtCore import Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QDragEnterEvent,
@@ -18,7 +18,7 @@ from PySide6.QtGui import (
 from PySide6.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
 from gp_labeler.views.bind import follow
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH
+from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.parts import Card, scrolled
 from gp_labeler.views.panels.pose_head import HeadCard
 from gp_labeler.views.panels.pose_overlay import OverlayCard
@@ -33,7 +33,7 @@ __all__ = ["PosePanel", "holds_touches"]
 
 _TOUCH_FILES = (".dat", ".csv", ".mrk.json", ".fcsv", ".txt")
 _WIDE, _WIDEST = 760, 1280
-"""From which width on, logical pixels, cards stand in two columns, and how wide these become."""
+"""From which width on cards stand in two columns, and how wide these become: at the normal text size."""
 
 
 def holds_touches(path: Path) -> bool:
@@ -69,7 +69,7 @@ class PosePanel(QWidget):
     ) -> None:
         super().__init__(parent)
         self._desk = workbench
-        self._stale = True
+        self._stale, self._is_alone = True, False
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.setAcceptDrops(True)
@@ -96,11 +96,12 @@ class PosePanel(QWidget):
 
     def set_wide(self, wide: bool) -> None:
         """Take all the width there is, where there is no scan beside; else that of the other panels."""
-        self.setMinimumWidth(PANEL_WIDTH)
-        self.setMaximumWidth(_ANY if wide else PANEL_WIDTH)
+        self._is_alone = wide
+        self._share_columns()
         self.result.set_large(wide)
         self.touches.table.set_roomy(wide)
         self.overlay.setVisible(not wide)  # there is nothing to draw over
+        self._area.updateGeometry()  # which no layout asks for while the panel is hidden
 
     def add_card(self, card: QWidget) -> None:
         """Put a card under the estimate."""
@@ -109,9 +110,6 @@ class PosePanel(QWidget):
     def take_file(self, path: Path) -> bool:
         """Take the touches of a file; return whether it could be read."""
         return self.touches.take_file(path)
-
-    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(PANEL_WIDTH, super().sizeHint().height())
 
     def _lay_out(self) -> None:
         self.left, self.right = QVBoxLayout(), QVBoxLayout()
@@ -129,7 +127,7 @@ class PosePanel(QWidget):
             for card in cards:
                 column.addWidget(card)
         body = QWidget()
-        body.setMaximumWidth(_WIDEST)
+        fit(body, lambda: body.setMaximumWidth(pixels(body, _WIDEST)))
         self._columns = QBoxLayout(QBoxLayout.Direction.TopToBottom, body)
         self._columns.setContentsMargins(4, 8, 8, 8)
         self._columns.setSpacing(6)
@@ -144,7 +142,8 @@ class PosePanel(QWidget):
         middle.addWidget(body, 0, Qt.AlignmentFlag.AlignTop)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scrolled(content))
+        self._area = scrolled(content)
+        layout.addWidget(self._area)
 
     def _connect(self) -> None:
         self.head.atlas_asked.connect(self.atlas_asked)
@@ -179,12 +178,16 @@ class PosePanel(QWidget):
             self._desk.set_tool("place")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
-        way = QBoxLayout.Direction
-        wide = event.size().width() >= _WIDE
-        self._columns.setDirection(way.LeftToRight if wide else way.TopToBottom)
-        for column in (0, 1):
-            self._columns.setStretch(column, int(wide))
+        self._share_columns()
         super().resizeEvent(event)
+
+    def _share_columns(self) -> None:
+        """Put the cards in two columns where they have the whole window, and it is wide."""
+        way = QBoxLayout.Direction
+        two = self._is_alone and self.width() >= pixels(self, _WIDE)
+        self._columns.setDirection(way.LeftToRight if two else way.TopToBottom)
+        for column in (0, 1):
+            self._columns.setStretch(column, int(two))
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: D102, N802 - Qt's name
         path = dropped_path(event)
@@ -202,7 +205,3 @@ class PosePanel(QWidget):
         if path is not None:
             event.acceptProposedAction()
             self.take_file(path)
-
-
-_ANY = 16777215
-"""What Qt takes for no limit."""

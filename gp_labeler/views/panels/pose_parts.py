@@ -18,8 +18,11 @@ from PySide6.QtWidgets import (
 
 from gp_labeler.views.bind import blocked
 from gp_labeler.views.chips import chip_pixmap
+from gp_labeler.views.fonts import TEXT, fit, pixels, styled
 from gp_labeler.views.panels.parts import Notice, emptied, text_label
 from gp_labeler.views.theme import theme_of
+
+_CHIP = 14
 
 __all__ = ["Notices", "Segments", "Verdict", "link", "numbers"]
 
@@ -97,13 +100,16 @@ class Verdict(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._chip, self.label = QLabel(), text_label("", "heading")
-        self._chip.setFixedSize(14, 14)
         self._level = ""
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(6)
         row.addWidget(self._chip)
         row.addWidget(self.label)
+        fit(self, self._fit)
+
+    def _fit(self) -> None:
+        self._chip.setFixedSize(pixels(self, _CHIP), pixels(self, _CHIP))
 
     def show_verdict(self, level: str, word: str, reason: str) -> None:
         """Show ``good``, ``warning`` or ``danger``, and its word; the reason is the tool tip."""
@@ -116,7 +122,7 @@ class Verdict(QWidget):
     def take_theme(self) -> None:
         """Draw in the colours of the theme."""
         theme, shape = theme_of(self), self._CHIPS[self._level]
-        self._chip.setPixmap(chip_pixmap(shape, 14, theme, self.devicePixelRatioF()))
+        self._chip.setPixmap(chip_pixmap(shape, pixels(self, _CHIP), theme, self.devicePixelRatioF()))
         if (sheet := f"color: {theme.states[shape]}") != self.label.styleSheet():  # to restyle takes its time
             self.label.setStyleSheet(sheet)
 
@@ -136,9 +142,9 @@ def link(text: str, hint: str = "") -> QPushButton:
     return button
 
 
-def numbers(pixels: int = 12, *, bold: bool = False) -> QLabel:
+def numbers(size: float = TEXT, *, bold: bool = False) -> QLabel:
     """Return a label for numbers that can be selected and copied."""
     label = text_label()
     label.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
-    label.setStyleSheet(f"font-size: {pixels}px; font-weight: {600 if bold else 400}")
+    styled(label, size, bold=bold)
     return label

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 
 from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
+from PySide6.QtWidgets import QGridLayout, QWidget
 
 from gp_core.atlas.pose import CochleaPose
 from gp_core.atlas.pose_quality import pose_quality
@@ -14,6 +14,8 @@ from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.bind import attempt
+from gp_labeler.views.fonts import HEADING, TITLE, styled
+from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import Notices, Verdict, link, numbers
 from gp_labeler.views.panels.pose_words import (
@@ -53,11 +55,9 @@ class ResultCard(Card):
         self.add_to_heading(self.verdict)
         for what in (self.waiting, self.one, self.two, self.notices):
             self.add(what)
-        row = QHBoxLayout()
-        row.setSpacing(4)
+        row = FlowLayout(spacing=4)
         for button in (self.other_side, self.swap, self.next):
             row.addWidget(button)
-        row.addStretch(1)
         self.add(row)
         self.next.clicked.connect(self._aim)
         self.swap.clicked.connect(lambda: attempt(workbench, workbench.pose.swap_names))
@@ -126,10 +126,12 @@ class _OnePose(QWidget):
 
     def set_large(self, large: bool) -> None:
         """Show it in type that is read from further away."""
-        for label, pixels, weight in ((self.origin, 17, 600), (self.axis, 13, 400), (self.region, 15, 600)):
-            label.setStyleSheet(
-                f"font-size: {round(pixels * (1.5 if large else 1))}px; font-weight: {weight}"
-            )
+        for label, size, bold in (
+            (self.origin, TITLE, True),
+            (self.axis, HEADING, False),
+            (self.region, HEADING + 1, True),
+        ):
+            styled(label, size * (1.5 if large else 1), bold=bold)
 
     def show_pose(self, pose: CochleaPose) -> None:
         self.origin.setText(f"{triple(pose.origin)}  mm")
@@ -149,8 +151,8 @@ class _TwoPoses(QWidget):
         self._grid.setHorizontalSpacing(12)
         self._grid.setVerticalSpacing(2)
         self._grid.setColumnStretch(3, 1)
-        self.apart = numbers(13, bold=True)
-        self.cells = [[numbers(13, bold=row > 6) for _ in range(3)] for row in range(9)]
+        self.apart = numbers(HEADING, bold=True)
+        self.cells = [[numbers(HEADING, bold=row > 6) for _ in range(3)] for row in range(9)]
         for row, cells in enumerate(self.cells):
             for column, cell in enumerate(cells):
                 side = Qt.AlignmentFlag.AlignRight if column else Qt.AlignmentFlag.AlignLeft

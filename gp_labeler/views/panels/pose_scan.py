@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.views.bind import NONE, attempt, follow, position_text
+from gp_labeler.views.fonts import HEADING, styled
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.pose_words import METHOD_WORDS, fine_mm, sentence
@@ -50,7 +51,7 @@ class InScanCard(Card):
         self._desk = workbench
         self.way = Segments(_WAYS, _HINTS)
         self.facts = {name: numbers() for name in ("Laid in", "CO", "FRE", "TRE at CO", "From the labels")}
-        self.facts["From the labels"].setStyleSheet("font-size: 13px; font-weight: 600")
+        styled(self.facts["From the labels"], HEADING, bold=True)
         self.notices, self.waiting = Notices(), text_label("", "hint", wrap=True)
         self.skull = text_label("", "hint", wrap=True)
         self.file = link("Load…", "Where the skull features are on the scan: a landmark file that names them")

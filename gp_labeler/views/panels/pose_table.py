@@ -15,8 +15,6 @@ from PySide6.QtCore import (
 )
 from PySide6.QtGui import (
     QColor,
-    QFont,
-    QFontMetrics,
     QKeyEvent,
     QKeySequence,
     QMouseEvent,
@@ -35,13 +33,16 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.views.panels.pose_cells import column_widths, paint_cell, paint_ground
+from gp_labeler.views.fonts import field_width, fit, font_of, line_height, pixels
+from gp_labeler.views.panels.pose_cells import column_widths, names_width, paint_cell, paint_ground
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ, TouchModel
-from gp_labeler.views.theme import FONT_PX, theme_of
+from gp_labeler.views.theme import theme_of
 
 __all__ = ["TouchTable"]
 
-_ROW, _ROOMY_ROW, _HEADER = 20, 24, 24
+_ROW, _ROOMY_ROW = 20, 24
+"""Height of a row, logical pixels at the normal text size."""
+
 _BEGINS_NUMBER = "0123456789-+."
 Index = QModelIndex | QPersistentModelIndex
 
@@ -74,8 +75,9 @@ class TouchTable(QTableView):
         self.setModel(model)
         self.setItemDelegate(_TouchDelegate(self))
         self.setAccessibleName("Touches")
+        self._roomy = False
         self._set_up()
-        self._fit()
+        fit(self, self._fit)
         model.modelReset.connect(self._fit)
         self.entered.connect(lambda index: self.looked_at.emit(self.name_at(index)))
         self.selectionModel().currentChanged.connect(self._on_current)
@@ -87,7 +89,7 @@ class TouchTable(QTableView):
 
     def set_roomy(self, roomy: bool) -> None:
         """Make the rows higher, where there is room."""
-        self.verticalHeader().setDefaultSectionSize(_ROOMY_ROW if roomy else _ROW)
+        self._roomy = roomy
         self._fit()
 
     def edit_position(self, name: str) -> None:
@@ -110,10 +112,7 @@ class TouchTable(QTableView):
         self.setVerticalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.verticalHeader().hide()
         self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        self.verticalHeader().setMinimumSectionSize(_ROW)
-        self.verticalHeader().setDefaultSectionSize(_ROW)
         header = self.horizontalHeader()
-        header.setFixedHeight(_HEADER)
         header.setHighlightSections(False)
         header.setSectionsClickable(False)
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
@@ -122,16 +121,39 @@ class TouchTable(QTableView):
         header.setSectionResizeMode(NAME, QHeaderView.ResizeMode.Stretch)
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
-        for column, width in column_widths(event.size().width()).items():
-            self.setColumnWidth(column, width)
+        self._share_width()
         super().resizeEvent(event)
 
+    def _share_width(self) -> None:
+        for column, width in column_widths(self, self._headings, self.viewport().width()).items():
+            if column != NAME:
+                self.setColumnWidth(column, width)
+
     def _fit(self) -> None:
-        height = self.verticalHeader().defaultSectionSize()
-        self.setFixedHeight(_HEADER + height * self._model.rowCount() + 4)
+        """Give columns and rows the room that their words take."""
+        row = max(pixels(self, _ROOMY_ROW if self._roomy else _ROW), line_height(self))
+        head = line_height(self) + 8
+        self.verticalHeader().setMinimumSectionSize(row)
+        self.verticalHeader().setDefaultSectionSize(row)
+        self.horizontalHeader().setFixedHeight(head)
+        self.setFixedHeight(head + row * self._model.rowCount() + 4)
+        self._share_width()
+        self.updateGeometry()
+
+    @property
+    def _headings(self) -> dict[int, str]:
+        model = self._model
+        return {
+            column: str(model.headerData(column, Qt.Orientation.Horizontal))
+            for column in range(model.columnCount())
+        }
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(340, self.height())
+        width = sum(column_widths(self, self._headings).values()) + 4
+        return QSize(width + (names_width(self) if self._roomy else 0), self.height())
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(sum(column_widths(self, self._headings).values()) + 4, self.height())
 
     def _on_current(self, current: QModelIndex, _: QModelIndex) -> None:
         self.viewport().update()
@@ -204,10 +226,10 @@ class _TouchDelegate(QStyledItemDelegate):
             painter.setPen(QPen(QColor(theme.accent_text), 1))
             painter.drawRect(box.adjusted(0.5, 0.5, -0.5, -0.5))
         painter.setClipRect(box)
-        font = QFont(table.font())
-        font.setPixelSize(FONT_PX)
-        painter.setFont(font)
-        paint_cell(painter, index.column(), box, row, theme, longest=table._model.largest, over=is_over)
+        painter.setFont(font_of(table))
+        paint_cell(
+            painter, table, index.column(), box, row, theme, longest=table._model.largest, over=is_over
+        )
         painter.restore()
 
     def createEditor(self, parent: QWidget, option: QStyleOptionViewItem, index: Index) -> QWidget:  # noqa: N802
@@ -224,7 +246,7 @@ class _TouchDelegate(QStyledItemDelegate):
 
     def updateEditorGeometry(self, editor: QWidget, option: QStyleOptionViewItem, index: Index) -> None:  # noqa: N802
         box = option.rect
-        wide = QFontMetrics(editor.font()).horizontalAdvance("-1000.000 -1000.000 -1000.000") + 12
+        wide = field_width(editor, "-1000.000 -1000.000 -1000.000")
         editor.setGeometry(box.x() - 4, box.y(), max(box.width(), wide) + 4, box.height())
 
     def eventFilter(self, editor: QObject, event: QEvent) -> bool:  # noqa: N802 - Qt's name

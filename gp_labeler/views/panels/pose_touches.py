@@ -22,7 +22,7 @@ from gp_labeler.workbench import Workbench
 __all__ = ["TouchesCard"]
 
 _DELETE = Qt.WidgetAttribute.WA_DeleteOnClose
-_DOWN, _UP = "\N{BLACK DOWN-POINTING SMALL TRIANGLE}", "\N{BLACK UP-POINTING SMALL TRIANGLE}"
+_DOWN, _UP = "\N{BLACK DOWN-POINTING TRIANGLE}", "\N{BLACK UP-POINTING TRIANGLE}"
 _LOOK_MS = 90
 """The pointer may pass over rows; only one it rests on is worth an estimate without it."""
 
@@ -127,9 +127,13 @@ class TouchesCard(Card):
         self.add(self.table)
         foot = QHBoxLayout()
         foot.setContentsMargins(11, 0, 8, 0)
-        foot.addWidget(self.change, 1)
         foot.addWidget(self.more)
         foot.addWidget(self.skull)
+        foot.addStretch(1)
+        change = QHBoxLayout()
+        change.setContentsMargins(11, 0, 11, 0)
+        change.addWidget(self.change)
+        self.add(change)
         self.add(foot)
 
     def _connect(self) -> None:

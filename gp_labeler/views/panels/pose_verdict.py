@@ -6,6 +6,7 @@ from PySide6.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, 
 
 from gp_labeler.session.state import PoseCheck
 from gp_labeler.views.bind import attempt, follow
+from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
 from gp_labeler.workbench import Workbench
 
@@ -15,6 +16,7 @@ _N_SHOWN = 3
 _Moved = tuple[float, float]
 """How far an estimate is from the one that was judged, mm and degrees."""
 
+_WHY = "Why, in a few words"
 _WORDS = {"accept": ("good", "Accepted"), "reject": ("error", "Rejected")}
 
 
@@ -34,8 +36,9 @@ class VerdictCard(Card):
         self.initials.setPlaceholderText("Initials")
         self.initials.setAccessibleName("Initials of who judges")
         self.initials.setMaxLength(24)
-        self.initials.setFixedWidth(84)
-        self.note.setPlaceholderText("Why, in a few words")
+        fit(self.initials, lambda: self.initials.setFixedWidth(field_width(self.initials, "Initials")))
+        self.note.setPlaceholderText(_WHY)
+        fit(self.note, lambda: self.note.setMinimumWidth(field_width(self.note, _WHY)))
         self.note.setAccessibleName("Note to the verdict")
         self.accept, self.reject = QPushButton("Accept"), QPushButton("Reject")
         self.accept.setToolTip("Keep in the specimen that this estimate was looked at and is good")

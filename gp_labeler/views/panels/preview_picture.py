@@ -7,7 +7,8 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
 from gp_labeler.imaging.preview import PreviewPlane
-from gp_labeler.views.theme import CAPTION_PX, theme_of
+from gp_labeler.views.fonts import TEXT, font_of
+from gp_labeler.views.theme import theme_of
 
 __all__ = ["PreviewPicture"]
 
@@ -57,10 +58,7 @@ class PreviewPicture(QWidget):
         box = QRectF(0, 0, columns * scale, rows * plane.aspect * scale)
         box.moveCenter(frame.center())
         painter.drawImage(box, image)
-        font = painter.font()
-        font.setPixelSize(CAPTION_PX + 2)
-        font.setBold(True)
-        painter.setFont(font)
+        painter.setFont(font_of(self, TEXT, bold=True))
         painter.setPen(QColor("#FFFFFF"))
         inner, flag = frame.adjusted(6, 2, -4, -2), Qt.AlignmentFlag
         left, right, bottom, top = tuple(plane.letters)

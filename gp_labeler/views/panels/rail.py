@@ -11,6 +11,7 @@ from PySide6.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxL
 from gp_core.landmarks.features import Side
 from gp_labeler.views.bind import follow
 from gp_labeler.views.chips import draw_chip
+from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
@@ -40,6 +41,7 @@ STEPS = (
     Step("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )
 _NEEDS_SCAN = ("label",)
+_PAD = 8
 
 
 class Rail(QWidget):
@@ -66,7 +68,6 @@ class Rail(QWidget):
         self._workbench = workbench
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "rail")
-        self.setFixedWidth(84)
         self._group = QButtonGroup(self)
         self.buttons = {step.id: self._button(n, step) for n, step in enumerate(STEPS, 1)}
         self.keys_button = _RailButton("keys", "Keys", "?", "info", self)
@@ -80,6 +81,7 @@ class Rail(QWidget):
         layout.addStretch(1)
         layout.addWidget(self.keys_button)
         self.buttons["scan"].setChecked(True)
+        fit(self, lambda: self.setFixedWidth(self.keys_button.sizeHint().width()))
         for signal in (workbench.volume_opened, workbench.session_replaced, workbench.landmarks_changed):
             follow(self, signal, self._refresh)
         self._refresh()
@@ -124,7 +126,7 @@ class _RailButton(QAbstractButton):
         self.setAccessibleName(title)
         self._number, self._icon, self._done = number, icon, False
         self.setFocusPolicy(Qt.FocusPolicy.TabFocus)
-        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+        self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Maximum)
         self.setCursor(Qt.CursorShape.PointingHandCursor)
         self.setAttribute(Qt.WidgetAttribute.WA_Hover)
 
@@ -136,7 +138,16 @@ class _RailButton(QAbstractButton):
             self.update()
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
-        return QSize(84, 64)
+        words = text_width(self, *(f"{n} {step.title}" for n, step in enumerate(STEPS, 1)), bold=True)
+        return QSize(max(words + 2 * _PAD, pixels(self, 72)), self._icon_height + line_height(self) + 10)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
+        """Return the room for the words alone: in a low window the icons go."""
+        return QSize(self.sizeHint().width(), line_height(self) + 8)
+
+    @property
+    def _icon_height(self) -> int:
+        return pixels(self, 36)
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: N802 - Qt's name
         if event.key() in (Qt.Key.Key_Return, Qt.Key.Key_Enter):
@@ -166,13 +177,17 @@ class _RailButton(QAbstractButton):
         colour = theme.text if self.isChecked() else theme.muted if self.isEnabled() else theme.faint
         if not self.isEnabled():
             painter.setOpacity(0.75)
-        draw_icon(painter, self._icon, QRectF(self.width() / 2 - 11, 10, 22, 22), QColor(colour))
+        has_icon = self.height() >= self.sizeHint().height()
+        if has_icon:
+            side = pixels(self, 22)
+            draw_icon(painter, self._icon, QRectF((self.width() - side) / 2, 10, side, side), QColor(colour))
         if self._done:
-            draw_chip(painter, "checked", QRectF(self.width() / 2 + 9, 5, 13, 13), theme)
-        font = self.font()
-        font.setBold(self.isChecked())
-        painter.setFont(font)
+            side = pixels(self, 13)
+            left = self.width() / 2 + pixels(self, 9) if has_icon else box.right() - side
+            draw_chip(painter, "checked", QRectF(left, 5 if has_icon else 1, side, side), theme)
+        painter.setFont(font_of(self, bold=self.isChecked()))
         painter.setPen(QColor(colour))
         words = f"{self._number} {self.text()}"
-        painter.drawText(box.adjusted(0, 34, 0, -4), Qt.AlignmentFlag.AlignCenter, words)
+        top = self._icon_height - 2 if has_icon else 0
+        painter.drawText(box.adjusted(0, top, 0, -2 if has_icon else 0), Qt.AlignmentFlag.AlignCenter, words)
         painter.end()

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QSize, Qt
+from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
 from gp_labeler.views.panels.bone_card import BoneCard
 from gp_labeler.views.panels.grey_card import GreyCard
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.mesh_card import MeshCard
 from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
@@ -37,7 +36,6 @@ class ScanPanel(QWidget):
         self._workbench = workbench
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
-        self.setFixedWidth(PANEL_WIDTH)
         self.facts = Facts()
         self._notes = QVBoxLayout()
         self._notes.setSpacing(6)
@@ -62,9 +60,6 @@ class ScanPanel(QWidget):
         follow(self, workbench.volume_opened, self._refresh)
         follow(self, workbench.session_replaced, self._refresh)
         self._refresh()
-
-    def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(PANEL_WIDTH, super().sizeHint().height())
 
     def _refresh(self, *_: object) -> None:
         volume = self._workbench.volume

@@ -43,7 +43,7 @@ class TrackerCard(Card):
         super().__init__("Tracked probe", parent)
         self._desk = workbench
         self.words = text_label(wrap=True)
-        self.tip = text_label("", "mono")
+        self.tip = text_label()
         self.progress = QProgressBar()
         self.progress.setTextVisible(False)
         self.progress.setFixedHeight(6)

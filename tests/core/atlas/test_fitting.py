@@ -130,12 +130,12 @@ def test_a_bad_file_is_named(change: object, message: str, tmp_path: Path) -> No
 def test_what_is_no_file_is_named(tmp_path: Path) -> None:
     for name, content in (("empty.json", b""), ("binary.json", bytes(range(256))), ("list.json", b"[1]")):
         (tmp_path / name).write_bytes(content)
-        with pytest.raises(FileFormatError, match="is not an atlas"):
+        with pytest.raises(FileFormatError, match=r"is not an atlas|is not JSON"):
             Atlas.load(tmp_path / name)
     (tmp_path / "deep.json").write_text("[" * 100_000)
     (tmp_path / "huge.json").write_text('{"gpAtlas": ' + "9" * 5000 + "}")
     for name in ("deep.json", "huge.json"):
-        with pytest.raises(FileFormatError, match=r"not valid JSON|atlas version"):
+        with pytest.raises(FileFormatError, match=r"is not JSON|atlas version"):
             Atlas.load(tmp_path / name)
-    with pytest.raises(FileFormatError, match="cannot be read"):
+    with pytest.raises(FileFormatError, match="does not exist"):
         Atlas.load(tmp_path / "none.json")

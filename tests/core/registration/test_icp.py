@@ -173,5 +173,5 @@ def test_what_is_no_stl_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "bone.stl").write_bytes(content)
     with pytest.raises(GpError, match=r"bone.stl: is no surface in STL"):
         read_stl(tmp_path / "bone.stl")
-    with pytest.raises(GpError, match="cannot be read"):
+    with pytest.raises(GpError, match="does not exist"):
         read_stl(tmp_path / "none.stl")

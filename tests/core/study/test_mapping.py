@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import time
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
@@ -40,18 +40,21 @@ def test_results_are_told_as_they_come() -> None:
 
 def test_what_done_raises_stops_the_rest() -> None:
     started: list[int] = []
+    stopped = threading.Event()
 
     def slow(number: int) -> int:
         started.append(number)
-        time.sleep(0.02)
+        assert number == 0 or stopped.wait(600)
         return number
 
     def stop(index: int, _: int) -> None:
         raise KeyboardInterrupt
 
-    with ThreadPoolExecutor(1) as threads, pytest.raises(KeyboardInterrupt):
-        run_map(slow, range(100), threads, done=stop)
-    assert len(started) < 50
+    with ThreadPoolExecutor(1) as threads:
+        with pytest.raises(KeyboardInterrupt):
+            run_map(slow, range(100), threads, done=stop)
+        stopped.set()
+    assert len(started) <= 2
 
 
 def test_processes() -> None:

@@ -278,7 +278,7 @@ def test_without_pixel_spacing_it_is_asked_for(value: list[object] | None, tmp_p
     assert plan.suggested_spacing == pytest.approx((0.14087,) * 3, rel=1e-4)
 
 
-def test_without_positions_the_thickness_and_the_numbers_count(tmp_path: Path) -> None:
+def test_without_positions_the_numbers_count_and_the_thickness_is_a_hint(tmp_path: Path) -> None:
     def strip(data: FileDataset, _: int) -> None:
         del data.ImagePositionPatient
         del data.ImageOrientationPatient
@@ -287,10 +287,12 @@ def test_without_positions_the_thickness_and_the_numbers_count(tmp_path: Path) -
     folder = write_series(scan, tmp_path / "a", change=strip)
     for n in range(25):
         (folder / f"IM{n:04d}.dcm").rename(folder / f"z{24 - n:04d}.dcm")
-    assert codes(folder) == ["no-positions", "sides-unknown"]
-    volume = read_volume(folder)
+    assert codes(folder) == ["no-positions", "spacing-missing", "sides-unknown"]
+    plan = inspect_volume(folder)
+    assert "SliceThickness of 0.1409 mm need not be it" in plan.errors[0].text
+    assert plan.suggested_spacing == pytest.approx(tuple(scan.spacing))
+    volume = read_volume(plan, spacing=plan.suggested_spacing)
     np.testing.assert_array_equal(volume.array, scan.array)
-    assert volume.spacing == pytest.approx(tuple(scan.spacing))
 
 
 def test_with_one_position_for_all_slices_the_numbers_count(tmp_path: Path) -> None:
@@ -311,7 +313,7 @@ def test_with_neither_positions_nor_thickness_the_distance_is_asked_for(tmp_path
 
     plan = inspect_volume(write_series(small(), tmp_path / "a", change=strip))
     assert [problem.code for problem in plan.errors] == ["spacing-missing"]
-    assert "neither positions nor a thickness" in plan.errors[0].text
+    assert "neither positions nor SpacingBetweenSlices" in plan.errors[0].text
 
 
 @pytest.mark.parametrize(
@@ -353,7 +355,7 @@ def test_a_file_of_many_frames(backward: bool, positions: bool, tmp_path: Path) 
     data.NumberOfFrames = 25
     shared, measures, plane = Dataset(), Dataset(), Dataset()
     measures.PixelSpacing = [f"{scan.spacing[1]:.9g}", f"{scan.spacing[0]:.9g}"]
-    measures.SliceThickness = f"{scan.spacing[2]:.9g}"
+    measures.SpacingBetweenSlices = f"{scan.spacing[2]:.9g}"
     plane.ImageOrientationPatient = [1, 0, 0, 0, 1, 0]
     shared.PixelMeasuresSequence, shared.PlaneOrientationSequence = Sequence([measures]), Sequence([plane])
     data.SharedFunctionalGroupsSequence = Sequence([shared])
@@ -373,7 +375,7 @@ def test_a_file_of_many_frames(backward: bool, positions: bool, tmp_path: Path) 
         index = np.random.default_rng(1).integers(0, [60, 24, 25], (50, 3)) @ scan.affine[:3, :3].T
         points = index + scan.affine[:3, 3]
         np.testing.assert_array_equal(volume.values_at(points), scan.values(points))
-        assert volume.is_mirrored is backward
+        assert not volume.is_mirrored  # frames are sorted by their positions, as slices are
     else:
         assert not inspect_volume(path).sides_known
 

@@ -17,6 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from gp_labeler.imaging.readers import VolumeError, inspect_volume, read_volume
 
+pytestmark = pytest.mark.machine
+
 
 def write_nrrd(scan: Scan, path: Path, space: str = "left-posterior-superior", **more: object) -> Path:
     flip = np.diag([-1, -1, 1.0]) if space == "right-anterior-superior" else np.eye(3)

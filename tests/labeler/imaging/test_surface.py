@@ -230,16 +230,16 @@ def test_building_the_locator_lets_other_threads_run(mouse: Volume) -> None:
 
     thread = threading.Thread(target=tick)
     thread.start()
-    meanwhile = []
-    for _ in range(5):
-        before = ticks[0]
+    meanwhile, tries = 0, 0
+    while meanwhile <= 3 and tries < 100:  # a busy machine may give the other thread no turn at first
+        before, tries = ticks[0], tries + 1
         Surface(surface.mesh, surface.level, surface.T_voxel_scan, surface.region).prepare()
-        meanwhile.append(ticks[0] - before)
+        meanwhile = ticks[0] - before
     over.set()
     thread.join()
     assert not unprepared.ready
     assert unprepared.prepare().ready
-    assert max(meanwhile) > 3, "one or two may fall before and after a call that lets nobody run"
+    assert meanwhile > 3, "one or two may fall before and after a call that lets nobody run"
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".stl", ".vtp"])
@@ -269,7 +269,7 @@ def test_what_a_user_can_do_wrong_is_said(tmp_path: Path) -> None:
         extract_isosurface(volume, 0.0, box=[[900, 900, 900], [910, 910, 910]])
     with pytest.raises(GpError, match=r"meshes are written as .ply, .stl, .vtp, got '.obj'"):
         surface.save(tmp_path / "bone.obj")
-    with pytest.raises(GpError, match=r"bone.ply: the mesh cannot be written .*another folder"):
+    with pytest.raises(GpError, match=r"bone.ply: cannot be written .*Check the folder"):
         surface.save(tmp_path / "nowhere" / "bone.ply")
     with pytest.raises(GeometryError, match="empty"):
         surface.only(np.zeros(surface.n_triangles, bool)).project([0, 0, 0])
@@ -296,3 +296,38 @@ def test_every_voxel_type_is_meshed(dtype: type) -> None:
     assert surface.bounds == pytest.approx(np.array([[2.5] * 3, [8.5] * 3]))
     with pytest.raises(GpError, match="values are 0 to 1"):
         extract_isosurface(Volume(array, np.eye(4)), 3)
+
+
+@pytest.mark.parametrize(
+    ("dtype", "offset"),
+    [
+        ("int8", -100),
+        ("uint8", 0),
+        ("int16", -32768),
+        ("uint16", 60000),
+        ("int32", -(2**31)),
+        ("uint32", 2**32 - 2000),
+        ("int64", -(2**40)),
+        ("uint64", 2**45),
+        ("float32", -4096.0),
+        ("float64", 1e11),
+    ],
+)
+@pytest.mark.parametrize("stride", [1, 2])
+def test_the_surface_is_right_for_every_voxel_type(dtype: str, offset: float, stride: int) -> None:
+    """Wide types hold differences that flying edges, and float32, would lose."""
+    from skimage.measure import marching_cubes
+
+    shape = ball(np.eye(3)).array.astype(np.float64)
+    steps = np.clip(np.rint(30 * shape), -100, 100) + 100
+    steps = np.rint(steps * (1.0 if dtype in ("int8", "uint8") else 7.0))
+    values = (steps.astype(dtype) + np.array(offset).astype(dtype)).astype(dtype)
+    level = 99.5 if dtype in ("int8", "uint8") else 699.5
+    threshold = level + 0.5 + offset if np.dtype(dtype).kind in "iu" else float(level + offset)
+    surface = extract_isosurface(Volume(values, np.eye(4)), threshold, smallest_mm=0, stride=stride)
+    if stride == 2:
+        nz, ny, nx = (n // 2 for n in steps.shape)
+        steps = steps[: 2 * nz, : 2 * ny, : 2 * nx].reshape(nz, 2, ny, 2, nx, 2).mean(axis=(1, 3, 5))
+    corners = marching_cubes(steps - level, 0.0)[0][:, ::-1] * stride + (stride - 1) / 2
+    assert cKDTree(corners).query(surface.points)[0].max() < 0.01
+    assert cKDTree(surface.points).query(corners)[0].max() < 0.01

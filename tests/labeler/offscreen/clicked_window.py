@@ -26,13 +26,13 @@ ON_BONE = MIDDLE + BALL_MM * np.array([0.3, -0.9, 0.1]) / np.linalg.norm([0.3, -
 
 def xdotool(*words: object) -> None:
     """Let the X server move the mouse or press keys, and let the window take it in."""
-    subprocess.run(["xdotool", *map(str, words)], check=True, timeout=20)
+    subprocess.run(["xdotool", *map(str, words)], check=True, timeout=120)
     QTest.qWait(150)
 
 
 def until(true: Callable[[], bool]) -> None:
     """Wait for what a click or key brings about; where it never does, the test tells what there is."""
-    end = time.monotonic() + 20
+    end = time.monotonic() + 120
     while not true() and time.monotonic() < end:
         QTest.qWait(10)
 

@@ -12,6 +12,8 @@ from pathlib import Path
 import pytest
 from window_cases import VOXEL_MM
 
+pytestmark = pytest.mark.machine
+
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[2]
 TOOLS = ("xvfb-run", "xdotool")
@@ -31,7 +33,7 @@ def test_real_mouse_and_keys_label_on_a_real_display() -> None:
         env=env,
         capture_output=True,
         text=True,
-        timeout=180,
+        timeout=600,
     )
     assert done.returncode == 0, done.stderr[-3000:]
     found = json.loads(done.stdout.splitlines()[-1])

@@ -11,6 +11,8 @@ from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.runner import do_step, run_script
 from gp_labeler.offscreen.script import StepError, make_script
 
+pytestmark = pytest.mark.machine
+
 
 def on_ball(*direction: float) -> np.ndarray:
     towards = np.array(direction, dtype=float)
@@ -92,9 +94,17 @@ def test_files_go_out_and_come_back(tmp_path) -> None:
         tmp_path,
         {"do": "import", "files": "out/ball_L.mrk.json"},
         {"do": "expect", "feature": "CA", "side": "L", "near": CA["at"]},
-        {"do": "export", "complete": True},
+        {"do": "export", "folder": "again", "complete": True},
     )
     assert "step 4: export: Wrote ball_L.mrk.json. Missing on the left side, to do" in back.error
+
+
+def test_a_script_does_not_write_over_what_it_reads(tmp_path) -> None:
+    assert run(tmp_path, LOOK, CA, {"do": "export"}).ok
+    before = (tmp_path / "out" / "ball_L.mrk.json").read_bytes()
+    report = run(tmp_path, {"do": "import", "files": "out/ball_L.mrk.json"}, {"do": "export"})
+    assert "ball_L.mrk.json: is read, and would be written over" in report.error
+    assert (tmp_path / "out" / "ball_L.mrk.json").read_bytes() == before
 
 
 def test_points_that_belong_elsewhere_stop_an_import(tmp_path) -> None:

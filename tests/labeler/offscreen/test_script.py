@@ -103,7 +103,7 @@ def test_a_file_that_is_no_script_is_named(tmp_path, name, text, problem) -> Non
 
 
 def test_a_script_that_cannot_be_read_is_named(tmp_path) -> None:
-    with pytest.raises(GpError, match="cannot be read"):
+    with pytest.raises(GpError, match="does not exist"):
         read_script(tmp_path / "none.toml")
     (tmp_path / "a.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(GpError, match="not a text file"):

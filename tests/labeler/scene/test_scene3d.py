@@ -31,6 +31,8 @@ from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.target import RenderTarget
 from gp_labeler.scene.window_level import WindowLevel
 
+pytestmark = pytest.mark.machine
+
 BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
 
 
@@ -474,7 +476,7 @@ def test_without_a_display_nothing_is_said_on_stderr() -> None:
     )
     without = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = subprocess.run(
-        [sys.executable, "-c", code], env=without, capture_output=True, text=True, timeout=60, check=False
+        [sys.executable, "-c", code], env=without, capture_output=True, text=True, timeout=600, check=False
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.split("\n")[:2] == ["(48, 64, 3)", "[]"]

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.label_check import check_side
 from gp_core.landmarks.features import CODES, FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session.document import document_of
@@ -73,6 +76,17 @@ def predict(landmarks: LandmarkSet):
     mean = shape(landmarks.side)
     offset = (landmarks.array(landmarks.placed) - mean.array(landmarks.placed)).mean(axis=0)
     return {code: (mean[code] + offset, np.eye(3) * 0.04) for code in PLACEABLE}
+
+
+def atlas_of_shape() -> Atlas:
+    """The same animal as an atlas."""
+    side = shape()
+    spread = np.eye(3 * len(PLACEABLE)) * 0.04
+    return Atlas("shape", PLACEABLE, side.array(PLACEABLE), spread, spread, 22)
+
+
+check = partial(check_side, atlas=atlas_of_shape())
+"""Doubts what is not where `shape` has it."""
 
 
 def text_of(state: SpecimenState) -> str:

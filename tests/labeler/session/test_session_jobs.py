@@ -12,6 +12,9 @@ from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Report
 from gp_labeler.session.jobs import Jobs, QueueDispatcher, TaskState
 
+PATIENCE = 120.0
+"""Seconds: only a failure lasts that long."""
+
 
 @dataclass(frozen=True)
 class Double:
@@ -84,9 +87,9 @@ def test_cancel_stops_and_delivers_nothing(jobs, queue):
     jobs.cancelled.connect(cancelled.append)
     job = Forever()
     task = jobs.submit(job, results.append)
-    assert job.entered.wait(30)
+    assert job.entered.wait(PATIENCE)
     task.cancel()
-    queue.deliver_until_idle(jobs, timeout=30)
+    queue.deliver_until_idle(jobs, timeout=PATIENCE)
     assert (task.state, results, cancelled) == (TaskState.CANCELLED, [], [task])
 
 
@@ -105,7 +108,7 @@ def test_the_newest_of_a_key_wins(jobs, queue):
     old = jobs.submit(Forever(), results.append, key="surface")
     other = jobs.submit(Double(5), results.append, key="else")
     new = jobs.submit(Double(7), results.append, key="surface")
-    queue.deliver_until_idle(jobs, timeout=30)
+    queue.deliver_until_idle(jobs, timeout=PATIENCE)
     assert sorted(results) == [10, 14]
     assert (old.state, other.state, new.state) == (TaskState.CANCELLED, TaskState.DONE, TaskState.DONE)
 
@@ -114,7 +117,7 @@ def test_a_job_for_later_is_spared_where_a_newer_one_comes_in_time(jobs, queue):
     spared, results = Forever(), []
     first = jobs.submit(spared, results.append, key="judging", after=60.0)
     jobs.submit(Double(2), results.append, key="judging", after=0.01)
-    queue.deliver_until_idle(jobs, timeout=30)
+    queue.deliver_until_idle(jobs, timeout=PATIENCE)
     assert results == [4]
     assert first.state is TaskState.CANCELLED
     assert not spared.entered.is_set()
@@ -151,7 +154,7 @@ def test_closing_waits_for_no_result(queue):
     job = Forever()
     jobs.submit(job, results.append)
     waiting = jobs.submit(Double(1), results.append)
-    assert job.entered.wait(30)
+    assert job.entered.wait(PATIENCE)
     jobs.close()
     while queue.deliver():
         pass

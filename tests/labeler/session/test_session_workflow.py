@@ -7,11 +7,10 @@ from functools import partial
 
 import numpy as np
 import pytest
-from session_cases import MARK, PLACEABLE, FakeVolume, predict, shape
+from session_cases import MARK, PLACEABLE, FakeVolume, check, predict, shape
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.quality import DOUBTFUL_SD
-from gp_core.atlas.shape import departures
+from gp_core.atlas.label_check import check_side
 from gp_core.atlas.shape import predict as shape_predict
 from gp_core.errors import FeatureError, GeometryError, GpError
 from gp_core.landmarks.features import CODES, Side
@@ -151,7 +150,7 @@ def test_locking_all_and_unlocking():
 
 
 def test_states_of_points():
-    session = Session(predict=predict)
+    session = Session(predict=predict, check=check)
     assert set(session.point_states(L).values()) == {PointState.TO_DO}
     session.do(ImportLandmarks((shape(L),), MARK))
     assert session.point_states(L)["CO"] is PointState.COMPUTED
@@ -164,7 +163,7 @@ def test_states_of_points():
     assert states["ZL"] is PointState.GHOST
     assert states["MN"] is PointState.UNSEEN
     assert [c for c, s in states.items() if s is PointState.DOUBTFUL] == ["FPP"]
-    assert session.doubts(L)["FPP"].distance == pytest.approx(3, abs=0.5)
+    assert session.doubts(L)["FPP"].departure_of("FPP").distance == pytest.approx(3, abs=0.5)
     session.do(CheckPoint(L, "FPP"))
     assert session.point_states(L)["FPP"] is PointState.CHECKED
 
@@ -211,7 +210,7 @@ def test_an_edit_of_one_side_asks_the_atlas_for_that_side_alone():
 
 
 def test_a_side_at_rest_stays_judged_while_the_other_is_labelled():
-    session = Session(predict=predict)
+    session = Session(predict=predict, check=check)
     session.do(ImportLandmarks((shape(L),), MARK))
     session.judging(L).run(lambda _: None)
     for code in set(PLACEABLE) - {"IN"}:  # which is the left side's as well
@@ -227,39 +226,38 @@ def test_an_atlas_that_cannot_say_expects_nothing():
 
     expectations = Expectations(refuse)
     assert not expectations.ghosts(shape(), LandmarkSet.empty(R))
-    assert not expectations.doubts(shape())
 
 
-def test_the_atlas_is_asked_once_for_the_same_points():
+def test_the_checker_is_asked_once_for_the_same_points():
     asked = []
 
     def count(landmarks):
         asked.append(landmarks)
-        return predict(landmarks)
+        return check(landmarks)
 
-    session = Session(BOTH.apply(SpecimenState()), predict=count)
+    session = Session(BOTH.apply(SpecimenState()), check=count)
     assert session.point_states(L, wait=False)["ZL"] is PointState.PLACED
     assert asked == []
     assert session.point_states(L) == session.point_states(L)
-    assert len(asked) == 19
+    assert len(asked) == 1
     session.do(PlacePoint(R, "ZL", (0, 0, 0), MARK))
     session.doubts(L)
-    assert len(asked) == 19
+    assert len(asked) == 1
 
 
 def test_nonsense_is_doubted_in_words_not_in_kilometres():
-    predicts = partial(shape_predict, Atlas.published())
+    published = partial(check_side, atlas=Atlas.published())
     rng = np.random.default_rng(0)
     heap = {code: 1e-3 * rng.normal(size=3) for code in CODES if code != "CO"}
-    assert not Expectations(predicts).departures(LandmarkSet.from_mapping(heap, L))
+    assert not published(LandmarkSet.from_mapping(heap, L)).departures
     off = {code: Atlas.published()[code] for code in heap} | {"ZL": (300.0, 0, 0)}
-    doubt = Expectations(predicts).doubts(LandmarkSet.from_mapping(off, L))["ZL"]
+    doubt = published(LandmarkSet.from_mapping(off, L)).doubts["ZL"]
     assert doubt.word == "far off"
     assert "check names, side and units" in doubt.text
 
 
 def test_doubts_can_be_found_by_a_job():
-    session = Session(BOTH.apply(SpecimenState()), predict=predict)
+    session = Session(BOTH.apply(SpecimenState()), check=check)
     session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
     assert session.point_states(L, wait=False)["FPP"] is PointState.PLACED
     with ThreadPoolExecutor(1) as pool:
@@ -268,13 +266,14 @@ def test_doubts_can_be_found_by_a_job():
 
 
 def test_doubts_do_not_blink_while_an_edit_is_judged():
-    session = Session(BOTH.apply(SpecimenState()), predict=predict)
+    session = Session(BOTH.apply(SpecimenState()), check=check)
     session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
 
     def doubted() -> dict[str, float]:
         states = session.point_states(L, wait=False)
         assert set(session.near_doubts(L)) == {c for c, s in states.items() if s is PointState.DOUBTFUL}
-        return {code: round(doubt.distance, 1) for code, doubt in session.near_doubts(L).items()}
+        doubts = session.near_doubts(L)
+        return {code: round(doubt.departure_of(code).distance, 1) for code, doubt in doubts.items()}
 
     assert doubted() == {}, "nobody has looked yet"
     session.judging(L).run(lambda fraction: None)
@@ -298,7 +297,7 @@ def test_doubts_do_not_blink_while_an_edit_is_judged():
 def test_labels_under_the_name_of_the_other_side_are_called_so():
     atlas, rng = Atlas.published(), np.random.default_rng(3)
     right = {code: (atlas[code] + rng.normal(size=3) * 0.1) * [-1, 1, 1] for code in atlas.codes}
-    session = Session(predict=partial(shape_predict, atlas))
+    session = Session(check=partial(check_side, atlas=atlas))
 
     def judged(side: Side) -> bool:
         session.judging(side).run(lambda fraction: None)
@@ -318,18 +317,15 @@ def test_labels_under_the_name_of_the_other_side_are_called_so():
     assert not judged(R), "one that is off says nothing of the side"
 
 
-def test_the_published_atlas_expects_as_its_own_checks_do():
+def test_a_point_far_off_is_doubted_and_its_ghost_comes_where_it_belongs():
     atlas = Atlas.published()
     rng = np.random.default_rng(3)
     points = {code: atlas[code] + rng.normal(size=3) * 0.1 for code in atlas.codes}
     points["MH"] = points["MH"] + [0, 2.5, 0]
-    session = Session(predict=partial(shape_predict, atlas))
+    session = Session(predict=partial(shape_predict, atlas), check=partial(check_side, atlas=atlas))
     session.do(ImportLandmarks((LandmarkSet.from_mapping(points, L),), MARK))
-    found = session.doubts(L)
-    far = {c: d for c, d in departures(atlas, session.landmarks(L)).items() if d.mahalanobis > DOUBTFUL_SD}
-    assert set(found) == set(far) == {"MH"}
-    assert found["MH"].distance == pytest.approx(far["MH"].distance)
-    assert found["MH"].n_sd == pytest.approx(far["MH"].mahalanobis)
+    assert set(session.doubts(L)) == {"MH"}
+    assert np.linalg.norm(session.doubts(L)["MH"].departure_of("MH").expected - atlas["MH"]) < 0.5
     labelling.clear(session, side=L, code="MH")
     ghost = session.ghosts(L)["MH"]
     assert np.linalg.norm(ghost.position - atlas["MH"]) < ghost.radius_95 < 1.0

@@ -13,8 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from session_cases import FakeVolume, edits, json_values, quick, text_of
 
+from gp_core import disk
 from gp_core.errors import FileFormatError, GpError
-from gp_core.landmarks.files import disk
 from gp_labeler.session.document import document_of, state_of
 from gp_labeler.session.edited_specimen import VolumeChangedError
 from gp_labeler.session.frozen_json import freeze
@@ -63,8 +63,8 @@ def damaged(**changes):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        ("{", "is not a JSON file. Choose a"),
-        ("[" * 100_000, "is not a JSON file"),
+        ("{", "is not JSON: damaged or cut off. Choose a"),
+        ("[" * 100_000, "is not JSON"),
         ([], "is not a specimen file"),
         ({"format": "other"}, "is not a specimen file"),
         (damaged(version=3), "saved by a newer program .version 3, this one reads up to 2.. Update"),
@@ -112,7 +112,7 @@ def test_reading_is_lenient_about_what_does_not_matter(tmp_path):
         json.dumps(damaged(future={"x": 1}, landmarks={"left": {"ca": {"position": [1, 2, 3], "x": 1}}}))
     )
     assert read_specimen(path).side("L").placed == ("CA",)
-    with pytest.raises(GpError, match="cannot be opened: No such file"):
+    with pytest.raises(GpError, match="does not exist"):
         read_specimen(tmp_path / "none")
 
 

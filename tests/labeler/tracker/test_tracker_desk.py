@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pyigtl
 import pytest
-from tracker_cases import POINTS, TIP, SimulatorProcess, until
+from tracker_cases import DEADLINE, POINTS, TIP, SimulatorProcess, until
 
 from gp_core import PROBE, Atlas, Side
 from gp_core.errors import GpError
@@ -136,7 +136,7 @@ def test_the_pose_is_sent_back_while_it_holds(desk):
         desk.pose.record(atlas[name], TouchHow.TYPED, name=name)
     client = pyigtl.OpenIGTLinkClient("127.0.0.1", port)
     try:
-        message = client.wait_for_message("T_tracker_cochlea", timeout=20)
+        message = client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE)
         np.testing.assert_allclose(message.matrix, desk.pose.estimate.pose.transform, atol=1e-4)
     finally:
         client.stop()
@@ -158,7 +158,7 @@ def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
             position = atlas[source] * (right if trouble == "side" else 1.0)
             desk.pose.record(position, TouchHow.TYPED, name=name)
         if trouble == "rejected":
-            assert client.wait_for_message("T_tracker_cochlea", timeout=20) is not None
+            assert client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE) is not None
             desk.pose.estimating.judge("reject")
         why = {"names": "check the names", "side": "check the side", "rejected": "it was rejected"}[trouble]
         assert words[-1].endswith(f"Held back: {why}."), "a dialog that is open shows it at once"
@@ -171,7 +171,7 @@ def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
         else:
             desk.pose.estimating.judge("accept")
         assert "Held back" not in words[-1]
-        message = client.wait_for_message("T_tracker_cochlea", timeout=20)
+        message = client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE)
         np.testing.assert_allclose(message.matrix, desk.pose.estimate.pose.transform, atol=1e-4)
     finally:
         client.stop()

@@ -20,8 +20,6 @@ from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.workbench import Workbench
 
-WAIT_MS = 30_000
-
 
 @pytest.fixture
 def desk():
@@ -51,7 +49,7 @@ def going(qtbot, desk, true):
         desk.tracker.poll()
         assert true()
 
-    qtbot.waitUntil(step, timeout=WAIT_MS)
+    qtbot.waitUntil(step)
 
 
 def connected(qtbot, desk, simulator):

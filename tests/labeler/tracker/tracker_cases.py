@@ -16,7 +16,7 @@ import numpy as np
 from gp_labeler.tracker import Fault, RecordedTouch, Sample, TouchRecorder, TrackerLink
 from gp_labeler.tracker.messages import TrackerMessage
 
-DEADLINE = 30.0
+DEADLINE = 120.0
 """Seconds: only a failure waits that long."""
 
 TIP = (5.0, -3.0, -120.0)
@@ -91,11 +91,11 @@ class SimulatorProcess:
         with contextlib.suppress(OSError):
             self._process.stdin.close()
         try:
-            self._process.wait(timeout=10)
+            self._process.wait(timeout=DEADLINE)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
-        self._reader.join(timeout=10)
+        self._reader.join(timeout=DEADLINE)
         self._process.stdout.close()
 
 

@@ -16,6 +16,8 @@ from gp_labeler.session.jobs import QueueDispatcher
 from gp_labeler.workbench import Workbench
 
 ATLAS = Atlas.published()
+PANEL_WIDTH = 472
+"""What a window of 1280 x 800 gives its panels, logical pixels."""
 
 
 def grey_volume(seed: int = 0) -> Volume:

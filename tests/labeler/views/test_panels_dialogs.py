@@ -307,7 +307,7 @@ def test_recovery_offers_each_and_deletes_only_at_the_second_click(state_directo
     qtbot.mouseClick(dialog.delete, CLICK)
     assert not recoveries[1].journal.exists()
     assert dialog.list.count() == 1
-    with qtbot.waitSignal(dialog.recover_asked, timeout=1000) as told:
+    with qtbot.waitSignal(dialog.recover_asked) as told:
         qtbot.mouseClick(dialog.recover, CLICK)
     desk = Workbench(state_directory, QueueDispatcher())
     desk.recover(told.args[0])

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
+from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan, in_scan, place
 from PySide6.QtCore import QModelIndex, QPoint, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QGuiApplication
 from PySide6.QtWidgets import QMenu
@@ -18,7 +18,7 @@ from gp_labeler.session.workflow import Active
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
 from gp_labeler.views.panels.feature_card import FeatureCard
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH, LabelPanel
+from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.views.panels.landmark_table import LandmarkTable
 from gp_labeler.views.panels.rail import Rail
@@ -124,7 +124,7 @@ def test_every_state_has_its_word(desk, panel):
     assert word(table, "FPA", LEFT) == "ghost"
     assert word(table, "FPA", RIGHT) == "to do"
     assert word(table, "CO", RIGHT) == "by itself", "nobody places it"
-    distance = desk.session.doubts(LEFT)["OI"].distance
+    distance = desk.session.doubts(LEFT)["OI"].departure_of("OI").distance
     assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
 
 
@@ -266,7 +266,7 @@ def test_everything_done_offers_the_export(desk, panel, qtbot):
             if not row.computed:
                 labelling.mark_unseen(desk.session, side=side, code=row.code)
     assert panel.card.content.name == "Everything is labelled"
-    with qtbot.waitSignal(panel.card.export_asked, timeout=1000):
+    with qtbot.waitSignal(panel.card.export_asked):
         qtbot.mouseClick(panel.card.primary, CLICK)
 
 
@@ -275,7 +275,7 @@ def test_without_a_scan_the_card_offers_to_open_one(qtbot):
     card = FeatureCard(desk)
     qtbot.addWidget(card)
     card.show()
-    with qtbot.waitSignal(card.open_asked, timeout=1000):
+    with qtbot.waitSignal(card.open_asked):
         qtbot.mouseClick(card.primary, CLICK)
     desk.close(discard=True)
 

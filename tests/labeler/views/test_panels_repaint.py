@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from panel_cases import ATLAS, deliver, desk_with_scan, in_scan, place
+from panel_cases import ATLAS, PANEL_WIDTH, deliver, desk_with_scan, in_scan, place
 from PySide6.QtCore import QEvent, QModelIndex, QObject, QSize
 from PySide6.QtGui import QColor, QImage, QPixmap, QRegion
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
@@ -24,7 +24,7 @@ from gp_labeler.session.touches import TouchHow
 from gp_labeler.session.workflow import Active
 from gp_labeler.views import feature_picture as pictures
 from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH, LabelPanel
+from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.landmark_model import LandmarkModel
 from gp_labeler.views.panels.pose_model import MISFIT, TouchModel
 from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of

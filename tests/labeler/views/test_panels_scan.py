@@ -141,7 +141,7 @@ def test_opacity_and_what_is_shown(desk, panel, qtbot):
 
 def test_the_mesh_card_counts_triangles_and_offers_to_save(desk, panel, qtbot):
     assert "triangles" in panel.mesh.state.text()
-    with qtbot.waitSignal(panel.mesh.save_asked, timeout=1000):
+    with qtbot.waitSignal(panel.mesh.save_asked):
         qtbot.mouseClick(panel.mesh.save, CLICK)
 
 
@@ -221,15 +221,15 @@ def test_the_first_page_offers_scan_specimen_demo_and_recent_files(tmp_path, qtb
         (page.open_specimen, page.open_specimen_asked),
         (page.demo, page.demo_asked),
     ):
-        with qtbot.waitSignal(signal, timeout=1000):
+        with qtbot.waitSignal(signal):
             qtbot.mouseClick(button, CLICK)
     QApplication.processEvents()
     recent = [b for b in page.findChildren(QPushButton, "recent") if b.isVisible()]
     assert [b.accessibleName() for b in recent] == ["Open GP-014.nrrd"]
-    with qtbot.waitSignal(page.path_chosen, timeout=1000) as told:
+    with qtbot.waitSignal(page.path_chosen) as told:
         qtbot.mouseClick(recent[0], CLICK)
     assert told.args == [str((tmp_path / "GP-014.nrrd").resolve())]
-    with qtbot.waitSignal(page.path_chosen, timeout=1000) as told:
+    with qtbot.waitSignal(page.path_chosen) as told:
         drop(page, tmp_path)
     assert told.args == [str(tmp_path)]
     assert list(cut_words(page)) == []

@@ -79,7 +79,7 @@ def test_the_dialog_shows_and_saves(qtbot, desk, top, tmp_path):
     touch_and_label(desk.session)
     dialog = PhysicalDialog(desk, Saving(tmp_path), top)
     dialog.show()
-    qtbot.waitUntil(lambda: dialog.result_found is not None, timeout=60_000)
+    qtbot.waitUntil(lambda: dialog.result_found is not None)
     assert dialog.rows.rowCount() == 1 + len(dialog.result_found.report.rows)
     assert not dialog.figure.pixmap().isNull()
     for button in (dialog.save_figure, dialog.save_json):
@@ -96,7 +96,7 @@ def test_without_skull_features_the_remedy_is_told(qtbot, desk, top, tmp_path):
         touching.record_touch(desk.session, "L", code, animal[code])
     dialog = PhysicalDialog(desk, Saving(tmp_path), top)
     dialog.show()
-    qtbot.waitUntil(lambda: dialog.findings.count() > 0, timeout=60_000)
+    qtbot.waitUntil(lambda: dialog.findings.count() > 0)
     assert "CA" in dialog.findings.itemAt(0).widget().words
     assert dialog.result_found is None
     dialog.accept()

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import cut_words, deliver, desk_with_scan
-from PySide6.QtCore import QEvent, QMimeData, QPoint, QPointF, QSize, Qt, QUrl
-from PySide6.QtGui import QDragEnterEvent, QDropEvent, QGuiApplication
+from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan
+from PySide6.QtCore import QEvent, QPoint, QSize, Qt
+from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
+from window_cases import drop_file
 
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
 from gp_core.atlas.draw import draw_animal
@@ -20,7 +21,6 @@ from gp_labeler.pose_desk import ORDER
 from gp_labeler.session import labelling, touching
 from gp_labeler.session.jobs import QueueDispatcher
 from gp_labeler.session.touches import TouchHow
-from gp_labeler.views.panels.label_panel import PANEL_WIDTH
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
@@ -95,16 +95,11 @@ def click(qtbot, panel: PosePanel, name: str, column: int) -> None:
 
 
 def drop(widget, path: Path) -> None:
-    data = QMimeData()
-    data.setUrls([QUrl.fromLocalFile(str(path))])
-    where, action = QPointF(20, 200), Qt.DropAction.CopyAction
-    none = Qt.KeyboardModifier.NoModifier
-    entering = QDragEnterEvent(where.toPoint(), action, data, CLICK, none)
-    QApplication.sendEvent(widget, entering)
-    assert entering.isAccepted()
-    if isinstance(widget, PosePanel):
-        assert path.name in widget.touches.change.toolTip()
-    QApplication.sendEvent(widget, QDropEvent(where, action, data, CLICK, none))
+    def hovering() -> None:
+        if isinstance(widget, PosePanel):
+            assert path.name in widget.touches.change.toolTip()
+
+    drop_file(widget, path, 20, 200, entered=hovering)
 
 
 def editor(panel: PosePanel) -> QLineEdit:
@@ -318,14 +313,14 @@ def test_it_says_beforehand_what_leaving_out_changes(desk, panel, qtbot):
     touch(desk, *PROBE)
     moved, turned = desk.pose.estimating.without("MN")
     click(qtbot, panel, "MN", NAME)
-    qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()), timeout=2000)
+    qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()))
     said = panel.touches.change.toolTip()
     assert said == f"Without MN: CO {moved:.2f} mm, axis {turned:.1f}°"
     before = desk.pose.estimate.pose
     click(qtbot, panel, "MN", USE)
     after = desk.pose.estimate.pose
     assert np.linalg.norm(after.origin - before.origin) == pytest.approx(moved)
-    qtbot.waitUntil(lambda: panel.touches.change.toolTip().startswith("With MN"), timeout=2000)
+    qtbot.waitUntil(lambda: panel.touches.change.toolTip().startswith("With MN"))
 
 
 def test_one_touch_or_all_are_cleared_and_come_back(desk, panel, qtbot):

@@ -7,9 +7,10 @@ import gc
 import os
 import subprocess
 import sys
+import threading
 import time
 import weakref
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,8 @@ from gp_labeler.views.application import make_window as make_plain
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.views.top_bar import TopBar
 
+pytestmark = pytest.mark.machine
+
 
 def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbot) -> None:
     status, words = window.status, "the file is truncated after three gigabytes and cannot be read. " * 3
@@ -40,7 +43,7 @@ def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbo
     assert height < status.height() >= text.heightForWidth(text.width())
     qtbot.wait(10)
     window.ui.open_demo()
-    qtbot.waitUntil(status.work.bar.isVisible, timeout=20000)
+    qtbot.waitUntil(status.work.bar.isVisible)
     status.work.stop.click()
     settle(qtbot, window)
     status.say("Saved", "info")
@@ -221,11 +224,11 @@ def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tm
     titles = [each.windowTitle().replace("[*]", "") for each in (window, other)]
     original = tmp_path / "one"
     assert titles == [f"ball – {original} – gp-labeler", f"ball – copy of {original} – gp-labeler"]  # noqa: RUF001
-    assert _kept(other) == "● a copy"
+    assert _kept(other) == "• a copy"
     other.ui.prompts.files = [tmp_path / "ball"]
     other.commands.run("file.save_as")
     assert other.windowTitle().replace("[*]", "") == f"ball – {tmp_path} – gp-labeler"  # noqa: RUF001
-    assert _kept(other) == "● saved"
+    assert _kept(other) == "• saved"
 
 
 def test_landmarks_are_exported_and_imported(window, make_window, tmp_path) -> None:
@@ -292,50 +295,41 @@ def test_every_action_can_be_run_at_any_time(window, make_window) -> None:
 
 @dataclass(frozen=True)
 class Slow:
-    """Work as VTK and SimpleITK do it: long, and letting other threads run."""
+    """Work as VTK and SimpleITK do it, letting other threads run; it goes on until enough is done."""
 
+    enough: threading.Event = field(default_factory=threading.Event)
     title: str = "Slow work"
 
-    def run(self, progress) -> float:
-        values = np.random.default_rng(0).normal(size=1_000_000)
-        for n in range(40):
+    def run(self, progress) -> bool:
+        values, end = np.random.default_rng(0).normal(size=1_000_000), time.monotonic() + 60
+        while not self.enough.is_set() and time.monotonic() < end:
             values = np.sin(values)
-            time.sleep(0.01)
-            progress(n / 40)
-        return float(values[0])
+            progress(0.5)
+        return self.enough.is_set()
 
 
 def test_the_window_answers_while_work_goes_on(qtbot, window) -> None:
-    gaps, last = [], [time.perf_counter()]
+    work, answered = Slow(), [0]
 
-    def tick() -> None:
-        now = time.perf_counter()
-        gaps.append(now - last[0])
-        last[0] = now
+    def answer() -> None:
+        answered[0] += window.status.work.bar.isVisible()
+        if answered[0] > 20:
+            work.enough.set()
 
-    timer = QTimer(interval=5, timerType=Qt.TimerType.PreciseTimer)
-    timer.timeout.connect(tick)
-    qtbot.wait(50)
-    last[0] = time.perf_counter()
+    timer = QTimer(interval=5)
+    timer.timeout.connect(answer)
     timer.start()
-    window.workbench.jobs.submit(Slow())
-    shown = []
-    qtbot.waitUntil(
-        lambda: shown.append(window.status.work.bar.isVisible()) or not window.workbench.jobs.running,
-        timeout=20000,
-    )
+    task = window.workbench.jobs.submit(work)
+    settle(qtbot, window)
     timer.stop()
-    assert any(shown)
-    assert len(gaps) > 20
-    assert max(gaps) < 0.5 * sum(gaps), "work on this thread would be one gap"
-    assert np.median(gaps) < 0.05
+    assert task.result, "on the thread of the window, work would have waited for its answers in vain"
 
 
 def test_work_can_be_stopped(qtbot, window) -> None:
     window.workbench.jobs.submit(Slow())
-    qtbot.waitUntil(lambda: window.status.work.bar.isVisible(), timeout=20000)
+    qtbot.waitUntil(lambda: window.status.work.bar.isVisible())
     QTest.mouseClick(window.status.work.stop, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: not window.workbench.jobs.running, timeout=20000)
+    qtbot.waitUntil(lambda: not window.workbench.jobs.running)
     assert not window.status.work.bar.isVisible()
 
 
@@ -396,9 +390,9 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
 
 def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
     menus = {entry.text(): entry.menu() for entry in window.menuBar().actions()}
-    assert max(menu.sizeHint().height() for menu in menus.values()) < 740
-    folded = [entry.menu().title() for entry in menus["&View"].actions() if entry.menu() is not None]
-    assert folded == ["Look from", "Cut bone"]
+    folded = [entry.menu() for menu in menus.values() for entry in menu.actions() if entry.menu() is not None]
+    assert max(menu.sizeHint().height() for menu in (*menus.values(), *folded)) < 480  # 1366 x 768 at 150 %
+    assert {"Look from", "Cut bone", "Text size"} <= {menu.title() for menu in folded}
 
 
 def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:

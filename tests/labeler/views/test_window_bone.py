@@ -170,11 +170,11 @@ def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, w
     assert scene.n_bone_frames == drawn
     scene.bone.show(scene.bone.surfaces, quick=scene.bone.surfaces)  # as with a mesh so large as to need one
     view.redraw()
-    qtbot.waitUntil(lambda: scene.is_fine, timeout=5000)
+    qtbot.waitUntil(lambda: scene.is_fine)
     draw, fine = view._draw_frame, []
     monkeypatch.setattr(view, "_draw_frame", lambda *, quick: (draw(quick=quick), fine.append(scene.is_fine)))
     QTest.keyClick(view, Qt.Key.Key_Left)
-    qtbot.waitUntil(lambda: len(fine) == 2 and view._finished, timeout=5000)
+    qtbot.waitUntil(lambda: len(fine) == 2 and view._finished)
     assert fine == [False, True], "the stand-in first"
     QTest.keyClick(view, Qt.Key.Key_Left)
     view.grab()  # a picture is finished, however little time there was

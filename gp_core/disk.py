@@ -1,0 +1,366 @@
+"""Files in and out of the program.
+
+Only plain files of bounded size are read, so that neither a pipe nor an endless file holds the program up. A
+file is written whole or not at all: a draft beside it goes to the disk, then takes its name; whatever fails,
+the old file stays. Devices and pipes are written to, never replaced. While a command runs, what it reads is
+protected: nothing is written over it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import json
+import os
+import re
+import stat
+import time
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from gp_core.errors import FileFormatError, GpError
+
+try:
+    import fcntl
+except ImportError:  # Windows, which does not let go of a file that is open
+    fcntl = None  # type: ignore[assignment]
+
+__all__ = [
+    "MAX_BYTES",
+    "atomic_file",
+    "check_file",
+    "is_protected",
+    "is_stream",
+    "protect",
+    "protected_inputs",
+    "read_bytes",
+    "read_head",
+    "read_json",
+    "remove_drafts",
+    "write_bytes",
+    "write_text",
+]
+
+AnyPath = str | PathLike[str]
+
+MAX_BYTES = 50_000_000
+"""Size of the largest text or JSON file that is read."""
+
+_DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+)?", re.DOTALL)
+_LONGEST_NAME = 200  # bytes of a name in its draft's name; systems allow 255
+_FORGOTTEN_SECONDS = 3600.0  # after which the draft of any file counts as left behind
+_PATIENCE_SECONDS = 10.0  # for somebody who reads a pipe
+_DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(?P<number>\d+)")
+_STREAMS = {"/dev/stdout": 1, "/dev/stderr": 2}
+_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+
+_protected: dict[tuple[int, int], str] = {}
+"""Device and number of the files that must not be written over."""
+
+
+# Reading
+
+
+def check_file(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES) -> None:
+    """Raise `FileFormatError` unless there is a plain file of at most `max_bytes`; `what` it should be."""
+    try:
+        _check_kind(Path(path).stat(), path, what, max_bytes)
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+
+
+def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES) -> bytes:
+    """Return what a plain file holds.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    what : str
+        What it should be; stands in the message.
+    max_bytes : int
+        Size of the largest file that is read.
+
+    Raises
+    ------
+    FileFormatError
+        Missing, a folder, a device or a pipe, not readable, or too large.
+    """
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # no pipe makes it wait
+    try:
+        if Path(path).is_dir():  # Windows cannot open one
+            _check_kind(Path(path).stat(), path, what, max_bytes)
+        with os.fdopen(os.open(path, flags), "rb") as file:
+            _check_kind(os.fstat(file.fileno()), path, what, max_bytes)
+            content = file.read(max_bytes + 1)
+    except (OSError, ValueError) as error:
+        raise _unreadable(path, error) from None
+    if len(content) > max_bytes:  # such as /proc, whose sizes say nothing
+        raise _too_large(path, what, max_bytes)
+    return content
+
+
+def read_head(path: AnyPath, n_bytes: int) -> bytes:
+    """Return the first bytes of a plain file, to tell its kind; none where it is no such file."""
+    with contextlib.suppress(OSError, ValueError):
+        if stat.S_ISREG(Path(path).stat().st_mode):
+            with Path(path).open("rb") as file:
+                return file.read(n_bytes)
+    return b""
+
+
+def read_json(path: AnyPath, *, what: str = "file", remedy: str | None = None) -> Any:
+    """Return what a JSON file holds; raises as `read_bytes` does, and where it is not JSON."""
+    content = read_bytes(path, what=what)
+    try:
+        return json.loads(content)
+    except (ValueError, RecursionError):
+        raise FileFormatError("is not JSON: damaged or cut off", file=path, remedy=remedy) from None
+
+
+def _check_kind(status: os.stat_result, path: AnyPath, what: str, max_bytes: int) -> None:
+    remedy = f"Give a {what}."
+    if stat.S_ISDIR(status.st_mode):
+        raise FileFormatError(f"is a folder, not a {what}", file=path, remedy="Name a file in it.")
+    if not stat.S_ISREG(status.st_mode):
+        raise FileFormatError("is no plain file but a device or a pipe", file=path, remedy=remedy)
+    if status.st_size > max_bytes:
+        raise _too_large(path, what, max_bytes)
+
+
+def _too_large(path: AnyPath, what: str, max_bytes: int) -> FileFormatError:
+    limit = f"{max_bytes / 1e6:g} MB"
+    return FileFormatError(f"is too large for a {what}, above {limit}", file=path, remedy=f"Give a {what}.")
+
+
+def _unreadable(path: AnyPath, error: Exception) -> FileFormatError:
+    if isinstance(error, FileNotFoundError):
+        return FileFormatError("does not exist", file=path, remedy="Check the name and the folder.")
+    return FileFormatError(
+        f"cannot be read ({_reason(error)})", file=path, remedy="Check its name and permissions."
+    )
+
+
+# Writing
+
+
+def write_text(path: AnyPath, text: str) -> None:
+    """Write a text as UTF-8, whole or not at all; raises as `atomic_file` does."""
+    write_bytes(path, text.encode("utf-8", errors="backslashreplace"))  # names may hold what is not UTF-8
+
+
+def write_bytes(path: AnyPath, content: bytes) -> None:
+    """Write a file whole or not at all; raises as `atomic_file` does."""
+    with atomic_file(path) as draft:
+        draft.write_bytes(content)
+
+
+@contextmanager
+def atomic_file(path: AnyPath) -> Iterator[Path]:
+    """Let a file be written whole or not at all.
+
+    Yields
+    ------
+    Path
+        A draft beside it, with the same suffix: write it whole. It takes the name of the file afterwards,
+        unless an exception comes. For a device or a pipe it is copied to it.
+
+    Raises
+    ------
+    GpError
+        The folder is missing, the disk or its permissions refuse, or the file is protected. What was there
+        before is untouched.
+    """
+    try:
+        _refuse_protected(path)
+        if is_stream(path):
+            with _temporary_draft(path) as draft:
+                yield draft
+                _send(path, draft.read_bytes())
+            return
+        target = Path(os.path.realpath(path))  # a link stays a link
+        _check_target(target, path)
+        remove_drafts(target.parent, target.name)
+        with _locked_draft(target) as draft:
+            yield draft
+            _to_disk(draft)
+            if target.exists():
+                draft.chmod(stat.S_IMODE(target.stat().st_mode))
+            draft.replace(target)
+        with contextlib.suppress(OSError):  # make the name last too, where the system can
+            _to_disk(target.parent)
+    except (OSError, ValueError) as error:
+        raise GpError(f"cannot be written ({_reason(error)})", file=path, remedy=_remedy(error)) from None
+
+
+def remove_drafts(folder: Path, name: str | None = None) -> None:
+    """Delete the drafts that killed programs left in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Where.
+    name : str, optional
+        Of this file only, and of others where the draft is old; by default of all.
+    """
+    with contextlib.suppress(OSError), os.scandir(folder) as entries:
+        for entry in entries:
+            match = _DRAFT.fullmatch(entry.name)
+            if match is None:
+                continue
+            if name in (None, match["name"]) or time.time() - entry.stat().st_mtime > _FORGOTTEN_SECONDS:
+                _remove_unless_locked(Path(entry.path))
+
+
+def _check_target(target: Path, path: AnyPath) -> None:
+    if target.is_dir():
+        raise GpError("is a folder, not a file", file=path, remedy="Name a file in it.")
+    if target.exists() and not target.is_file():
+        raise GpError("is neither a file nor a pipe", file=path, remedy="Name another file.")
+    if target.exists() and not os.access(target, os.W_OK):  # to replace it, the folder's permission would do
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+
+
+@contextmanager
+def _locked_draft(target: Path) -> Iterator[Path]:
+    """Make a draft that `remove_drafts` leaves alone as long as this program lives."""
+    name = os.fsdecode(os.fsencode(target.name)[:_LONGEST_NAME])
+    draft = target.with_name(f".{name}.{os.urandom(4).hex()}.tmp{target.suffix[:20]}")
+    descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
+    try:
+        if fcntl is None:
+            os.close(descriptor)  # Windows renames no file that is open
+            descriptor = -1
+        else:
+            with contextlib.suppress(OSError):  # a file system without locks
+                fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield draft
+    finally:
+        draft.unlink(missing_ok=True)
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+def _remove_unless_locked(draft: Path) -> None:
+    with contextlib.suppress(OSError):
+        descriptor = os.open(draft, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0))
+        try:
+            if fcntl is not None:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        finally:
+            os.close(descriptor)
+        draft.unlink()
+
+
+def _to_disk(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _reason(error: Exception) -> object:
+    return getattr(error, "strerror", None) or error  # ValueError: a name that no system can hold
+
+
+def _remedy(error: Exception) -> str:
+    if getattr(error, "errno", None) in _FULL:
+        return "Free some space, or choose another folder. The file is as it was."
+    return "Check the folder and its permissions."
+
+
+# Devices, pipes and the program's own streams
+
+
+def is_stream(path: AnyPath) -> bool:
+    """Whether a file is to be written to, and must not be replaced."""
+    if _own_descriptor(path) is not None:
+        return True
+    with contextlib.suppress(OSError):
+        mode = Path(path).stat().st_mode
+        return stat.S_ISCHR(mode) or stat.S_ISFIFO(mode)
+    return False
+
+
+def _own_descriptor(path: AnyPath) -> int | None:
+    name = str(Path(path).absolute())
+    match = _DESCRIPTOR.fullmatch(name)
+    return int(match["number"]) if match else _STREAMS.get(name)
+
+
+@contextmanager
+def _temporary_draft(path: AnyPath) -> Iterator[Path]:
+    import tempfile
+
+    with tempfile.TemporaryDirectory() as folder:
+        yield Path(folder, f"draft{Path(path).suffix}")
+
+
+def _send(path: AnyPath, content: bytes) -> None:
+    own = _own_descriptor(path)
+    descriptor = _opened_stream(path) if own is None else os.dup(own)
+    with os.fdopen(descriptor, "wb") as stream:
+        stream.write(content)
+
+
+def _opened_stream(path: AnyPath) -> int:
+    """Open a device, or a pipe that somebody reads, or will soon."""
+    end = time.monotonic() + _PATIENCE_SECONDS
+    while True:
+        try:
+            descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))
+            break
+        except OSError as error:
+            if error.errno != errno.ENXIO:
+                raise
+            if time.monotonic() > end:
+                raise OSError(errno.ENXIO, "nobody reads this pipe") from None
+        time.sleep(0.05)
+    os.set_blocking(descriptor, True)
+    return descriptor
+
+
+# What a command reads
+
+
+@contextmanager
+def protected_inputs(paths: Iterable[AnyPath] = ()) -> Iterator[None]:
+    """Let nothing be written over these files, also through links, and over those that `protect` adds."""
+    before = dict(_protected)
+    try:
+        for path in paths:
+            protect(path)
+        yield
+    finally:
+        _protected.clear()
+        _protected.update(before)
+
+
+def protect(path: AnyPath) -> None:
+    """Let nothing be written over a file until the command ends."""
+    found = _identity(path)
+    if found is not None:
+        _protected.setdefault(found, os.fspath(path))
+
+
+def is_protected(path: AnyPath) -> bool:
+    """Whether a file is one that the command reads."""
+    return _identity(path) in _protected
+
+
+def _refuse_protected(path: AnyPath) -> None:
+    if is_protected(path):
+        raise GpError("is read, and would be written over", file=path, remedy="Name another file.")
+
+
+def _identity(path: AnyPath) -> tuple[int, int] | None:
+    """Return what tells a plain file from all others, whatever name it has; None where there is none."""
+    with contextlib.suppress(OSError, ValueError):
+        status = Path(path).stat()
+        if stat.S_ISREG(status.st_mode):
+            return status.st_dev, status.st_ino
+    return None

@@ -1,0 +1,57 @@
+"""Worker processes of a study: they leave Ctrl-C to the program that started them, and end with it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from multiprocessing import parent_process
+from multiprocessing.context import SpawnContext, SpawnProcess
+
+__all__ = ["worker_context"]
+
+
+class _Worker(SpawnProcess):
+    """A process that no Ctrl-C reaches from its start on, and that does not outlive its parent."""
+
+    def start(self) -> None:
+        with _interrupts_held():  # what is held here stays held in the process that begins
+            super().start()
+
+    def run(self) -> None:
+        threading.Thread(target=_end_with_parent, daemon=True).start()
+        super().run()
+
+
+class _WorkerContext(SpawnContext):
+    Process = _Worker
+
+
+def worker_context() -> SpawnContext:
+    """Return what a pool makes its processes of.
+
+    They are started afresh, not forked: a fork copies the locks of threads that do not come along.
+    """
+    return _WorkerContext()
+
+
+def _end_with_parent() -> None:
+    """Wait until the parent is gone, killed or not, then end at once: nobody reads the results any more."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+    os._exit(1)
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -1,0 +1,73 @@
+r"""What reaches a terminal: text without codes that would steer it.
+
+Names of files, animals and landmarks come from anywhere, and may hold escape sequences; a terminal would obey
+them. Control characters are shown instead, such as ``\x1b``.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, TextIO
+
+__all__ = ["leave_output", "plain_terminal", "printable"]
+
+# C0 and C1 control characters, line separators, what turns the direction of writing, lone surrogates
+_UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+_KEPT = "\n\t"
+
+
+def printable(text: str) -> str:
+    r"""Return a text with control characters shown as escapes; lines and tabs stay."""
+    return _UNSEEN.sub(_escaped, text)
+
+
+def _escaped(match: re.Match[str]) -> str:
+    character = match[0]
+    if character in _KEPT:
+        return character
+    code = ord(character)
+    if 0xDC80 <= code <= 0xDCFF:  # a byte of a name that is not UTF-8
+        code -= 0xDC00
+    return f"\\x{code:02x}" if code < 0x100 else f"\\u{code:04x}"
+
+
+@contextmanager
+def plain_terminal() -> Iterator[None]:
+    """Let what is written to stdout and stderr hold no control characters."""
+    before = sys.stdout, sys.stderr
+    for stream in before:
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows a question mark
+    sys.stdout, sys.stderr = (_PlainStream(stream) for stream in before)
+    try:
+        yield
+    finally:
+        sys.stdout, sys.stderr = before
+
+
+def leave_output() -> None:
+    """Write no more to stdout, which nobody reads; Python would complain at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+class _PlainStream:
+    """A text stream that shows control characters instead of passing them on.
+
+    A carriage return may begin what is written: so a line of progress is written over.
+    """
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        start = "\r" if text.startswith("\r") else ""
+        self._stream.write(start + printable(text[len(start) :]))
+        return len(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)

@@ -1,0 +1,172 @@
+"""Voxels of detached and attached headers: in one file or several, as bytes or as text."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gp_labeler.imaging.readers.headers import Layout
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error
+from gp_labeler.imaging.readers.source import Compression, Plane, RawSource, SliceSource
+
+__all__ = ["Chain", "Stored", "Whole", "shortage", "voxels_in"]
+
+_LONGEST_LINE = 1 << 20
+
+
+@dataclass(frozen=True)
+class Stored:
+    """How voxels are written into each of their files.
+
+    Parameters
+    ----------
+    dtype : dtype
+        Of one value, with its byte order.
+    packing : str
+        Compression, or ``"text"`` for numbers and ``"hex"`` for bytes written out.
+    offset : int
+        Bytes of the file before the voxels, or before their compressed stream.
+    lines : int
+        Lines to skip from there.
+    skip : int
+        Bytes to skip after that, of the unpacked stream.
+    tail : int, optional
+        Bytes after the voxels, which then are counted from the end of the file.
+    """
+
+    dtype: np.dtype[Any]
+    packing: str = "none"
+    offset: int = 0
+    lines: int = 0
+    skip: int = 0
+    tail: int | None = None
+
+
+@dataclass(frozen=True)
+class Chain:
+    """Planes of several files, one after the other."""
+
+    parts: tuple[RawSource, ...]
+
+    def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
+        """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
+        first = 0
+        for part in self.parts:
+            here = [number - first for number in wanted if first <= number < first + part.n_planes]
+            if here:
+                with failing_as_volume_error(part.path):
+                    yield from part.planes(here)
+            first += part.n_planes
+
+
+@dataclass(frozen=True)
+class Whole:
+    """Planes of voxels that can only be read all at once.
+
+    Parameters
+    ----------
+    load : callable
+        Returns the stored planes.
+    finish : callable
+        Makes the (y, x) grey plane of a stored one.
+    """
+
+    load: Callable[[], Plane]
+    finish: Callable[[Plane], Plane]
+
+    def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
+        """Yield the (y, x) grey planes with the numbers `wanted`."""
+        stored = self.load()
+        for number in wanted:
+            yield self.finish(stored[number])
+
+
+def voxels_in(
+    files: Sequence[Path], stored: Stored, layout: Layout, finish: Callable[[Plane], Plane]
+) -> SliceSource:
+    """Return the source of voxels that lie in one file, or in several of as many planes each.
+
+    Raises
+    ------
+    VolumeError
+        The planes cannot be shared out among the files, or the lines to skip are not there.
+    """
+    if stored.packing in ("text", "hex"):
+        if len(files) > 1:
+            raise VolumeError("its voxels are text in several files", remedy="Save it as one file.")
+        return Whole(partial(_typed_out, files[0], stored, layout), finish)
+    each, rest = divmod(layout.n_planes, len(files))
+    if rest or not each:
+        raise VolumeError(
+            f"its {layout.n_planes} slices cannot be shared out among {len(files)} files",
+            remedy="Correct its header.",
+        )
+    parts = tuple(_raw(file, stored, layout, each, finish) for file in files)
+    return parts[0] if len(parts) == 1 else Chain(parts)
+
+
+def shortage(source: SliceSource) -> tuple[Problem, ...]:
+    """Return the problem that a file is too short, of the first that is."""
+    parts = source.parts if isinstance(source, Chain) else (source,)
+    every = (part.shortage() for part in parts if isinstance(part, RawSource))
+    return next((problems for problems in every if problems), ())
+
+
+def _raw(
+    file: Path, stored: Stored, layout: Layout, n_planes: int, finish: Callable[[Plane], Plane]
+) -> RawSource:
+    packing: Compression = stored.packing  # type: ignore[assignment]
+    source = RawSource(
+        path=file,
+        offset=_after_lines(file, stored),
+        dtype=stored.dtype,
+        plane_shape=layout.plane_shape,
+        n_planes=n_planes,
+        compression=packing,
+        finish=finish,
+        skip=stored.skip,
+    )
+    if stored.tail is None:
+        return source
+    end = file.stat().st_size - stored.tail
+    return replace(source, offset=max(0, end - source.plane_bytes * n_planes), skip=0)
+
+
+def _after_lines(file: Path, stored: Stored) -> int:
+    if not stored.lines:
+        return stored.offset
+    with file.open("rb") as opened:
+        opened.seek(stored.offset)
+        for n in range(stored.lines):
+            if not opened.readline(_LONGEST_LINE).endswith(b"\n"):
+                raise VolumeError(f"it has no {stored.lines} lines to skip, only {n}", file=file)
+        return opened.tell()
+
+
+def _typed_out(file: Path, stored: Stored, layout: Layout) -> Plane:
+    """Read voxels that are written out, as numbers or as hexadecimal bytes."""
+    with file.open("rb") as opened:
+        opened.seek(_after_lines(file, stored) + stored.skip)
+        text = opened.read()
+    shape = (layout.n_planes, *layout.plane_shape)
+    n = int(np.prod(shape))
+    try:
+        if stored.packing == "hex":
+            values = np.frombuffer(bytes.fromhex(text.decode("ascii")), stored.dtype)
+        else:
+            values = np.array(text.split(maxsplit=n)[:n], dtype=np.float64)
+    except ValueError:
+        raise VolumeError("its voxels, written as text, are no numbers", file=file) from None
+    if len(values) < n:
+        raise VolumeError(
+            f"it holds {len(values):,} values, but {n:,} are needed: it is incomplete",
+            file=file,
+            remedy="Copy it again.",
+        )
+    planes: Plane = values[:n].astype(stored.dtype).reshape(shape)
+    return planes

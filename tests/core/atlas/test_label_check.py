@@ -1,0 +1,151 @@
+"""Mistakes in labels are found and named, good labels left alone, however the head lies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+from atlas_cases import random_pose
+
+from gp_core import Atlas, LandmarkSet, Side, Specimen, check_side
+from gp_core.atlas.draw import draw_animal
+from gp_core.frames import mirror_x
+from gp_core.landmarks.suggestion import Suggestion
+
+N_EARS = 60
+LEAST = {  # of 60, by labels: side found, exchange found, exchange named; what the best checker before found
+    4: (35, 16, 16),
+    5: (57, 59, 18),
+    6: (59, 60, 24),
+    8: (60, 60, 38),
+    12: (60, 60, 52),
+    19: (60, 60, 55),
+}
+CHANCE = 3
+"""Other ears than those counted then: this many fewer of 60 is no worse."""
+
+
+@pytest.fixture(scope="module")
+def published() -> Atlas:
+    return Atlas.published()
+
+
+def _ears(atlas: Atlas, n: int, n_ears: int, seed: int) -> Iterator[LandmarkSet]:
+    for ear in range(n_ears):
+        rng = np.random.default_rng([seed, n, ear])
+        side = (Side.LEFT, Side.RIGHT)[ear % 2]
+        whole = draw_animal(atlas, rng=rng, tilt_deg=20).side(side)
+        codes = rng.choice(atlas.codes, n, replace=False)
+        yield LandmarkSet.from_mapping({c: whole[c] + rng.normal(0, 0.1, 3) for c in codes}, side)
+
+
+def _swapped(landmarks: LandmarkSet, a: str, b: str) -> LandmarkSet:
+    return landmarks.with_point(a, landmarks[b]).with_point(b, landmarks[a])
+
+
+def _renamed(landmarks: LandmarkSet) -> LandmarkSet:
+    return LandmarkSet(landmarks.points, landmarks.side.other, landmarks.frame)
+
+
+@pytest.mark.parametrize("n", LEAST)
+def test_mistakes_are_found_at_least_as_often_as_by_the_two_checkers_before(published: Atlas, n: int) -> None:
+    found = np.zeros(3, dtype=int)
+    for ear in _ears(published, n, N_EARS, seed=1):
+        a, b = ear.placed[0], ear.placed[-1]
+        exchanged = check_side(_swapped(ear, a, b), published)
+        named = [set(f.landmarks) for f in exchanged.findings if f.kind == "swapped"] == [{a, b}]
+        both = {a, b} <= set(exchanged.doubts)
+        found += (check_side(_renamed(ear), published).is_other_side, named or both, named)
+    assert (found >= np.array(LEAST[n]) - CHANCE).all(), found
+
+
+@pytest.mark.parametrize("n", [4, 5, 8, 13, 19])
+def test_good_labels_are_left_alone(published: Atlas, n: int) -> None:
+    ears = _ears(published, n, 40, seed=2)
+    assert [check_side(ear, published).doubts for ear in ears] == [{}] * 40
+
+
+def test_the_real_labels_are_left_alone_and_their_mistakes_found(
+    real_specimens: list[Specimen], published: Atlas
+) -> None:
+    rng = np.random.default_rng(0)
+    for animal in real_specimens:
+        for side in animal.sides.values():
+            codes = rng.choice(published.codes, 8, replace=False).tolist()
+            some = LandmarkSet.from_mapping(side.as_mapping(codes), side.side)
+            assert check_side(some, published).doubts == {}
+            assert check_side(_renamed(some), published).is_other_side
+            doubt = check_side(_swapped(some, *codes[:2]), published).doubts[codes[0]]
+            assert (doubt.kind, set(doubt.landmarks)) == ("swapped", set(codes[:2]))
+
+
+def test_a_finding_says_what_how_sure_and_what_to_do(published: Atlas) -> None:
+    (ear,) = _ears(published, 12, 1, seed=3)
+    (finding,) = (f for f in check_side(_renamed(ear), published).findings if f.is_doubt)
+    assert (finding.kind, finding.landmarks, finding.side) == ("other side", ear.placed, ear.side.other)
+    assert finding.certainty == pytest.approx(1, abs=1e-3)
+    assert finding.remedy == "Swap left and right."
+    a, b = ear.placed[2:4]
+    (finding,) = (f for f in check_side(_swapped(ear, a, b), published).findings if f.is_doubt)
+    assert (finding.kind, finding.landmarks) == ("swapped", (a, b))
+    assert finding.certainty > 0.95
+    assert finding.remedy == f"Exchange the names of {a} and {b}."
+    np.testing.assert_allclose(finding.departure_of(a).expected, ear[a], atol=1.0)
+
+
+def test_several_mistakes_are_told_apart(published: Atlas) -> None:
+    (ear,) = _ears(published, 19, 1, seed=4)
+    wrong = _swapped(_swapped(ear, "CA", "CB"), "RWA", "RWP").with_point("OS", ear["OS"] + [0, 0, 4])
+    found = {(f.kind, f.landmarks) for f in check_side(_renamed(wrong), published).findings if f.is_doubt}
+    assert found == {
+        ("other side", tuple(wrong.placed)),
+        ("swapped", ("CA", "CB")),
+        ("swapped", ("RWA", "RWP")),
+        ("far", ("OS",)),
+    }
+
+
+def test_one_wrong_label_accuses_no_other(published: Atlas) -> None:
+    for ear in _ears(published, 8, 20, seed=5):
+        code = next(c for c in ear.placed if c not in ("IN", "ZL", "MN", "OI"))
+        doubts = check_side(ear.with_point(code, ear[code] + [3, 3, 0]), published).doubts
+        assert set(doubts) == {code}
+        assert doubts[code].kind == "far"
+        assert doubts[code].departure_of(code).distance == pytest.approx(4.2, abs=1)
+
+
+def test_neither_pose_nor_side_nor_order_matters(published: Atlas) -> None:
+    (ear,) = _ears(published, 9, 1, seed=6)
+    wrong = _swapped(ear, *ear.placed[:2]).with_point(ear.placed[4], ear[ear.placed[4]] + [2, 0, 0])
+    T = random_pose(np.random.default_rng(7))
+    mirrored = LandmarkSet(mirror_x(wrong.points), wrong.side.other, wrong.frame)
+    backwards = LandmarkSet.from_mapping(dict(reversed(wrong.as_mapping().items())), wrong.side)
+    still = check_side(wrong, published)
+    for other in (wrong.moved(T), mirrored, backwards):
+        again = check_side(other, published)
+        assert {(f.kind, f.landmarks) for f in again.findings} == {
+            (f.kind, f.landmarks) for f in still.findings
+        }
+        for code, away in still.departures.items():
+            assert again.departures[code].n_sd == pytest.approx(away.n_sd, rel=1e-6, abs=1e-6)
+    for code, away in still.departures.items():
+        expected = check_side(wrong.moved(T), published).departures[code].expected
+        np.testing.assert_allclose(expected, T.apply(away.expected[None])[0], atol=1e-5)
+
+
+def test_points_at_one_place_are_named(published: Atlas) -> None:
+    few = LandmarkSet.from_mapping({"CA": [0, 0, 0], "CB": [0.02, 0, 0]}, "L")
+    doubts = check_side(few, published).doubts
+    assert {code: doubt.kind for code, doubt in doubts.items()} == {"CA": "duplicate", "CB": "duplicate"}
+
+
+def test_suggestions_are_not_judged_and_judge_nothing(published: Atlas) -> None:
+    (ear,) = _ears(published, 6, 1, seed=8)
+    to_do = next(code for code in published.codes if code not in ear)
+    suggested = ear.with_suggestions({to_do: Suggestion(np.full(3, 99.0), 1.0, "atlas")})
+    found = check_side(suggested, published)
+    assert found.doubts == {}
+    assert [f.kind for f in found.findings if f.landmarks == (to_do,)] == ["suggested"]
+    for code, away in check_side(ear, published).departures.items():
+        assert found.departures[code].n_sd == away.n_sd

@@ -1,0 +1,81 @@
+"""Processes of a study: Ctrl-C is one line, and none outlives the program that started it."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are counted in /proc")
+
+STUDY = [sys.executable, "-m", "gp_core.cli", "compare", "--repeats", "200", "--workers", "2"]
+DEADLINE_SECONDS = 60.0
+
+
+def children(pid: int) -> set[int]:
+    """Return all processes that a process started, and theirs."""
+    found: set[int] = set()
+    for stat in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            name, _, rest = stat.read_text().rpartition(")")
+        except OSError:
+            continue
+        if int(rest.split()[1]) == pid:
+            child = int(name.split()[0])
+            found |= {child, *children(child)}
+    return found
+
+
+def alive(pids: set[int]) -> set[int]:
+    return {pid for pid in pids if Path(f"/proc/{pid}/stat").exists() and _state(pid) not in ("Z", "")}
+
+
+def _state(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return ""
+
+
+def wait_for(condition, seconds: float = DEADLINE_SECONDS) -> bool:
+    end = time.monotonic() + seconds
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    return bool(condition())
+
+
+@pytest.fixture
+def study():
+    process = subprocess.Popen(
+        STUDY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, text=True
+    )
+    yield process
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+    process.communicate()
+
+
+@pytest.mark.parametrize(("number", "pause"), [(signal.SIGKILL, 0.0), (signal.SIGTERM, 3.0)])
+def test_workers_end_with_the_study(number: signal.Signals, pause: float, study: subprocess.Popen) -> None:
+    assert wait_for(lambda: len(children(study.pid)) >= 3), "two workers and the tracker of their resources"
+    time.sleep(pause)
+    workers = children(study.pid)
+    study.send_signal(number)
+    assert wait_for(lambda: not alive(workers)), "somebody still works"
+    out, _ = study.communicate(timeout=DEADLINE_SECONDS)  # ends where nobody holds the pipe open
+    assert out == ""
+
+
+@pytest.mark.parametrize("pause", [0.0, 0.3])
+def test_ctrl_c_is_one_line(pause: float, study: subprocess.Popen) -> None:
+    """As a terminal does it: the whole group is told, workers that begin just now too."""
+    assert wait_for(lambda: len(children(study.pid)) >= 2)
+    time.sleep(pause)
+    os.killpg(study.pid, signal.SIGINT)
+    _, err = study.communicate(timeout=DEADLINE_SECONDS)
+    assert (study.returncode, err) == (130, "gp-core: stopped\n")

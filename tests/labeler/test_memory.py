@@ -1,0 +1,171 @@
+"""Scans that were closed are freed at once, by counting alone: three of them must fit where one does.
+
+Voxels are gigabytes, and what the collector of cycles looks at is a handful of small objects: it may not come
+for hours.
+"""
+
+from __future__ import annotations
+
+import gc
+import weakref
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+from window_cases import MIDDLE, ball_volume, settle, write_ball
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.session import labelling
+from gp_labeler.session.jobs import Progress, QueueDispatcher
+from gp_labeler.session.state import How
+from gp_labeler.workbench import Workbench
+
+Refs = dict[str, weakref.ref]
+
+
+@dataclass(frozen=True)
+class _Fails:
+    """A job that fails with voxels in its hands."""
+
+    volume: Volume
+    title = "Fails"
+
+    def run(self, progress: Progress) -> None:
+        voxels = self.volume.array
+        try:
+            _ = voxels[len(voxels)]
+        except IndexError as problem:
+            raise GpError("there is no such slice") from problem
+
+
+@dataclass(frozen=True)
+class _Waits:
+    """A job that is stopped with voxels in its hands."""
+
+    volume: Volume
+    title = "Waits"
+
+    def run(self, progress: Progress) -> None:
+        while True:
+            progress.wait(0.005)
+            progress(0.5)
+
+
+@pytest.fixture
+def no_collector() -> Iterator[None]:
+    gc.collect()
+    gc.disable()
+    yield
+    gc.enable()
+
+
+@pytest.fixture
+def desk() -> Iterator[tuple[Workbench, Callable[[], None]]]:
+    dispatcher = QueueDispatcher()
+    desk = Workbench(None, dispatcher)
+    yield desk, lambda: dispatcher.deliver_until_idle(desk.jobs, timeout=60)
+    desk.close()
+
+
+def _new_ball(n: int, direction: np.ndarray | None = None) -> Volume:
+    ball = ball_volume()
+    array = ball.array.copy()
+    array[0, 0, n] += 1
+    return Volume.from_parts(array, ball.spacing, ball.origin, direction, name=f"ball{n}")
+
+
+def _remembered(desk: Workbench) -> Refs:
+    """Return weak references to the voxels and meshes that are open."""
+    assert desk.volume is not None
+    array = desk.volume.array
+    refs: Refs = {"volume": weakref.ref(desk.volume), "array": weakref.ref(array)}
+    if array.base is not None:
+        refs["voxels"] = weakref.ref(array.base)
+    for n, surface in enumerate((*desk.surfaces, *desk.quick_surfaces)):
+        refs |= {f"surface {n}": weakref.ref(surface), f"mesh {n}": weakref.ref(surface.mesh)}
+        refs[f"locator {n}"] = weakref.ref(surface._locator)
+    return refs
+
+
+def _alive(refs: Refs) -> list[str]:
+    return [name for name, ref in refs.items() if ref() is not None]
+
+
+def _work_on(desk: Workbench, wait: Callable[[], None]) -> Refs:
+    """Mesh, place points, change the threshold, to one without a surface too; end jobs in every way."""
+    wait()
+    refs = _remembered(desk)
+    for n, code in enumerate(("CA", "RWP", "OS", "CB")):
+        labelling.place(
+            desk.session, MIDDLE + np.array([n, 1, 0.3 * n]), How.SLICE, side=Side.LEFT, code=code
+        )
+    for threshold in (1100.0, 1e9, 1000.0):
+        desk.set_threshold(threshold)
+        wait()
+    desk.jobs.submit(_Fails(desk.volume))
+    waiting = desk.jobs.submit(_Waits(desk.volume))
+    waiting.cancel()
+    del waiting
+    wait()
+    desk.abandon()
+    return refs | {f"later {name}": ref for name, ref in _remembered(desk).items()}
+
+
+@pytest.mark.usefixtures("no_collector")
+def test_opening_another_scan_frees_the_one_before(desk) -> None:
+    desk, wait = desk
+    desk.open_volume(_new_ball(1))
+    first = _work_on(desk, wait)
+    desk.open_volume(_new_ball(2))
+    wait()
+    assert _alive(first) == []
+    second = _work_on(desk, wait)
+    desk.begin()
+    wait()
+    assert _alive(second) == []
+
+
+@pytest.mark.usefixtures("no_collector")
+def test_a_scan_read_from_a_file_is_freed(desk, tmp_path: Path) -> None:
+    desk, wait = desk
+    desk.open_scan(write_ball(tmp_path / "ball.nrrd"))
+    wait()
+    refs = _work_on(desk, wait)
+    desk.open_scan(tmp_path / "ball.nrrd")
+    wait()
+    assert _alive(refs) == []
+
+
+@pytest.mark.usefixtures("no_collector")
+def test_closing_frees_the_scan() -> None:
+    dispatcher = QueueDispatcher()
+    desk = Workbench(None, dispatcher)
+    desk.open_volume(_new_ball(3))
+    refs = _work_on(desk, lambda: dispatcher.deliver_until_idle(desk.jobs, timeout=60))
+    desk.close(discard=True)
+    assert _alive(refs) == []
+
+
+@pytest.mark.parametrize("layout", ["shown", "hidden"])
+def test_the_window_frees_the_scan_before(layout: str, qtbot, make_window, no_collector) -> None:
+    from scipy.spatial.transform import Rotation
+
+    window = make_window()
+    desk, wait = window.workbench, lambda: settle(qtbot, window)
+    oblique = Rotation.from_euler("xyz", [10, 20, 5], degrees=True).as_matrix()
+    desk.open_volume(_new_ball(1))
+    first = _work_on(desk, wait)
+    window.grab()
+    if layout == "hidden":
+        window.hide()
+    desk.open_volume(_new_ball(2, oblique))
+    wait()
+    assert _alive(first) == []
+    second = _work_on(desk, wait)
+    desk.begin()
+    wait()
+    assert _alive(second) == []
