@@ -79,6 +79,20 @@ def _has_ghost(desk: Workbench) -> bool:
     return active.code is not None and active.code in desk.session.ghosts(active.side)
 
 
+def _is_suggested(desk: Workbench) -> bool:
+    mark = _mark(desk)
+    return mark is not None and mark.suggestion is not None
+
+
+def _can_confirm(desk: Workbench) -> bool:
+    return _is_free(desk) and (_has_ghost(desk) or _is_suggested(desk))
+
+
+def _can_place(desk: Workbench) -> bool:
+    """Whether placing the chosen point moves none that is placed, or is asked for."""
+    return _has_scan(desk) and _is_free(desk) and (desk.replacing or not _is_placed(desk))
+
+
 # What is done
 
 
@@ -136,6 +150,26 @@ def _look_from(letter: str) -> Run:
 
 def _place_at_crosshair(desk: Workbench, ui: Ui) -> None:
     labelling.place(desk.session, desk.session.crosshair, How.SLICE)
+    desk.arm_replacing(False)
+
+
+def _confirm(desk: Workbench, ui: Ui) -> None:
+    active = desk.session.active
+    if active.code is not None:
+        desk.confirm(active.side, active.code)
+
+
+def _accept_or_confirm(desk: Workbench, ui: Ui) -> None:
+    if _is_suggested(desk):
+        _confirm(desk, ui)
+    else:
+        labelling.accept_ghost(desk.session)
+
+
+def _let_place(desk: Workbench, ui: Ui) -> None:
+    if not desk.is_labelling:
+        ui.show_step("label")
+    desk.set_tool("place")
 
 
 def _toggle_lock(desk: Workbench, ui: Ui) -> None:
@@ -234,7 +268,8 @@ def view_rows() -> Iterator[Action]:
     for word, letter, keys in _VIEWPOINTS:
         yield row(f"view.from_{word}", f"Look from {word}", keys, _look_from(letter), group="from")
     for title, tool, key in _TOOLS:
-        yield row(f"tool.{tool}", title, (key,), _set_tool(tool), checked=_has_tool(tool), group="tool",
+        run = _let_place if tool == "place" else _set_tool(tool)
+        yield row(f"tool.{tool}", title, (key,), run, checked=_has_tool(tool), group="tool",
                   hint="What the left button does over a slice")
     yield row("view.auto_greys", "Automatic contrast", ("Shift+W",), _auto_greys, _has_scan, group="tool")
     for title, field, key in _SHOWN:
@@ -281,17 +316,26 @@ def landmark_rows() -> Iterator[Action]:
             checked: Test | None = None, group: str = "place", hint: str = "", icon: str = "") -> Action:
         return Action(id, "Landmarks", title, keys, run, enabled, checked, hint, group, icon)
 
-    yield row("point.accept_ghost", "Accept the ghost", ("Return", "Enter"),
-              lambda d, ui: labelling.accept_ghost(d.session), lambda d: _has_ghost(d) and _is_free(d),
-              hint="Place the point where the atlas expects it", icon="check")
-    yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair,
-              lambda d: _has_scan(d) and _is_free(d), icon="label")
+    yield row("point.accept_ghost", "Accept the ghost, confirm a suggestion", ("Return", "Enter"),
+              _accept_or_confirm, _can_confirm, icon="check",
+              hint="An accepted ghost is a suggestion: it counts once it is confirmed where it can be judged")
+    yield row("point.confirm", "Confirm the suggestion or ghost", ("Ctrl+Return", "Ctrl+Enter"), _confirm,
+              _can_confirm, hint="The view comes closer first where the point cannot be judged")
+    yield row("point.accept_all", "Accept all ghosts of this side", (),
+              lambda d, ui: labelling.accept_all_ghosts(d.session),
+              lambda d: bool(d.session.ghosts(d.session.active.side)), hint="As suggestions to confirm")
+    yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
+              icon="label")
+    yield row("point.replace", "Re-place with the next click", ("Shift+P",),
+              lambda d, ui: d.arm_replacing(not d.replacing),
+              lambda d: _has_scan(d) and _is_free(d) and _is_placed(d), checked=lambda d: d.replacing,
+              hint="One click moves the chosen point; without this, a click leaves it where it is")
     yield row("point.skip", "Skip for now", ("N",), lambda d, ui: labelling.skip(d.session), _has_active,
               icon="skip")
     yield row("point.unseen", "Cannot be seen", ("X",), lambda d, ui: labelling.mark_unseen(d.session),
               _is_free, icon="unseen")
     yield row("point.clear", "Clear", ("Delete", "Backspace"), lambda d, ui: labelling.clear(d.session),
-              lambda d: _is_free(d) and _is_settled(d))
+              lambda d: _is_free(d) and (_is_settled(d) or _is_suggested(d)))
     yield row("point.check", "Mark as checked", ("K",), _toggle_check, _is_placed, checked=_is_checked,
               group="state")
     yield row("point.lock", "Lock", ("L",), _toggle_lock, _is_settled, checked=_is_locked, group="state",

@@ -71,7 +71,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
         (
             "In the 3D view",
             (
-                ("Click on bone", "place the point"),
+                ("Click on bone", "place the point that is to do"),
                 ("Drag a point", "move it, on the bone"),
                 ("Left drag", "rotate (Ctrl: spin)"),
                 ("Middle drag, Shift+drag", "pan"),
@@ -86,7 +86,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
         (
             "On a slice",
             (
-                ("Click", "place the point"),
+                ("Click", "place the point that is to do"),
                 ("Drag a point", "move it, on bone if placed there (Alt: freely)"),
                 ("Arrow keys", "move the point a voxel"),
                 ("Wheel, F and B", "next and previous slice"),

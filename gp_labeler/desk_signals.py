@@ -69,6 +69,8 @@ class DeskSignals:
     dragged = Signal(object)
     """The `Drag` that goes on; None when it is over."""
     tool_changed = Signal(str)
+    replacing_changed = Signal(bool)
+    """Whether the next click moves the chosen point, which is placed already."""
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into sight, mm."""
     import_asked = Signal(object)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from gp_labeler.pose_desk import PoseDesk
 from gp_labeler.session import labelling
 from gp_labeler.session.atlas_memory import AtlasMemory
 from gp_labeler.session.edited_specimen import VolumeChangedError
+from gp_labeler.session.edits import point_text, require_free
 from gp_labeler.session.jobs import Dispatcher, Jobs, Task
 from gp_labeler.session.opening import new_session, open_session, recover_session, tidy_name
 from gp_labeler.session.recent import RecentFiles
@@ -33,18 +34,30 @@ from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import RenameSpecimen
 from gp_labeler.session.specimen_file import SUFFIX
-from gp_labeler.session.state import How, SpecimenState
+from gp_labeler.session.state import How, SpecimenState, point_key
 from gp_labeler.tracker_desk import TrackerDesk
 from gp_labeler.work import Demo, InspectScan, MakeDemo, ReadScan, phantom_seed
 
-__all__ = ["TOOLS", "Drag", "Workbench"]
+__all__ = ["TOOLS", "Drag", "Sight", "Workbench"]
 
 TOOLS = ("place", "look", "grey", "touch")
 """What a plain left click or drag over a slice does: place, move the crosshair, grey window, touch."""
 
 
+class Sight(Protocol):
+    """What a window knows of what the user sees."""
+
+    def can_judge(self, position: FloatArray) -> bool:
+        """Whether a view shows a (3,) scan position with voxels at least two screen pixels wide."""
+        ...
+
+    def bring_close(self, position: FloatArray) -> None:
+        """Show a (3,) scan position so closely that it can be judged."""
+        ...
+
+
 class Drag:
-    """A placed point on its way: shown where the hand has it, and not yet an edit."""
+    """A placed or suggested point on its way: shown where the hand has it, and not yet an edit."""
 
     def __init__(self, side: Side, code: str, position: FloatArray, how: How) -> None:
         self.side, self.code, self.position, self.how = side, code, position, how
@@ -83,7 +96,10 @@ class Workbench(AtlasDesk, BoneDesk):
         self.atlas_memory = AtlasMemory(directory) if directory else None
         self.truth: Specimen | None = None  # of a phantom: where its features really are
         self.drag: Drag | None = None
+        self.sight: Sight | None = None  # of the window, if there is one
         self.tool = "place"
+        self.is_labelling = True  # whether a plain click may place
+        self.replacing = False  # whether the next click moves the chosen, placed point
         self._author = author
         self._last: tuple[Side, str] | None = None
         self._abandoned: SpecimenState | None = None
@@ -93,6 +109,8 @@ class Workbench(AtlasDesk, BoneDesk):
         self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
+        for signal in (self.active_changed, self.session_replaced, self.landmarks_changed):
+            signal.connect(self._disarm)
         self.pose = PoseDesk(self)
         self.tracker = TrackerDesk(self)
 
@@ -198,39 +216,95 @@ class Workbench(AtlasDesk, BoneDesk):
     def begin_labelling(self) -> None:
         """Let a click place points; who labels shall not see where an estimate wants the cochlea."""
         self.pose.draw(visible=False)
+        self.is_labelling = True
         if self.tool != "grey":
             self.set_tool("place")
 
-    def begin_judging(self) -> None:
-        """Show the estimate, and let no click that is meant to look at it move a landmark."""
-        self.pose.prepare()
-        self.pose.draw(visible=True)
-        if self.tool == "place" and self.volume is not None:
+    def begin_looking(self) -> None:
+        """Let clicks look, not place: outside the step Label, a click is not meant for a landmark."""
+        self.is_labelling = False
+        self.arm_replacing(False)
+        if self.tool in ("place", "touch"):
             self.set_tool("look")
 
+    def begin_judging(self) -> None:
+        """Show the estimate, and let no click that is meant to look at it move a landmark."""
+        is_touching = self.tool == "touch"
+        self.pose.prepare()
+        self.pose.draw(visible=True)
+        self.begin_looking()
+        if is_touching:
+            self.set_tool("touch")
+
+    def arm_replacing(self, on: bool = True) -> None:
+        """Let the next click, and no other, move the chosen point, which is placed; or think better of it.
+
+        Raises
+        ------
+        GpError
+            No placed point is chosen, or it is locked.
+        """
+        if on:
+            active = self.session.active
+            mark = None if active.code is None else self.session.state.landmark(active.side, active.code)
+            if active.code is None or mark is None or mark.position is None:
+                raise GpError("no placed point is chosen to re-place", remedy="Choose one in the table.")
+            require_free(self.session.state, [point_key(active.side, active.code)])
+        if on != self.replacing:
+            self.replacing = on
+            self.replacing_changed.emit(on)
+
+    def confirm(self, side: Side, code: str) -> bool:
+        """Confirm a suggestion, or a ghost, where it can be judged; else bring it there first.
+
+        Returns
+        -------
+        bool
+            Whether it is confirmed. Where not, the view shows it now, for the user to judge and confirm it.
+
+        Raises
+        ------
+        GpError
+            Nothing suggests where the point is, or it is locked.
+        """
+        session = self.session
+        is_ghost = code in session.ghosts(side)
+        where = labelling.place_of(session, side, code)
+        if where is None or session.state.landmark(side, code).settled:
+            point = point_text(side, code)
+            raise GpError(f"{point} is not suggested, so there is nothing to confirm", landmark=code)
+        if self.sight is not None and not self.sight.can_judge(where):
+            labelling.go_to(session, side, code)
+            self.sight.bring_close(where)
+            self.say(f"Is {point_text(side, code)} right here? Confirm it, or drag it to where it belongs")
+            return False
+        if is_ghost:
+            labelling.accept_ghost(session, side=side, code=code)
+        return labelling.confirm(session, side=side, code=code)
+
     def go_to(self, side: Side, code: str) -> None:
-        """Choose a point, and bring it, or where it is expected, into sight in every view."""
+        """Choose a point, and bring it, or where it is suggested or expected, into sight in every view."""
         labelling.go_to(self.session, side, code)
-        landmarks, ghosts = self.session.landmarks(side), self.session.ghosts(side)
-        if code in landmarks or code in ghosts:
+        if labelling.place_of(self.session, side, code) is not None:
             self.point_shown.emit(self.session.crosshair)
 
     def nudged_point(self) -> tuple[Side, str] | None:
-        """Return the point that arrow keys move: the chosen one if it is placed, else the one placed last."""
+        """Return the point that arrow keys move: the chosen one where it has a place, else the last."""
         active, last = self.session.active, self._last
-        if active.code is not None and self.session.state.landmark(active.side, active.code).position:
+        if active.code is not None and self.session.state.landmark(active.side, active.code).shown_position:
             return active.side, active.code
         if last is not None and self.session.state.landmark(*last).position is not None:
             return last
         return None
 
     def begin_drag(self, side: Side, code: str) -> bool:
-        """Take up a placed point; False where it cannot be moved."""
+        """Take up a placed or suggested point; False where it cannot be moved."""
         mark = self.session.state.landmark(side, code)
-        if mark.position is None or mark.locked:
+        if mark.shown_position is None or mark.locked:
             return False
-        how = mark.provenance.how if mark.provenance else How.SLICE
-        self.drag = Drag(side, code, np.array(mark.position), how)
+        is_placed = mark.position is not None and mark.provenance is not None
+        how = mark.provenance.how if is_placed and mark.provenance else How.SLICE
+        self.drag = Drag(side, code, np.array(mark.shown_position), how)
         self.dragged.emit(self.drag)
         return True
 
@@ -247,7 +321,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.dragged.emit(None)
         if drag is None or not keep:
             return False
-        here = self.session.state.landmark(drag.side, drag.code).position
+        here = self.session.state.landmark(drag.side, drag.code).shown_position
         if here is not None and np.allclose(here, drag.position, atol=1e-9):
             return False
         return labelling.place(self.session, drag.position, drag.how, side=drag.side, code=drag.code)
@@ -305,6 +379,8 @@ class Workbench(AtlasDesk, BoneDesk):
         self._follow(self.session)
         self.session_replaced.emit(session)
         self.surfaces_changed.emit()
+        for text in session.notices:
+            self.say(text, "warning")
         self._read_own_scan()
 
     def _read_own_scan(self) -> None:
@@ -354,6 +430,9 @@ class Workbench(AtlasDesk, BoneDesk):
         self._last = touched[0] if len({code for _, code in touched}) == 1 else None
         self._judge({side for side, _ in changed})
         self._bone.mesh_ears()
+
+    def _disarm(self, *_: object) -> None:
+        self.arm_replacing(False)
 
     def _on_failed(self, task: Task[Any]) -> None:
         self.say(task.message, "error")

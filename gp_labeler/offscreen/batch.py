@@ -20,7 +20,7 @@ __all__ = ["SUMMARY", "run_batch", "summary_lines"]
 
 SUMMARY = "summary.csv"
 
-_COLUMNS = ("specimen", "ok", "steps", "placed", "seconds", "largest error mm", "error")
+_COLUMNS = ("specimen", "ok", "steps", "placed", "suggested", "seconds", "largest error mm", "error")
 
 
 def run_batch(
@@ -64,10 +64,10 @@ def run_batch(
 def summary_lines(reports: Mapping[str, Report]) -> list[str]:
     """Return a table for the terminal."""
     width = max(len(name) for name in reports)
-    lines = [f"{'specimen':<{max(width, 8)}}  steps  placed  seconds"]
+    lines = [f"{'specimen':<{max(width, 8)}}  steps  placed  suggested  seconds"]
     for name, report in reports.items():
         row = _row(name, report)
-        counts = f"{row['steps']:>5}  {row['placed']:>6}  {row['seconds']:>7}"
+        counts = f"{row['steps']:>5}  {row['placed']:>6}  {row['suggested']:>9}  {row['seconds']:>7}"
         lines.append(f"{name:<{max(width, 8)}}  {counts}  {report.error or 'done'}")
     failed = sum(not report.ok for report in reports.values())
     return [*lines, f"{len(reports) - failed} of {len(reports)} done"]
@@ -112,6 +112,7 @@ def _row(name: str, report: Report) -> dict[str, Any]:
         "ok": "yes" if report.ok else "no",
         "steps": len(report.steps) - (not report.ok and bool(report.steps)),
         "placed": content["n_placed"],
+        "suggested": content["n_suggested"],
         "seconds": f"{report.seconds:.1f}",
         "largest error mm": "" if largest is None else f"{largest:.3f}",
         "error": report.error,

@@ -13,7 +13,7 @@ from gp_core.disk import write_text
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.offscreen.rig import Rig
 
-__all__ = ["Report", "StepRecord", "feature_rows", "pose_rows"]
+__all__ = ["Report", "StepRecord", "feature_rows", "pose_rows", "suggested_rows"]
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ class Report:
     error: str = ""
     steps: list[StepRecord] = field(default_factory=list)
     features: list[dict[str, Any]] = field(default_factory=list)
+    suggested: list[dict[str, Any]] = field(default_factory=list)
     poses: list[dict[str, Any]] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
 
@@ -76,7 +77,8 @@ class Report:
     def take_stock(self, rig: Rig) -> None:
         """Note what the window holds now."""
         self.specimen = rig.desk.session.state.specimen
-        self.features, self.poses = feature_rows(rig), pose_rows(rig)
+        self.features, self.suggested = feature_rows(rig), suggested_rows(rig)
+        self.poses = pose_rows(rig)
         self.files = [_relative(file, rig.output) for file in rig.files]
 
     def as_dict(self) -> dict[str, Any]:
@@ -90,6 +92,7 @@ class Report:
             "error": self.error,
             "seconds": round(self.seconds, 3),
             "n_placed": len(self.features),
+            "n_suggested": len(self.suggested),
             "largest_error_mm": max(errors, default=None),
             "largest_error_voxels": max(voxels, default=None),
             "steps": [
@@ -103,6 +106,7 @@ class Report:
                 for step in self.steps
             ],
             "features": self.features,
+            "suggested": self.suggested,
             "poses": self.poses,
             "files": self.files,
         }
@@ -125,6 +129,21 @@ def feature_rows(rig: Rig) -> list[dict[str, Any]]:
                 row |= {"true": truth.tolist(), "error_mm": off, "error_voxels": off / rig.voxel}
             rows.append(row)
     return rows
+
+
+def suggested_rows(rig: Rig) -> list[dict[str, Any]]:
+    """Return a row for each feature that is only suggested: where, how sure, and by what."""
+    return [
+        {
+            "side": side.value,
+            "feature": code,
+            "suggested": list(suggestion.position),
+            "radius_95_mm": suggestion.radius_95,
+            "source": suggestion.source,
+        }
+        for side in Side
+        for code, suggestion in rig.desk.session.landmarks(side).suggested.items()
+    ]
 
 
 def pose_rows(rig: Rig) -> list[dict[str, Any]]:

@@ -151,6 +151,11 @@ class Rig:
         landmarks = self.desk.session.landmarks(side)
         return landmarks[code] if feature(code).code in landmarks else None
 
+    def shown_at(self, side: Side, code: str) -> FloatArray | None:
+        """Return where a feature is placed, computed or suggested, (3,) mm, scan frame."""
+        suggestion = self.desk.session.landmarks(side).suggested.get(feature(code).code)
+        return self.placed(side, code) if suggestion is None else np.array(suggestion.position)
+
     # The views
 
     @property

@@ -15,10 +15,12 @@ from gp_core.landmarks.features import Side
 if TYPE_CHECKING:
     from gp_labeler.offscreen.rig import Rig
 
-__all__ = ["Pair", "Ranges", "Step", "Triple", "make_step"]
+__all__ = ["Lengths", "Pair", "Positions", "Ranges", "Step", "Triple", "make_step"]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
+Positions = dict[str, Triple]
+Lengths = dict[str, float]
 Ranges = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 S = TypeVar("S", bound="Step")
 
@@ -167,6 +169,10 @@ def _positions(value: Any) -> dict[str, Triple]:
     return {_text(key): convert(each) for key, each in value.items()}
 
 
+def _lengths(value: Any) -> dict[str, float]:
+    return {_text(name): _number(length) for name, length in value.items()}
+
+
 _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     str: ("text", _text),
     float: ("a number", _number),
@@ -177,5 +183,6 @@ _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     Triple: ("three numbers", _numbers(3)),
     Ranges: ("three pairs of whole numbers", _ranges),
     tuple[str, ...]: ("texts", _texts),
-    dict[str, Triple]: ("a table of positions", _positions),
+    Positions: ("a table of positions", _positions),
+    Lengths: ("a table of numbers", _lengths),
 }

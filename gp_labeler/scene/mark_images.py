@@ -31,7 +31,7 @@ def mark_image(shape: str, colour: str, diameter: float, opacity: float = 1.0) -
     Parameters
     ----------
     shape : str
-        ``ball``, ``diamond`` or ``triangle``.
+        ``ball``, ``diamond``, ``triangle`` or ``frame``.
     colour : str
         ``#RRGGBB``.
     diameter : float
@@ -42,7 +42,7 @@ def mark_image(shape: str, colour: str, diameter: float, opacity: float = 1.0) -
     radius = max(1.0, min(diameter, _LARGEST) / 2)
     half = int(np.ceil(1.5 * radius)) + 1
     y, x = np.mgrid[-half : half + 1, -half : half + 1] / radius
-    inside, normals = {"ball": _ball, "diamond": _diamond, "triangle": _triangle}[shape](x, y)
+    inside, normals = _SOLIDS[shape](x, y)
     depth = inside * radius
     tone = _lit(normals)
     rim = np.clip(_RIM_PIXELS + 0.5 - depth, 0, 1) if radius > 2 else np.zeros_like(depth)
@@ -85,3 +85,13 @@ def _triangle(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     normals = np.concatenate([-_TRIANGLE[side], np.full((*side.shape, 1), 0.9)], axis=-1)
     inside: FloatArray = 0.68 - across.max(axis=-1)
     return inside, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+
+
+def _frame(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the same of a square with a hole: nothing hides what lies beneath it, which is to be judged."""
+    out = np.maximum(np.abs(x), np.abs(y))
+    inside = np.minimum(1.1 - out, out - 0.55)
+    return inside, np.broadcast_to([0.0, 0.0, 1.0], (*x.shape, 3))
+
+
+_SOLIDS = {"ball": _ball, "diamond": _diamond, "triangle": _triangle, "frame": _frame}

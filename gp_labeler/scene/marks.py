@@ -18,7 +18,7 @@ from gp_labeler.scene.stage import Stage
 
 __all__ = ["GlyphSize", "Mark", "MarkActor"]
 
-_SHAPES = {"computed": "diamond", "doubtful": "triangle"}
+_SHAPES = {"computed": "diamond", "doubtful": "triangle", "suggested": "frame"}
 """A state shows by shape as well as by colour; others are balls."""
 
 _FAINT = 0.30
@@ -55,7 +55,8 @@ class Mark:
     label : str
         What stands beside it; empty for none.
     state : str
-        ``placed``, ``computed``, ``doubtful``, ``other`` (the other side) or any other state of the theme.
+        ``placed``, ``suggested``, ``computed``, ``doubtful``, ``other`` (the other side) or any
+        other state of the theme.
     active : bool
         Whether it is the one being worked on: larger, and its label is never left out.
     """

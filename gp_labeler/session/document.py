@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.session.frozen_json import thaw
 from gp_labeler.session.state import (
     How,
@@ -26,7 +27,15 @@ from gp_labeler.session.state import (
 from gp_labeler.session.touches import Touch, Touches, TouchHow, TouchKey, touch_name
 from gp_labeler.session.volume_reference import VolumeReference
 
-__all__ = ["Document", "document_of", "provenance_document", "provenance_of", "state_of", "volume_document"]
+__all__ = [
+    "Document",
+    "accepted_ghosts",
+    "document_of",
+    "provenance_document",
+    "provenance_of",
+    "state_of",
+    "volume_document",
+]
 
 Document = dict[str, Any]
 T = TypeVar("T")
@@ -94,9 +103,18 @@ def _landmark_out(landmark: Landmark) -> Document:
     out: Document = {}
     if landmark.position is not None:
         out["position"] = list(landmark.position)
+    if landmark.suggestion is not None:
+        out["suggestion"] = _suggestion_out(landmark.suggestion)
     if landmark.provenance is not None:
         out["provenance"] = provenance_document(landmark.provenance)
     return out | {name: True for name in ("unseen", "locked", "checked") if getattr(landmark, name)}
+
+
+def _suggestion_out(suggestion: Suggestion) -> Document:
+    out: Document = {"position": list(suggestion.position)}
+    if suggestion.radius_95 is not None:
+        out["radius_95_mm"] = suggestion.radius_95
+    return out | ({"source": suggestion.source} if suggestion.source else {})
 
 
 def provenance_document(provenance: Provenance) -> Document:
@@ -149,7 +167,8 @@ def _landmarks_in(document: Mapping[str, Any]) -> dict[PointKey, Landmark]:
 
 
 def _landmark_in(document: Mapping[str, Any], where: str) -> Landmark:
-    position, provenance = document.get("position"), document.get("provenance")
+    position, found = document.get("position"), document.get("provenance")
+    provenance = None if found is None else provenance_of(found, f"{where}.provenance")
     is_true = {
         n: _typed(document.get(n, False), bool, f"{where}.{n}") for n in ("unseen", "locked", "checked")
     }
@@ -158,8 +177,33 @@ def _landmark_in(document: Mapping[str, Any], where: str) -> Landmark:
         unseen=is_true["unseen"] and position is None,
         locked=is_true["locked"],
         checked=is_true["checked"] and position is not None,
-        provenance=None if provenance is None else provenance_of(provenance, f"{where}.provenance"),
+        provenance=provenance,
+        suggestion=_suggestion_in(document, where),
     )
+
+
+def _suggestion_in(document: Mapping[str, Any], where: str) -> Suggestion | None:
+    if "suggestion" not in document:
+        return None
+    where = f"{where}.suggestion"
+    content = _typed(document["suggestion"], dict, where)
+    radius = content.get("radius_95_mm")
+    return Suggestion(
+        _triple(content.get("position"), f"{where}.position"),
+        None if radius is None else _number(radius, f"{where}.radius_95_mm"),
+        _typed(content.get("source", ""), str, f"{where}.source"),
+    )
+
+
+def accepted_ghosts(document: Mapping[str, Any]) -> list[tuple[Side | None, str]]:
+    """Return the points that an earlier version placed where they were expected; they are suggestions now."""
+    marks = document.get("landmarks", {})
+    return [
+        (None if owner == BOTH else Side.parse(owner), code)
+        for owner, of_side in marks.items()
+        for code, mark in of_side.items()
+        if "position" in mark and mark.get("provenance", {}).get("how") == How.GHOST.value
+    ]
 
 
 def provenance_of(document: Any, where: str) -> Provenance:

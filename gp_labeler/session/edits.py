@@ -7,7 +7,7 @@ never touched, so a failed edit leaves nothing behind. `text` finishes the sente
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from gp_core.checks import as_points
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.session.state import (
     TO_DO,
     Landmark,
@@ -30,10 +31,12 @@ from gp_labeler.session.state import (
 __all__ = [
     "CheckPoint",
     "ClearPoint",
+    "ConfirmPoint",
     "Edit",
     "LockPoints",
     "MarkUnseen",
     "PlacePoint",
+    "SuggestPoints",
     "SwapPoints",
     "SwapSides",
     "as_position",
@@ -129,6 +132,69 @@ class PlacePoint(_OnPoint):
 
 
 @dataclass(frozen=True)
+class SuggestPoints:
+    """Suggest where points of one side are, for a person to confirm; those that are placed or unseen stay.
+
+    Parameters
+    ----------
+    side : Side
+        Whose points; IN is of both.
+    suggestions : mapping of str to Suggestion
+        By feature code; scan frame, mm.
+    provenance : Provenance
+        Who took them over, and when.
+    """
+
+    side: Side
+    suggestions: Mapping[str, Suggestion]
+    provenance: Provenance
+
+    def __post_init__(self) -> None:
+        side, codes = Side.parse(self.side), {feature(code).code: code for code in self.suggestions}
+        object.__setattr__(self, "side", side)
+        object.__setattr__(self, "suggestions", {code: self.suggestions[codes[code]] for code in codes})
+
+    @property
+    def text(self) -> str:
+        """Such as ``suggest FPP left`` or ``suggest 16 points left``."""
+        if len(self.suggestions) == 1:
+            return f"suggest {point_text(self.side, next(iter(self.suggestions)))}"
+        return f"suggest {len(self.suggestions)} points {self.side.word}"
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the suggestions of what is still to do; raises `GpError` for CO."""
+        wanted = {point_key(self.side, code): value for code, value in self.suggestions.items()}
+        open_keys = [key for key in wanted if not state.landmarks.get(key, TO_DO).settled]
+        require_free(state, open_keys)
+        new = {key: Landmark(suggestion=wanted[key], provenance=self.provenance) for key in open_keys}
+        return state.with_landmarks(new)
+
+
+@dataclass(frozen=True)
+class ConfirmPoint(_OnPoint):
+    """Make an observation of a suggestion: a person has looked at the point and finds it right."""
+
+    provenance: Provenance
+
+    @property
+    def text(self) -> str:
+        """Such as ``confirm FPP left``."""
+        return f"confirm {self._point}"
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the point placed where it is suggested; raises `GpError` where it is not."""
+        suggestion = state.landmark(self.side, self.code).suggestion
+        if suggestion is None:
+            raise GpError(
+                f"{self._point} is not suggested, so there is nothing to confirm",
+                specimen=state.specimen,
+                landmark=self.code,
+                remedy="Accept its ghost first, or place it.",
+            )
+        return self._replaced(state, Landmark(suggestion.position, provenance=self.provenance))
+
+
+@dataclass(frozen=True)
 class ClearPoint(_OnPoint):
     """Make a point one that is still to do."""
 
@@ -173,7 +239,11 @@ class CheckPoint(_OnPoint):
         """Return the state with the point so marked; raises `GpError` where it is not placed."""
         landmark = state.landmark(self.side, self.code)
         if landmark.position is None:
-            raise GpError(f"{self._point} is not placed, so it cannot be checked", landmark=self.code)
+            word, remedy = "not placed", "Place it first."
+            if landmark.suggestion is not None:
+                word, remedy = "only suggested", "Confirm it first."
+            problem = f"{self._point} is {word}, so it cannot be checked"
+            raise GpError(problem, landmark=self.code, remedy=remedy)
         return state.with_landmarks({self.key: replace(landmark, checked=self.checked)})
 
 
@@ -213,7 +283,10 @@ class LockPoints:
 
 @dataclass(frozen=True)
 class SwapPoints:
-    """Exchange what is known of two features of one side, placed under each other's names."""
+    """Exchange what is known of two features of one side, placed under each other's names.
+
+    A suggestion was made for its own feature, so it is dropped, not exchanged.
+    """
 
     side: Side
     code: str
@@ -228,7 +301,7 @@ class SwapPoints:
         """Return the state with the two exchanged; raises `GpError` where one is locked."""
         a, b = point_key(self.side, self.code), point_key(self.side, self.other)
         require_free(state, (a, b))
-        return state.with_landmarks({a: state.landmarks.get(b, TO_DO), b: state.landmarks.get(a, TO_DO)})
+        return state.with_landmarks({a: _observed(state, b), b: _observed(state, a)})
 
 
 @dataclass(frozen=True)
@@ -249,3 +322,8 @@ class SwapSides:
             for (side, code), landmark in state.landmarks.items()
         }
         return replace(state, landmarks=crossed)
+
+
+def _observed(state: SpecimenState, key: PointKey) -> Landmark:
+    landmark = state.landmarks.get(key, TO_DO)
+    return TO_DO if landmark.suggestion is not None else landmark

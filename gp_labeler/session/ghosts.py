@@ -14,6 +14,7 @@ from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
 from gp_core.landmarks.sets import LandmarkSet, Status
+from gp_core.landmarks.suggestion import Suggestion
 
 __all__ = ["Expectations", "Ghost", "Predict", "fingerprint", "mirror_ghosts"]
 
@@ -58,6 +59,12 @@ class Ghost:
         """Radius that holds the point with 95 %, mm, along the least certain direction."""
         return float(np.sqrt(CHI2_95 * max(np.linalg.eigvalsh(self.covariance)[-1], 0.0)))
 
+    @property
+    def suggestion(self) -> Suggestion:
+        """The same as a suggestion for a person to confirm."""
+        x, y, z = self.position.tolist()
+        return Suggestion((x, y, z), self.radius_95 or None, self.source)
+
 
 T = TypeVar("T")
 
@@ -81,7 +88,7 @@ class Expectations:
 
         From three placed features on it is the atlas that says so; before, the `other` side, mirrored.
         """
-        key = ("ghosts", fingerprint(landmarks), fingerprint(other))
+        key = ("ghosts", fingerprint(landmarks), tuple(landmarks.suggested), fingerprint(other))
         return self._remembered(key, lambda: self._ghosts(landmarks, other))
 
     def _remembered(self, key: tuple[object, ...], make: Callable[[], dict[str, T]]) -> Mapping[str, T]:

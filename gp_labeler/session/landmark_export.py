@@ -9,24 +9,39 @@ from pathlib import Path
 
 from gp_core.checks import check_option
 from gp_core.errors import GpError
-from gp_core.landmarks.features import CODES, FEATURES, Side
-from gp_core.landmarks.files import write_csv, write_fcsv, write_markups
+from gp_core.landmarks.features import CODES, FEATURES, Side, feature
+from gp_core.landmarks.files import (
+    landmark_file_name,
+    write_csv,
+    write_fcsv,
+    write_markups,
+    write_suggestions,
+)
 from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_labeler.session.document import provenance_document, volume_document
 from gp_labeler.session.state import SpecimenState
 
-__all__ = ["FORMATS", "ExportReport", "export_landmarks"]
+__all__ = ["FORMATS", "ExportReport", "export_landmarks", "export_names"]
 
 Writer = Callable[[Path, LandmarkSet, SpecimenState], None]
 
 
-def _write_markups(path: Path, landmarks: LandmarkSet, state: SpecimenState) -> None:
+def _volume(state: SpecimenState) -> dict[str, object] | None:
     volume = None if state.volume is None else volume_document(state.volume)
     if volume is not None:
         volume.pop("path", None)  # of no use to others, and nobody's business
+    return volume
+
+
+def _write_suggestions(path: Path, landmarks: LandmarkSet, state: SpecimenState) -> None:
+    write_suggestions(path, landmarks, specimen=state.specimen, volume=_volume(state))
+
+
+def _write_markups(path: Path, landmarks: LandmarkSet, state: SpecimenState) -> None:
     marks = {f.code: state.landmark(landmarks.side, f.code) for f in FEATURES if not f.computed}
     provenance = {c: provenance_document(m.provenance) for c, m in marks.items() if m.provenance is not None}
-    write_markups(path, landmarks, specimen=state.specimen, volume=volume, provenance=provenance)
+    placed = {code: how for code, how in provenance.items() if code not in landmarks.suggested}
+    write_markups(path, landmarks, specimen=state.specimen, volume=_volume(state), provenance=placed)
 
 
 _WRITERS: Mapping[str, Writer] = {
@@ -47,16 +62,20 @@ class ExportReport:
         The files.
     to_do, unseen : mapping of Side to tuple of str
         Of the sides written: features without a position, because nobody placed them or they cannot be seen.
+    suggested : mapping of Side to tuple of str
+        Features that are only suggested, and so without a position in the landmark files.
     """
 
     files: tuple[Path, ...]
     to_do: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
     unseen: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
+    suggested: Mapping[Side, tuple[str, ...]] = field(default_factory=dict)
 
     @property
     def is_complete(self) -> bool:
         """Whether both sides have all 20 features."""
-        return len(self.to_do) == len(Side) and not any((*self.to_do.values(), *self.unseen.values()))
+        missing = (*self.to_do.values(), *self.unseen.values(), *self.suggested.values())
+        return len(self.to_do) == len(Side) and not any(missing)
 
     @property
     def text(self) -> str:
@@ -66,7 +85,11 @@ class ExportReport:
             if side not in self.to_do:
                 lines.append(f"The {side.word} side is not labelled and was not written.")
                 continue
-            for what, codes in (("to do", self.to_do[side]), ("not seen", self.unseen[side])):
+            for what, codes in (
+                ("to do", self.to_do[side]),
+                ("suggested, not confirmed", self.suggested.get(side, ())),
+                ("not seen", self.unseen[side]),
+            ):
                 if codes:
                     lines.append(f"Missing on the {side.word} side, {what}: {' '.join(codes)}.")
         return "\n".join(lines)
@@ -78,6 +101,7 @@ def export_landmarks(
     *,
     formats: Iterable[str] = (".mrk.json",),
     overwrite: bool = False,
+    suggested: bool = False,
 ) -> ExportReport:
     """Write ``<specimen>_L`` and ``<specimen>_R`` into a folder, each side on which something is placed.
 
@@ -91,6 +115,9 @@ def export_landmarks(
         Of `FORMATS`. ``.mrk.json`` alone says everything; the others are for programs that cannot read it.
     overwrite : bool
         Whether files of that name may be replaced.
+    suggested : bool
+        Whether to write what is only suggested too, into ``<specimen>_L_suggested.mrk.json`` and ``_R_``; the
+        landmark files never hold it.
 
     Returns
     -------
@@ -106,17 +133,48 @@ def export_landmarks(
     suffixes = tuple(formats)
     for suffix in suffixes:
         check_option(suffix, "format", FORMATS)
-    sides = [side for side in Side if _is_labelled(state, side)]
-    if not sides:
-        raise GpError("nothing is placed yet", specimen=state.specimen, remedy="Place some features first.")
-    files = {folder / f"{state.specimen}_{side.value}{suffix}": side for side in sides for suffix in suffixes}
+    files = {folder / name: job for name, job in _files(state, suffixes, suggested).items()}
+    if not files:
+        raise _nothing_placed(state)
     _make_room(folder, files, overwrite)
-    for path, side in files.items():
-        _WRITERS[next(s for s in suffixes if path.name.endswith(s))](path, state.side(side), state)
+    for path, (write, side) in files.items():
+        write(path, state.side(side), state)
+    sides = [side for side in Side if _is_labelled(state, side)]
     return ExportReport(
         tuple(files),
         {side: _codes(state.side(side), Status.TO_DO) for side in sides},
         {side: _codes(state.side(side), Status.UNSEEN) for side in sides},
+        {side: _codes(state.side(side), Status.SUGGESTED) for side in sides},
+    )
+
+
+def export_names(state: SpecimenState, formats: Iterable[str], *, suggested: bool = False) -> tuple[str, ...]:
+    """Return the names of the files that `export_landmarks` would write."""
+    return tuple(_files(state, tuple(formats), suggested))
+
+
+def _files(
+    state: SpecimenState, suffixes: tuple[str, ...], suggested: bool
+) -> dict[str, tuple[Writer, Side]]:
+    """Return what to write, by file name."""
+    sides = [side for side in Side if _is_labelled(state, side)]
+    files = {f"{state.specimen}_{side.value}{s}": (_WRITERS[s], side) for side in sides for s in suffixes}
+    for side in Side if suggested else ():
+        codes = state.side(side).suggested
+        if codes and (side in sides or any(not feature(code).shared for code in codes)):
+            name = landmark_file_name(state.specimen, side, suggested=True)
+            files[name] = (_write_suggestions, side)
+    return files
+
+
+def _nothing_placed(state: SpecimenState) -> GpError:
+    n = sum(mark.suggestion is not None for mark in state.landmarks.values())
+    if not n:
+        return GpError("nothing is placed yet", specimen=state.specimen, remedy="Place some features first.")
+    return GpError(
+        f"nothing is placed yet, {n} point{' is' if n == 1 else 's are'} only suggested",
+        specimen=state.specimen,
+        remedy="Confirm them where you can judge them, or export the suggestions too.",
     )
 
 

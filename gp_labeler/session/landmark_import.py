@@ -90,17 +90,29 @@ def import_landmarks(
     }
     new = provenance(session, How.IMPORTED, source=source)
     session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
-    return (*_doubtful_origin(session, lists), *off_bone)
+    return (*_doubtful_origin(session, lists), *off_bone, *_suggested(sets))
+
+
+def _suggested(sets: tuple[LandmarkSet, ...]) -> list[str]:
+    names = dict.fromkeys(
+        point_text(landmarks.side, code) for landmarks in sets for code in landmarks.suggested
+    )
+    if not names:
+        return []
+    many = "is only a suggestion" if len(names) == 1 else "are only suggestions"
+    return [f"{_shortened(list(names))} {many}: confirm or correct each"]
 
 
 def _misfit(
     session: Session, sets: tuple[LandmarkSet, ...], near_bone: Predicate | None, accepted: bool
 ) -> tuple[str, ...]:
-    names = [point_text(s.side, code) for s in sets for code in s.placed if not feature(code).computed]
-    placed = [s[code] for s in sets for code in s.placed if not feature(code).computed]
-    if not placed:
+    observed = {(s.side, code): s[code] for s in sets for code in s.placed if not feature(code).computed}
+    suggested = {
+        (s.side, code): np.array(found.position) for s in sets for code, found in s.suggested.items()
+    }
+    if not (located := suggested | observed):
         return ()
-    points = np.array(placed)
+    names, points = [point_text(*key) for key in located], np.array(list(located.values()))
     contains: Predicate | None = getattr(session.volume, "contains", None)
     problem, remedy = "", ""
     if contains is not None and not (inside := contains(points)).all():
@@ -119,8 +131,11 @@ def _misfit(
 
 def _listed(names: list[str], chosen: NDArray[np.bool_]) -> str:
     wanted = [name for name, is_chosen in zip(names, chosen, strict=True) if is_chosen]
-    shown = ", ".join(wanted[:6]) + (", ..." if len(wanted) > 6 else "")
-    return f"{len(wanted)} of {len(names)} points ({shown})"
+    return f"{len(wanted)} of {len(names)} points ({_shortened(wanted)})"
+
+
+def _shortened(names: list[str]) -> str:
+    return ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
 
 
 def _known(points: PointList, side: Side) -> dict[tuple[Side, str], Provenance]:
@@ -161,7 +176,8 @@ class ImportLandmarks:
     known : mapping of (Side, str) to Provenance
         Provenance that the file carries.
     replace_placed : bool
-        Whether placed points give way; otherwise only what is still to do is filled.
+        Whether placed points give way; otherwise only what is still to do is filled. A suggestion never
+        replaces a placed or unseen point.
     asked : mapping, optional
         How `import_landmarks` was asked for it, for a script that does it again.
     """
@@ -175,8 +191,10 @@ class ImportLandmarks:
     @property
     def text(self) -> str:
         """Such as ``import 38 points``."""
-        n = len({key for key, mark in self._marks().items() if mark.position is not None})
-        return f"import {n} point{'' if n == 1 else 's'}"
+        marks = self._marks().values()
+        n, n_suggested = (sum(bool(getattr(m, name)) for m in marks) for name in ("position", "suggestion"))
+        text = f"import {n} point{'' if n == 1 else 's'}"
+        return f"{text}, {n_suggested} suggestion{'' if n_suggested == 1 else 's'}" if n_suggested else text
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the points taken over.
@@ -192,7 +210,8 @@ class ImportLandmarks:
         changes = {
             key: mark
             for key, mark in self._marks().items()
-            if self.replace_placed or not state.landmarks.get(key, TO_DO).settled
+            if not state.landmarks.get(key, TO_DO).settled
+            or (self.replace_placed and mark.suggestion is None)
         }
         moved = [key for key, mark in changes.items() if _moves(state.landmarks.get(key, TO_DO), mark)]
         require_free(state, moved)
@@ -211,14 +230,19 @@ class ImportLandmarks:
                         landmark=code,
                         remedy="Correct one of the files, or import one side.",
                     )
+        for landmarks in self.landmarks:
+            for code in landmarks.suggested:
+                marks.setdefault(point_key(landmarks.side, code), self._mark(landmarks, code))
         return marks
 
     def _mark(self, landmarks: LandmarkSet, code: str) -> Landmark:
         provenance = (self.known or {}).get((landmarks.side, code), self.provenance)
         if code in landmarks.unseen:
             return Landmark(unseen=True, provenance=provenance)
+        if code in landmarks.suggested:
+            return Landmark(suggestion=landmarks.suggested[code], provenance=provenance)
         return Landmark(as_position(landmarks[code], code), provenance=provenance)
 
 
 def _moves(old: Landmark, new: Landmark) -> bool:
-    return (old.position, old.unseen) != (new.position, new.unseen)
+    return (old.position, old.unseen, old.suggestion) != (new.position, new.unseen, new.suggestion)

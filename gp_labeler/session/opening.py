@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from gp_core.checks import check_option
 from gp_core.errors import GpError
-from gp_labeler.session.document import state_of
+from gp_core.landmarks.features import feature
+from gp_labeler.session.document import accepted_ghosts, state_of
 from gp_labeler.session.keeper import Keeper
 from gp_labeler.session.places import absolute_path
 from gp_labeler.session.recovery import Recovery, find_recovery, replayed
 from gp_labeler.session.session import Session
-from gp_labeler.session.specimen_file import read_specimen
+from gp_labeler.session.specimen_file import read_document, state_in
 from gp_labeler.session.state import SpecimenState
 
 __all__ = ["UnsavedEditsError", "new_session", "open_session", "recover_session", "tidy_name"]
@@ -99,8 +101,11 @@ def open_session(
         if unsaved == "ask":
             raise UnsavedEditsError(recovery)
         return recover_session(recovery, directory, **options)
-    state = read_specimen(file)
-    return Session(state, keeper=Keeper.begin(directory, state, None if as_copy else file), **options)
+    document = read_document(file)
+    state = state_in(document, file)
+    session = Session(state, keeper=Keeper.begin(directory, state, None if as_copy else file), **options)
+    session.notices = _demotions(document)
+    return session
 
 
 def recover_session(recovery: Recovery, directory: Path, **options: Any) -> Session:
@@ -116,7 +121,21 @@ def recover_session(recovery: Recovery, directory: Path, **options: Any) -> Sess
     saved = state_of(recovery.content.base)
     if saved.volume is None:
         saved = saved.on_volume(history.state.volume, history.state.import_choices)
-    return Session(history, keeper=keeper, saved=saved, **options)
+    session = Session(history, keeper=keeper, saved=saved, **options)
+    session.notices = _demotions(recovery.content.document)
+    return session
+
+
+def _demotions(document: Mapping[str, Any]) -> tuple[str, ...]:
+    """Say, once, that what an earlier version counted as placed is only suggested."""
+    found = accepted_ghosts(document)
+    if not found:
+        return ()
+    names = [code if side is None or feature(code).shared else f"{code} {side.value}" for side, code in found]
+    many = "1 point was an accepted ghost" if len(found) == 1 else f"{len(found)} points were accepted ghosts"
+    it = "it counts as a suggestion" if len(found) == 1 else "they count as suggestions"
+    shown = ", ".join(names[:6]) + (", …" if len(names) > 6 else "")
+    return (f"{many} that nobody had confirmed: {it} now ({shown}). Confirm or correct each in the table.",)
 
 
 def tidy_name(text: str) -> str:

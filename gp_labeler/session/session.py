@@ -78,6 +78,8 @@ class Session(EditedSpecimen):
         super().__init__(history, keeper or Keeper(), saved=saved, clock=clock)
         self.author = _user() if author is None else author
         self.view = View()
+        self.notices: tuple[str, ...] = ()
+        """What the user should be told once, now that this session is open."""
         self._expectations, self._checks = Expectations(predict), LabelChecks(check)
         self._crosshair: FloatArray = _read_only([0.0, 0.0, 0.0])
         self._active = next_point(self.state, Active(Side.LEFT), self.ghosts)

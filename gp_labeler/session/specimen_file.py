@@ -1,9 +1,9 @@
 """The specimen file, ``<specimen>.gpspecimen.json``: what the application saves.
 
-Layout (version 1): ``format``, ``version``, ``application``, ``specimen``, ``volume`` (name, size, spacing,
+Layout (version 3): ``format``, ``version``, ``application``, ``specimen``, ``volume`` (name, size, spacing,
 checksum, path, and path relative to the file), ``landmarks`` (by ``L``, ``R`` and ``both``, then by feature
-code: position in scan mm, LPS; unseen, locked, checked; provenance), ``threshold``, ``import_choices``,
-``notes`` and ``pose_checks``.
+code: position in scan mm, LPS, or suggestion; unseen, locked, checked; provenance), ``threshold``,
+``import_choices``, ``notes`` and ``pose_checks``.
 """
 
 from __future__ import annotations
@@ -22,11 +22,19 @@ from gp_core.errors import FileFormatError, GpError
 from gp_labeler.session.document import Document, document_of, state_of
 from gp_labeler.session.state import SpecimenState
 
-__all__ = ["SUFFIX", "application", "digest", "read_specimen", "write_specimen"]
+__all__ = [
+    "SUFFIX",
+    "application",
+    "digest",
+    "read_document",
+    "read_specimen",
+    "state_in",
+    "write_specimen",
+]
 
 SUFFIX = ".gpspecimen.json"
 FORMAT = "gp-labeler specimen"
-VERSION = 2
+VERSION = 3
 
 
 def application() -> str:
@@ -63,14 +71,24 @@ def read_specimen(path: str | PathLike[str]) -> SpecimenState:
     GpError
         It cannot be opened, is no specimen file, is of a newer version, or an entry is not what it should be.
     """
+    return state_in(read_document(path), path)
+
+
+def read_document(path: str | PathLike[str]) -> Mapping[str, Any]:
+    """Read the document of a specimen file as it was saved; raises as `read_specimen` does."""
     source = Path(path)
     content = read_json(source, what="specimen file", remedy=f"Choose a *{SUFFIX} file.")
     _check_header(content, source)
+    return _with_found_volume(content, source.absolute().parent)
+
+
+def state_in(document: Mapping[str, Any], path: str | PathLike[str]) -> SpecimenState:
+    """Return the state of the document that was read from `path`; raises `FileFormatError`."""
     try:
-        return state_of(_with_found_volume(content, source.absolute().parent))
+        return state_of(document)
     except GpError as error:
         raise FileFormatError(
-            error.problem, file=source, landmark=error.landmark, remedy=error.remedy
+            error.problem, file=path, landmark=error.landmark, remedy=error.remedy
         ) from None
 
 

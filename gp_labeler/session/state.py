@@ -21,6 +21,7 @@ from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.session.frozen_json import freeze
 from gp_labeler.session.touches import Touch, TouchKey, touched_set
 from gp_labeler.session.volume_reference import VolumeReference
@@ -52,6 +53,8 @@ class How(str, Enum):
     MESH = "mesh"
     SLICE = "slice"
     GHOST = "accepted ghost"
+    CONFIRMED = "confirmed suggestion"
+    NUDGED = "nudged suggestion"
     IMPORTED = "imported"
     TYPED = "typed"
     UNSEEN = "looked for"
@@ -72,7 +75,7 @@ class Provenance:
     voxel_mm : (3,) tuple of float, optional
         Voxel size of the scan it was placed on, mm.
     source : str
-        The file it was imported from.
+        The file it was imported from, or what suggested it.
     """
 
     how: How
@@ -84,18 +87,43 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Landmark:
-    """One point of one side (or shared by both): position in scan mm, and what is known about it."""
+    """One point of one side (or shared by both): position in scan mm, and what is known about it.
+
+    A `position` is an observation. A point that is only suggested has none, but a `suggestion`, whose
+    `provenance` says who accepted it. A position that came about by accepting a ghost, as earlier versions
+    kept it, is a suggestion.
+    """
 
     position: Position | None = None
     unseen: bool = False
     locked: bool = False
     checked: bool = False
     provenance: Provenance | None = None
+    suggestion: Suggestion | None = None
+
+    def __post_init__(self) -> None:
+        suggestion = self.suggestion
+        if self.position is not None and self.provenance is not None and self.provenance.how is How.GHOST:
+            suggestion = suggestion or Suggestion(self.position, source="atlas")
+            object.__setattr__(self, "position", None)
+        if self.position is not None or self.unseen:
+            suggestion = None
+        object.__setattr__(self, "suggestion", suggestion)
+        if suggestion is not None:  # there is nothing yet to check or to lock
+            object.__setattr__(self, "checked", False)
+            object.__setattr__(self, "locked", False)
 
     @property
     def settled(self) -> bool:
-        """Whether it was placed, or looked for and not seen."""
+        """Whether a person has decided: it was placed, or looked for and not seen."""
         return self.unseen or self.position is not None
+
+    @property
+    def shown_position(self) -> Position | None:
+        """Where it is shown: where it was placed, else where it is suggested."""
+        if self.position is not None:
+            return self.position
+        return None if self.suggestion is None else self.suggestion.position
 
 
 TO_DO = Landmark()
@@ -158,7 +186,7 @@ class SpecimenState:
     specimen : str
         Name of the specimen; exported files are called after it.
     landmarks : mapping of PointKey to Landmark
-        What was placed, marked or locked; a point that is to do has no entry.
+        What was placed, suggested, marked or locked; a point that is to do has no entry.
     volume : VolumeReference, optional
         The scan.
     import_choices : mapping
@@ -249,15 +277,18 @@ def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Si
 
 
 def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> LandmarkSet:
-    positions, unseen = {}, set()
+    positions, unseen, suggested = {}, set(), {}
     for row in FEATURES:
         mark = TO_DO if row.computed else landmarks.get(point_key(side, row.code), TO_DO)
         if mark.position is not None:
             positions[row.code] = _plausible(mark.position, row.code)
         elif mark.unseen:
             unseen.add(row.code)
+        elif mark.suggestion is not None:
+            _plausible(mark.suggestion.position, row.code)
+            suggested[row.code] = mark.suggestion
     placed = replace(LandmarkSet.from_mapping(positions, side), unseen=frozenset(unseen))
-    return with_cochlea_origin(placed)
+    return with_cochlea_origin(placed).with_suggestions(suggested)
 
 
 def _check_touches(touches: Mapping[TouchKey, Touch]) -> None:

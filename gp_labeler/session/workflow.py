@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from gp_core.atlas.label_check import Finding
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.session.edits import point_text
@@ -37,6 +39,7 @@ class PointState(str, Enum):
 
     TO_DO = "to do"
     GHOST = "ghost"
+    SUGGESTED = "suggested"
     PLACED = "placed"
     CHECKED = "checked"
     DOUBTFUL = "doubtful"
@@ -59,18 +62,21 @@ class Progress:
     n_placed: int
     n_unseen: int
     n_total: int = len(CODES)
+    n_suggested: int = 0
 
     @property
     def text(self) -> str:
-        """Such as ``3 of 20``, or ``18 of 20, 2 not seen``."""
-        unseen = f", {self.n_unseen} not seen" if self.n_unseen else ""
-        return f"{self.n_placed} of {self.n_total}{unseen}"
+        """Such as ``3 of 20``, ``18 of 20, 2 not seen``, or ``3 placed, 16 suggested``."""
+        placed = f"{self.n_placed} of {self.n_total}"
+        if self.n_suggested:
+            placed = f"{self.n_placed} placed, {self.n_suggested} suggested"
+        return f"{placed}, {self.n_unseen} not seen" if self.n_unseen else placed
 
 
 def progress(state: SpecimenState, side: Side) -> Progress:
     """Count the points of one side."""
     landmarks = state.side(side)
-    return Progress(len(landmarks.placed), len(landmarks.unseen))
+    return Progress(len(landmarks.placed), len(landmarks.unseen), n_suggested=len(landmarks.suggested))
 
 
 def point_state(
@@ -82,6 +88,8 @@ def point_state(
     landmark = state.landmark(side, code)
     if landmark.unseen:
         return PointState.UNSEEN
+    if landmark.suggestion is not None:
+        return PointState.SUGGESTED
     if landmark.position is None:
         return PointState.GHOST if code in ghosts else PointState.TO_DO
     if landmark.checked:
@@ -104,6 +112,8 @@ def placing_order(ghosts: Mapping[str, Ghost]) -> tuple[str, ...]:
 def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Active:
     """Return what to place after `active`: round this side, then the other side, then what was left standing.
 
+    What is suggested on a side comes after what is to do there, the least certain first.
+
     Returns
     -------
     Active
@@ -115,11 +125,22 @@ def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Act
             at = order.index(active.code)
             order = order[at + 1 :] + order[:at]
         for code in order:
-            if not state.landmark(side, code).settled:
+            mark = state.landmark(side, code)
+            if not mark.settled and mark.suggestion is None:
                 return Active(side, code)
+        if suggested := _by_doubt(state, side, after=active.code if side is active.side else None):
+            return Active(side, suggested[0])
     if active.code is not None and not state.landmark(active.side, active.code).settled:
         return active
     return Active(active.side)
+
+
+def _by_doubt(state: SpecimenState, side: Side, *, after: str | None) -> list[str]:
+    """Return what is suggested on one side, the least certain first; round from `after`, which comes last."""
+    radii = {code: found.radius_95 for code, found in state.side(side).suggested.items()}
+    order = sorted(radii, key=lambda code: -(radii[code] or np.inf))
+    at = order.index(after) + 1 if after in order else 0
+    return order[at:] + order[:at]
 
 
 def click_text(state: SpecimenState, active: Active) -> str:
@@ -128,13 +149,15 @@ def click_text(state: SpecimenState, active: Active) -> str:
         left = any(
             not state.landmark(side, f.code).settled for side in Side for f in FEATURES if not f.computed
         )
-        return "Choose a feature to place" if left else "Everything is placed · choose a feature to move it"
+        return "Choose a feature to place" if left else "Everything is placed · drag a point to move it"
     point, landmark = point_text(active.side, active.code), state.landmark(active.side, active.code)
     if feature(active.code).shared:
         point += ", for both sides"
     if landmark.locked:
         return f"{point} is locked"
+    if landmark.suggestion is not None:
+        return f"{point} is suggested · Enter confirms it where it can be judged, a click places it"
     if landmark.position is not None:
-        return f"Click on bone or a slice to move {point}"
+        return f"{point} is placed · drag, nudge or re-place it to move it"
     after_all = " after all" if landmark.unseen else ""
     return f"Click on bone or a slice to place {point}{after_all}"

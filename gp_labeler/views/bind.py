@@ -12,6 +12,7 @@ from PySide6.QtCore import QObject, QSignalBlocker
 from PySide6.QtWidgets import QWidget
 
 from gp_core.errors import GpError
+from gp_core.landmarks.suggestion import Suggestion
 
 __all__ = [
     "NONE",
@@ -25,6 +26,7 @@ __all__ = [
     "set_role",
     "size_text",
     "spacing_text",
+    "suggestion_text",
     "value_text",
     "voxel_text",
 ]
@@ -103,6 +105,14 @@ def mm_text(length: float) -> str:
         return NONE
     digits = 1 if abs(length) >= 0.995 else 2 if abs(length) >= 0.0995 else 3
     return f"{length:.{digits}f} mm".replace("-", _MINUS)
+
+
+def suggestion_text(suggestion: Suggestion) -> str:
+    """Return what a suggestion says of itself, such as ``atlas, 95 % within 0.86 mm``; empty for nothing."""
+    radius = suggestion.radius_95
+    return ", ".join(
+        filter(None, (suggestion.source, f"95 % within {mm_text(radius)}" if radius is not None else ""))
+    )
 
 
 def degrees_text(angle_rad: float) -> str:

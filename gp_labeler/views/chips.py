@@ -95,6 +95,13 @@ def _diamond(painter: QPainter, colour: QColor, ground: QColor) -> None:
     painter.drawPolygon(QPolygonF([QPointF(0, -4.9), QPointF(4.9, 0), QPointF(0, 4.9), QPointF(-4.9, 0)]))
 
 
+def _square(painter: QPainter, colour: QColor, ground: QColor) -> None:
+    painter.drawRect(QRectF(-4, -4, 8, 8))
+    painter.setPen(Qt.PenStyle.NoPen)
+    painter.setBrush(colour)
+    painter.drawRect(QRectF(-1.3, -1.3, 2.6, 2.6))
+
+
 def _target(painter: QPainter, colour: QColor, ground: QColor) -> None:
     painter.drawEllipse(QPointF(), 4.8, 4.8)
     painter.setBrush(colour)
@@ -115,6 +122,7 @@ SHAPES: Mapping[str, Callable[[QPainter, QColor, QColor], None]] = MappingProxyT
     {
         "to do": _ring,
         "ghost": _dashed_ring,
+        "suggested": _square,
         "placed": _disc,
         "checked": _ticked_disc,
         "doubtful": _triangle,

@@ -20,6 +20,9 @@ __all__ = ["Commands"]
 _VIEW_KEYS = {"Return", "Enter", "Space", "Delete", "Backspace"}
 """Keys that buttons, tables and text fields need themselves: they act while the pointer is in a view."""
 
+_ONCE = ("point.accept_ghost", "point.confirm")
+"""A key that is held down must not run through suggestions that nobody has looked at."""
+
 _FOLDED = {
     "layout": "Views",
     "from": "Look from",
@@ -62,6 +65,7 @@ class Commands(QObject):
             workbench.volume_opened,
             workbench.surfaces_changed,
             workbench.tool_changed,
+            workbench.replacing_changed,
             workbench.atlas_changed,
             workbench.pose.changed,
             workbench.pose.target_changed,
@@ -109,6 +113,7 @@ class Commands(QObject):
         made.setObjectName(row.id)
         made.setShortcuts([QKeySequence(keys) for keys in row.shortcuts])
         made.setCheckable(row.checked is not None)
+        made.setAutoRepeat(row.id not in _ONCE)
         keys = keys_text(row.shortcuts[0]) if row.shortcuts else ""
         made.setToolTip((row.hint or row.title.rstrip("…")) + (f"  ({keys})" if keys else ""))
         made.triggered.connect(partial(self.run, row.id))

@@ -10,10 +10,12 @@ from gp_core.atlas.label_check import HEAD_MM
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import Ghost
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.segments import Segment
+from gp_labeler.session.ghosts import CHI2_95
 from gp_labeler.session.workflow import PointState
 from gp_labeler.workbench import Workbench
 
@@ -25,6 +27,7 @@ _BEYOND_MM = 1.0
 _MARK_STATES: Mapping[PointState, str] = {
     PointState.COMPUTED: "computed",
     PointState.DOUBTFUL: "doubtful",
+    PointState.SUGGESTED: "suggested",
 }
 
 
@@ -40,7 +43,7 @@ def point_of(key: str) -> tuple[Side, str]:
 
 
 def drawn_marks(workbench: Workbench) -> list[Mark]:
-    """Return the placed points of both sides; a shared one once, on the side being worked on.
+    """Return the placed and suggested points of both sides; a shared one once, on the side worked on.
 
     Under an estimate they stand without their names, but for the active one: forty names would hide it.
     """
@@ -50,10 +53,11 @@ def drawn_marks(workbench: Workbench) -> list[Mark]:
     for side in (active.side.other, active.side):
         landmarks, states = session.landmarks(side), session.point_states(side, wait=False)
         for code in CODES:
-            if code not in landmarks or (feature(code).shared and side is not active.side):
+            where = _shown_at(landmarks, code)
+            if where is None or (feature(code).shared and side is not active.side):
                 continue
             dragged = drag is not None and (drag.side, drag.code) == (side, code)
-            position = drag.position if drag is not None and dragged else landmarks[code]
+            position = drag.position if drag is not None and dragged else where
             state = _MARK_STATES.get(states[code], "placed" if side is active.side else "other")
             is_active = dragged or (side, code) == (active.side, active.code)
             name = code if named or is_active else ""
@@ -61,8 +65,15 @@ def drawn_marks(workbench: Workbench) -> list[Mark]:
     return marks
 
 
+def _shown_at(landmarks: LandmarkSet, code: str) -> FloatArray | None:
+    if code in landmarks:
+        return landmarks[code]
+    suggestion = landmarks.suggested.get(code)
+    return None if suggestion is None else np.array(suggestion.position)
+
+
 def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
-    """Return where the active point is expected: one that is to do, or is doubted where it was placed."""
+    """Return where the active point is expected: to do, suggested, or doubted where it was placed."""
     session = workbench.session
     side, code = session.active.side, session.active.code
     if code is None or not session.view.state.ghosts_visible:
@@ -74,9 +85,18 @@ def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
         if away is None or away.distance > HEAD_MM:  # such a place would mean nothing
             return []
         return [Ghost(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]
+    suggestion = session.landmarks(side).suggested.get(code)
+    if suggestion is not None and suggestion.radius_95 is not None:
+        return [_region(key_of(side, code), suggestion, suggestion.radius_95)]
     if ghost is None:
         return []
     return [Ghost(key_of(side, code), ghost.position, ghost.covariance, f"{code}?", active=True)]
+
+
+def _region(key: str, suggestion: Suggestion, radius_95: float) -> Ghost:
+    """Return where a suggested point lies with 95 %; the point itself is a mark and bears the name."""
+    covariance = radius_95**2 / CHI2_95 * np.eye(3)
+    return Ghost(key, np.array(suggestion.position), covariance, "", active=True)
 
 
 def drawn_segments(workbench: Workbench, colours: SceneColours) -> list[Segment]:

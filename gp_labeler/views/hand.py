@@ -68,27 +68,48 @@ class Hand:
         self._mark, drag = None, self._desk.drag
         self._desk.end_drag(keep=False)
         if drag is not None:
-            self._desk.session.set_crosshair(self._desk.session.landmarks(drag.side)[drag.code])
+            where = labelling.place_of(self._desk.session, drag.side, drag.code)
+            if where is not None:
+                self._desk.session.set_crosshair(where)
 
     def click(self, position: FloatArray | None, how: How, mark: str | None) -> None:
         """Take a click at a scan position (None: it missed) and on a mark (None: on none).
 
-        A point that is to do is placed; else a mark is chosen; else the chosen point moves here.
+        A point that is to do is placed, one that shall be re-placed moves here; else a mark is chosen, or the
+        crosshair comes here. A click never moves a placed point just because its row is chosen.
         """
-        desk, active = self._desk, self._desk.session.active
+        desk = self._desk
+        if desk.replacing:
+            if position is not None:
+                self._guarded(lambda: self._place(position, how))
+                desk.arm_replacing(False)
+            return
         if desk.tool == "touch":
             if position is not None:
                 self._guarded(lambda: self._touch(position))
             return
-        is_new = active.code is not None and not desk.session.state.landmark(active.side, active.code).settled
-        if mark is not None and not (desk.tool == "place" and is_new):
+        places = desk.tool == "place" and self._is_to_place()
+        if mark is not None and not (places and self._is_to_do()):
             desk.go_to(*point_of(mark))
         elif position is None:
             return
-        elif desk.tool != "place" or active.code is None:
-            desk.session.set_crosshair(position)
-        else:
+        elif places:
             self._guarded(lambda: self._place(position, how))
+        else:
+            desk.session.set_crosshair(position)
+
+    def _is_to_place(self) -> bool:
+        """Whether a point is chosen that is not placed."""
+        active, state = self._desk.session.active, self._desk.session.state
+        return active.code is not None and state.landmark(active.side, active.code).position is None
+
+    def _is_to_do(self) -> bool:
+        """Whether a point is chosen of which nothing is known: it may lie where another is placed."""
+        active, state = self._desk.session.active, self._desk.session.state
+        if active.code is None:
+            return False
+        mark = state.landmark(active.side, active.code)
+        return not mark.settled and mark.suggestion is None
 
     def take_back(self) -> None:
         """Take back the point that the first click of a double click placed."""
@@ -102,12 +123,15 @@ class Hand:
             landmark_menu(self._desk, *point_of(mark), view).popup(where)
 
     def cursor(self, on_target: bool, mark: str | None) -> Qt.CursorShape:
-        """Return the pointer that says what a click would do."""
+        """Return the pointer that says what a click would do: a cross where it places, moves or touches."""
+        writes = self._desk.tool == "touch" or (self._desk.tool == "place" and self._is_to_place())
+        if self._desk.replacing:
+            return Qt.CursorShape.CrossCursor if on_target else Qt.CursorShape.ForbiddenCursor
         if mark is not None and self._can_drag(mark):
             return Qt.CursorShape.OpenHandCursor
         if self._desk.tool == "grey":
             return Qt.CursorShape.SizeAllCursor
-        return Qt.CursorShape.CrossCursor if on_target else Qt.CursorShape.ArrowCursor
+        return Qt.CursorShape.CrossCursor if on_target and writes else Qt.CursorShape.ArrowCursor
 
     def take_focus(self, view: QWidget) -> None:
         """Let keys go to the view under the pointer, unless somebody is typing."""

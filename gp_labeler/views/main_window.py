@@ -133,6 +133,8 @@ class MainWindow(QMainWindow):
             self.workbench.begin_labelling()
         elif step == "pose":
             self.workbench.begin_judging()
+        else:
+            self.workbench.begin_looking()
         self.panels.setCurrentWidget(self.steps[step])
         self._arrange()
 
@@ -185,11 +187,13 @@ class MainWindow(QMainWindow):
         self.welcome.open_specimen_asked.connect(self.ui.ask_open_file)
         self.welcome.demo_asked.connect(self.ui.open_demo)
         self.welcome.path_chosen.connect(self._on_path_chosen)
-        self._label.addAction(self.commands.actions["point.accept_ghost"])  # Enter means it there too
+        for id in ("point.accept_ghost", "point.confirm"):
+            self._label.addAction(self.commands.actions[id])  # Enter means it there too
         card = self._label.card
         card.open_asked.connect(self.ui.ask_open_file)
         card.find_asked.connect(self.ui.ask_find_scan)
         card.export_asked.connect(partial(self.commands.run, "file.export"))
+        card.confirm_asked.connect(partial(self.commands.run, "point.confirm"))
         self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
         self._scan.mesh.action_asked.connect(self.commands.run)
         self._atlas.asked.connect(self.commands.run)

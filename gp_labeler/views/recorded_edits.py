@@ -10,10 +10,12 @@ from gp_core.landmarks.features import Side
 from gp_labeler.session.edits import (
     CheckPoint,
     ClearPoint,
+    ConfirmPoint,
     Edit,
     LockPoints,
     MarkUnseen,
     PlacePoint,
+    SuggestPoints,
     SwapPoints,
     SwapSides,
 )
@@ -70,6 +72,20 @@ Find = Callable[[Any, SpecimenState, bool], "list[Table] | None"]
 def _put(edit: PlacePoint, _: SpecimenState, merge: bool) -> list[Table]:
     point = {"feature": edit.code, "side": edit.side.value}
     return [step("put", **point, at=list(edit.position), how=edit.provenance.how.value, nudge=merge)]
+
+
+def _suggest(edit: SuggestPoints, *_: object) -> list[Table] | None:
+    sources = {found.source for found in edit.suggestions.values()}
+    if len(sources) != 1:
+        return None
+    points = {code: list(found.position) for code, found in edit.suggestions.items()}
+    radii = {code: found.radius_95 for code, found in edit.suggestions.items() if found.radius_95}
+    source = sources.pop() or None
+    return [step("suggest", side=edit.side.value, points=points, radii=radii or None, source=source)]
+
+
+def _confirm(edit: ConfirmPoint, *_: object) -> list[Table]:
+    return [step("confirm", feature=edit.code, side=edit.side.value)]
 
 
 def _on_chosen(side: Side, code: str, id: str, **more: Any) -> list[Table]:
@@ -179,6 +195,8 @@ def _verdict(edit: RecordPoseCheck, *_: object) -> list[Table]:
 RECORDED: Mapping[type, Find] = MappingProxyType(
     {
         PlacePoint: _put,
+        SuggestPoints: _suggest,
+        ConfirmPoint: _confirm,
         ClearPoint: _clear,
         MarkUnseen: _unseen,
         CheckPoint: _check,

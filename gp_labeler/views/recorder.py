@@ -245,7 +245,8 @@ class Recorder(QObject):
     def _on_exported(self, report: ExportReport) -> None:
         names = [file.name for file in report.files]
         formats = [suffix for suffix in FORMATS if any(name.endswith(suffix) for name in names)]
-        self.tables.append(step("export", formats=formats))
+        suggested = any("_suggested." in name for name in names)
+        self.tables.append(step("export", formats=formats, suggested=suggested))
 
     def _on_pictured(self, file: Path) -> None:
         self.tables.append(step("screenshot", path=file.name))

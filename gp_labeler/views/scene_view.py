@@ -95,7 +95,7 @@ class SceneView(QWidget):
         self._slices_old = False
         self._hover: FloatArray | None = None
         self._pointer: tuple[float, float] | None = None
-        self._dragging = False
+        self._dragging = self._on_target = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
         self._fine_timer.timeout.connect(self._refine)
         self._draw_timer = QTimer(self, interval=0, singleShot=True)
@@ -163,6 +163,13 @@ class SceneView(QWidget):
         self.scene.text_scale = text_scale(self)
         self._show_points()
 
+    def voxel_pixels(self, position: FloatArray, voxel_mm: float) -> float:
+        """Return how many logical pixels a voxel is wide at a (3,) scan position; 0 where it is not seen."""
+        if not self._shows(position, 1.0) or bool(self.scene.hidden(position)[0]):
+            return 0.0
+        pixel_mm = float(self.scene.camera.viewpoint().pixel_sizes(position[None])[0])
+        return voxel_mm / (pixel_mm * self.devicePixelRatioF())
+
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
         """Return the logical pixel at which a (3,) scan position is seen, for tests and scripts."""
         x, y = self.scene.display_of(np.reshape(position, (1, 3)))[0]
@@ -175,6 +182,8 @@ class SceneView(QWidget):
         follow(self, desk.session_replaced, self._on_session_replaced)
         for signal in (desk.landmarks_changed, desk.active_changed, desk.ghosts_changed, desk.doubts_changed):
             follow(self, signal, self._show_points)
+        for signal in (desk.replacing_changed, desk.tool_changed, desk.active_changed):
+            follow(self, signal, self._show_cursor)
         follow(self, desk.pose.overlay_changed, self._show_points)
         follow(self, desk.crosshair_changed, self._on_crosshair)
         follow(self, desk.point_shown, self.go_to)
@@ -394,6 +403,8 @@ class SceneView(QWidget):
         arrow = _ARROWS.get(Qt.Key(event.key()))
         if event.key() == Qt.Key.Key_Escape and self._desk.drag is not None:
             self._hand.cancel()
+        elif event.key() == Qt.Key.Key_Escape and self._desk.replacing:
+            self._desk.arm_replacing(False)
         elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
             self.scene.camera.rotate(*arrow)
             self.redraw(quick=True)
@@ -435,7 +446,13 @@ class SceneView(QWidget):
         point = self._point_at(x, y)
         if point is not None and Modifier.SHIFT in held:
             self._desk.session.set_crosshair(point)
-        self.setCursor(self._hand.cursor(point is not None, self._mark_at(x, y)))
+        self._on_target = point is not None
+        self._show_cursor()
+
+    def _show_cursor(self, *_: object) -> None:
+        """Show the pointer that says what a click here does."""
+        if self._pointer is not None:
+            self.setCursor(self._hand.cursor(self._on_target, self._mark_at(*self._pointer)))
 
     def _point_at(self, x: float, y: float) -> FloatArray | None:
         """Take where the pointer is; return the (3,) scan position where a click would land."""

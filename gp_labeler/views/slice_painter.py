@@ -234,7 +234,8 @@ class SlicePainter:
             painter.setBrush(QColor(colour.red(), colour.green(), colour.blue(), 26))
             painter.setPen(QPen(colour, 1.8 * ratio))
             painter.drawPolygon(ring)
-            if ring.boundingRect().intersects(QRectF(0, 0, *shown.size)):  # it may be larger than the view
+            in_view = ring.boundingRect().intersects(QRectF(0, 0, *shown.size))  # it may be larger
+            if ghost.label and in_view:
                 upper_right = corners[int((corners[:, 0] - corners[:, 1]).argmax())]
                 beside = np.clip(upper_right, 1.0, np.array(shown.size) - 1.0)
                 names.append(SliceName(ghost.label, beside, colour.name(), 4.0, 3.0))
@@ -286,8 +287,12 @@ def _draw_mark(
     fade: float,
     ratio: float,
 ) -> None:
-    """Draw a point: full where the slice passes through it, its outline where it lies behind or before."""
+    """Draw a point: full where the slice passes through it, its outline where it lies behind or before.
+
+    A suggested one is never full: what lies beneath it is to be judged.
+    """
     shape, colour = _SHAPES.get(mark.state, "ball"), _on_black(mark.state)
+    in_slice = in_slice and mark.state != "suggested"
     painter.save()
     painter.setOpacity(fade)
     picture = marker_picture(shape, radius, colour, full=in_slice, line=1.6 * ratio, halo=3.2 * ratio)
@@ -299,7 +304,7 @@ def _draw_mark(
     painter.restore()
 
 
-_SHAPES = {"computed": "rhomb", "doubtful": "triangle"}
+_SHAPES = {"computed": "rhomb", "doubtful": "triangle", "suggested": "square"}
 
 
 def _name(mark: Mark, pixel: FloatArray) -> SliceName:

@@ -104,6 +104,17 @@ class SliceView(QWidget):
         if self.source is not None:
             self.move_to(self._position() + n * self.source.step(self.plane))
 
+    def voxel_pixels(self, position: FloatArray, voxel_mm: float) -> float:
+        """Return how many logical pixels a voxel is wide at a (3,) scan position; 0 where it is not seen."""
+        if self.shown is None or self.source is None:
+            return 0.0
+        x, y = self.pixel_at(position)
+        off = float(np.abs(self.shown.off_slice(np.reshape(position, (1, 3))))[0])
+        in_view = 0 <= x < self.width() and 0 <= y < self.height()
+        if not in_view or off > 0.75 * self.source.step(self.plane):
+            return 0.0
+        return voxel_mm / (self.shown.mm_per_pixel * self.devicePixelRatioF())
+
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
         """Return the logical pixel over which a (3,) scan position lies, for tests and scripts."""
         if self.shown is None:
@@ -122,6 +133,8 @@ class SliceView(QWidget):
         follow(self, desk.session_replaced, self._on_session_replaced)
         follow(self, desk.crosshair_changed, self._on_crosshair)
         follow(self, desk.point_shown, self.go_to)
+        for signal in (desk.replacing_changed, desk.tool_changed, desk.active_changed):
+            follow(self, signal, self._show_cursor)
         for signal in (
             desk.landmarks_changed,
             desk.active_changed,
@@ -222,7 +235,7 @@ class SliceView(QWidget):
         if event.buttons() == Qt.MouseButton.NoButton:
             if Modifier.SHIFT in modifiers_of(event):
                 self._desk.session.set_crosshair(here)
-            self.setCursor(self._hand.cursor(self._is_inside(here), self._mark_at(x, y)))
+            self._show_cursor()
             return
         view = self._control.move(self.shown, x, y)
         if view is not self.shown:
@@ -246,7 +259,7 @@ class SliceView(QWidget):
             self._hand.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         plain = event.button() == Qt.MouseButton.LeftButton and not modifiers_of(event)
         here = self.shown.pixel_to_scan([[x, y]])[0]
-        if clicked and plain and not dragged and (self._desk.tool != "grey" or mark):
+        if clicked and plain and not dragged and (self._desk.tool != "grey" or mark or self._desk.replacing):
             self._hand.click(here if self._is_inside(here) else None, How.SLICE, mark)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
@@ -271,6 +284,8 @@ class SliceView(QWidget):
         plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
         if key == Qt.Key.Key_Escape and self._desk.drag is not None:
             self._hand.cancel()
+        elif key == Qt.Key.Key_Escape and self._desk.replacing:
+            self._desk.arm_replacing(False)
         elif key in _ARROWS and plain and self.source is not None:
             self._nudge(*_ARROWS[key])
         elif key in _STEPS and plain:
@@ -286,6 +301,12 @@ class SliceView(QWidget):
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
         self._hand.take_focus(self)
         super().enterEvent(event)
+
+    def _show_cursor(self, *_: object) -> None:
+        """Show the pointer that says what a click here does."""
+        if self.shown is not None and self._pointer is not None:
+            here = self.shown.pixel_to_scan([self._pointer])[0]
+            self.setCursor(self._hand.cursor(self._is_inside(here), self._mark_at(*self._pointer)))
 
     def _nudge(self, right: float, down: float) -> None:
         """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""

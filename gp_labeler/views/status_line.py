@@ -74,6 +74,7 @@ class StatusLine(QWidget):
             workbench.session_replaced,
             workbench.tool_changed,
             workbench.volume_opened,
+            workbench.replacing_changed,
             workbench.dragged,
             workbench.pose.target_changed,
         ):
@@ -118,6 +119,9 @@ class StatusLine(QWidget):
         elif desk.volume is None:
             its_own = "File > Find scan says where the scan is now" if desk.session.volume_is_lost else ""
             self._show(self.without_scan or its_own or "Open a scan, or try the demo", "hint")
+        elif desk.replacing and desk.session.active.code is not None:
+            point = point_text(desk.session.active.side, desk.session.active.code)
+            self._show(f"The next click moves {point} there · Esc leaves it where it is", "next")
         elif desk.tool == "touch":
             target = desk.pose.target
             where = f"where {point_text(desk.pose.side, target)} is" if target else "in vain: all are touched"

@@ -151,6 +151,7 @@ DARK = Theme(
         {
             "to do": "#93A0AD",
             "ghost": "#6FC1F8",
+            "suggested": "#6FC1F8",
             "placed": "#F6A43C",
             "checked": "#A6DB6C",
             "doubtful": "#FF7B81",
@@ -187,6 +188,7 @@ LIGHT = Theme(
         {
             "to do": "#5A6775",
             "ghost": "#0F66A9",
+            "suggested": "#0F66A9",
             "placed": "#9A5200",
             "checked": "#3F6D12",
             "doubtful": "#B81C27",

@@ -6,6 +6,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
 
+from gp_core.checks import FloatArray
 from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
@@ -19,6 +20,11 @@ from gp_labeler.workbench import Workbench
 __all__ = ["ViewFrame", "ViewGrid"]
 
 _HEADER_HEIGHT, _GAP = 24, 6
+CLOSE_MM = 12.0
+"""Across a view that looks closely at a point."""
+
+JUDGED_PIXELS = 2.0
+"""Logical pixels that the smallest voxel edge must cover for a person to judge a position."""
 
 
 class ViewHeader(QWidget):
@@ -170,6 +176,7 @@ class ViewGrid(QWidget):
         self.setMinimumWidth(2 * self.scene_view.minimumWidth() + _GAP)
         self._listen()
         self._lay_out()
+        workbench.sight = self
 
     @property
     def views(self) -> tuple[SceneView | SliceView, ...]:
@@ -180,6 +187,25 @@ class ViewGrid(QWidget):
         """Show everything in every view."""
         for view in self.views:
             view.reset()
+
+    def can_judge(self, position: FloatArray) -> bool:
+        """Whether a view shows a (3,) scan position with voxels at least two logical pixels wide."""
+        volume = self._desk.volume
+        return volume is not None and any(
+            view.isVisible() and view.voxel_pixels(position, min(volume.spacing)) >= JUDGED_PIXELS
+            for view in self.views
+        )
+
+    def bring_close(self, position: FloatArray) -> None:
+        """Show a (3,) scan position in every view so closely that it can be judged."""
+        volume = self._desk.volume
+        if volume is None:
+            return
+        for view in self.views:
+            side = min(view.width(), view.height())
+            view.zoom_to(position, min(CLOSE_MM, side * min(volume.spacing) / (2 * JUDGED_PIXELS)))
+        if not self.can_judge(position):  # such as what bone hides in the 3D view, shown alone
+            self._desk.session.view.update(layout="four-up")
 
     def release(self) -> None:
         """Let go of scene and voxels."""

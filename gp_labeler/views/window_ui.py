@@ -28,6 +28,7 @@ from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_about, export_asking, import_asking
 from gp_labeler.views.recorder import Recorder
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+from gp_labeler.views.view_grid import CLOSE_MM
 from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ _SCANS = (
     "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
-_CLOSE_MM = 12.0
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
 
 
@@ -249,7 +249,7 @@ class WindowUi(AtlasUi, PoseUi):
         if active.code is not None:
             desk.go_to(active.side, active.code)
         for view in self._window.grid.views:
-            view.zoom_to(desk.session.crosshair, _CLOSE_MM)
+            view.zoom_to(desk.session.crosshair, CLOSE_MM)
 
     def look_from(self, letter: str) -> None:
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""

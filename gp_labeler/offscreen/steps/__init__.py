@@ -10,7 +10,7 @@ from gp_labeler.offscreen.steps.atlas import Check, Fit, UseAtlas
 from gp_labeler.offscreen.steps.expecting import Expect
 from gp_labeler.offscreen.steps.files import Details, Export, Import, Save
 from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
-from gp_labeler.offscreen.steps.placing import Choose, Drag, Place, Put
+from gp_labeler.offscreen.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
 from gp_labeler.offscreen.steps.pose import CarryPath, Estimate, Overlay, Report, Verdict
 from gp_labeler.offscreen.steps.scan import Mesh, Open, Spacing, Threshold
 from gp_labeler.offscreen.steps.touching import Register, Skull, Touches
@@ -18,7 +18,7 @@ from gp_labeler.offscreen.steps.touching import Register, Skull, Touches
 __all__ = ["STEPS"]
 
 _ALL: tuple[type[Step], ...] = (
-    *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Put, Drag, Key, Act, Undo),
+    *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, Key, Act, Undo),
     *(Details, Import, Export, Fit, UseAtlas, Touches, Skull, Register, Estimate, Overlay, Verdict, Report),
     *(CarryPath, Check, Screenshot, Save, Expect),
 )

@@ -31,6 +31,8 @@ class Expect(Step):
         mm; by default one voxel.
     placed : int, optional
         How many points are placed or computed.
+    suggested : int, optional
+        How many points are suggested and not yet confirmed, of `side` or of both.
     message : str, optional
         A part of something that the window has said.
     pose_within : float, optional
@@ -43,6 +45,7 @@ class Expect(Step):
     near: Triple | str | None = None
     within: float | None = None
     placed: int | None = None
+    suggested: int | None = None
     message: str | None = None
     pose_within: float | None = None
 
@@ -52,20 +55,24 @@ class Expect(Step):
         if self.feature is not None:
             found.append(self._point(rig, feature(self.feature).code))
         if self.placed is not None:
-            found.append(self._count(rig, self.placed))
+            found.append(self._count(rig, "placed", self.placed))
+        if self.suggested is not None:
+            found.append(self._count(rig, "suggested", self.suggested))
         if self.message is not None:
             found.append(self._heard(rig, self.message))
         if self.pose_within is not None:
             found.append(self._pose(rig, self.pose_within))
         if not found:
-            raise GpError("expect needs feature, placed, message or pose_within")
+            raise GpError("expect needs feature, placed, suggested, message or pose_within")
         return ", ".join(found)
 
     def _point(self, rig: Rig, code: str) -> str:
         side = self.side or Side.LEFT
         there = rig.placed(side, code)
         if there is None:
-            raise GpError(f"{code} {side.word} is not placed", landmark=code)
+            is_suggested = code in rig.desk.session.landmarks(side).suggested
+            word = "only suggested" if is_suggested else "not placed"
+            raise GpError(f"{code} {side.word} is {word}", landmark=code)
         if self.near is None:
             return f"{code} {side.word} is placed"
         aim = rig.truth(side, code) if self.near == "truth" else np.array(self.near)
@@ -76,12 +83,15 @@ class Expect(Step):
             raise GpError(f"{code} {side.word} lies {off:.3f} mm off, allowed are {allowed:g}", landmark=code)
         return f"{code} {side.word} {off:.3f} mm off"
 
-    def _count(self, rig: Rig, wanted: int) -> str:
+    def _count(self, rig: Rig, state: str, wanted: int) -> str:
         sides = list(Side) if self.side is None else [self.side]
-        counted = sum(rig.desk.session.progress(side).n_placed for side in sides)
+        found = [rig.desk.session.progress(side) for side in sides]
+        counted = sum(getattr(each, f"n_{state}") for each in found)
         if counted != wanted:
-            raise GpError(f"{counted} points are placed, expected were {wanted}")
-        return f"{counted} points"
+            n_suggested = sum(each.n_suggested for each in found)
+            others = f" and {n_suggested} only suggested" if state == "placed" and n_suggested else ""
+            raise GpError(f"{counted} points are {state}{others}, expected were {wanted}")
+        return f"{wanted} points" if state == "placed" else f"{wanted} suggested"
 
     def _heard(self, rig: Rig, text: str) -> str:
         if not any(text in said for said, _ in rig.messages):

@@ -65,17 +65,22 @@ class Export(Step):
     formats : text or texts
         Of ``.mrk.json``, ``.fcsv`` and ``.csv``.
     complete : bool
-        Fail where a side lacks a feature.
+        Fail where a side lacks a feature, or has one only suggested.
+    suggested : bool
+        Write also what is only suggested, into ``<specimen>_L_suggested.mrk.json`` and ``_R_``.
     """
 
     do: ClassVar[str] = "export"
     folder: str = "."
     formats: tuple[str, ...] = (".mrk.json",)
     complete: bool = False
+    suggested: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         state, folder = rig.desk.session.state, rig.to_write(self.folder)
-        report = export_landmarks(state, folder, formats=self.formats, overwrite=True)
+        report = export_landmarks(
+            state, folder, formats=self.formats, overwrite=True, suggested=self.suggested
+        )
         rig.wrote(*report.files)
         if self.complete and not report.is_complete:
             raise GpError(report.text.replace("\n", " "))

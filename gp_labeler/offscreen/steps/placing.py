@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 import numpy as np
@@ -11,16 +11,17 @@ import numpy as np
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.offscreen.aiming import aim_at_bone, scroll_to
 from gp_labeler.offscreen.events import click, drag, press_keys
 from gp_labeler.offscreen.rig import VIEWS, Rig
-from gp_labeler.offscreen.step import Pair, Step, Triple
+from gp_labeler.offscreen.step import Lengths, Pair, Positions, Step, Triple
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import PlacePoint
+from gp_labeler.session.edits import PlacePoint, SuggestPoints
 from gp_labeler.session.state import How
 
-__all__ = ["Choose", "Drag", "Place", "Put"]
+__all__ = ["Choose", "Confirm", "Drag", "Place", "Put", "Suggest"]
 
 _KEYS = {"ghost": "Return", "crosshair": "Space"}
 
@@ -37,8 +38,9 @@ class Place(Step):
         Which side.
     at : three numbers or str, optional
         A scan position, mm, through which the click goes: the view is scrolled and zoomed to it.
-        ``truth`` is where the phantom has the feature. ``ghost`` and ``crosshair`` press the keys that place
-        the point where the atlas expects it, or where the crosshair is.
+        ``truth`` is where the phantom has the feature. ``crosshair`` presses the key that places the point
+        where the crosshair is. ``ghost`` presses the key that suggests it where the atlas expects it; then it
+        counts as placed only once a step `confirm` confirms it.
     pixel : two numbers, optional
         Instead of `at`: a logical pixel of the view as it is, from its top left.
     view : str
@@ -63,6 +65,8 @@ class Place(Step):
         _ = rig.voxel
         before, since = rig.desk.session.state, len(rig.messages)
         rig.choose(self.side, code)
+        if self.at != "ghost" and rig.placed(self.side, code) is not None:
+            rig.desk.arm_replacing()  # a click alone leaves a placed point where it is
         name = self._hit(rig, code)
         rig.settle(in_passing=False)
         if rig.desk.session.state is before:
@@ -143,7 +147,9 @@ class Put(Step):
     at : three numbers
         Scan position, mm.
     how : str
-        What is remembered of it: ``mesh``, ``slice``, ``accepted ghost``, ``imported`` or ``typed``.
+        What is remembered of it: ``mesh``, ``slice``, ``typed``, ``imported``, ``confirmed suggestion`` or
+        ``nudged suggestion``. With ``accepted ghost``, as scripts of earlier versions have it, the point is
+        only suggested there.
     nudge : bool
         Whether it is moved by arrow keys; such movements in a row are one undo.
     """
@@ -162,6 +168,7 @@ class Put(Step):
         rig.choose(self.side, code)
         session = rig.desk.session
         if self.nudge:
+            how = How.NUDGED if how is How.GHOST else how
             found = labelling.provenance(session, how)
             session.do(PlacePoint(self.side, code, self.at, found, verb="nudge"), merge=True)
         else:
@@ -174,6 +181,92 @@ def _how(word: str) -> How:
     if word not in words:
         raise GpError(f"how must be one of {', '.join(words)}, got {word!r}")
     return How(word)
+
+
+@dataclass(frozen=True)
+class Suggest(Step):
+    """Suggest where points are, for a person to confirm; what is placed or unseen stays as it is.
+
+    Parameters
+    ----------
+    points : mapping of str to three numbers
+        Scan positions by feature code, mm.
+    side : L or R
+        Which side.
+    radii : mapping of str to float
+        By feature code, where known: radius that holds the point with 95 % probability, mm.
+    source : str
+        What suggests them.
+    """
+
+    do: ClassVar[str] = "suggest"
+    says: ClassVar[tuple[str, ...]] = ("side",)
+    points: Positions
+    side: Side
+    radii: Lengths = field(default_factory=dict)
+    source: str = ""
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        _ = rig.voxel  # a scan must be there
+        session = rig.desk.session
+        radii = {feature(code).code: radius for code, radius in self.radii.items()}
+        suggestions = {
+            code: Suggestion(at, radii.get(feature(code).code), self.source)
+            for code, at in self.points.items()
+        }
+        session.do(SuggestPoints(self.side, suggestions, labelling.provenance(session, How.GHOST)))
+        rig.settle(in_passing=False)
+        return f"{session.progress(self.side).n_suggested} suggested"
+
+
+@dataclass(frozen=True)
+class Confirm(Step):
+    """Confirm a suggested point, as a person does: look closely at it, then press the key.
+
+    Parameters
+    ----------
+    feature : str
+        Its code; its ghost is accepted first where it is not suggested yet.
+    side : L or R
+        Which side.
+    within : float, optional
+        Fail, and confirm nothing, where it lies farther than this from its true place in the phantom, mm.
+    """
+
+    do: ClassVar[str] = "confirm"
+    says: ClassVar[tuple[str, ...]] = ("feature", "side")
+    feature: str
+    side: Side
+    within: float | None = None
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        code = feature(self.feature).code
+        rig.choose(self.side, code)
+        found = "" if self.within is None else self._judged(rig, code, self.within)
+        for _ in range(_MOST_LOOKS):
+            if rig.desk.session.state.landmark(self.side, code).settled:
+                break
+            rig.window.commands.run("point.confirm")
+            rig.settle(in_passing=False)
+        if rig.placed(self.side, code) is None:
+            raise GpError(f"{code} {self.side.word} has no suggestion to confirm", landmark=code)
+        return found
+
+    def _judged(self, rig: Rig, code: str, within: float) -> str:
+        where = labelling.place_of(rig.desk.session, self.side, code)
+        if where is None:
+            raise GpError(f"{code} {self.side.word} has no suggestion to confirm", landmark=code)
+        off = float(np.linalg.norm(where - rig.truth(self.side, code)))
+        if off > within:
+            raise GpError(
+                f"{code} {self.side.word} is suggested {off:.3f} mm off, allowed are {within:g}",
+                landmark=code,
+            )
+        return f"{off:.3f} mm from there"
+
+
+_MOST_LOOKS = 3
+"""Times that the key is pressed: it brings the view there, perhaps in another layout, then confirms."""
 
 
 @dataclass(frozen=True)
@@ -199,7 +292,7 @@ class Choose(Step):
 
 @dataclass(frozen=True)
 class Drag(Step):
-    """Drag a placed point to another place.
+    """Drag a placed point to another place, or a suggested one, which is placed by that.
 
     Parameters
     ----------
@@ -225,7 +318,7 @@ class Drag(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         code = feature(self.feature).code
-        start = rig.placed(self.side, code)
+        start = rig.shown_at(self.side, code)
         if (self.to is None) == (self.by is None):
             raise GpError("drag needs to or by, one of them", landmark=code)
         if start is None:

@@ -8,7 +8,7 @@ from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.session.edits import point_text
 from gp_labeler.session.session import Session
 from gp_labeler.session.workflow import OPENING, PointState
-from gp_labeler.views.bind import mm_text
+from gp_labeler.views.bind import mm_text, suggestion_text
 from gp_labeler.views.panels.parts import breakable
 
 __all__ = ["CardContent", "content_of"]
@@ -104,6 +104,7 @@ _EXTERNAL = ("touchable", "The probe can touch it on an opened animal: it serves
 _VERBS = {
     PointState.TO_DO: "Place next",
     PointState.GHOST: "Place next",
+    PointState.SUGGESTED: "Suggested",
     PointState.PLACED: "Placed",
     PointState.CHECKED: "Checked",
     PointState.DOUBTFUL: "Look again",
@@ -112,6 +113,7 @@ _VERBS = {
 _ACTIONS = {
     PointState.TO_DO: ("crosshair", "Place at crosshair"),
     PointState.GHOST: ("ghost", "Accept ghost"),
+    PointState.SUGGESTED: ("confirm", "Confirm"),
     PointState.PLACED: ("check", "Mark as checked"),
     PointState.CHECKED: ("next", "Next feature"),
     PointState.DOUBTFUL: ("check", "It is right"),
@@ -135,6 +137,10 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
         ghost = session.ghosts(side)[code]
         who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
+    if state is PointState.SUGGESTED:
+        said = suggestion_text(session.landmarks(side).suggested[code])
+        source = f" ({said})" if said else ""
+        return f"Not confirmed{source}. It counts once you confirm or correct it.", "ghost"
     doubt = session.near_doubts(side).get(code)
     if state is PointState.DOUBTFUL and doubt is not None:
         words = doubt.text
@@ -142,7 +148,7 @@ def _status(session: Session, side: Side, code: str, state: PointState) -> tuple
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"
     if state is PointState.PLACED:
-        return f"{_settled_words(session, side, code)} Drag or nudge it to correct it.", "hint"
+        return f"{_settled_words(session, side, code)} Drag, nudge or re-place it to correct it.", "hint"
     if state is PointState.UNSEEN:
         return "Looked for, not seen. Click to place it after all.", "hint"
     return _first_ones(session, side), "hint"
@@ -157,7 +163,8 @@ def _settled_words(session: Session, side: Side, code: str) -> str:
     words = {
         "mesh": "Placed on bone.",
         "slice": "Placed on a slice.",
-        "accepted ghost": "Placed on its ghost.",
+        "confirmed suggestion": "Suggested and confirmed.",
+        "nudged suggestion": "Suggested and corrected.",
     }
     return words.get(how, f"{how.capitalize()}." if how else "Placed.")
 

@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
-from gp_labeler.session.landmark_export import FORMATS, export_landmarks
+from gp_labeler.session.landmark_export import FORMATS, export_landmarks, export_names
 from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, breakable, emptied, scrolled, text_label
@@ -80,6 +80,8 @@ class ExportDialog(QDialog):
         self.files.setText(
             breakable("   ".join(names)) if names else "Nothing is placed yet, or no format is chosen."
         )
+        n_suggested = sum(m.suggestion is not None for m in self._workbench.session.state.landmarks.values())
+        self.suggested.setVisible(bool(n_suggested))
         self.replace.setVisible(bool(there))
         self.replace.setText(f"Replace {len(there)} file{'s' if len(there) > 1 else ''} of that name")
         self.export.setEnabled(bool(names) and (not there or self.replace.isChecked()))
@@ -91,6 +93,9 @@ class ExportDialog(QDialog):
         self.browse = QPushButton("Browse…")
         self.browse.clicked.connect(self._browse)
         self.formats = {suffix: self._format_box(suffix) for suffix in FORMATS}
+        self.suggested = QCheckBox("Suggestions too, in files of their own, marked as not confirmed")
+        self.suggested.setToolTip("3D Slicer takes every point of a landmark file as observed")
+        self.suggested.toggled.connect(self.refresh)
         self.files = text_label("", "", wrap=True)
         self.replace = QCheckBox()
         self.replace.toggled.connect(self.refresh)
@@ -127,6 +132,7 @@ class ExportDialog(QDialog):
         self._form.addWidget(text_label("Formats", "heading"))
         for box in self.formats.values():
             self._form.addWidget(box)
+        self._form.addWidget(self.suggested)
         self._form.addWidget(text_label("Files", "heading"))
         self._form.addWidget(self.files)
         self._form.addWidget(self.replace)
@@ -152,15 +158,20 @@ class ExportDialog(QDialog):
             statuses = {code: landmarks.status(code) for code in session.point_states(side, wait=False)}
             to_do = [code for code, status in statuses.items() if status is Status.TO_DO]
             unseen = [code for code, status in statuses.items() if status is Status.UNSEEN]
+            suggested = list(landmarks.suggested)
             parts = [
                 f"{word} {' '.join(codes)}"
-                for word, codes in (("to do:", to_do), ("not seen:", unseen))
+                for word, codes in (
+                    ("to do:", to_do),
+                    ("suggested, not confirmed, so without a position:", suggested),
+                    ("not seen:", unseen),
+                )
                 if codes
             ]
             words = f"The {side.word} side has {session.progress(side).text}" + "".join(
                 f"; {p}" for p in parts
             )
-            found.append(("warning" if to_do else "info" if unseen else "good", f"{words}."))
+            found.append(("warning" if to_do or suggested else "info" if unseen else "good", f"{words}."))
             found += self._doubts(side)
         return found
 
@@ -189,9 +200,8 @@ class ExportDialog(QDialog):
         return [suffix for suffix, box in self.formats.items() if box.isChecked()]
 
     def _names(self) -> list[str]:
-        session = self._workbench.session
-        sides = [side for side in Side if session.landmarks(side).placed]
-        return [f"{session.state.specimen}_{s.value}{suffix}" for s in sides for suffix in self._suffixes()]
+        state = self._workbench.session.state
+        return list(export_names(state, self._suffixes(), suggested=self.suggested.isChecked()))
 
     def _there(self) -> list[Path]:
         folder = Path(self.folder.text())
@@ -207,7 +217,11 @@ class ExportDialog(QDialog):
         state, folder = self._workbench.session.state, self.folder.text()
         try:
             report = export_landmarks(
-                state, folder, formats=self._suffixes(), overwrite=self.replace.isChecked()
+                state,
+                folder,
+                formats=self._suffixes(),
+                overwrite=self.replace.isChecked(),
+                suggested=self.suggested.isChecked(),
             )
         except GpError as error:
             self._result.setText(breakable(str(error)))

@@ -53,6 +53,7 @@ class FeatureCard(QWidget):
     open_asked = Signal()
     find_asked = Signal()
     export_asked = Signal()
+    confirm_asked = Signal()
 
     def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -204,6 +205,8 @@ class FeatureCard(QWidget):
             self.find_asked.emit()
         elif action == "export":
             self.export_asked.emit()
+        elif action == "confirm":
+            self.confirm_asked.emit()
         else:
             self._do(lambda: _EDITS[action](self._workbench))
 
@@ -265,6 +268,7 @@ _EDITS: Mapping[str, Callable[[Workbench], object]] = {
 
 _COMMANDS: Mapping[str, str] = {
     "ghost": "point.accept_ghost",
+    "confirm": "point.accept_ghost",
     "crosshair": "point.place",
     "check": "point.check",
     "unlock": "point.lock",

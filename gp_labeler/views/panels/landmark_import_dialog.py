@@ -125,9 +125,11 @@ class LandmarkImportDialog(QDialog):
         except GpError as error:
             return "error", str(error)
         unseen = f", {len(landmarks.unseen)} not seen" if landmarks.unseen else ""
+        suggested = f", {len(landmarks.suggested)} only suggested" if landmarks.suggested else ""
         return (
             "info",
-            f"{file.name}: {len(landmarks.placed)} points of the {landmarks.side.word} side{unseen}",
+            f"{file.name}: {len(landmarks.placed)} points of the {landmarks.side.word} side"
+            f"{suggested}{unseen}",
         )
 
     def _show(self, findings: Sequence[tuple[str, str]]) -> None:

@@ -18,7 +18,7 @@ __all__ = ["landmark_menu"]
 
 
 def landmark_menu(workbench: Workbench, side: Side, code: str, parent: QWidget) -> QMenu:
-    """Return the menu of a point: go there, check, clear, not seen, lock, swap, copy its position."""
+    """Return the menu of a point: what can be done to it, and where it is."""
     menu = QMenu(parent)
     session = workbench.session
 
@@ -43,8 +43,14 @@ def _add_edits(add: Callable[..., None], workbench: Workbench, side: Side, code:
     session = workbench.session
     mark: Landmark = session.state.landmark(side, code)
     placed, free = mark.position is not None, not mark.locked
-    ghost = code in session.ghosts(side)
+    ghost, suggested = code in session.ghosts(side), mark.suggestion is not None
     add("Accept ghost", lambda: labelling.accept_ghost(session, side=side, code=code), enabled=ghost)
+    add("Confirm", lambda: workbench.confirm(side, code), enabled=ghost or suggested)
+    add(
+        "Re-place with the next click",
+        lambda: _arm_replacing(workbench, side, code),
+        enabled=placed and free and workbench.volume is not None,
+    )
     checked = mark.checked
     add(
         "Take back the check" if checked else "Mark as checked",
@@ -53,13 +59,18 @@ def _add_edits(add: Callable[..., None], workbench: Workbench, side: Side, code:
     )
     unseen = MarkUnseen(side, code, labelling.provenance(session, How.UNSEEN))
     add("Cannot be seen", lambda: session.do(unseen), enabled=free and not mark.unseen)
-    add("Clear", lambda: session.do(ClearPoint(side, code)), enabled=free and mark.settled)
+    add("Clear", lambda: session.do(ClearPoint(side, code)), enabled=free and (mark.settled or suggested))
     locked = mark.locked
     add(
         "Unlock" if locked else "Lock",
         lambda: labelling.lock(session, not locked, side=side, code=code),
         enabled=mark.settled,
     )
+
+
+def _arm_replacing(workbench: Workbench, side: Side, code: str) -> None:
+    workbench.go_to(side, code)
+    workbench.arm_replacing()
 
 
 def _add_swaps(add: Callable[..., None], menu: QMenu, workbench: Workbench, side: Side, code: str) -> None:

@@ -8,13 +8,16 @@ from PySide6.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersisten
 
 from gp_core.landmarks.features import CODES, Side, feature, index_of
 from gp_labeler.session.workflow import PointState
-from gp_labeler.views.bind import follow, mm_text
+from gp_labeler.views.bind import follow, mm_text, suggestion_text
 from gp_labeler.workbench import Workbench
 
 __all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkModel"]
 
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of the columns after the first."""
+
+_SUGGESTED = "\N{WHITE SQUARE}"
+"""Before a number of suggestions in the header: it has the shape of their chips."""
 
 _USER = int(Qt.ItemDataRole.UserRole)
 STATE_ROLE, ACTIVE_ROLE, LOCKED_ROLE, CODE_ROLE = (_USER + n for n in range(1, 5))
@@ -85,9 +88,11 @@ class LandmarkModel(QAbstractTableModel):
     def headerData(  # noqa: D102, N802 - Qt's name
         self, section: int, orientation: Qt.Orientation, role: int = int(Qt.ItemDataRole.DisplayRole)
     ) -> Any:
-        if orientation is not Qt.Orientation.Horizontal or role != Qt.ItemDataRole.DisplayRole:
+        if orientation is not Qt.Orientation.Horizontal:
             return None
-        return self._headings[section]
+        if role == Qt.ItemDataRole.ToolTipRole and section:
+            return self._workbench.session.progress(SIDES[section - 1]).text
+        return self._headings[section] if role == Qt.ItemDataRole.DisplayRole else None
 
     def data(self, index: Index, role: int = int(Qt.ItemDataRole.DisplayRole)) -> Any:  # noqa: D102
         if not index.isValid():
@@ -118,7 +123,8 @@ class LandmarkModel(QAbstractTableModel):
 
     def _heading(self, side: Side) -> str:
         progress = self._workbench.session.progress(side)
-        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
+        suggested = f"  {_SUGGESTED}{progress.n_suggested}" if progress.n_suggested else ""
+        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}{suggested}"
 
     def _cell(self, code: str, side: Side, state: PointState) -> _Cell:
         session, row = self._workbench.session, feature(code)
@@ -142,6 +148,9 @@ class LandmarkModel(QAbstractTableModel):
             return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
         if state is PointState.DOUBTFUL and (doubt := self._workbench.session.near_doubts(side).get(code)):
             text += f", {doubt.text}"
+        if state is PointState.SUGGESTED:
+            said = suggestion_text(self._workbench.session.landmarks(side).suggested[code])
+            text += f", not confirmed{f' ({said})' if said else ''}"
         if state is PointState.GHOST:
             text += (
                 f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"

@@ -175,7 +175,7 @@ class PosePanel(QWidget):
         super().hideEvent(event)
         self._stale = True
         if self._desk.tool == "touch" and not event.spontaneous():
-            self._desk.set_tool("place")
+            self._desk.set_tool("look")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
         self._share_columns()

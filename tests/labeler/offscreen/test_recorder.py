@@ -51,7 +51,9 @@ ACTION_STEPS = {
     **{id: "view" for id in ACTIONS if id.startswith("view.")},
     **{id: "action" for id in ACTIONS if id.startswith(("view.from_", "view.cut_", "tool."))},
     **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection", "view.slices_visible"), "action"),
-    **dict.fromkeys(("point.accept_ghost", "point.place"), "put"),
+    "point.place": "put",
+    **dict.fromkeys(("point.accept_ghost", "point.accept_all"), "suggest"),
+    "point.confirm": "confirm",
     **{f"point.{verb}": "action" for verb in ("unseen", "clear", "check", "lock", "lock_all")},
     **dict.fromkeys(("pose.open_touches", "pose.clear"), "touches"),
     "pose.open_skull": "skull",
@@ -75,6 +77,7 @@ NOT_WRITTEN = {
     **dict.fromkeys(("point.skip", "point.next", "point.previous", "point.other_side"), CHOOSES),
     **dict.fromkeys(("pose.skip", "pose.other_side"), CHOOSES),
     **dict.fromkeys(("pose.tracker", "pose.guide"), "shows settings, or asks for touches, which are written"),
+    "point.replace": "arms a click: the move is written",
     "pose.physical": "tells only: its result is no part of the specimen",
     **dict.fromkeys(("atlas.show", "atlas.try"), "tells only: nothing of it is kept"),
     **dict.fromkeys(
@@ -174,6 +177,7 @@ def place_three(recording) -> None:
     """Place two of the left and one of the right by clicks, and nudge one."""
     session, scene = recording.session, recording.window.grid.scene_view
     axial = recording.window.grid.slice_views[Plane.AXIAL]
+    recording.window.set_step("label")  # elsewhere a click looks
     scene.view_from("A")
     session.set_crosshair(INSIDE)
     axial.setFocus()
@@ -196,6 +200,8 @@ def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
     assert run("point.check") == ["choose", "action"]
     assert run("point.lock") == ["choose", "action"]
     desk.go_to(Side.RIGHT, "OS")
+    assert run("point.place") == []  # it is placed already
+    assert run("point.replace") == []
     assert run("point.place") == ["put"]  # where the crosshair is
     assert run("edit.undo") == ["undo"]
     assert run("edit.redo") == ["action"]
@@ -233,13 +239,24 @@ def test_imports_of_every_kind_are_done_again(recording) -> None:
     assert recording.check().count("import") == 2
 
 
-def test_the_ghost_is_put_where_it_was(recording) -> None:
+def test_suggestions_and_confirmations_are_done_again(recording) -> None:
     recording.begin()
     for code, at in (("CA", (2, 0, 0)), ("RWP", (-2, 1, 0)), ("OS", (0, -2, 1))):
         labelling.place(recording.session, MIDDLE + at, How.SLICE, side="L", code=code)
     recording.desk.go_to(Side.LEFT, "CB")
-    assert recording.run("point.accept_ghost") == ["put"]
-    assert recording.recorder.tables[-1]["how"] == "accepted ghost"
+    assert recording.run("point.accept_ghost") == ["suggest"]
+    assert recording.recorder.tables[-1]["source"] == "atlas"
+    assert recording.run("point.accept_all") == ["suggest"]
+    assert recording.run("edit.undo") == ["undo"]
+    assert recording.run("edit.redo") == ["action"]
+    for code in ("CB", "RWA", "RWA"):
+        recording.desk.go_to(Side.LEFT, code)
+        recording.run("point.confirm")
+    assert [table["feature"] for table in recording.recorder.tables if table["do"] == "confirm"] == [
+        "CB",
+        "RWA",
+    ]
+    assert recording.session.progress(Side.LEFT).text == "6 placed, 14 suggested"  # CO is computed
     recording.check(*FILES[:2])
 
 

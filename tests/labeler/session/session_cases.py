@@ -15,13 +15,16 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
 from gp_core.landmarks.features import CODES, FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.session.document import document_of
 from gp_labeler.session.edits import (
     CheckPoint,
     ClearPoint,
+    ConfirmPoint,
     LockPoints,
     MarkUnseen,
     PlacePoint,
+    SuggestPoints,
     SwapPoints,
     SwapSides,
 )
@@ -130,6 +133,11 @@ pose_checks = st.builds(
 )
 
 
+suggestions = st.builds(
+    Suggestion, positions, st.none() | st.floats(1e-3, 1e3), st.sampled_from(("", "atlas", "mirror"))
+)
+
+
 @st.composite
 def landmark_sets(draw, side: Side):
     points = draw(st.dictionaries(few_codes, positions, max_size=4))
@@ -137,7 +145,8 @@ def landmark_sets(draw, side: Side):
     landmarks = LandmarkSet.from_mapping(points, side)
     for code in sorted(unseen - set(points)):
         landmarks = landmarks.with_unseen(code)
-    return landmarks
+    suggested = draw(st.dictionaries(few_codes, suggestions, max_size=2))
+    return landmarks.with_suggestions(suggested)
 
 
 touches = st.builds(
@@ -157,6 +166,8 @@ touched_names = st.sampled_from(("MN", "LLI", "IN", "S1"))
 edits = st.one_of(
     st.builds(PlacePoint, sides, few_codes, positions, provenances),
     st.builds(PlacePoint, sides, few_codes, positions, provenances, st.just("nudge")),
+    st.builds(SuggestPoints, sides, st.dictionaries(few_codes, suggestions, max_size=3), provenances),
+    st.builds(ConfirmPoint, sides, few_codes, provenances),
     st.builds(ClearPoint, sides, few_codes),
     st.builds(MarkUnseen, sides, few_codes, st.none() | provenances),
     st.builds(CheckPoint, sides, few_codes, st.booleans()),

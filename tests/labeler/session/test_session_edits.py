@@ -29,7 +29,7 @@ from gp_labeler.session.history import History
 from gp_labeler.session.landmark_import import ImportLandmarks
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import RenameSpecimen, SetThreshold
-from gp_labeler.session.state import How, SpecimenState
+from gp_labeler.session.state import TO_DO, How, SpecimenState, point_key
 
 L, R = Side.LEFT, Side.RIGHT
 
@@ -114,7 +114,8 @@ def test_locked_points_stay_whatever_is_done(before, after):
     session = Session()
     done(session, before)
     labelling.lock_all(session)
-    locked = dict(session.state.landmarks)
+    locked = {key: mark for key, mark in session.state.landmarks.items() if mark.settled}
+    assert all(mark.locked for mark in locked.values())  # but nothing that is only suggested
     unlocking = [edit for edit in after if not isinstance(edit, (LockPoints, CheckPoint))]
     for state in done(session, unlocking):
         assert {key: state.landmarks[key] for key in locked} == locked
@@ -130,7 +131,9 @@ def test_swapping_twice_changes_nothing(sequence, side, code, other):
     labelling.lock_all(session, locked=False)
     state = session.state
     swap = SwapPoints(side, code, other)
-    assert swap.apply(swap.apply(state)) == state
+    keys = (point_key(side, code), point_key(side, other))
+    dropped = {key: TO_DO for key in keys if state.landmarks.get(key, TO_DO).suggestion}
+    assert swap.apply(swap.apply(state)) == state.with_landmarks(dropped)  # they were made for their names
     assert SwapSides().apply(SwapSides().apply(state)) == state
 
 

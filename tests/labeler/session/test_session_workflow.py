@@ -39,7 +39,7 @@ def test_auto_advance_visits_everything_once():
         assert len(visited) == len(set(visited)) == 37  # 19 and 18: IN is shared
         assert {a.side for a in visited[:19]} == {L}
         assert [session.progress(side).text for side in Side] == ["20 of 20", "20 of 20"]
-        assert session.click_text == "Everything is placed · choose a feature to move it"
+        assert session.click_text == "Everything is placed · drag a point to move it"
         with pytest.raises(GpError, match=r"no feature is chosen. Choose one in the table"):
             labelling.place(session, (0, 0, 0))
 
@@ -129,7 +129,7 @@ def test_the_next_click_is_told():
     assert session.click_text == "Click on bone or a slice to place IN, for both sides after all"
     session.do(PlacePoint(L, "ZL", (1, 2, 3), MARK))
     labelling.go_to(session, L, "ZL")
-    assert session.click_text == "Click on bone or a slice to move ZL left"
+    assert session.click_text == "ZL left is placed · drag, nudge or re-place it to move it"
     labelling.lock(session)
     assert session.click_text == "ZL left is locked"
     with pytest.raises(GpError, match="ZL left is locked"):
@@ -186,6 +186,7 @@ def test_ghosts_need_three_points_and_an_atlas():
     labelling.go_to(session, L, "ZL")
     labelling.accept_ghost(session)
     assert session.state.landmark(L, "ZL").provenance.how is How.GHOST
+    assert session.point_states(L)["ZL"] is PointState.SUGGESTED
     assert "ZL" not in session.ghosts(L)
 
 

@@ -197,13 +197,14 @@ def test_a_right_click_opens_the_menu(desk, panel, qtbot):
 # Card
 
 
-def test_the_primary_button_accepts_the_ghost_and_goes_on(desk, panel, qtbot):
+def test_the_primary_button_suggests_the_ghost_and_goes_on(desk, panel, qtbot):
     place(desk, "CA", "RWP", "OS")
     active = desk.session.active
     ghost = desk.session.ghosts(active.side)[active.code].position.copy()
     assert panel.card.content.action == "ghost"
     qtbot.mouseClick(panel.card.primary, CLICK)
-    np.testing.assert_allclose(desk.session.landmarks(active.side)[active.code], ghost)
+    suggestion = desk.session.landmarks(active.side).suggested[active.code]
+    np.testing.assert_allclose(suggestion.position, ghost)
     assert desk.session.active != active
 
 
