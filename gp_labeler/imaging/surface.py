@@ -124,6 +124,7 @@ def _no_surface(volume: Volume, threshold: float, box: ArrayLike | None) -> GpEr
     where = "in the volume" if box is None else "in the box"
     return GpError(
         f"no surface {where} at threshold {threshold:g}; the volume's values are {low:g} to {high:g}",
+        file=volume.path,
         remedy="Choose another threshold or a larger box.",
     )
 

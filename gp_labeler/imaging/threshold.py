@@ -49,7 +49,7 @@ def propose_threshold(volume: Volume) -> float:
     ----------
     Otsu 1979, doi:10.1109/TSMC.1979.4310076; Liao, Chen and Chung 2001, J. Inf. Sci. Eng. 17, 713-727.
     """
-    values = _block_means(volume.array)
+    values = _block_means(volume.array, volume.fill)
     values = values[np.isfinite(values)]
     low, high = np.percentile(values, _TAILS_PERCENT) if len(values) else (0.0, 0.0)
     if not low < high:
@@ -57,6 +57,7 @@ def propose_threshold(volume: Volume) -> float:
     if not low < high:
         raise GpError(
             f"the volume has no contrast: every voxel is {low:g}",
+            file=volume.path,
             remedy="Check that the right series or folder was opened.",
         )
     counts, edges = np.histogram(values.clip(low, high), bins=_BINS)
@@ -75,15 +76,21 @@ def _otsu(histogram: tuple[NDArray[Any], FloatArray], classes: int) -> list[floa
     return [float(threshold) for threshold in found]
 
 
-def _block_means(array: NDArray[Any]) -> FloatArray:
-    """Average 2 x 2 x 2 blocks on a coarse grid: noise falls by 2.8, and large scans stay quick."""
+def _block_means(array: NDArray[Any], fill: float | None) -> FloatArray:
+    """Average 2 x 2 x 2 blocks on a coarse grid: noise falls by 2.8, and large scans stay quick.
+
+    A block that holds a voxel that was not measured has no mean.
+    """
     stride = max(1, int(np.ceil((array.size / _SAMPLES) ** (1 / 3))))
     span = [max(1, n - 1) for n in array.shape]
     total = np.zeros(1)
     for corner in np.ndindex(2, 2, 2):
         shift = [c if n > 1 else 0 for c, n in zip(corner, array.shape, strict=True)]
         block = tuple(slice(s, n + s, stride) for s, n in zip(shift, span, strict=True))
-        total = total + array[block].astype(np.float64)
+        values = array[block].astype(np.float64)
+        if fill is not None:
+            values[values == fill] = np.nan
+        total = total + values
     return np.asarray(total / 8).ravel()
 
 

@@ -46,6 +46,9 @@ class Volume:
         What the import decided, for the record: channel chosen, type narrowed, order of slices, ...
     choices : mapping
         The import options that were used, as JSON values; `read_volume(path, **choices)` reads the same.
+    fill : float, optional
+        The value of voxels that were not measured, such as those outside the scanner's circle; it is below
+        all others and counts in no statistics.
 
     Raises
     ------
@@ -65,6 +68,7 @@ class Volume:
     path: Path | None = None
     notes: tuple[str, ...] = ()
     choices: Mapping[str, Any] = field(default_factory=dict)
+    fill: float | None = None
 
     def __post_init__(self) -> None:
         array = np.asarray(self.array)
@@ -176,9 +180,15 @@ class Volume:
         step = max(1, flat.size // _SAMPLES)
         while math.gcd(step, self.array.shape[2]) > 1:  # else the samples would walk down columns
             step += 1
-        sample = flat[::step]
-        low, high = np.percentile(sample[np.isfinite(sample)], _PERCENTILES)
+        low, high = np.percentile(self.measured(flat[::step]), _PERCENTILES)
         return float(low), float(high)
+
+    def measured(self, values: GreyArray) -> GreyArray:
+        """Return those of some voxels' values that were measured and are finite, (N,); all, if none was."""
+        fit = np.isfinite(values)
+        if self.fill is not None:
+            fit &= values != self.fill
+        return np.asarray(values[fit] if fit.any() else np.ravel(values))
 
     @cached_property
     def checksum(self) -> str:

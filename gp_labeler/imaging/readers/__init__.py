@@ -11,8 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+from gp_labeler.imaging.fill import find_fill, replace_fill
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
@@ -20,7 +19,7 @@ from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.plan import ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, quiet
 from gp_labeler.imaging.readers.source import assemble
-from gp_labeler.imaging.volume import GreyArray, Volume
+from gp_labeler.imaging.volume import Volume
 
 __all__ = [
     "READABLE",
@@ -144,7 +143,7 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 def _load(plan: ImportPlan, report: Report) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
         array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
-    array, filled = _finite(array)
+    fill, filled = replace_fill(array, find_fill(array))
     volume = Volume(
         array,
         plan.T_scan_voxel(),
@@ -152,23 +151,7 @@ def _load(plan: ImportPlan, report: Report) -> Volume:
         path=Path(plan.path).resolve(),
         notes=(*plan.all_notes(), *filled),
         choices=plan.options.as_json(),
+        fill=fill,
     )
     volume.checksum  # noqa: B018 - computed here, off the UI thread
     return volume
-
-
-def _finite(array: GreyArray) -> tuple[GreyArray, tuple[str, ...]]:
-    """Put the lowest value where a float volume has none: surfaces cannot be made through NaN."""
-    if array.dtype.kind != "f":
-        return array, ()
-    bad = [~np.isfinite(plane) for plane in array]
-    n_bad = sum(int(plane.sum()) for plane in bad)
-    if n_bad == 0:
-        return array, ()
-    lowest = min(
-        (float(plane[~hole].min()) for plane, hole in zip(array, bad, strict=True) if not hole.all()),
-        default=0,
-    )
-    for plane, hole in zip(array, bad, strict=True):
-        plane[hole] = lowest
-    return array, (f"{n_bad} voxels without a finite value were set to {lowest:g}",)

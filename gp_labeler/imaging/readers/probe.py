@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
 from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.choosing import FEW
 from gp_labeler.imaging.readers.dicom import inspect_dicom
 from gp_labeler.imaging.readers.dicom_tags import is_dicom, is_dicomdir
 from gp_labeler.imaging.readers.formats import (
@@ -20,9 +22,10 @@ from gp_labeler.imaging.readers.formats import (
     volume_kind,
 )
 from gp_labeler.imaging.readers.itk_image import inspect_itk_image
+from gp_labeler.imaging.readers.naming import group_slices
 from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.plan import ImportPlan
-from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error, names, quiet
+from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error, names, quiet, warning
 from gp_labeler.imaging.readers.scanco import inspect_scanco
 from gp_labeler.imaging.readers.stack import inspect_stack
 from gp_labeler.imaging.readers.tiff import inspect_tiff, is_multi_page
@@ -34,6 +37,7 @@ _HINTS = {
     ".raw": "A raw file needs its header: give the MHD or NHDR file that belongs to it.",
     ".vol": "Save it as TIFF stack, DICOM or MHD in the scanner's software.",
     ".vff": "Save it as NRRD in 3D Slicer (extension SlicerRT) first.",
+    ".ome": "It is the description of an OME-TIFF: give a TIFF file that belongs to it.",
     ".mnc": "Save it as NIfTI or NRRD first.",
     ".stl": "This is a mesh; give the scan it was made from.",
     ".ply": "This is a mesh; give the scan it was made from.",
@@ -77,26 +81,47 @@ def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportP
 
 
 def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    """Look into the only scan of a folder; few images beside it, such as screenshots, are named, not read."""
     files = _files(folder)
     images = _images(files)
     others = [file for file in files if file.suffix.lower() not in SLICE_SUFFIXES]
-    n_dicom = sum(is_dicom(file) for file in others if not is_dicomdir(file))
-    if n_dicom and n_dicom >= len(images):
-        return inspect_dicom(folder, others, options, report)
-    if any(map(is_dicomdir, files)) and (disc := _dicom_below(folder)):
+    dicom = [file for file in others if is_dicom(file) and not is_dicomdir(file)]
+    if not dicom and any(map(is_dicomdir, files)) and (disc := _dicom_below(folder)):
         return inspect_dicom(folder, disc, options, report)
     few = images if len(images) <= _FEW_IMAGES else []
-    volumes = [file for file in (*others, *few) if _is_volume(file)]
-    n_slices = len(images) - sum(file in volumes for file in images)
-    if len(volumes) == 1 and n_slices <= 1:
-        return _inspect_file(volumes[0], options, report)
-    if len(volumes) > 1 and n_slices <= len(volumes):
-        raise VolumeError(
-            f"it holds several volumes: {names(volumes, 12)}", file=folder, remedy="Give one of them."
+    volumes = [file for file in (*others, *few) if file not in set(dicom) and _is_volume(file)]
+    slices = [image for image in images if image not in set(volumes)]
+    stack = max((len(group.files) for group in group_slices(slices)), default=0)
+    if len(volumes) + bool(dicom) > 1:
+        raise _several(folder, volumes, dicom, slices if stack > 1 else [])
+    if volumes or dicom:
+        plan = (
+            inspect_dicom(folder, others, options, report)
+            if dicom
+            else _inspect_file(volumes[0], options, report)
         )
+        if stack > 1 and stack >= FEW * plan.size[2]:
+            raise _several(folder, volumes, dicom, slices)
+        text = f"images beside it are left out: {names(slices)}"
+        return replace(plan, found=(*plan.found, warning("stray", text))) if slices else plan
     if images:
         return inspect_stack(folder, images, options, report)
     return _inspect_below(folder, files, options, report)
+
+
+def _several(
+    folder: Path, volumes: Sequence[Path], dicom: Sequence[Path], slices: Sequence[Path]
+) -> VolumeError:
+    """Return the question which scan of a folder is meant."""
+    kinds = [names(volumes, 12)] if volumes else []
+    kinds += [f"{len(dicom)} DICOM files ({names(dicom, 1)})"] if dicom else []
+    kinds += [f"{len(slices)} images ({names(slices, 1)})"] if slices else []
+    what = "several volumes" if len(kinds) == 1 else "several scans"
+    return VolumeError(
+        f"it holds {what}: {'; '.join(kinds)}",
+        file=folder,
+        remedy="Give one of them: a file, or any file of a series or stack.",
+    )
 
 
 def _inspect_below(folder: Path, files: Sequence[Path], options: ImportOptions, report: Report) -> ImportPlan:

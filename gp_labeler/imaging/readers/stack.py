@@ -131,7 +131,7 @@ def _read_headers(files: Sequence[Path], report: Report) -> dict[Path, _Slice]:
 
 def _tiff_slice(path: Path) -> _Slice:
     with tifffile.TiffFile(path) as tif:
-        page = full_page(tif)
+        page = full_page(tif, path)
         check_page(page, path)
         return _Slice(
             page_shape(page),
@@ -160,7 +160,7 @@ def _pixel_size(path: Path, orientation: int) -> PixelSize:
 def _stored_pixel_size(path: Path) -> PixelSize:
     if path.suffix.lower() in TIFF_SUFFIXES:
         with tifffile.TiffFile(path) as tif:
-            page = full_page(tif)
+            page = full_page(tif, path)
             images, _ = ome_images(tif.ome_metadata or "", path.parent) if tif.is_ome else ((), "")
             shape = {"X": page.imagewidth, "Y": page.imagelength}
             fitting = (image for image in images if all(image.sizes[a] == n for a, n in shape.items()))
@@ -316,7 +316,7 @@ def _decoder(channel: int | None) -> Callable[[Path], Plane]:
 def _decode(path: Path, channel: int | None) -> Plane:
     if path.suffix.lower() in TIFF_SUFFIXES:
         with tifffile.TiffFile(path) as tif:
-            page = full_page(tif)
+            page = full_page(tif, path)
             return finishing(page, channel if page.samplesperpixel > 1 else None)(page.asarray(maxworkers=1))
     with Image.open(path) as image:
         return np.asarray(oriented(_grey(image, channel), _exif_orientation(image)))

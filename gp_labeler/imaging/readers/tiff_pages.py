@@ -39,14 +39,28 @@ def is_reduced(page: Any) -> bool:
     return bool(int(page.subfiletype) & (_REDUCED | _MASK)) if hasattr(page, "subfiletype") else False
 
 
-def full_page(tif: tifffile.TiffFile) -> tifffile.TiffPage:
-    """Return the page that stands for a file of one slice: the first of the largest, no thumbnail."""
+def full_page(tif: tifffile.TiffFile, path: Path) -> tifffile.TiffPage:
+    """Return the page that stands for a file of one slice: the largest, no thumbnail.
+
+    Raises
+    ------
+    VolumeError
+        Several are as large.
+    """
     pages = [page for page in tif.pages if isinstance(page, tifffile.TiffPage) and not is_reduced(page)]
     if not pages:
         first = tif.pages.first
         assert isinstance(first, tifffile.TiffPage)
         return first
-    return max(pages, key=lambda page: page.imagelength * page.imagewidth)
+    page = max(pages, key=lambda page: page.imagelength * page.imagewidth)
+    n_alike = sum(other.shape == page.shape for other in pages)
+    if n_alike > 1 or page.imagedepth > 1:
+        raise VolumeError(
+            f"it holds {max(n_alike, page.imagedepth)} slices; a stack has one slice in each file",
+            file=path,
+            remedy="Put files that are volumes by themselves into folders of their own.",
+        )
+    return page
 
 
 def orientation_of(page: tifffile.TiffPage) -> int:

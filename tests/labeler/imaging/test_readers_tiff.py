@@ -191,7 +191,7 @@ def test_one_file_in_a_folder_stands_for_the_folder(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").write_text("x")
     assert_same_values(tmp_path, scan, spacing=SPACING)
     tifffile.imwrite(tmp_path / "b.tif", scan.array, photometric="minisblack")
-    with pytest.raises(VolumeError, match=r"holds several volumes: a.tif, b.tif.*Give one of them"):
+    with pytest.raises(VolumeError, match=r"holds several volumes: a.tif, b.tif.*Give one of them:"):
         read_volume(tmp_path)
 
 

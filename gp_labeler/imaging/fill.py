@@ -1,0 +1,192 @@
+"""Values that stand where a scanner measured nothing: outside its circle, in lost slices."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Fill", "find_fill", "replace_fill"]
+
+_Array = NDArray[Any]
+_Mask = NDArray[np.bool_]
+
+_SLICES, _ACROSS = 24, 128
+"""As many slices, and pixels along their edges, are looked at."""
+
+_FEWEST, _MOST = 0.002, 0.95
+"""Part of the voxels that can be fill."""
+
+_ALWAYS, _HARDLY_EVER = 0.99, 0.05
+"""Part of the voxels outside the circle, and inside, that have its value."""
+
+_APART = 0.1
+"""An extreme value stands apart if the next one is this far off, in units of the range of all others."""
+
+_ONCE, _ALIKE = 0.97, 0.5
+"""Part of the lines that enter the field once; squared steps between neighbours, over those of any two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fill:
+    """One value that stands for nothing.
+
+    Parameters
+    ----------
+    value : float
+        The value; NaN stands for all that are not finite.
+    outside : (y, x) bool array, optional
+        Where in every slice it stands for nothing; None: everywhere.
+    """
+
+    value: float
+    outside: _Mask | None = None
+
+    def where(self, plane: _Array) -> _Mask:
+        """Return which pixels of a (y, x) slice were not measured."""
+        here = ~np.isfinite(plane) if np.isnan(self.value) else plane == self.value
+        return np.asarray(here if self.outside is None else here & self.outside)
+
+
+def find_fill(array: _Array) -> tuple[Fill, ...]:
+    """Find the values of a (z, y, x) scan that stand for nothing.
+
+    A fill is one exact value. It is known by its place, the same part of every slice around a middle that has
+    other values, as outside a scanner's circle; or by standing apart from all others, as the lowest or
+    highest, around a part without dents, as a scanner's field is. Air that a program masked or cut off is no
+    fill: bone begins there.
+    """
+    found: list[Fill] = []
+    if array.dtype.kind == "f" and not all(np.isfinite(plane).all() for plane in array):
+        found.append(Fill(np.nan))
+    ks, js, is_ = (_spread(n, most) for n, most in zip(array.shape, (_SLICES, _ACROSS, _ACROSS), strict=True))
+    sample = array[np.ix_(ks, js, is_)]
+    left = np.isfinite(sample)
+    for _ in range(3):
+        fill = _circle(array, sample, left, ks) or _extreme(sample, left)
+        if fill is None:
+            break
+        found.append(fill)
+        outside = None if fill.outside is None else fill.outside[np.ix_(js, is_)]
+        left &= ~np.stack([Fill(fill.value, outside).where(plane) for plane in sample])
+    return tuple(found)
+
+
+def replace_fill(array: _Array, fills: tuple[Fill, ...]) -> tuple[float | None, tuple[str, ...]]:
+    """Put one value below all measured ones wherever a scan has a fill.
+
+    Parameters
+    ----------
+    array : (z, y, x) array
+        Grey values; changed.
+    fills : tuple of Fill
+        What `find_fill` found.
+
+    Returns
+    -------
+    value : float or None
+        What now stands where nothing was measured; None where the type has no value below all others, so
+        that the lowest had to be taken.
+    notes : tuple of str
+        What was done, for the record.
+    """
+    if not fills:
+        return None, ()
+    counts, low, high = np.zeros(len(fills), dtype=np.int64), np.inf, -np.inf
+    for plane in array:
+        nothing = np.zeros(plane.shape, dtype=bool)
+        for n, fill in enumerate(fills):
+            here = fill.where(plane) & ~nothing
+            counts[n] += int(here.sum())
+            nothing |= here
+        if not nothing.all():
+            measured = plane[~nothing]
+            low, high = min(low, float(measured.min())), max(high, float(measured.max()))
+    if not np.isfinite(low):
+        low = high = 0.0
+    below, room = _below(low, high, array.dtype)
+    if len(fills) == 1 and np.isnan(fills[0].value) and counts[0] < _FEWEST * array.size:
+        below, room = low, False  # a few holes, not a part that lies outside
+    for plane in array:
+        nothing = np.logical_or.reduce([fill.where(plane) for fill in fills])
+        plane[nothing] = below
+    notes = tuple(_note(fill, int(n), array.size) for fill, n in zip(fills, counts, strict=True) if n)
+    return (below if room else None), notes
+
+
+def _note(fill: Fill, n: int, size: int) -> str:
+    what = "without a finite value" if np.isnan(fill.value) else f"of the value {fill.value:g}"
+    part = f"{100 * n / size:.2g} %"
+    return f"{n} voxels {what} ({part}) were not measured, and count as neither bone nor air"
+
+
+def _below(low: float, high: float, dtype: np.dtype[Any]) -> tuple[float, bool]:
+    """Return a value below the lowest one, and whether the type has room for it."""
+    if dtype.kind in "iu":
+        room = low > np.iinfo(dtype).min
+        return (low - 1 if room else low), room
+    step = 1.0 if high - low >= 1 else 0.05 * (high - low) or 1.0
+    below = dtype.type(low - max(step, 4 * float(np.spacing(dtype.type(abs(low))))))
+    return float(below), bool(np.isfinite(below))
+
+
+def _spread(n: int, most: int) -> NDArray[np.intp]:
+    """Return at most so many of n indices, the first and last among them."""
+    return np.unique(np.linspace(0, n - 1, min(n, most)).round().astype(np.intp))
+
+
+def _circle(array: _Array, sample: _Array, left: _Mask, ks: NDArray[np.intp]) -> Fill | None:
+    """Return the value that fills the corners of every slice, and the same part of each."""
+    there = left.any(axis=(1, 2))
+    sample, left, ks = sample[there], left[there], ks[there]
+    rows, columns = [0, 0, -1, -1], [0, -1, 0, -1]
+    if len(ks) < 4 or not left[:, rows, columns].all():
+        return None
+    value = sample[0, 0, 0]
+    if (sample[:, rows, columns] == value).mean() < _ALWAYS:
+        return None
+    here = (sample == value) & left
+    outside = here.mean(axis=0) > 0.5
+    if not _FEWEST <= outside.mean() <= _MOST:
+        return None
+    if here[:, outside].mean() < _ALWAYS or here[:, ~outside].mean() > _HARDLY_EVER:
+        return None
+    return Fill(float(value), (array[ks] == value).mean(axis=0) > 0.5)
+
+
+def _extreme(sample: _Array, left: _Mask) -> Fill | None:
+    """Return the lowest or highest value, if it stands apart, around a measured part without dents."""
+    if not left.any():
+        return None
+    for value in (sample[left].min(), sample[left].max()):
+        measured = left & (sample != value)
+        rest = sample[measured].astype(np.float64)
+        if not _FEWEST <= 1 - len(rest) / left.sum() <= _MOST or not len(rest):
+            continue
+        low, high = np.percentile(rest, (0.1, 99.9))
+        gap = min(abs(rest.min() - value), abs(rest.max() - value))
+        if gap > _APART * (high - low) and _has_no_dents(measured) and _has_structure(sample, measured):
+            return Fill(float(value))
+    return None
+
+
+def _has_no_dents(measured: _Mask) -> bool:
+    """Return whether lines along two axes or more enter what was measured once only."""
+    single = []
+    for axis in range(3):
+        along = np.moveaxis(measured, axis, -1)
+        enters = along[..., 0] + (along[..., 1:] & ~along[..., :-1]).sum(axis=-1)
+        single.append(float((enters[enters > 0] == 1).mean()))
+    return sorted(single)[1] > _ONCE
+
+
+def _has_structure(sample: _Array, measured: _Mask) -> bool:
+    """Return whether neighbours are more alike than any two voxels; in mere noise they are not."""
+    pairs = measured[..., 1:] & measured[..., :-1]
+    values = sample[measured].astype(np.float64)
+    if not pairs.any():
+        return False
+    steps = sample[..., 1:][pairs].astype(np.float64) - sample[..., :-1][pairs]
+    return bool(np.mean(steps**2) < 2 * _ALIKE * values.var())
