@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
+from vtkmodules.vtkCommonCore import reference
+from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
 from gp_labeler.imaging.readers import read_volume
-from gp_labeler.imaging.surface import extract_isosurface
+from gp_labeler.imaging.surface import Surface, extract_isosurface
 from gp_labeler.imaging.volume import Volume
 
 SIZE = (46, 40, 34)
@@ -53,14 +54,26 @@ def outside(points: np.ndarray, centre: np.ndarray) -> np.ndarray:
     return -_BLEND * np.log(total)
 
 
-def surface_points(volume: Volume, level: float = LEVEL) -> np.ndarray:
-    return extract_isosurface(volume, level, smallest_mm=0).points.astype(float)
+def surface_of(volume: Volume, level: float = LEVEL) -> Surface:
+    return extract_isosurface(volume, level, smallest_mm=0)
 
 
 def off_by(path: Path, grid: np.ndarray | None = None, level: float = LEVEL, **options: Any) -> float:
     """Return how far the surface read from a file is from that of the voxels, in voxels, at worst."""
     grid = affine() if grid is None else grid
-    found = surface_points(read_volume(path, **options), level)
-    expected = surface_points(Volume(voxels(grid), grid))
-    there, back = cKDTree(expected).query(found)[0], cKDTree(found).query(expected)[0]
-    return float(max(there.max(), back.max()) / SPACING.min())
+    found = surface_of(read_volume(path, **options), level)
+    expected = surface_of(Volume(voxels(grid), grid))
+    return max(_distance(found, expected), _distance(expected, found)) / SPACING.min()
+
+
+def _distance(one: Surface, other: Surface) -> float:
+    """Return how far a vertex of one surface lies from the other, mm, at worst."""
+    locator = vtkStaticCellLocator()
+    locator.SetDataSet(other.mesh)
+    locator.BuildLocator()
+    nearest, cell, part, squared = [0.0] * 3, reference(0), reference(0), reference(0.0)
+    apart = 0.0
+    for point in one.points.tolist():
+        locator.FindClosestPoint(point, nearest, cell, part, squared)
+        apart = max(apart, float(squared))
+    return apart**0.5

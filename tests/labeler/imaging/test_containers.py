@@ -17,7 +17,7 @@ import nrrd
 import numpy as np
 import pytest
 import SimpleITK
-from bodies import LEVEL, ORIGIN, SIZE, SPACING, affine, middle, off_by, outside, surface_points, voxels
+from bodies import LEVEL, ORIGIN, SIZE, SPACING, affine, middle, off_by, outside, surface_of, voxels
 from scipy.spatial.transform import Rotation
 
 from gp_labeler.imaging.readers import VolumeError, inspect_volume, read_volume
@@ -174,7 +174,7 @@ NRRDS: dict[str, Write] = {
 
 
 def test_the_body_is_what_its_voxels_show() -> None:
-    points = surface_points(Volume(RAW, affine()))
+    points = surface_of(Volume(RAW, affine())).points
     assert np.abs(outside(points, middle(affine()))).max() < 0.12 * SPACING.min()
     assert len(points) > 2500
 

@@ -1,0 +1,431 @@
+"""The same body in DICOM of many kinds: the same surface to 0.1 voxel, or one question that names the tag."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+import SimpleITK
+from bodies import LEVEL, ORIGIN, SPACING, affine, off_by, voxels
+from dicom_makers import Change, dataset, decimal, enhanced, group, put_pixels, slices, write
+from pydicom.dataset import Dataset, FileDataset
+from pydicom.fileset import FileSet
+from pydicom.uid import (
+    DeflatedExplicitVRLittleEndian,
+    ExplicitVRBigEndian,
+    ImplicitVRLittleEndian,
+    RLELossless,
+)
+from scipy.spatial.transform import Rotation
+
+from gp_labeler.imaging.readers import VolumeError, inspect_volume, read_volume
+
+Make = Callable[[Path], Path]
+RAW = voxels()
+N = len(RAW)
+SHUFFLED = np.random.default_rng(3).permutation(N)
+TURNED = affine(Rotation.from_euler("xyz", [20, -35, 50], degrees=True).as_matrix())
+
+
+def changed(change: Change, **how: object) -> Make:
+    return lambda folder: write(folder, slices(**how), change)
+
+
+def one_file(**how: object) -> Make:
+    def make(folder: Path) -> Path:
+        enhanced(**how).save_as(folder / "a.dcm", enforce_file_format=True)
+        return folder / "a.dcm"
+
+    return make
+
+
+def setting(**tags: object) -> Change:
+    def change(data: FileDataset, n: int) -> None:
+        for name, value in tags.items():
+            setattr(data, name, value(n) if callable(value) else value)
+
+    return change
+
+
+def without(*names: str, **tags: object) -> Change:
+    def change(data: FileDataset, n: int) -> None:
+        setting(**tags)(data, n)
+        for name in names:
+            delattr(data, name)
+
+    return change
+
+
+def rescaled(slope: Callable[[int], float], intercept: Callable[[int], float]) -> Make:
+    """Slices whose stored numbers differ, and whose values do not."""
+
+    def change(data: FileDataset, n: int) -> None:
+        put_pixels(data, np.rint((RAW[n].astype(float) - intercept(n)) / slope(n)).astype("int16"))
+        data.RescaleSlope, data.RescaleIntercept = f"{slope(n)}", f"{intercept(n)}"
+
+    return changed(change)
+
+
+def inverted(bits: int = 16, signed: bool = False, **tags: object) -> Make:
+    def change(data: FileDataset, n: int) -> None:
+        low, high = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+        put_pixels(data, (low + high - RAW[n].astype(int)).astype("int16" if signed else "uint16"))
+        data.BitsStored, data.HighBit, data.PhotometricInterpretation = bits, bits - 1, "MONOCHROME1"
+        setting(**tags)(data, n)
+
+    return changed(change)
+
+
+def packed(change: Change = lambda *_: None) -> Make:
+    def pack(data: FileDataset, n: int) -> None:
+        change(data, n)
+        data.compress(RLELossless, generate_instance_uid=False)
+
+    return changed(pack)
+
+
+def bare(*, meta: bool, syntax: str = ImplicitVRLittleEndian) -> Make:
+    """Files without the preamble, and perhaps without the group that says how they are written."""
+
+    def make(folder: Path) -> Path:
+        write(folder, slices(syntax=syntax))
+        for file in folder.iterdir():
+            raw = file.read_bytes()
+            file.write_bytes(raw[132:] if meta else raw[144 + int.from_bytes(raw[140:144], "little") :])
+        return folder
+
+    return make
+
+
+def disc(given: str = "") -> Make:
+    def make(folder: Path) -> Path:
+        (folder / "in").mkdir()
+        files = FileSet()
+        for file in sorted(write(folder / "in", slices()).iterdir()):
+            files.add(file)
+        (folder / "disc").mkdir()
+        files.write(folder / "disc")
+        (folder / "disc" / "AUTORUN.INF").write_text("x")
+        return folder / "disc" / given
+
+    return make
+
+
+def nested(folder: Path) -> Path:
+    """Put every slice into a folder of its own."""
+    for n, data in enumerate(slices()):
+        (folder / f"s{n}").mkdir()
+        data.save_as(folder / f"s{n}" / "image", enforce_file_format=True)
+    return folder
+
+
+def itk_frames(folder: Path) -> Path:
+    image = SimpleITK.GetImageFromArray(RAW)
+    image.SetSpacing(SPACING.tolist())
+    image.SetOrigin(ORIGIN.tolist())
+    SimpleITK.WriteImage(image, str(folder / "a.dcm"))
+    return folder / "a.dcm"
+
+
+def words_of_bytes(data: FileDataset, n: int) -> None:
+    """Write 8-bit pixels as big-endian words: the bytes of each pair are exchanged."""
+    put_pixels(data, voxels(dtype="uint8")[n])
+    data.PixelData = np.frombuffer(data.PixelData, np.uint8).reshape(-1, 2)[:, ::-1].tobytes()
+    data["PixelData"].VR = "OW"
+
+
+def jittered(by: float) -> Change:
+    """Orientations that differ in their last digits, about an edge at which a rounding would part them."""
+
+    def change(data: FileDataset, n: int) -> None:
+        turn = Rotation.from_euler("z", np.arccos(0.985) + (by if n % 2 else -by)).as_matrix()
+        data.ImageOrientationPatient = decimal(turn[:, :2].T.ravel())
+
+    return change
+
+
+def nudged(axis: int, by: Callable[[int], float]) -> Change:
+    def change(data: FileDataset, n: int) -> None:
+        position = [float(v) for v in data.ImagePositionPatient]
+        position[axis] += by(n)
+        data.ImagePositionPatient = decimal(position)
+
+    return change
+
+
+GRID_985 = affine(Rotation.from_euler("z", np.arccos(0.985)).as_matrix())
+HALF = RAW // 2
+EIGHT_BIT = LEVEL * 250 / 1900
+
+READ: dict[str, tuple[Make, dict[str, object]]] = {
+    "plain": (changed(lambda *_: None), {}),
+    "turned": (changed(lambda *_: None, grid=TURNED), {"grid": TURNED}),
+    "implicit": (changed(lambda *_: None, syntax=ImplicitVRLittleEndian), {}),
+    "big endian": (changed(lambda *_: None, syntax=ExplicitVRBigEndian), {}),
+    "deflated": (changed(lambda *_: None, syntax=DeflatedExplicitVRLittleEndian), {}),
+    "8-bit words, big endian": (
+        changed(words_of_bytes, syntax=ExplicitVRBigEndian),
+        {"level": EIGHT_BIT},
+    ),
+    "32 bits": (changed(lambda data, n: put_pixels(data, RAW[n].astype("int32"))), {}),
+    "thickness is no distance": (changed(setting(SliceThickness="1.2")), {}),
+    "distance contradicts positions": (changed(setting(SpacingBetweenSlices="0.6")), {}),
+    "file names shuffled": (lambda folder: write(folder, [slices()[n] for n in SHUFFLED]), {}),
+    "numbers shuffled": (changed(setting(InstanceNumber=lambda n: int(SHUFFLED[n]))), {}),
+    "a uid for each slice": (changed(setting(SeriesInstanceUID=lambda n: f"1.2.{n}")), {}),
+    "all uids for each slice": (
+        changed(
+            setting(SeriesInstanceUID=lambda n: f"1.2.{n}", StudyInstanceUID=lambda n: f"1.3.{n}")
+        ),
+        {},
+    ),
+    "no uid": (changed(without("SeriesInstanceUID")), {}),
+    "jitter in the last digits": (changed(jittered(1e-6), grid=GRID_985), {"grid": GRID_985}),
+    "positions with two decimals": (
+        changed(
+            lambda data, _: setattr(
+                data, "ImagePositionPatient", [f"{float(v):.2f}" for v in data.ImagePositionPatient]
+            )
+        ),
+        {},
+    ),
+    "MONOCHROME1": (inverted(), {}),
+    "MONOCHROME1, 12 bits": (inverted(12), {}),
+    "MONOCHROME1, signed": (inverted(signed=True), {}),
+    "MONOCHROME1, packed": (
+        packed(
+            lambda data, n: (
+                put_pixels(data, 65535 - RAW[n]),
+                setattr(data, "PhotometricInterpretation", "MONOCHROME1"),
+            )
+        ),
+        {},
+    ),
+    "a slope for each slice": (rescaled(lambda n: 1 + 0.25 * (n % 4), lambda n: 0.0), {}),
+    "an intercept for each slice": (rescaled(lambda n: 2.0, lambda n: -100.0 * (n % 5)), {}),
+    "signed, with intercept": (rescaled(lambda n: 1.0, lambda n: 1024.0), {}),
+    "packed, a slope for each slice": (
+        packed(
+            lambda data, n: (
+                put_pixels(data, np.rint(RAW[n] / (1 + n % 3)).astype("uint16")),
+                setting(RescaleSlope=str(1 + n % 3), RescaleIntercept="0")(data, n),
+            )
+        ),
+        {},
+    ),
+    "12 bits above overlays": (
+        changed(
+            lambda data, n: (
+                put_pixels(data, (RAW[n] | np.uint16(0x5000))),
+                setting(BitsStored=12, HighBit=11)(data, n),
+            )
+        ),
+        {},
+    ),
+    "12 bits at the top": (
+        changed(
+            lambda data, n: (
+                put_pixels(data, (RAW[n] << 4) | np.uint16(0x5)),
+                setting(BitsStored=12, HighBit=15)(data, n),
+            )
+        ),
+        {},
+    ),
+    "packed": (packed(), {}),
+    "no preamble": (bare(meta=True), {}),
+    "no preamble, no group 2": (bare(meta=False), {}),
+    "no preamble, explicit": (bare(meta=False, syntax="1.2.840.10008.1.2.1"), {}),
+    "disc": (disc(), {}),
+    "DICOMDIR": (disc("DICOMDIR"), {}),
+    "a folder for each slice": (nested, {}),
+    "frames": (one_file(), {}),
+    "frames backwards": (one_file(order=range(N - 1, -1, -1)), {}),
+    "frames shuffled": (one_file(order=SHUFFLED), {}),
+    "frames of two packets": (one_file(order=[*range(0, N, 2), *range(1, N, 2)]), {}),
+    "a slope for each frame": (
+        one_file(
+            order=SHUFFLED,
+            planes=np.stack([np.rint(RAW[n] / (1 + n % 3)) for n in range(N)]).astype("uint16"),
+            frame=lambda one, n: setattr(
+                one,
+                "PixelValueTransformationSequence",
+                [group(RescaleSlope=str(1 + n % 3), RescaleIntercept="0", RescaleType="US")],
+            ),
+        ),
+        {},
+    ),
+    "one enhanced file a slice": (
+        lambda folder: write(folder, [enhanced(order=[n]) for n in range(N)]),
+        {},
+    ),
+    "SimpleITK frames": (itk_frames, {}),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("name", READ)
+def test_dicom(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    make, how = READ[name]
+    path = make(tmp_path)
+    capfd.readouterr()
+    allowed = 0.1 if "decimals" not in name else 0.15
+    assert off_by(path, **how) < allowed
+    assert inspect_volume(path).sides_known
+    assert capfd.readouterr() == ("", "")
+
+
+ASKED: dict[str, tuple[Make, str]] = {
+    "thickness alone": (
+        changed(without("ImagePositionPatient")),
+        "SliceThickness of 0.6 mm need not be it.*--spacing 0.25 0.25 0.6",
+    ),
+    "a rounded orientation": (
+        changed(setting(ImageOrientationPatient=[0.97, 0.26, 0, -0.26, 0.96, 0])),
+        "ImageOrientationPatient of i000.dcm is rounded.*--accept orientation",
+    ),
+    "orientations that differ": (
+        changed(jittered(0.004)),
+        "ImageOrientationPatient differs.*--accept orientation",
+    ),
+    "a gap": (changed(nudged(2, lambda n: 0.3 * (n > 12))), r"1 of its slices.*--accept gap"),
+    "uneven": (changed(nudged(2, lambda n: 0.05 * (n % 3 == 0))), "lie unevenly.*--accept uneven"),
+    "a tilted gantry": (
+        changed(nudged(1, lambda n: 0.01 * n)),
+        "shifted sideways by 0.33 mm.*--accept tilted",
+    ),
+    "a slice beside the others": (
+        changed(nudged(0, lambda n: 0.2 * (n == 9))),
+        "shifted sideways.*--accept tilted",
+    ),
+    "pixel sizes that differ": (
+        changed(setting(PixelSpacing=lambda n: ["0.25", "0.25"] if n < 20 else ["0.26", "0.26"])),
+        "PixelSpacing of i020.dcm differs from that of i000.dcm.*--accept pixel-size",
+    ),
+    "slope NaN": (changed(setting(RescaleSlope="nan", RescaleIntercept="0")), "RescaleSlope is nan"),
+    "slope infinite": (changed(setting(RescaleSlope="inf", RescaleIntercept="0")), "RescaleSlope is inf"),
+    "slope 0": (changed(setting(RescaleSlope="0", RescaleIntercept="0")), "RescaleSlope is 0"),
+    "intercept NaN, of one": (
+        changed(setting(RescaleIntercept=lambda n: "nan" if n == 7 else "0")),
+        "of i007.dcm, RescaleIntercept is nan.*--accept scaling",
+    ),
+    "a table of values": (
+        changed(setting(ModalityLUTSequence=lambda n: [group(LUTDescriptor=[2, 0, 16])])),
+        "ModalityLUTSequence",
+    ),
+    "time points": (
+        lambda folder: write(
+            folder,
+            [*slices(), *slices(HALF)],
+            setting(TemporalPositionIdentifier=lambda n: 1 + n // N),
+        ),
+        "2 scans: series 1, time point 1: 34 slices.*--series",
+    ),
+    "acquisitions": (
+        lambda folder: write(
+            folder, [*slices(), *slices(HALF)], setting(AcquisitionNumber=lambda n: 1 + n // N)
+        ),
+        "2 scans: series 1, acquisition 1: 34 slices.*--series",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("name", ASKED)
+def test_dicom_that_is_asked_about(name: str, tmp_path: Path) -> None:
+    make, words = ASKED[name]
+    with pytest.raises(VolumeError, match=words) as refused:
+        read_volume(make(tmp_path))
+    assert "\n" not in str(refused.value)
+    assert refused.value.file
+
+
+def test_what_is_asked_can_be_answered(tmp_path: Path) -> None:
+    path = ASKED["thickness alone"][0](tmp_path)
+    at_home = affine()
+    at_home[:3, 3] = 0
+    assert off_by(path, at_home, spacing=SPACING.tolist()) < 0.1
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+def test_of_time_points_one_can_be_chosen(tmp_path: Path) -> None:
+    path = ASKED["time points"][0](tmp_path)
+    assert off_by(path, series="time point 1") < 0.1
+    plan = inspect_volume(path)
+    assert [choice.id for choice in plan.choices] == ["1.2.3.4 time point 1", "1.2.3.4 time point 2"]
+    np.testing.assert_array_equal(read_volume(path, series="time point 2").array, HALF)
+
+
+@pytest.mark.parametrize("tag", ["StackID", "TemporalPositionIndex"])
+def test_frames_at_the_same_places_are_several_scans(tag: str, tmp_path: Path) -> None:
+    both = enhanced(order=range(2 * N), planes=np.concatenate([RAW, HALF]))
+    for n, frame in enumerate(both.PerFrameFunctionalGroupsSequence):
+        place = affine() @ [0, 0, n % N, 1]
+        frame.PlanePositionSequence[0].ImagePositionPatient = decimal(place[:3])
+        value = 1 + n // N
+        setattr(frame.FrameContentSequence[0], tag, str(value) if tag == "StackID" else value)
+    both.save_as(tmp_path / "a.dcm", enforce_file_format=True)
+    with pytest.raises(VolumeError, match=r"holds 2 scans.*--series"):
+        read_volume(tmp_path / "a.dcm")
+    word = "stack 1" if tag == "StackID" else "temporal position 1"
+    assert off_by(tmp_path / "a.dcm", series=word) < 0.1
+
+
+def test_a_scan_cut_into_files_of_many_frames_is_put_together(tmp_path: Path) -> None:
+    for name, order in (("a", range(15, N)), ("b", range(15))):
+        part = enhanced(order=order)
+        part.ConcatenationUID = "1.2.9"
+        part.save_as(tmp_path / f"{name}.dcm", enforce_file_format=True)
+    assert off_by(tmp_path) < 0.1
+
+
+def test_two_series_with_one_size_are_not_mixed(tmp_path: Path) -> None:
+    write(tmp_path, [*slices(), *slices(HALF)], setting(SeriesInstanceUID=lambda n: f"1.2.{n // N}"))
+    with pytest.raises(VolumeError, match="holds 2 scans"):
+        read_volume(tmp_path)
+    assert off_by(tmp_path / "i003.dcm") < 0.1
+
+
+def test_two_scouts_beside_a_series_of_single_uids_are_left_out(tmp_path: Path) -> None:
+    write(tmp_path, slices(), setting(SeriesInstanceUID=lambda n: f"1.2.{n}"))
+    scout = dataset()
+    put_pixels(scout, RAW[0][:30])
+    scout.SeriesInstanceUID = "1.2.99"
+    scout.save_as(tmp_path / "scout.dcm", enforce_file_format=True)
+    assert off_by(tmp_path) < 0.1
+    codes = [problem.code for problem in inspect_volume(tmp_path).warnings]
+    assert sorted(codes) == ["scout", "uid-per-slice"]
+
+
+def test_without_an_orientation_positions_give_the_distance_and_sides_are_unknown(tmp_path: Path) -> None:
+    plan = inspect_volume(changed(without("ImageOrientationPatient"))(tmp_path))
+    assert plan.spacing == pytest.approx(tuple(SPACING))
+    assert [problem.code for problem in plan.warnings] == ["no-orientation", "sides-unknown"]
+
+
+def test_without_positions_slice_locations_give_the_distance(tmp_path: Path) -> None:
+    change = without("ImagePositionPatient", SliceLocation=lambda n: f"{0.3 * n:.6g}")
+    plan = inspect_volume(changed(change)(tmp_path))
+    assert plan.spacing == pytest.approx(tuple(SPACING))
+    assert [problem.code for problem in plan.warnings] == ["no-positions", "sides-unknown"]
+    assert "SliceLocation" in plan.warnings[0].text
+
+
+def test_frames_with_offsets_from_one_position(tmp_path: Path) -> None:
+    dose = enhanced(sop_class="1.2.840.10008.5.1.4.1.1.481.2")
+    del dose.PerFrameFunctionalGroupsSequence, dose.SharedFunctionalGroupsSequence
+    dose.ImagePositionPatient, dose.ImageOrientationPatient = decimal(ORIGIN), [1, 0, 0, 0, 1, 0]
+    dose.PixelSpacing = decimal(SPACING[1::-1])
+    dose.GridFrameOffsetVector = decimal(SPACING[2] * np.arange(N))
+    dose.save_as(tmp_path / "a.dcm", enforce_file_format=True)
+    assert off_by(tmp_path / "a.dcm") < 0.1
+
+
+def test_floats(tmp_path: Path) -> None:
+    data: Dataset = enhanced()
+    del data.PixelData
+    data.FloatPixelData = RAW.astype("<f4").tobytes()
+    data.BitsAllocated = 32
+    data.save_as(tmp_path / "a.dcm", enforce_file_format=True)
+    assert off_by(tmp_path / "a.dcm") < 0.1
