@@ -6,7 +6,7 @@ thread; only sockets have threads of their own.
 """
 
 from gp_labeler.tracker.address import TrackerAddress
-from gp_labeler.tracker.judge import Fault, Limits, Sample
+from gp_labeler.tracker.samples import Fault, Limits, Sample
 from gp_labeler.tracker.link import LinkPhase, LinkState, TrackerLink
 from gp_labeler.tracker.probe import PivotCollector, Probe
 from gp_labeler.tracker.sender import PoseSender

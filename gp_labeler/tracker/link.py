@@ -10,7 +10,8 @@ from enum import Enum
 
 from gp_labeler.tracker.address import TrackerAddress
 from gp_labeler.tracker.connection import Arrived, Connection, Event, Lost, Opened
-from gp_labeler.tracker.judge import Fault, Judge, Limits, Sample
+from gp_labeler.tracker.sample_filter import SampleFilter
+from gp_labeler.tracker.samples import Fault, Limits, Sample
 from gp_labeler.tracker.messages import TrackerMessage, hello
 
 __all__ = ["LinkPhase", "LinkState", "TrackerLink"]
@@ -41,7 +42,7 @@ class LinkState:
 
 
 class TrackerLink:
-    """Receives a probe's messages, judges them, and comes back by itself where the connection is lost.
+    """Receives a probe's messages, checks them, and comes back by itself where the connection is lost.
 
     Nothing of it blocks: call `poll` from a timer, 30 to 60 times a second, always on the same thread.
 
@@ -89,7 +90,7 @@ class TrackerLink:
 
     def _begin(self) -> None:
         """Forget the connection before: clocks, positions and names may all be others."""
-        self._judge = Judge(self.address.probe, self.address.reference, self.limits)
+        self._filter = SampleFilter(self.address.probe, self.address.reference, self.limits)
         self._heard = self._clock()
         self._arrivals: deque[float] = deque(maxlen=400)
         self._told_hz, self._told_at = 0.0, self._clock()
@@ -99,9 +100,9 @@ class TrackerLink:
         self.devices = {}
 
     def set_limits(self, limits: Limits) -> None:
-        """Judge by other limits from now on, also after a reconnection."""
+        """Use other limits from now on, also after a reconnection."""
         self.limits = limits
-        self._judge.set_limits(limits)
+        self._filter.set_limits(limits)
 
     @property
     def state(self) -> LinkState:
@@ -140,7 +141,7 @@ class TrackerLink:
         for event in self._connection.events():
             samples += self._take(event)
         if self._stands:
-            samples += self._judge.take([], self._clock())
+            samples += self._filter.take([], self._clock())
             self._listen()
         for sample in samples:
             if sample.fault:
@@ -167,7 +168,7 @@ class TrackerLink:
             case Arrived(messages):
                 for message in messages:
                     self._note(message)
-                return self._judge.take(messages, messages[-1].received)
+                return self._filter.take(messages, messages[-1].received)
         return []
 
     def _listen(self) -> None:

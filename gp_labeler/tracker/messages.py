@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any
 
@@ -24,7 +24,15 @@ __all__ = ["MessageDecoder", "TrackerMessage", "hello", "pack_transform"]
 _HEADER_BYTES = 58
 _VERSIONS = (1, 2, 3)
 _READ = ("TRANSFORM", "STRING")
-_LONGEST_READ = 1_000_000
+
+_LARGEST = {"TRANSFORM": 10_000, "STRING": 1_000_000, "STATUS": 1_000_000, "POSITION": 100_000}
+"""Bytes that a message of a type can have, metadata included."""
+
+_LARGEST_OTHER = 2_000_000_000
+"""The same for an image or a mesh."""
+
+_LONGEST_S = 3.0
+"""A message that is still incomplete after that time has a header with a wrong size."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +55,8 @@ class TrackerMessage:
         Of a header of version 2.
     problem : str
         Why its content cannot be read; empty where it can.
+    damaged : bool
+        Whether its bytes are not those that were sent, as its checksum tells.
     """
 
     device: str
@@ -57,6 +67,7 @@ class TrackerMessage:
     text: str = ""
     metadata: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     problem: str = ""
+    damaged: bool = False
 
 
 class MessageDecoder:
@@ -65,42 +76,77 @@ class MessageDecoder:
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._skip = 0
+        self._begun: float | None = None
+        self._understood = False
 
     def feed(self, data: bytes, received: float) -> list[TrackerMessage]:
         """Take what has arrived, and return the messages that are now complete.
 
-        Types other than TRANSFORM and STRING come without content.
+        Types other than TRANSFORM and STRING come without content; so does a body whose checksum is wrong.
 
         Raises
         ------
         GpError
-            This is not OpenIGTLink.
+            This is not OpenIGTLink, or the stream is damaged: where the next message begins is not known.
         """
         self._buffer += data
         messages: list[TrackerMessage] = []
         while True:
-            if self._skip:
-                cut = min(self._skip, len(self._buffer))
-                del self._buffer[:cut]
-                self._skip -= cut
-            if len(self._buffer) < _HEADER_BYTES:
-                return messages
-            header = _read_header(bytes(self._buffer[:_HEADER_BYTES]))
-            size = int(header["body_size"])
-            if header["message_type"] not in _READ or size > _LONGEST_READ:
-                self._skip = _HEADER_BYTES + size
+            self._pass_over()
+            header = self._header() if len(self._buffer) >= _HEADER_BYTES else None
+            if header is None:
+                return self._wait(messages, received)
+            size = _HEADER_BYTES + int(header["body_size"])
+            if header["message_type"] in _READ:
+                if len(self._buffer) < size:
+                    return self._wait(messages, received)
+                messages.append(_read_body(header, bytes(self._buffer[_HEADER_BYTES:size]), received))
+            else:
                 messages.append(_without_content(header, received))
-                continue
-            if len(self._buffer) < _HEADER_BYTES + size:
-                return messages
-            body = bytes(self._buffer[_HEADER_BYTES : _HEADER_BYTES + size])
-            self._skip = _HEADER_BYTES + size
-            messages.append(_read_body(header, body, received))
+            self._skip, self._begun = size, None
+
+    def _pass_over(self) -> None:
+        cut = min(self._skip, len(self._buffer))
+        del self._buffer[:cut]
+        self._skip -= cut
+
+    def _wait(self, messages: list[TrackerMessage], received: float) -> list[TrackerMessage]:
+        """Return what is complete; raise GpError where the rest of a message has been awaited for too long."""
+        unfinished = self._skip or self._buffer
+        self._begun = None if not unfinished else received if self._begun is None else self._begun
+        if self._begun is not None and received - self._begun > _LONGEST_S:
+            raise _damaged("a message does not end")
+        return messages
+
+    def _header(self) -> dict[str, Any]:
+        """Return the header that the buffer begins with.
+
+        Raises
+        ------
+        GpError
+            It is none, or one that cannot be true.
+        """
+        try:
+            header = _read_header(bytes(self._buffer[:_HEADER_BYTES]))
+        except GpError:
+            if self._understood:
+                raise _damaged("no message begins where one should") from None
+            raise
+        kind, size = header["message_type"], int(header["body_size"])
+        if size > _LARGEST.get(kind, _LARGEST_OTHER):
+            raise _damaged(f"a {kind} message claims {size} bytes")
+        self._understood = True
+        return header
+
+
+def _damaged(what: str) -> GpError:
+    return GpError(f"the data that arrive are damaged: {what}", remedy="Check the network and the server.")
 
 
 def _read_header(data: bytes) -> dict[str, Any]:
     try:
         header: dict[str, Any] = pyigtl.MessageBase.parse_header(data)
+        header["crc"] = int.from_bytes(data[-8:], "big")
         kind = header["message_type"]
         known = header["header_version"] in _VERSIONS and kind.isascii() and kind.isprintable() and kind
     except UnicodeDecodeError:
@@ -120,6 +166,8 @@ def _without_content(header: dict[str, Any], received: float, problem: str = "")
 
 
 def _read_body(header: dict[str, Any], body: bytes, received: float) -> TrackerMessage:
+    if pyigtl.messages.CRC64(body) != header["crc"]:
+        return replace(_without_content(header, received, "its checksum is wrong"), damaged=True)
     message = pyigtl.MessageBase.create_message(header["message_type"])
     try:
         message.unpack(header, body)

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_labeler.tracker.judge import Fault, Sample
+from gp_labeler.tracker.samples import Fault, Sample
 from gp_labeler.tracker.rigid import turn_deg
 
 if TYPE_CHECKING:

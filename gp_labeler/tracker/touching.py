@@ -13,7 +13,7 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_labeler.tracker.judge import Fault, Sample
+from gp_labeler.tracker.samples import Fault, Sample
 from gp_labeler.tracker.probe import Probe
 
 __all__ = ["RecordedTouch", "RefusedTouch", "TouchRecorder", "TouchSettings"]
@@ -47,6 +47,8 @@ class TouchSettings:
         The fewest samples of a touch.
     max_gap_s : float
         The longest time without a usable sample.
+    good_share : float
+        The least share of the readings that must be good and near the others.
 
     Raises
     ------
@@ -60,6 +62,7 @@ class TouchSettings:
     away_mm: float = 5.0
     min_samples: int = 8
     max_gap_s: float = 0.15
+    good_share: float = 0.8
 
     def __post_init__(self) -> None:
         for name, value in vars(self).items():
@@ -83,6 +86,9 @@ class RecordedTouch:
         From the first to the last sample.
     time : str
         When it ended, ISO 8601, UTC.
+    segment : int
+        Counts the jumps that the marker had not taken back: touches of different segments may be in frames
+        that differ.
     """
 
     position: FloatArray
@@ -90,6 +96,7 @@ class RecordedTouch:
     n_samples: int
     duration_s: float
     time: str
+    segment: int = 0
 
 
 @dataclass(frozen=True)
@@ -199,7 +206,7 @@ class TouchRecorder:
         window = [s for s in self._recent if begun <= s.received]
         self._pressed_at = None
         self.progress = 0.0
-        return self._finish(self._judge(window))
+        return self._finish(self._average(window))
 
     def _overdue(self) -> RecordedTouch | RefusedTouch | None:
         """End a press that waits for samples which do not come."""
@@ -214,7 +221,7 @@ class TouchRecorder:
         if self.progress < 1.0:
             return None
         settled = window[0].time + _SETTLING * self.settings.window_s
-        outcome = self._judge([s for s in window if s.time >= settled])
+        outcome = self._average([s for s in window if s.time >= settled])
         if isinstance(outcome, RefusedTouch):
             return None
         self._finish(outcome)
@@ -254,7 +261,7 @@ class TouchRecorder:
             self.progress = 0.0
         return outcome
 
-    def _judge(self, window: Sequence[Sample]) -> RecordedTouch | RefusedTouch:
+    def _average(self, window: Sequence[Sample]) -> RecordedTouch | RefusedTouch:
         """Average a window of samples, or say why not."""
         usable = [s for s in window if s.usable]
         refusal = self._too_little(window, usable)
@@ -262,6 +269,9 @@ class TouchRecorder:
             return refusal
         tips = np.array([self.probe.tip(s) for s in usable])
         position, kept = _robust_mean(tips)
+        if kept.mean() < self.settings.good_share:
+            strays = f"{len(kept) - kept.sum()} of {len(kept)} readings lie apart from the others"
+            return RefusedTouch(f"{strays}. Touch again.")
         distances = np.linalg.norm(tips[kept] - position, axis=1)
         third = len(tips) // 3 + 1
         drift = float(np.linalg.norm(np.median(tips[-third:], axis=0) - np.median(tips[:third], axis=0)))
@@ -272,7 +282,8 @@ class TouchRecorder:
                     f"The tip moved by {moved:.1f} mm ({allowed:g} is allowed). Hold it still."
                 )
         spread = float(np.sqrt(np.mean(distances**2)))
-        return RecordedTouch(position, spread, int(kept.sum()), usable[-1].time - usable[0].time, _utc_now())
+        seconds = usable[-1].time - usable[0].time
+        return RecordedTouch(position, spread, int(kept.sum()), seconds, _utc_now(), usable[-1].segment)
 
     def _too_little(self, window: Sequence[Sample], usable: Sequence[Sample]) -> RefusedTouch | None:
         faults = Counter(s.fault for s in window if not s.usable)
@@ -282,7 +293,8 @@ class TouchRecorder:
         settings = self.settings
         lacking = settings.window_s - _seconds(usable)
         gap = max([lacking / 2, *(b.time - a.time for a, b in pairwise(usable))])
-        if gap <= settings.max_gap_s and len(usable) >= settings.min_samples:
+        enough = len(usable) >= max(settings.min_samples, settings.good_share * len(window))
+        if gap <= settings.max_gap_s and enough:
             return None
         if faults:
             fault = faults.most_common(1)[0][0]

@@ -53,12 +53,56 @@ def test_what_is_not_openigtlink_is_said() -> None:
 
 
 def test_a_body_that_cannot_be_read_is_named_and_passed_over() -> None:
-    whole = _transform()
-    short = whole[:42] + struct.pack("> Q", 20) + whole[50:78]
+    short = _with_body(_transform(), _transform()[58:78])
     broken, good = MessageDecoder().feed(short + _transform(2.0), 1.0)
     assert broken.matrix is None
     assert "cannot be read" in broken.problem
     assert good.matrix[0, 3] == 2.0
+
+
+def _with_body(whole: bytes, body: bytes) -> bytes:
+    """Return a message with another body, its size and checksum right."""
+    return whole[:42] + struct.pack("> QQ", len(body), pyigtl.messages.CRC64(body)) + body
+
+
+def test_every_flipped_bit_of_a_body_is_noticed_and_the_next_message_is_read() -> None:
+    whole = _transform(1.0, TransformStatus="OK")
+    for bit in range(8 * 58, 8 * len(whole)):
+        spoilt = bytearray(whole)
+        spoilt[bit // 8] ^= 1 << bit % 8
+        damaged, good = MessageDecoder().feed(bytes(spoilt) + _transform(2.0), 1.0)
+        assert damaged.damaged
+        assert damaged.matrix is None
+        assert good.matrix[0, 3] == 2.0
+
+
+@pytest.mark.parametrize("size", [2**63, 2**40, 3_000_000_000])
+def test_a_header_that_claims_an_impossible_size_ends_the_connection_in_true_words(size) -> None:
+    decoder = MessageDecoder()
+    decoder.feed(_transform(), 1.0)
+    image = pyigtl.ImageMessage(np.zeros((4, 5, 5), np.uint8), device_name="Image").pack()
+    with pytest.raises(GpError, match="damaged: a IMAGE message claims"):
+        decoder.feed(image[:42] + struct.pack("> Q", size) + image[50:], 1.1)
+
+
+@pytest.mark.parametrize("kind", ["TRANSFORM", "IMAGE"])
+def test_a_message_that_never_ends_is_given_up(kind) -> None:
+    decoder = MessageDecoder()
+    header = bytearray(_transform()[:58])
+    header[2:14] = kind.encode().ljust(12, b"\0")
+    header[42:50] = struct.pack("> Q", 9000)
+    decoder.feed(bytes(header), 1.0)
+    for k in range(20):
+        decoder.feed(_transform(), 1.0 + k / 10)
+    with pytest.raises(GpError, match="does not end"):
+        decoder.feed(_transform(), 4.1)
+
+
+def test_a_stream_that_was_understood_and_loses_its_place_is_called_damaged() -> None:
+    decoder = MessageDecoder()
+    decoder.feed(_transform(), 1.0)
+    with pytest.raises(GpError, match="no message begins where one should"):
+        decoder.feed(_transform()[7:] + _transform(), 1.1)
 
 
 def test_a_pose_goes_out_as_pyigtl_reads_it() -> None:
