@@ -13,20 +13,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
-from gp_core.atlas.pose_quality import pose_quality
+from gp_core.atlas.pose_gate import PoseGate
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.registration.pivot import PivotCalibration
-from gp_labeler.session.estimate import Estimate
+from gp_labeler.pose_sending import PoseSending
 from gp_labeler.session.session import Session
-from gp_labeler.session.state import SpecimenState
-from gp_labeler.session.touches import TouchHow
+from gp_labeler.session.touches import Touch, TouchHow, TouchKey
 from gp_labeler.tracker import (
+    FrameCheck,
     Limits,
     LinkPhase,
     PivotCollector,
-    PoseSender,
     Probe,
     RecordedTouch,
     RefusedTouch,
@@ -67,18 +66,21 @@ class TrackerDesk:
     def __init__(self, desk: Workbench) -> None:
         self._desk = desk
         self._link: TrackerLink | None = None
-        self._sender: PoseSender | None = None
         self._limits = Limits()
         self._recorder = TouchRecorder(Probe())
         self._dwell = False
         self._words = ""
-        self._held = ""
+        self._sending = PoseSending()
+        self._links = 0
+        self._frame = FrameCheck()
         self._latest: Sample | None = None
         self._tip: FloatArray | None = None
         self._trail: deque[FloatArray] = deque(maxlen=_TRAIL)
         self.pivot: PivotCollector | None = None
         self.calibration: PivotCalibration | None = None
         self._aim = self._aim_now()
+        self._sending.changed.connect(self.changed.emit)
+        self._sending.held_back.connect(self._say_held)
         desk.pose.changed.connect(self._on_pose_changed)
         desk.details_changed.connect(self._on_pose_changed)
 
@@ -107,6 +109,7 @@ class TrackerDesk:
     def connect(self, address: TrackerAddress) -> None:
         """Connect in the background, in place of the link there was."""
         self.disconnect()
+        self._links += 1
         self._link = TrackerLink(address, self._limits)
         self._link.open()
         self.changed.emit()
@@ -130,6 +133,7 @@ class TrackerDesk:
             link.close()
             self._recorder.cancel()
             self._forget_tip()
+            self._update_sending()
             self.changed.emit()
             self.moved.emit()
 
@@ -147,6 +151,7 @@ class TrackerDesk:
                 self.press()
             for outcome in self._recorder.update(samples):
                 self._take(outcome)
+        self._update_sending()
         if self._words != self.words or self.pivot is not None:
             self._words = self.words
             self.changed.emit()
@@ -253,28 +258,75 @@ class TrackerDesk:
         self.set_tip_offset(found.tip_offset)
         return found
 
+    # Whether touches still lie in one frame
+
+    @property
+    def doubtful(self) -> tuple[str, ...]:
+        """Tracked touches of the side in work that may lie in another frame than what is read now."""
+        if not self.on:
+            return ()
+        side = self._desk.pose.side
+        return tuple(name for name in self._tracked() if self._frame.is_doubtful((side, name)))
+
+    @property
+    def frame_words(self) -> str:
+        """Since when the reference is verified, or which touches may lie in another frame."""
+        if doubtful := self.doubtful:
+            return (
+                f"The marker jumped, or the connection was lost, since {', '.join(doubtful)} "
+                f"{'was' if len(doubtful) == 1 else 'were'} touched. Touch {doubtful[0]} again to check."
+            )
+        last = self._frame.last
+        if last is None:
+            begun = min((touch.time for touch in self._tracked().values()), default="")
+            return (
+                f"Reference not verified since {_clock_time(begun)}: touch a feature again." if begun else ""
+            )
+        apart = f"{last.key[1]} touched again {last.distance_mm:.1f} mm from before"
+        if last.agrees:
+            return f"Reference verified at {_clock_time(last.time)}: {apart}."
+        return f"The reference moved, or a touch was wrong, at {_clock_time(last.time)}: {apart}."
+
+    def _tracked(self) -> dict[str, Touch]:
+        side, touches = self._desk.pose.side, self._desk.session.state.touches
+        return {
+            name: touch
+            for (of, name), touch in touches.items()
+            if of is side and touch.how is TouchHow.TRACKED
+        }
+
     # The pose sent back
+
+    @property
+    def gate(self) -> PoseGate:
+        """The limits within which a pose is sent."""
+        return self._sending.gate
+
+    def set_gate(self, gate: PoseGate) -> None:
+        """Send poses within other limits from now on."""
+        self._sending.gate = gate
+        self._update_sending()
+        self.changed.emit()
 
     @property
     def sending(self) -> str:
         """How the sending of the pose stands, for a person; empty where nothing is sent."""
-        if self._sender is None:
-            return ""
-        return f"{self._sender.words} Held back: {self._held}." if self._held else self._sender.words
+        return self._sending.words
+
+    @property
+    def sending_port(self) -> int | None:
+        """Where the pose is sent from, or to; None where nothing is sent."""
+        return self._sending.port
 
     def start_sending(self, port: int, host: str | None = None, device: str = "T_tracker_cochlea") -> None:
-        """Send the pose from now on, whenever there is one; raises `GpError` where the port is taken."""
-        self.stop_sending()
-        self._sender = PoseSender(port, host=host, device=device)
-        self._on_pose_changed()
+        """Send the pose from now on, whenever it may be; raises `GpError` where the port is taken."""
+        self._sending.start(port, host, device)
+        self._update_sending()
         self.changed.emit()
 
     def stop_sending(self) -> None:
         """Send nothing any more."""
-        sender, self._sender, self._held = self._sender, None, ""
-        if sender is not None:
-            sender.close()
-            self.changed.emit()
+        self._sending.stop()
 
     def close(self) -> None:
         """End everything."""
@@ -306,6 +358,8 @@ class TrackerDesk:
             return
         try:
             self._check_frame()
+            key = (self._desk.pose.side, self._desk.pose.target or "")
+            before = self._desk.session.state.touches.get(key)
             self._desk.pose.record(
                 outcome.position,
                 TouchHow.TRACKED,
@@ -316,7 +370,29 @@ class TrackerDesk:
         except GpError as error:
             self.refused.emit(f"{str(error)[:1].upper()}{str(error)[1:]}")
             return
+        self._compare(key, outcome, before)
         self.touched.emit(outcome)
+
+    def _compare(self, key: TouchKey, outcome: RecordedTouch, before: Touch | None) -> None:
+        """Compare a touch with the one that it replaces, and say so where something has moved."""
+        was = before.position if before is not None and before.how is TouchHow.TRACKED else None
+        repeated = self._frame.record(
+            key, outcome.position, self._segment(outcome.segment), was, outcome.time
+        )
+        if repeated is not None and not repeated.agrees:
+            self._desk.say(
+                f"{key[1]} is {repeated.distance_mm:.1f} mm from where it was touched before: "
+                "the reference moved, or one of the two touches was wrong",
+                "warning",
+            )
+        elif self.doubtful:
+            self._desk.say(self.frame_words, "warning")
+        self._update_sending()
+        self.changed.emit()
+
+    def _segment(self, segment: int) -> tuple[int, int]:
+        connections = 0 if self._link is None else self._link.connections
+        return (1000 * self._links + connections, segment)
 
     def _source(self) -> str:
         assert self._link is not None
@@ -343,6 +419,8 @@ class TrackerDesk:
             return
         self._latest = samples[-1]
         for sample in samples:
+            if sample.usable:
+                self._frame.follow(self._segment(sample.segment))
             tip = self.probe.tip(sample) if sample.usable else None
             if tip is not None:
                 self._tip = tip
@@ -353,34 +431,24 @@ class TrackerDesk:
         self._latest = self._tip = None
         self._trail.clear()
 
-    def _on_pose_changed(self) -> None:
-        if self._sender is None:
-            return
-        estimate = self._desk.pose.estimate
-        pose = None if estimate is None else estimate.pose
-        self._hold("" if estimate is None else _why_held(estimate, self._desk.session.state))
-        if pose is None or pose.transform_to_touches.dst != "tracker" or self._held:
-            self._sender.clear()
-        else:
-            self._sender.send(pose.transform_to_touches)
+    def _on_pose_changed(self, *_: object) -> None:
+        self._update_sending()
 
-    def _hold(self, why: str) -> None:
-        """Hold the pose back, or no longer, and say so: whoever waits for it may not see the dialog."""
-        if why == self._held:
-            return
-        self._held = why
-        if why:
-            self._desk.say(f"The pose is held back from the robot: {why}", "warning")
-        self.changed.emit()
+    def _say_held(self, why: str) -> None:
+        self._desk.say(f"The pose is held back from the robot: {why}", "warning")
+
+    def _update_sending(self) -> None:
+        if self._sending.on:
+            pose, state = self._desk.pose, self._desk.session.state
+            self._sending.update(pose.estimate, state, self.doubtful, self._reference_age())
+
+    def _reference_age(self) -> float | None:
+        """Return how long ago the reference was read, s; None where no touch was taken in its frame."""
+        if not any(_IN in touch.source for touch in self._tracked().values()):
+            return None
+        return float("inf") if self._link is None else self._link.reference_age_s
 
 
-def _why_held(estimate: Estimate, state: SpecimenState) -> str:
-    """Return why an estimate is not for a robot, although there is one; empty where it may have it."""
-    pose = estimate.pose
-    if pose is None:
-        return ""
-    if pose.side_state == "wrong" or pose.names_state == "wrong":
-        return pose_quality(pose).word.lower()
-    last = next((check for check in reversed(state.pose_checks) if check.side is estimate.side), None)
-    is_rejected = last is not None and last.verdict == "reject" and estimate.moved_since(last.pose) is None
-    return "it was rejected" if is_rejected else ""
+def _clock_time(time: str) -> str:
+    """Return the hours and minutes of an ISO time, UTC."""
+    return f"{time[11:16]} UTC" if len(time) >= 16 else time

@@ -207,6 +207,17 @@ class Estimate:
             out["error_mm"], out["error_deg"] = errors
         return out
 
+    def is_that_of(self, judged: Mapping[str, Any]) -> bool:
+        """Whether it is the very estimate that was judged: of the same touches, atlas and settings.
+
+        Parameters
+        ----------
+        judged : mapping
+            `PoseCheck.pose`.
+        """
+        now = {} if self.pose is None else self.pose.as_dict()
+        return all(key in judged and _same(judged[key], value) for key, value in now.items())
+
     def moved_since(self, judged: Mapping[str, Any]) -> tuple[float, float] | None:
         """Return by how much the cochlea's frame moved, mm, and turned, degrees, since it was judged.
 
@@ -228,6 +239,15 @@ class Estimate:
         turn = (np.trace(then[:3, :3].T @ now[:3, :3]) - 1) / 2
         degrees = float(np.degrees(np.arccos(np.clip(turn, -1, 1))))
         return (mm, degrees) if mm > _SAME_MM or degrees > _SAME_DEG else None
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two values of a pose file are equal, lists and tuples alike."""
+    if isinstance(one, Mapping) and isinstance(other, Mapping):
+        return one.keys() == other.keys() and all(_same(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return bool(one == other)
 
 
 def apart(

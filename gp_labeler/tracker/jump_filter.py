@@ -1,8 +1,8 @@
 """Jumps: a marker that changes its place faster than a hand can move it.
 
-A jump that is taken back was a false reading, and nothing is recorded between. One that is not may be a false
-reading that lasts, or the reference was knocked: after a pause samples are believed again, in a new *segment*,
-for positions from before and after it may be in frames that differ.
+A jump that is taken back was a false reading, and nothing is recorded between. One that stays may be a false
+reading that lasts, or the reference was knocked. After a pause, samples are believed again, in a new
+*segment*: positions from before and after the jump may be in frames that differ.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class _Left:
 
 @dataclass(frozen=True)
 class _State:
-    """What is known of jumps: the segment, the believed sample that was its last, the segments left before."""
+    """What is known of jumps: the segment, its last believed sample, and the segments left before."""
 
     segment: int = 0
     last: Sample | None = None

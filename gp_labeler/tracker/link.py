@@ -10,14 +10,15 @@ from enum import Enum
 
 from gp_labeler.tracker.address import TrackerAddress
 from gp_labeler.tracker.connection import Arrived, Connection, Event, Lost, Opened
+from gp_labeler.tracker.messages import TrackerMessage, hello
 from gp_labeler.tracker.sample_filter import SampleFilter
 from gp_labeler.tracker.samples import Fault, Limits, Sample
-from gp_labeler.tracker.messages import TrackerMessage, hello
 
 __all__ = ["LinkPhase", "LinkState", "TrackerLink"]
 
 _PRESSED = ("1", "ON", "TRUE", "DOWN", "PRESS", "PRESSED")
 _SECONDS_BETWEEN_PRESSES = 1.0
+_MOST_DEVICES = 100
 
 
 class LinkPhase(str, Enum):
@@ -86,6 +87,8 @@ class TrackerLink:
         self._stands = False
         self._why = ""
         self._presses = 0
+        self.connections = 0
+        """How often a connection was made: nobody knows what was moved between two of them."""
         self._begin()
 
     def _begin(self) -> None:
@@ -114,6 +117,12 @@ class TrackerLink:
         """Messages of the probe in the last second."""
         now = self._clock()
         return float(sum(now - at <= 1.0 for at in self._arrivals))
+
+    @property
+    def reference_age_s(self) -> float:
+        """How long ago the last good reading of the reference came, seconds; infinite where none has."""
+        seen = self._filter.reference_seen
+        return float("inf") if seen is None else self._clock() - seen
 
     def open(self) -> None:
         """Connect, in the background; does nothing where it is open already."""
@@ -159,6 +168,7 @@ class TrackerLink:
         match event:
             case Opened():
                 self._begin()
+                self.connections += 1
                 self._stands = True
             case Lost(why, pause):
                 self._phase = LinkPhase.LOST
@@ -181,7 +191,8 @@ class TrackerLink:
             self._told_at, self._told_hz = self._clock(), self.rate_hz
 
     def _note(self, message: TrackerMessage) -> None:
-        self.devices[message.device] = message.kind
+        if message.device in self.devices or len(self.devices) < _MOST_DEVICES:
+            self.devices[message.device] = message.kind
         if message.device == self.address.probe and message.kind == "TRANSFORM":
             self._heard = message.received
             self._arrivals.append(message.received)

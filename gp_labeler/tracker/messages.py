@@ -111,7 +111,7 @@ class MessageDecoder:
         self._skip -= cut
 
     def _wait(self, messages: list[TrackerMessage], received: float) -> list[TrackerMessage]:
-        """Return what is complete; raise GpError where the rest of a message has been awaited for too long."""
+        """Return what is complete; raise GpError where the rest of a message does not come."""
         unfinished = self._skip or self._buffer
         self._begun = None if not unfinished else received if self._begun is None else self._begun
         if self._begun is not None and received - self._begun > _LONGEST_S:

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_labeler.tracker.samples import Fault, Sample
 from gp_labeler.tracker.rigid import turn_deg
+from gp_labeler.tracker.samples import Fault, Sample
 
 if TYPE_CHECKING:
     from gp_core.registration.pivot import PivotCalibration

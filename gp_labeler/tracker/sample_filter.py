@@ -43,6 +43,8 @@ class SampleFilter:
         self._jumps = JumpFilter(self.limits)
         self._head_jumps = JumpFilter(self.limits.of_head)
         self._segments: dict[tuple[int, int], int] = {(0, 0): 0}
+        self.reference_seen: float | None = None
+        """When the last good reading of the reference arrived, seconds of this computer's monotonic clock."""
 
     def set_limits(self, limits: Limits) -> None:
         """Use other limits from now on; what is known of the devices stays."""
@@ -76,7 +78,7 @@ class SampleFilter:
         return samples
 
     def _in_segment(self, paired: Sample) -> Sample:
-        """Return the sample as its jumps leave it, with one number for the segments of probe and reference."""
+        """Return the sample as jumps leave it, with one number for the segments of probe and reference."""
         sample = self._jumps.check(paired)
         key = (paired.segment, sample.segment)
         return replace(sample, segment=self._segments.setdefault(key, len(self._segments)))
@@ -86,7 +88,10 @@ class SampleFilter:
         sample = device.check(message)
         if device.clock.changes != changes:  # what came before has time stamps of another clock
             self._references.clear()
-        self._references.append(self._head_jumps.check(sample))
+        checked = self._head_jumps.check(sample)
+        self._references.append(checked)
+        if checked.usable:
+            self.reference_seen = checked.received
 
     def _pair(self, probe: Sample, now: float) -> Sample | None:
         """Return the probe in the reference's frame; None where the reference may still come."""
@@ -179,7 +184,7 @@ def _interpolated(before: Sample, after: Sample, time: float) -> FloatArray:
     if span <= 0:
         return before.matrix
     share = (time - before.time) / span
-    turns = Slerp([0.0, 1.0], Rotation.from_matrix([before.matrix[:3, :3], after.matrix[:3, :3]]))
+    turns = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([before.matrix[:3, :3], after.matrix[:3, :3]])))
     pose = np.eye(4)
     pose[:3, :3] = turns(share).as_matrix()
     pose[:3, 3] = (1 - share) * before.matrix[:3, 3] + share * after.matrix[:3, 3]

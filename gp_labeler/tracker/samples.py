@@ -68,11 +68,11 @@ class Limits:
 
     speed_mm_s: float = 1000.0
     turn_deg_s: float = 720.0
-    acceleration_mm_s2: float = 4_000.0
+    acceleration_mm_s2: float = 3_000.0
     turn_acceleration_deg_s2: float = 4_000.0
     head_speed_mm_s: float = 150.0
     head_acceleration_mm_s2: float = 1_000.0
-    noise_mm: float = 2.0
+    noise_mm: float = 1.5
     noise_deg: float = 3.0
     settle_s: float = 2.0
     late_s: float = 0.25

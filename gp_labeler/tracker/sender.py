@@ -1,4 +1,4 @@
-"""The estimated pose sent back out as an OpenIGTLink TRANSFORM, for a robot or for 3D Slicer."""
+"""How the estimated pose stands, sent out over OpenIGTLink for a robot or for 3D Slicer."""
 
 from __future__ import annotations
 
@@ -8,15 +8,11 @@ import socket
 import threading
 import time
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from gp_core.checks import FloatArray
-from gp_core.errors import FrameError, GpError
-from gp_core.frames import RigidTransform
+from gp_core.atlas.pose_gate import GateReason
+from gp_core.errors import GpError
 from gp_labeler.tracker.address import check_device, check_host
 from gp_labeler.tracker.connection import Connection, Lost, Opened, keep_alive
-from gp_labeler.tracker.messages import pack_transform
+from gp_labeler.tracker.pose_message import PoseMessage
 
 __all__ = ["PoseSender"]
 
@@ -24,8 +20,14 @@ _BACKLOG = 8
 _MOST_WAITING = 1_000_000
 
 
+_SILENT = GateReason("stale", "gp-labeler does not answer")
+
+
 class PoseSender:
-    """Sends one pose again and again, so that whoever listens has it, and notices where it stops.
+    """Sends how the pose stands again and again, and the pose itself while it may be used.
+
+    It has a thread of its own. Where a message is to be renewed and is not, because the program hangs, it
+    withdraws the pose by itself.
 
     As a server it serves any number of clients; as a client it connects to a server (3D Slicer's, a
     robot's) and comes back by itself.
@@ -65,7 +67,8 @@ class PoseSender:
         if host is not None:
             check_host(host)
         self.device = device
-        self._matrix: FloatArray | None = None
+        self._message = PoseMessage()
+        self._ends = float("inf")
         self._period_s = period_s
         self._stop = threading.Event()
         self._status = "Waiting for a pose."
@@ -88,32 +91,21 @@ class PoseSender:
         if self._connection is not None:
             return self._status
         to = "nobody listens" if not self._peers else f"{self._peers} listening"
-        what = "no pose yet" if self._matrix is None else f"sending {self.device}"
+        what = f"sending {self.device}" if self._message.usable else "sending no pose"
         return f"Port {self.port}: {what}, {to}."
 
-    def send(self, pose: RigidTransform | ArrayLike) -> None:
-        """Send this pose from now on.
+    def send(self, message: PoseMessage, *, renew_s: float | None = None) -> None:
+        """Send this from now on.
 
         Parameters
         ----------
-        pose : RigidTransform or (4, 4) array_like
-            ``T_tracker_cochlea``, mm; sent as it is, in the tracker's (or the reference's) own coordinates.
-
-        Raises
-        ------
-        FrameError
-            It is not rigid.
+        message : PoseMessage
+            A pose that may be used, or why none may.
+        renew_s : float, optional
+            Withdraw the pose where `send` is not called again within so many seconds.
         """
-        if not isinstance(pose, RigidTransform):
-            try:
-                pose = RigidTransform(np.asarray(pose, dtype=np.float64), "tracker", "cochlea")
-            except (TypeError, ValueError):
-                raise FrameError("a pose must be a (4, 4) matrix of numbers") from None
-        self._matrix = pose.matrix
-
-    def clear(self) -> None:
-        """Send nothing from now on: what was estimated no longer holds."""
-        self._matrix = None
+        self._ends = float("inf") if renew_s is None else time.monotonic() + renew_s
+        self._message = message
 
     def close(self) -> None:
         """Stop sending, and end the connections and threads."""
@@ -126,8 +118,10 @@ class PoseSender:
 
     def _run(self) -> None:
         while not self._stop.wait(self._period_s):
-            matrix = self._matrix
-            data = b"" if matrix is None else pack_transform(matrix, self.device, time.time())
+            message, ends = self._message, self._ends
+            if message.usable and time.monotonic() > ends:
+                message = message.held_back_for(_SILENT)
+            data = message.pack(self.device, time.time())
             if self._server is not None:
                 self._peers = self._server.serve(data)
             else:

@@ -13,8 +13,8 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_labeler.tracker.samples import Fault, Sample
 from gp_labeler.tracker.probe import Probe
+from gp_labeler.tracker.samples import Fault, Sample
 
 __all__ = ["RecordedTouch", "RefusedTouch", "TouchRecorder", "TouchSettings"]
 

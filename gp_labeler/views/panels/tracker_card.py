@@ -43,6 +43,7 @@ class TrackerCard(Card):
         super().__init__("Tracked probe", parent)
         self._desk = workbench
         self.words = text_label(wrap=True)
+        self.frame_words = text_label(role="hint", wrap=True)
         self.tip = text_label()
         self.progress = QProgressBar()
         self.progress.setTextVisible(False)
@@ -57,7 +58,7 @@ class TrackerCard(Card):
         settings.setProperty("role", "link")
         settings.clicked.connect(self.settings_asked)
         self.add_to_heading(settings)
-        for widget in (self.words, self.tip, self.progress):
+        for widget in (self.words, self.tip, self.progress, self.frame_words):
             self.add(widget)
         row = QHBoxLayout()
         row.addWidget(self.record, 1)
@@ -77,6 +78,10 @@ class TrackerCard(Card):
             self.dwell.setChecked(tracker.dwell)
         self.record.setText(f"Record {target}" if target else "All touched")
         self.record.setEnabled(target is not None and tracker.pivot is None)
+        words = tracker.frame_words
+        self.frame_words.setText(words)
+        self.frame_words.setVisible(bool(words))
+        set_role(self.frame_words, "warning" if tracker.doubtful else "hint")
         self._on_moved()
 
     def _on_moved(self) -> None:

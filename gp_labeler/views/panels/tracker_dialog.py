@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from typing import Any
 
@@ -18,11 +19,13 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_core.atlas.pose_gate import PoseGate
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.bind import follow, set_role
+from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
 from gp_labeler.views.window_state import WindowState
@@ -32,6 +35,7 @@ __all__ = ["TrackerDialog"]
 
 _MEMORY = "tracker"
 _STILL = "may stand still"
+_GATE = "largest region sent"
 _SEND_PORT = 18945
 _HINTS: Mapping[str, tuple[str, str]] = {
     "host": ("Host", "127.0.0.1, or the name of the computer that runs PLUS or Slicer"),
@@ -183,6 +187,26 @@ class TrackerDialog(QDialog):
         except GpError as error:
             self._complain(error)
 
+    def _use_gate(self, *_: object) -> None:
+        """Send poses within the limits typed here from now on."""
+        try:
+            self._desk.tracker.set_gate(PoseGate(self.radius.value, self.cone.value))
+        except GpError as error:
+            self._complain(error)
+            self._show_gate()
+            return
+        self._remember()
+        self._complain(None)
+
+    def _limits(self) -> list[float]:
+        gate = self._desk.tracker.gate
+        return [gate.max_radius_mm, gate.max_cone_deg]
+
+    def _show_gate(self) -> None:
+        gate = self._desk.tracker.gate
+        self.radius.set_value(gate.max_radius_mm)
+        self.cone.set_value(gate.max_cone_deg)
+
     def _complain(self, error: GpError | None) -> None:
         self.problem.setText("" if error is None else str(error))
         self.problem.setVisible(error is not None)
@@ -206,12 +230,20 @@ class TrackerDialog(QDialog):
         self.still.setChecked(still)
         for name, field in self.fields.items():
             field.setText(str(known.get(name, "")))
+        self._recall_gate()
         if self._desk.tracker.probe.tip_offset.any():
             self.fields["tip"].setText(_tip_text(self._desk.tracker.probe.tip_offset))
 
+    def _recall_gate(self) -> None:
+        limits = self._memory.fields(_MEMORY).get(_GATE)
+        if isinstance(limits, list) and len(limits) == 2:
+            with contextlib.suppress(GpError, TypeError):  # a memory that was tampered with sets no limit
+                self._desk.tracker.set_gate(PoseGate(*limits))
+        self._show_gate()
+
     def _remember(self) -> None:
         typed: dict[str, Any] = {name: field.text() for name, field in self.fields.items()}
-        self._memory.set(**{_MEMORY: typed | {_STILL: self.still.isChecked()}})
+        self._memory.set(**{_MEMORY: typed | {_STILL: self.still.isChecked(), _GATE: self._limits()}})
 
     # Widgets
 
@@ -232,6 +264,10 @@ class TrackerDialog(QDialog):
         self.send_port = QLineEdit(str(_SEND_PORT))
         self.send_port.setAccessibleName("Port to send the pose from")
         self.send_port.setFixedWidth(72)
+        self.radius = NumberField("Largest 95 % radius of a pose that is sent, mm", widest="10.00")
+        self.cone = NumberField("Largest 95 % cone of a pose that is sent, degrees", widest="10.00")
+        for field in (self.radius, self.cone):
+            field.value_chosen.connect(self._use_gate)
         self.still = QCheckBox("Readings may stand still: a robot arm or a simulation")
         self.still.setToolTip(
             "For a device without noise, whose readings repeat to the last digit. Leave it off for a camera: "
@@ -306,6 +342,16 @@ class TrackerDialog(QDialog):
         row.addStretch(1)
         card.add(self.send_words)
         card.add(row)
+        card.add(
+            text_label("Only an accepted pose is sent, while its 95 % region is within", "hint", wrap=True)
+        )
+        limits = QHBoxLayout()
+        limits.setSpacing(8)
+        for field, unit in ((self.radius, "mm about the origin"), (self.cone, "degrees about the axis")):
+            limits.addWidget(field)
+            limits.addWidget(text_label(unit, "hint"))
+        limits.addStretch(1)
+        card.add(limits)
         return card
 
 

@@ -6,6 +6,7 @@ python tests/labeler/tracker/hostile_tracker.py --touches 10000
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -143,10 +144,15 @@ class Session:
         which = DEVICES if rng.random() < 0.2 else (str(rng.choice(DEVICES)),)
         if kind == "clock":
             self._clock_shift += float(rng.choice([-1, 1]) * np.exp(rng.uniform(np.log(0.3), np.log(4000))))
-        self._mishaps.append(
-            Mishap(kind, which, begins, begins + seconds, mm * direction / np.linalg.norm(direction), seconds)
-        )
+        self.begin(kind, which, seconds, mm * direction / np.linalg.norm(direction), begins)
         self._next += rng.exponential(self._every)
+
+    def begin(
+        self, kind: str, devices: tuple[str, ...], seconds: float, shift: np.ndarray, at: float | None = None
+    ) -> None:
+        """Let something go wrong from now on, or from a moment."""
+        begins = self.now if at is None else at
+        self._mishaps.append(Mishap(kind, devices, begins, begins + seconds, shift, seconds))
 
     def _tell(self, device: str, true: np.ndarray) -> None:
         rng = self.rng
@@ -155,9 +161,7 @@ class Session:
         pose[:3, :3] = rotation_of(rng.normal(0, 4e-4, 3)) @ pose[:3, :3]
         late, damage, status = 0.0, False, "OK"
         for mishap in (m for m in self._mishaps if device in m.devices):
-            if mishap.kind == "jump":
-                pose[:3, 3] += mishap.shift
-            elif mishap.kind == "stray" and rng.random() < 0.5:
+            if mishap.kind == "jump" or (mishap.kind == "stray" and rng.random() < 0.5):
                 pose[:3, 3] += mishap.shift
             elif mishap.kind == "hide":
                 status = "MISSING"
@@ -204,11 +208,15 @@ class Session:
     # A touch
 
     def touch(self, place: np.ndarray) -> tuple[object, np.ndarray]:
-        """Go to a place, press, and return what came of it and where the tip truly was."""
+        """Go to a place, press there, and return what came of it and where the tip truly was."""
         self.go(place, self.rng.uniform(0.6, 1.2))
         arrives = self._way[2] + self._way[3]
         while self.now < arrives + 0.1:
             self.step()
+        return self.press()
+
+    def press(self) -> tuple[object, np.ndarray]:
+        """Press, and return what came of it and where the tip truly was."""
         self.outcomes.clear()
         self.recorder.press()
         tips, connections = [], self.connections
@@ -242,7 +250,7 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--smallest", type=float, default=3.0, help="of the jumps, mm")
     given = parser.parse_args()
-    print(run(given.touches, given.seed, smallest_mm=given.smallest))
+    sys.stdout.write(f"{run(given.touches, given.seed, smallest_mm=given.smallest)}\n")
 
 
 if __name__ == "__main__":

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from tracker_cases import message, pose
 
 from gp_labeler.tracker.sample_filter import SampleFilter
-from gp_labeler.tracker.samples import Fault, Limits
+from gp_labeler.tracker.samples import Fault, Limits, Sample
 
 _STEP = 1 / 60
 
@@ -179,13 +181,25 @@ def test_a_jump_is_no_less_a_jump_where_readings_are_rare(hertz) -> None:
     assert {s.fault for s in got[rest:]} == {Fault.JUMP}
 
 
-@pytest.mark.parametrize("hertz", [20, 60, 250])
-def test_a_vigorous_hand_is_no_jump(hertz) -> None:
+def _there_and_back(hertz: int) -> list[float]:
     """250 mm in half a second, as smoothly as hands move, there and back."""
     s = np.linspace(0, 1, hertz // 2, endpoint=False)
     go = 250 * (10 * s**3 - 15 * s**4 + 6 * s**5)
-    xs = [0.0] * hertz + [*go, *(250 - go)] * 4 + [0.0] * hertz
-    assert {(s.fault, s.segment) for s in _samples(xs, 1 / hertz)} == {(Fault.NONE, 0)}
+    return [0.0] * hertz + [*go, *(250 - go)] * 4 + [0.0] * hertz
+
+
+@pytest.mark.parametrize("hertz", [60, 250])
+def test_a_vigorous_hand_is_no_jump(hertz) -> None:
+    samples = _samples(_there_and_back(hertz), 1 / hertz)
+    assert {(s.fault, s.segment) for s in samples} == {(Fault.NONE, 0)}
+
+
+def test_where_readings_are_rare_a_vigorous_hand_costs_its_first_one_only() -> None:
+    samples = _samples(_there_and_back(20), 1 / 20)
+    doubted = [k for k, s in enumerate(samples) if not s.usable]
+    assert len(doubted) <= 8
+    assert all(b - a > 1 for a, b in pairwise(doubted))
+    assert {s.segment for s in samples if s.usable} == {0}
 
 
 def test_a_flick_costs_samples_and_begins_no_segment() -> None:

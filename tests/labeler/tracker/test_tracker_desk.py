@@ -131,9 +131,11 @@ def test_a_pivot_calibration_finds_the_tip_and_uses_it(desk, simulator):
 def test_the_pose_is_sent_back_while_it_holds(desk):
     atlas = Atlas.published()
     desk.tracker.start_sending(0)
-    port = desk.tracker._sender.port
-    for name in ("RWA", "RWP", "OS", "MN"):
+    port = desk.tracker.sending_port
+    for name in (*PROBE, "IN"):
         desk.pose.record(atlas[name], TouchHow.TYPED, name=name)
+    assert "nobody has accepted it" in desk.tracker.sending
+    desk.pose.estimating.judge("accept")
     client = pyigtl.OpenIGTLinkClient("127.0.0.1", port)
     try:
         message = client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE)
@@ -151,25 +153,29 @@ def test_a_pose_that_looks_wrong_is_held_back(desk, trouble):
     desk.message.connect(lambda text, _: said.append(text))
     desk.tracker.start_sending(0)
     desk.tracker.changed.connect(lambda: words.append(desk.tracker.sending))
-    client = pyigtl.OpenIGTLinkClient("127.0.0.1", desk.tracker._sender.port)
+    client = pyigtl.OpenIGTLinkClient("127.0.0.1", desk.tracker.sending_port)
     try:
-        for name in PROBE:
+        for name in (*PROBE, "IN"):
             source = {"MN": "OS", "OS": "MN"}.get(name, name) if trouble == "names" else name
             position = atlas[source] * (right if trouble == "side" else 1.0)
             desk.pose.record(position, TouchHow.TYPED, name=name)
+        desk.pose.estimating.judge("accept")
         if trouble == "rejected":
             assert client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE) is not None
             desk.pose.estimating.judge("reject")
-        why = {"names": "check the names", "side": "check the side", "rejected": "it was rejected"}[trouble]
-        assert words[-1].endswith(f"Held back: {why}."), "a dialog that is open shows it at once"
-        assert f"The pose is held back from the robot: {why}" in said
-        assert desk.tracker._sender._matrix is None
+        why = {"names": "look exchanged", "side": "look like those of the", "rejected": "it was rejected"}[
+            trouble
+        ]
+        assert "Held back: " in words[-1], "a dialog that is open shows it at once"
+        assert why in words[-1]
+        assert any(text.startswith("The pose is held back from the robot: ") for text in said)
         if trouble == "names":
             desk.pose.swap_names()
         elif trouble == "side":
             desk.pose.change_side()
-        else:
-            desk.pose.estimating.judge("accept")
+        if trouble != "rejected":
+            assert "nobody has accepted it" in words[-1], "the touches have changed since"
+        desk.pose.estimating.judge("accept")
         assert "Held back" not in words[-1]
         message = client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE)
         np.testing.assert_allclose(message.matrix, desk.pose.estimate.pose.transform, atol=1e-4)

@@ -154,7 +154,7 @@ def test_the_pose_is_sent_and_stopped_from_the_dialog(qtbot, desk, top):
     assert "port must be a whole number" in dialog.problem.text()
     typed(qtbot, dialog.send_port, "0")
     qtbot.mouseClick(dialog.send, Qt.MouseButton.LeftButton)
-    assert "no pose yet" in dialog.send_words.text()
+    assert "sending no pose" in dialog.send_words.text()
     qtbot.mouseClick(dialog.send, Qt.MouseButton.LeftButton)
     assert desk.tracker.sending == ""
     dialog.close()
