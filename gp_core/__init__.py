@@ -15,11 +15,13 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.insertion import carry_path, read_path
 from gp_core.atlas.label_check import Departure, Finding, SideCheck, check_side, check_specimen
+from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.next_touch import TouchGain, gains
 from gp_core.atlas.pose import CochleaPose, estimate_pose
 from gp_core.atlas.pose_files import read_pose
 from gp_core.atlas.pose_gate import GateReason, PoseGate
 from gp_core.atlas.pose_quality import PoseQuality, pose_quality
+from gp_core.atlas.reading_state import read_as
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -38,6 +40,7 @@ from gp_core.registration.fiducials import FiducialRegistration, register_fiduci
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
 from gp_core.study.compare import ComparisonReport, compare
+from gp_core.study.conditions import ConditionsReport, conditions, touch_conditions
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
 from gp_core.study.nested import NestedReport, nested_search
@@ -56,6 +59,7 @@ __all__ = [
     "Atlas",
     "CochleaPose",
     "ComparisonReport",
+    "ConditionsReport",
     "Departure",
     "DistanceTable",
     "Feature",
@@ -63,6 +67,7 @@ __all__ = [
     "Finding",
     "GateReason",
     "GpError",
+    "Hypothesis",
     "JrmpcResult",
     "JrmpcSettings",
     "LandmarkSet",
@@ -87,6 +92,7 @@ __all__ = [
     "check_side",
     "check_specimen",
     "compare",
+    "conditions",
     "distances",
     "estimate_pose",
     "fit_atlas",
@@ -99,6 +105,7 @@ __all__ = [
     "physical_test",
     "pose_quality",
     "predict",
+    "read_as",
     "read_landmarks",
     "read_path",
     "read_pose",
@@ -106,6 +113,7 @@ __all__ = [
     "register_fiducials",
     "search_features",
     "simulate",
+    "touch_conditions",
     "write_markups",
     "write_suggestions",
 ]

@@ -8,14 +8,23 @@ import sys
 from collections.abc import Sequence
 
 from gp_core import __version__
-from gp_core.commands import estimate, labels, study, study_errors, study_physical, study_search, tracking
+from gp_core.commands import (
+    conditions,
+    estimate,
+    labels,
+    study,
+    study_errors,
+    study_physical,
+    study_search,
+    tracking,
+)
 from gp_core.commands.options import keeping_inputs
 from gp_core.errors import GpError
 from gp_core.terminal import leave_output, plain_terminal
 
 __all__ = ["main", "make_parser"]
 
-_COMMANDS = (estimate, tracking, labels, study, study_search, study_errors, study_physical)
+_COMMANDS = (estimate, tracking, labels, study, study_search, study_errors, study_physical, conditions)
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -149,6 +149,12 @@ class CochleaPose:
         """Whether the 95 % region is of several parts, one a reading that is not ruled out."""
         return any(h.probability >= UNDECIDED for h in self.hypotheses)
 
+    @property
+    def likelier_reading(self) -> Hypothesis | None:
+        """The other reading that is likelier than the touches as they are named; None where none is."""
+        best = next(iter(self.hypotheses), None)
+        return best if best is not None and best.probability > self.probability else None
+
     def _readings(self) -> Iterator[tuple[float, FloatArray, FloatArray, FloatArray]]:
         yield self.probability, self.origin, self.axis, self.covariance
         for h in self.hypotheses:

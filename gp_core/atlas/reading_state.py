@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gp_core.atlas.mixture import UNDECIDED, Hypothesis
 from gp_core.atlas.pose import CochleaPose
+from gp_core.errors import FeatureError
+from gp_core.landmarks.features import feature
+from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["decide", "reading_warnings"]
+__all__ = ["decide", "read_as", "reading_warnings", "with_names_exchanged"]
 
 _WRONG = 0.5
 """Probability of other readings from which the one given is called wrong."""
@@ -75,3 +79,40 @@ def reading_warnings(pose: CochleaPose) -> Iterator[str]:
             f"these points fit the {other} side about as well, so a wrong side would pass: "
             "touch one more feature away from their plane"
         )
+
+
+def read_as(touches: LandmarkSet, reading: Hypothesis) -> LandmarkSet:
+    """Return touches as a hypothesis reads them: of the other ear, or with two names exchanged.
+
+    Examples
+    --------
+    >>> from gp_core.atlas.atlas import Atlas
+    >>> from gp_core.atlas.pose import estimate_pose
+    >>> atlas = Atlas.published()
+    >>> names = {"CL": "OS", "OS": "CL", "MN": "MN", "LLI": "LLI", "RWA": "RWA", "RWP": "RWP"}
+    >>> touches = LandmarkSet.from_mapping({a: atlas[b] for a, b in names.items()}, "L", frame="tracker")
+    >>> best = estimate_pose(touches, "L", atlas).likelier_reading
+    >>> estimate_pose(read_as(touches, best), "L", atlas).state
+    'side clear, names clear'
+    """
+    if reading.exchanged is not None:
+        touches = with_names_exchanged(touches, reading.exchanged)
+    return replace(touches, side=reading.side)
+
+
+def with_names_exchanged(touches: LandmarkSet, pair: tuple[str, str]) -> LandmarkSet:
+    """Return touches in which two features have each other's position.
+
+    Raises
+    ------
+    FeatureError
+        One of them is not touched, or no feature.
+    """
+    a, b = (feature(name).code for name in pair)
+    missing = [code for code in (a, b) if code not in touches]
+    if missing:
+        raise FeatureError(
+            f"{a} and {b} cannot be exchanged: {' and '.join(missing)} not touched",
+            remedy=f"Touched are {' '.join(touches.placed)}.",
+        )
+    return touches.with_point(a, touches[b]).with_point(b, touches[a])

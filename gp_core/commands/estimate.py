@@ -8,17 +8,21 @@ from pathlib import Path
 
 import numpy as np
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.insertion import UNITS, carry_path, read_path, rows_before_centre, write_path
+from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.next_touch import MM_A_DEGREE, TouchGain, gains
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose, estimate_pose
 from gp_core.atlas.pose_gate import doubt_about
+from gp_core.atlas.reading_state import read_as, with_names_exchanged
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.checks import FloatArray
 from gp_core.commands.options import Subparsers, add_command, add_json, blaming, read_atlas, save_json, say
 from gp_core.errors import GpError
 from gp_core.landmarks.files import read_touches
 from gp_core.landmarks.files.naming import named_side
-from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["HELD_BACK", "add", "pose_table"]
 
@@ -59,6 +63,7 @@ def add(commands: Subparsers) -> None:
         metavar="MM",
         help="error of an ordinary touch; default: found from the touches",
     )
+    _add_doubts(parser)
     parser.add_argument(
         "--round-window",
         choices=ROUND_WINDOWS,
@@ -76,13 +81,36 @@ def add(commands: Subparsers) -> None:
         metavar="FILE",
         help="write CO and a point of the axis here, as Slicer markups (.mrk.json)",
     )
-    parser.add_argument(
+    _add_path(parser)
+
+
+def _add_doubts(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("what may be wrong")
+    group.add_argument(
+        "--shared-error",
+        type=float,
+        default=DEFAULT_SHARED_ERROR_MM,
+        metavar="MM",
+        help="RMS length of one offset that all touches share: tip calibration, tracker, soft tissue; it "
+        f"widens the region; default: {DEFAULT_SHARED_ERROR_MM:g}",
+    )
+    group.add_argument(
+        "--exchange",
+        type=_two_names,
+        metavar="A,B",
+        help="give each of two touches the other's name before the estimate, such as RWA,RWP",
+    )
+    group.add_argument(
+        "--take-best",
+        action="store_true",
+        help="where the other side, or an exchange of two names, is likelier than what is given, take that",
+    )
+    group.add_argument(
         "--accept-warnings",
         action="store_true",
         help="write all files even where names or side look wrong or are undecided; without it, only --json "
         "is written then, and the status is 3",
     )
-    _add_path(parser)
 
 
 def _add_path(parser: argparse.ArgumentParser) -> None:
@@ -110,31 +138,67 @@ def run(args: argparse.Namespace) -> int:
     """Estimate, print, and write what was asked for."""
     path = _path_of(args)
     touches = read_touches(args.touches, args.side)
+    if args.exchange is not None:
+        with blaming(args.touches):
+            touches = with_names_exchanged(touches, args.exchange)
     atlas, specimens = read_atlas(args.atlas)
     if atlas is None and args.method == "robust":
         with blaming(" ".join(args.atlas)):
             atlas = fit_atlas(specimens or [])
     own_atlas = "" if args.atlas == ["published"] else f" with atlas {' '.join(args.atlas)}"
     with blaming(args.touches + own_atlas):
-        pose = estimate_pose(
-            touches,
-            args.side,
-            atlas,
-            method=args.method,
-            specimens=specimens,
-            probe_noise=args.probe_noise,
-            round_window=args.round_window,
+        touches, pose, taken = _estimated(args, touches, atlas, specimens)
+        next_touches = (
+            ()
+            if atlas is None
+            else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
         )
-        next_touches = () if atlas is None else gains(touches, atlas, probe_noise=args.probe_noise)
     held_back = _is_held_back(pose) and not args.accept_warnings
     _write(args, pose, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
+    if taken is not None:
+        say(f"  ! taken as {taken.label}, which is likelier than what was given")
     for line in _asides(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
     if held_back:
         say(f"  ! {_what_was_held_back(args, pose)}")
     return HELD_BACK if held_back else 0
+
+
+def _two_names(text: str) -> tuple[str, str]:
+    names = [name.strip().upper() for name in text.split(",")]
+    if len(names) != 2 or names[0] == names[1]:
+        raise argparse.ArgumentTypeError(f"expected two different features such as RWA,RWP, got {text!r}")
+    return names[0], names[1]
+
+
+def _estimated(
+    args: argparse.Namespace,
+    touches: LandmarkSet,
+    atlas: Atlas | None,
+    specimens: list[Specimen] | None,
+) -> tuple[LandmarkSet, CochleaPose, Hypothesis | None]:
+    """Estimate the touches as they are named; with ``--take-best``, as they are likeliest to be meant."""
+
+    def estimate(read: LandmarkSet) -> CochleaPose:
+        return estimate_pose(
+            read,
+            read.side,
+            atlas,
+            method=args.method,
+            specimens=specimens,
+            probe_noise=args.probe_noise,
+            round_window=args.round_window,
+            shared_error=args.shared_error,
+        )
+
+    pose = estimate(touches)
+    best = pose.likelier_reading
+    if best is None or not args.take_best:
+        return touches, pose, None
+    touches = read_as(touches, best)
+    return touches, estimate(touches), best
 
 
 def _is_held_back(pose: CochleaPose) -> bool:
@@ -213,12 +277,7 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
     """Yield the lines of a short readable table, and what of `next_touches`, best first, gains most."""
     yield f"Cochlea from {source}, {pose.side.word} side, method {pose.method}, atlas {pose.atlas}"
     yield ""
-    x, y, z = pose.origin
-    within = "95 % within" if pose.method == "robust" else "animals scatter by"
-    yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
-    x, y, z = pose.axis
-    yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"
-    yield f"  state         {pose.state}"
+    yield from _position_lines(pose)
     yield ""
     yield "  touch   from the mean, mm"
     for code, distance in pose.residuals.items():
@@ -227,6 +286,25 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
         yield f"  ! {warning}"
     if next_touches:
         yield f"  {_advice(next_touches[0])}"
+
+
+def _position_lines(pose: CochleaPose) -> Iterator[str]:
+    """Yield origin and axis with their regions, the state of side and names, and the other readings."""
+    x, y, z = pose.origin
+    within = "95 % within" if pose.method == "robust" else "animals scatter by"
+    yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
+    x, y, z = pose.axis
+    yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"
+    yield f"  state         {pose.state}"
+    if pose.shared_error is not None:
+        yield f"  shared error  {pose.shared_error:g} mm, which the regions allow for"
+    if pose.has_parts:
+        plain = f"{pose.plain_radius_95:.2f} mm and {np.degrees(pose.plain_cone_95):.1f} deg"
+        yield f"  as named      95 % within {plain}; the region above is of several parts:"
+        yield f"    {pose.probability:6.1%}  as named"
+        for other in pose.hypotheses:
+            x, y, z = other.origin
+            yield f"    {other.probability:6.1%}  {other.label}: CO {x:.3f} {y:.3f} {z:.3f}"
 
 
 def _advice(best: TouchGain) -> str:

@@ -183,6 +183,7 @@ class ConditionRow:
             "group": condition.group,
             "condition": condition.label,
             "n_touches": condition.n_touches,
+            "noise_mm": condition.noise_mm,
             "shared_error_mm": condition.shared_error_mm,
             "n": len(self.animals),
             "e_co_mm": float(values["e_co_mm"].mean()),

@@ -113,3 +113,50 @@ def test_the_shell_writes_nothing_for_a_robot_in_doubt(
 def test_the_shell_ends_with_3_even_where_nothing_was_to_be_written(tmp_path: Path) -> None:
     assert main(["estimate", _file(tmp_path, ANIMAL), "--side", "R"]) == 3
     assert main(["estimate", _file(tmp_path, ANIMAL), "--side", "L"]) == 0
+
+
+def test_the_shell_reads_touches_as_they_are_likeliest_meant(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    straight = estimate_pose(ANIMAL, "L", ATLAS)
+    out = tmp_path / "p.json"
+    for touches, side, words in (
+        (ANIMAL, "R", ["--take-best"]),
+        (EXCHANGED, "L", ["--take-best"]),
+        (EXCHANGED, "L", ["--exchange", "mn,OS"]),
+        (ANIMAL, "L", ["--take-best"]),
+    ):
+        file = _file(tmp_path, touches)
+        assert main(["estimate", file, "--side", side, *words, "--json", str(out)]) == 0
+        pose = read_pose(out)
+        np.testing.assert_allclose(pose.transform, straight.transform, atol=1e-6)
+        assert pose.side.value == "L"
+    said = capsys.readouterr().out
+    assert said.count("! taken as the left ear, which is likelier than what was given") == 1
+    assert said.count("exchanged, which is likelier") == 1
+
+
+@pytest.mark.parametrize(
+    ("pair", "message"),
+    [("MN,ZL", "MN and ZL cannot be exchanged: ZL not touched"), ("MN,XX", "unknown feature 'XX'")],
+)
+def test_names_that_are_not_touched_are_not_exchanged(
+    pair: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["estimate", _file(tmp_path, ANIMAL), "--side", "L", "--exchange", pair]) == 2
+    assert message in capsys.readouterr().err
+
+
+def test_the_shell_says_what_the_regions_allow_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    radii = []
+    for words in ([], ["--shared-error", "0.6"]):
+        out = tmp_path / "p.json"
+        assert main(["estimate", _file(tmp_path, ANIMAL), "--side", "L", *words, "--json", str(out)]) == 0
+        radii.append(read_pose(out).radius_95)
+    said = capsys.readouterr().out
+    assert "shared error  0.2 mm" in said
+    assert "shared error  0.6 mm" in said
+    assert radii[1] > 1.5 * radii[0]
+    assert main(["estimate", _file(tmp_path, ANIMAL), "--side", "L", "--shared-error", "-1"]) == 2
