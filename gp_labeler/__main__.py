@@ -39,6 +39,12 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
     parser.add_argument("path", nargs="?", type=Path, metavar="VOLUME|SPECIMEN", help="what to open")
     parser.add_argument("--demo", action="store_true", help="open a synthetic head")
+    parser.add_argument(
+        "--state",
+        type=Path,
+        metavar="DIR",
+        help="where unsaved edits are kept; by default a folder of the user",
+    )
     offscreen = parser.add_argument_group("without a display")
     offscreen.add_argument(
         "--offscreen", metavar="SCRIPT|demo", help="do what a script says, in the same window, unseen"
@@ -111,7 +117,7 @@ def _window(args: argparse.Namespace) -> int:
         )
     from gp_labeler.views.application import run_window  # here: `--help` need not wait for Qt and VTK
 
-    return run_window(args.path, demo=args.demo)
+    return run_window(args.path, demo=args.demo, directory=args.state)
 
 
 if __name__ == "__main__":

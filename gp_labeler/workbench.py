@@ -175,8 +175,9 @@ class Workbench(AtlasDesk, BoneDesk):
 
     def recover(self, recovery: Recovery) -> None:
         """Go on where a killed program stopped."""
-        if self.directory is not None:
-            self._replace(recover_session(recovery, self.directory, **self._session_options))
+        self._replace(recover_session(recovery, self.directory, **self._session_options))
+        if recovery.content.damage:
+            self.say(f"{recovery.content.damage}.", "warning")
 
     def open_demo(self, seed: int = 0, spacing: float = 0.2) -> None:
         """Make the phantom and open it as a new specimen."""

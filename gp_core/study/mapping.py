@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
@@ -62,13 +63,16 @@ def run_map(
             "a worker process died", remedy="Free some memory, or try again with fewer workers."
         ) from None
     except CancelledError:  # Dask cancels what it cannot reach any more
-        raise GpError(
-            "the Dask scheduler is gone", remedy="Start it again; with --checkpoint, what was done is kept."
-        ) from None
+        raise _scheduler_gone() from None
     finally:
         for future in futures:
             future.cancel()
     return [found[i] for i in range(len(items))]
+
+
+def _scheduler_gone() -> GpError:
+    remedy = "Start it again; a search with --checkpoint goes on where it was."
+    return GpError("the Dask scheduler is gone", remedy=remedy)
 
 
 def _told(index: int, result: Result, done: Callable[[int, Result], None] | None) -> Result:
@@ -129,5 +133,12 @@ def _cluster(address: str) -> Iterator[Executor]:
             f"no Dask scheduler answers at {address} ({error})",
             remedy="Start one with: dask scheduler, and workers with: dask worker ADDRESS.",
         ) from None
-    with client:
-        yield client.get_executor()
+    for name in ("distributed", "distributed.client", "tornado", "asyncio"):  # what matters is said by us
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        with client:
+            yield client.get_executor()
+    except (OSError, RuntimeError, TimeoutError):
+        if client.status == "running":
+            raise
+        raise _scheduler_gone() from None

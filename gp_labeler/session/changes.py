@@ -55,7 +55,7 @@ def _parent(result: Document, original: Document, path: list[str]) -> Document:
     target, source = result, original
     for key in path[:-1]:
         shared = source.get(key)
-        if target[key] is shared:
-            target[key] = dict(target[key])
+        if target.get(key) is shared:
+            target[key] = dict(shared or {})  # it lacks where the record that made it is lost
         target, source = target[key], shared if isinstance(shared, dict) else {}
     return target

@@ -2,9 +2,8 @@
 
 A journal is a file of JSON lines, each ``{"record": ..., "crc32": ...}``. The first record holds the whole
 document as it was last saved; each further one what an edit changed in it (not the command: so replay depends
-on nothing but the format). A record is on the disk before the edit shows. Reading stops at the first line
-that is torn, out of sequence, or whose checksum is wrong; an edit whose line was not finished was never
-confirmed.
+on nothing but the format). A record is on the disk before the edit shows. An edit whose line was not finished
+was never confirmed. Damaged lines are left out, with what no longer fits without them, and counted.
 """
 
 from __future__ import annotations
@@ -15,7 +14,7 @@ import json
 import os
 import re
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -23,8 +22,9 @@ from typing import Any, BinaryIO
 from gp_core.disk import read_bytes, write_bytes
 from gp_core.errors import FileFormatError, GpError
 from gp_labeler.session.changes import difference, dumped, patched
-from gp_labeler.session.document import Document
+from gp_labeler.session.document import Document, document_of, state_of
 from gp_labeler.session.specimen_file import application
+from gp_labeler.session.state import SpecimenState
 
 __all__ = ["Entry", "Journal", "JournalContent", "read_journal"]
 
@@ -63,6 +63,8 @@ class JournalContent:
         Checksum of that file.
     n_bytes : int
         Length of the part that is whole.
+    damage : str
+        What of it cannot be read, in words; empty where nothing was damaged.
     """
 
     base: Document
@@ -70,11 +72,17 @@ class JournalContent:
     specimen_file: Path | None
     saved: str | None
     n_bytes: int
+    damage: str = ""
 
     @property
     def document(self) -> Document:
         """The document after the last confirmed edit."""
         return self.entries[-1].document if self.entries else self.base
+
+    @property
+    def time(self) -> str:
+        """When the last edit was made; empty where there is none."""
+        return self.entries[-1].time if self.entries else ""
 
 
 class Journal:
@@ -224,33 +232,66 @@ def read_journal(path: Path) -> JournalContent:
         It cannot be opened, its first record is damaged, or it is of a newer version.
     """
     content = read_bytes(path, what="journal", max_bytes=_MAX_BYTES)
-    records = _whole_records(content)
-    header, end = next(records, ({}, 0))
-    if header.get("kind") != "base" or not isinstance(header.get("document"), dict):
-        raise FileFormatError("is not a journal, or its beginning is damaged", file=path)
+    records, n_damaged = _records(content)
+    header = records.pop(0) if records and records[0].get("kind") == "base" else None
+    if header is None and not records:
+        raise FileFormatError("is not a journal, or all of it is damaged", file=path)
+    header = header or {"document": document_of(SpecimenState("recovered")), "version": VERSION}
+    if not isinstance(header.get("document"), dict):
+        raise FileFormatError("is not a journal", file=path)
     if header.get("version") != VERSION:
         raise FileFormatError(f"is a journal of version {header.get('version')}, not {VERSION}", file=path)
-    document, entries = header["document"], []
-    for record, n_bytes in records:
-        document = patched(document, record["changes"])
-        entries.append(Entry(record["kind"], record["text"], record["time"], document))
-        end = n_bytes
+    entries, n_lost = _entries(header["document"], records)
     file = header.get("specimen_file")
     return JournalContent(
-        header["document"], tuple(entries), Path(file) if file else None, header.get("saved"), end
+        header["document"],
+        tuple(entries),
+        Path(file) if file else None,
+        header.get("saved"),
+        content.rfind(b"\n") + 1,
+        _damage(max(n_lost, n_damaged), "saved" in header, path) if n_lost or n_damaged else "",
     )
 
 
-def _whole_records(content: bytes) -> Iterator[tuple[dict[str, Any], int]]:
-    """Yield each record with the offset behind it, up to the first line that is not whole."""
-    start = 0
-    for n in range(content.count(b"\n")):
-        end = content.index(b"\n", start) + 1
-        record = _record(content[start:end])
-        if record is None or record.get("n") != n:
-            return
-        yield record, end
-        start = end
+def _records(content: bytes) -> tuple[list[dict[str, Any]], int]:
+    """Return the records that are whole, and the number of the lines that are not.
+
+    What stands behind the last line is an edit that was being written when the program was killed.
+    """
+    *lines, tail = content.split(b"\n")
+    found = [_record(line + b"\n") for line in lines]
+    if _record(tail[:-1] + b"\n") is not None:  # all of it was written; its end is damaged
+        found.append(None)
+    whole = [record for record in found if record is not None]
+    return whole, len(found) - len(whole)
+
+
+def _entries(document: Document, records: list[dict[str, Any]]) -> tuple[list[Entry], int]:
+    """Apply the records in turn; those that do not fit, for what they build on is lost, are counted."""
+    entries: list[Entry] = []
+    n_lost, expected = 0, 1
+    for record in records:
+        try:
+            n = int(record["n"])
+            changed = patched(document, record["changes"])
+            kind = record["kind"]
+            if n != expected or n_lost:
+                state_of(changed)  # what it builds on is lost: it may not fit
+                kind = "edit" if n != expected and kind != "change" else kind  # nor what it undoes be there
+            entries.append(Entry(kind, record["text"], record["time"], changed))
+        except (GpError, KeyError, TypeError, ValueError, IndexError, AttributeError):
+            n_lost += 1
+            continue
+        n_lost += max(n - expected, 0)
+        document, expected = changed, n + 1
+    return entries, n_lost
+
+
+def _damage(n_lost: int, has_header: bool, path: Path) -> str:
+    edits = f"{n_lost} edit{'' if n_lost == 1 else 's'} in {path.name} cannot be read: the file is damaged"
+    if has_header:
+        return f"{edits}. All others are here, and a copy of the file is kept"
+    return f"{edits}, also in what had been saved before; what was edited since is here. A copy is kept"
 
 
 def _line(record: Mapping[str, Any]) -> bytes:

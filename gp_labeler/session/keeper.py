@@ -7,11 +7,19 @@ from os import PathLike
 from pathlib import Path
 from uuid import uuid4
 
+from gp_core.disk import read_bytes, write_bytes
 from gp_core.errors import GpError
 from gp_labeler.session.document import document_of
 from gp_labeler.session.journal import Journal, read_journal
 from gp_labeler.session.lock import FileLock, InUseError
-from gp_labeler.session.places import UNSAVED, absolute_path, journal_path, lock_path, volume_lock_path
+from gp_labeler.session.places import (
+    UNSAVED,
+    absolute_path,
+    journal_folder,
+    journal_path,
+    lock_path,
+    volume_lock_path,
+)
 from gp_labeler.session.recovery import Recovery
 from gp_labeler.session.specimen_file import SUFFIX, digest, write_specimen
 from gp_labeler.session.state import SpecimenState
@@ -56,25 +64,24 @@ class Keeper:
         return keeper
 
     @classmethod
-    def resume(cls, directory: Path, recovery: Recovery) -> Keeper:
+    def resume(cls, directory: Path | None, recovery: Recovery) -> Keeper:
         """Go on with a journal that a killed program left; raises as `begin` does."""
         keeper = cls(directory, recovery.specimen_file)
+        keeper._saved = recovery.content.saved
+        if directory is None:
+            return keeper
         file = keeper.specimen_file
-        path = recovery.journal if file is None else journal_path(directory, file)
+        is_here = recovery.journal.parent == journal_folder(directory)
+        path = recovery.journal if file is None and is_here else journal_path(directory, file)
         keeper._lock = keeper._locked(path, file)
         try:
-            if path != recovery.journal:  # it was set aside
-                _set_aside(path)
-                recovery.journal.replace(path)
-            content = read_journal(path)
-            keeper._journal = Journal.resume(path, content)
+            keeper._journal = _resumed(recovery, path)
         except OSError as error:
             keeper._lock.release()
             raise GpError(f"cannot be moved: {error.strerror}", file=recovery.journal) from None
         except GpError:
             keeper._lock.release()
             raise
-        keeper._saved = content.saved
         return keeper
 
     def record(self, kind: str, text: str, state: SpecimenState, *, time: str) -> None:
@@ -207,6 +214,26 @@ class Keeper:
         except GpError as error:  # saved it is, and the old journal still tells the same
             _log.warning("the journal could not be begun anew after saving: %s", error)
         self.specimen_file = target
+
+
+def _resumed(recovery: Recovery, path: Path) -> Journal:
+    """Go on with a journal at `path`; a copy of a damaged one is kept, and one in another folder stays."""
+    content = recovery.content
+    elsewhere = recovery.journal.parent != path.parent
+    if content.damage and not elsewhere:
+        copy = recovery.journal.with_name(f"{recovery.journal.stem}-{uuid4().hex[:8]}.damaged")
+        write_bytes(copy, read_bytes(recovery.journal, what="journal"))
+    if path != recovery.journal:
+        _set_aside(path)
+    if content.damage or elsewhere:
+        journal = Journal.create(path, content.base, specimen_file=content.specimen_file, saved=content.saved)
+        journal.append("edit", "recover edits", content.document, time=content.time)
+        if path != recovery.journal and not elsewhere:
+            recovery.discard()
+        return journal
+    if path != recovery.journal:  # it was set aside
+        recovery.journal.replace(path)
+    return Journal.resume(path, read_journal(path))
 
 
 def _set_aside(journal: Path) -> None:

@@ -56,8 +56,7 @@ class FileLock:
         self.path = path
         self._file: IO[str] | None = None
         try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            file = path.open("a+", encoding="utf-8")
+            file = _opened(path)
         except OSError as error:
             raise GpError(f"cannot be made: {error.strerror}", file=path) from None
         if not _lock(file):
@@ -67,10 +66,10 @@ class FileLock:
                 f"{what} is open in another window{holder}",
                 remedy="Go on there, or close it there first; or open it here as a copy.",
             )
-        file.truncate(0)
-        file.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname()}))
-        file.flush()
         self._file = file
+        with contextlib.suppress(OSError):  # a full disk: it is locked all the same
+            file.truncate(0)
+            os.write(file.fileno(), json.dumps({"pid": os.getpid(), "host": socket.gethostname()}).encode())
 
     def release(self, *, remove: bool = False) -> None:
         """Let go; more than once does no harm.
@@ -84,7 +83,19 @@ class FileLock:
         self._file.close()
         self._file = None
         if remove:
-            self.path.unlink(missing_ok=True)
+            with contextlib.suppress(OSError):
+                self.path.unlink(missing_ok=True)
+
+
+def _opened(path: Path) -> IO[str]:
+    """Open a lock file; where it cannot be written, to be read, which the system locks all the same."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        return path.open("a+", encoding="utf-8")
+    except OSError:
+        if not path.is_file():
+            raise
+        return path.open(encoding="utf-8")
 
 
 def _lock(file: IO[str]) -> bool:

@@ -108,7 +108,7 @@ def open_session(
     return session
 
 
-def recover_session(recovery: Recovery, directory: Path, **options: Any) -> Session:
+def recover_session(recovery: Recovery, directory: Path | None, **options: Any) -> Session:
     """Go on where a killed program stopped; undo works back to where it was saved last.
 
     Raises

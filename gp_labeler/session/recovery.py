@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import logging
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
 
+from gp_core.disk import remove_drafts
 from gp_core.errors import GpError
 from gp_labeler.session.document import document_of, state_of
 from gp_labeler.session.history import LIMIT, History
 from gp_labeler.session.journal import Entry, JournalContent, read_journal
-from gp_labeler.session.lock import FileLock
+from gp_labeler.session.lock import FileLock, InUseError
 from gp_labeler.session.places import UNSAVED, journal_folder, journal_path, lock_path
 from gp_labeler.session.specimen_file import read_specimen
 from gp_labeler.session.state import SpecimenState
 
-__all__ = ["Recovery", "find_recoveries", "find_recovery", "replayed"]
+__all__ = ["Recovery", "find_recoveries", "find_recovery", "replayed", "unreadable_journals"]
 
 _log = logging.getLogger(__name__)
 
@@ -54,11 +56,15 @@ class Recovery:
         n = len(entries)
         when = _local(entries[-1].time) if n else ""
         last = f", the last{when}: {_words(entries[-1])}" if n else ""
-        return f"{self.state.specimen}: {n} unsaved edit{'' if n == 1 else 's'}{last}"
+        damage = f". {self.content.damage}" if self.content.damage else ""
+        return f"{self.state.specimen}: {n} unsaved edit{'' if n == 1 else 's'}{last}{damage}"
 
     def discard(self) -> None:
-        """Delete the journal: the user does not want these edits."""
-        self.journal.unlink(missing_ok=True)
+        """Delete the journal: the user does not want these edits; raises `GpError` where that is refused."""
+        try:
+            self.journal.unlink(missing_ok=True)
+        except OSError as error:
+            raise GpError(f"cannot be deleted: {error.strerror}", file=self.journal) from None
 
 
 def _words(entry: Entry) -> str:
@@ -79,18 +85,35 @@ def find_recoveries(directory: Path) -> tuple[Recovery, ...]:
     those that cannot be read are left where they are.
     """
     found = []
+    remove_drafts(journal_folder(directory))
     for journal in sorted(journal_folder(directory).glob("*.jsonl")):
+        lock = None
         try:
             lock = FileLock(lock_path(journal), "the journal")
-        except GpError:
+        except InUseError:
             continue
+        except GpError:  # it cannot be made, so no window has it: the disk is full, or may only be read
+            pass
         recovery = _read(journal)
         if recovery is not None and _is_saved(recovery):
-            recovery.discard()
+            with suppress(GpError):
+                recovery.discard()
         elif recovery is not None:
             found.append(recovery)
-        lock.release(remove=journal.name.startswith(UNSAVED))
-    return tuple(sorted(found, key=lambda r: r.content.entries[-1].time, reverse=True))
+        if lock is not None:
+            lock.release(remove=journal.name.startswith(UNSAVED))
+    return tuple(sorted(found, key=lambda r: r.content.time, reverse=True))
+
+
+def unreadable_journals(directory: Path) -> tuple[str, ...]:
+    """Return what to tell of the journals that cannot be read at all; they are left where they are."""
+    found = []
+    for journal in sorted(journal_folder(directory).glob("*.jsonl")):
+        try:
+            _ = Recovery(journal, read_journal(journal)).state
+        except GpError as error:
+            found.append(f"{error} It is left where it is")
+    return tuple(found)
 
 
 def find_recovery(directory: Path, specimen_file: Path) -> Recovery | None:
@@ -121,6 +144,8 @@ def _read(journal: Path) -> Recovery | None:
 
 def _is_saved(recovery: Recovery) -> bool:
     """Whether the last confirmed state is the saved one: the kill fell between saving and tidying up."""
+    if recovery.content.damage:  # nobody knows what it said
+        return False
     document = recovery.content.document
     base = recovery.content.base
     only_opened = "volume" not in base and all(entry.kind == "change" for entry in recovery.content.entries)

@@ -17,9 +17,11 @@ from gp_core.errors import GpError
 from gp_labeler.installation import check_display
 from gp_labeler.plain_numbers import use_plain_numbers
 from gp_labeler.session.places import default_directory
-from gp_labeler.session.recovery import find_recoveries
+from gp_labeler.session.recovery import find_recoveries, unreadable_journals
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.state_question import directory_to_use
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.workbench import Workbench
 
@@ -103,13 +105,17 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
             remedy="Use gp-labeler --offscreen SCRIPT|demo --output DIR, or run it under xvfb-run.",
         )
     app = make_application()
-    directory = directory or default_directory()
+    wanted = directory or default_directory()
+    directory = directory_to_use(wanted, Prompts(None))
     window = make_window(directory)
     sys.excepthook = lambda kind, error, trace: _report(window, kind, error, trace)
     window.show()
 
     def begin() -> None:
-        window.ui.take_recoveries(find_recoveries(directory))
+        places = list(dict.fromkeys(place for place in (wanted, directory) if place is not None))
+        for words in (words for place in places for words in unreadable_journals(place)):
+            window.workbench.say(words, "warning")
+        window.ui.take_recoveries(tuple(found for place in places for found in find_recoveries(place)))
         if demo:
             window.ui.open_demo()
         elif path is not None:

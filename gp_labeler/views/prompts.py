@@ -15,11 +15,11 @@ class Prompts:
 
     Parameters
     ----------
-    parent : QWidget
+    parent : QWidget, optional
         The window.
     """
 
-    def __init__(self, parent: QWidget) -> None:
+    def __init__(self, parent: QWidget | None) -> None:
         self._parent = parent
 
     def choose(

@@ -121,12 +121,48 @@ def test_a_torn_or_damaged_line_costs_only_itself(sequence, data):
         damaged = content[:at] + (
             bytes([content[at] ^ 1]) + content[at + 1 :] if flip and at < len(content) else b""
         )
+        original = read_journal(path)
         path.write_bytes(damaged)
-        whole = content[:at].count(b"\n") - 1
         read = read_journal(path)
-        assert len(read.entries) == whole
-        assert text_of(state_of(read.document)) in states
-        assert path.read_bytes()[: read.n_bytes] == content[: read.n_bytes]
+        n_whole = content[:at].count(b"\n") - 1
+        if flip and at < len(content):
+            assert read.entries[:n_whole] == original.entries[:n_whole]
+            assert len(read.entries) < len(original.entries)
+            assert "cannot be read: the file is damaged" in read.damage
+            assert state_of(read.document)
+        else:
+            assert (len(read.entries), read.damage) == (n_whole, "")
+            assert text_of(state_of(read.document)) in states
+            assert path.read_bytes()[: read.n_bytes] == content[: read.n_bytes]
+
+
+@pytest.mark.parametrize("line", [0, 1, 3, 5])
+def test_one_flipped_bit_costs_one_edit_and_a_copy_of_the_file_is_kept(line, tmp_path):
+    session = new_session(tmp_path, specimen="GP-014")
+    codes = ("CA", "CB", "OS", "RWA", "RWP")
+    for i, code in enumerate(codes):
+        session.do(PlacePoint(L, code, (i, 2 * i, 3), MARK))
+    abandon(session)
+    (path,) = (tmp_path / "journals").glob("*.jsonl")
+    lines = path.read_bytes().splitlines(keepends=True)
+    middle = len(lines[line]) // 2
+    lines[line] = lines[line][:middle] + bytes([lines[line][middle] ^ 4]) + lines[line][middle + 1 :]
+    path.write_bytes(damaged := b"".join(lines))
+
+    (recovery,) = find_recoveries(tmp_path)
+    assert "1 edit in" in recovery.text
+    again = recover_session(recovery, tmp_path)
+    kept = {code for n, code in enumerate(codes, start=1) if n != line}
+    assert {code for code in codes if (L, code) in again.state.landmarks} == kept
+    (copy,) = (tmp_path / "journals").glob("*.damaged")
+    assert copy.read_bytes() == damaged
+
+    again.do(SetNotes("goes on"))
+    abandon(again)
+    (recovery,) = find_recoveries(tmp_path)
+    assert recovery.content.damage == ""
+    assert recovery.state.notes == "goes on"
+    assert {code for code in codes if (L, code) in recovery.state.landmarks} == kept
 
 
 def test_edits_go_on_behind_a_torn_line(tmp_path):
@@ -296,7 +332,7 @@ def test_what_is_no_journal_is_left_alone(tmp_path):
     )
     assert find_recoveries(tmp_path) == ()
     assert len(list(folder.glob("*.jsonl"))) == 3
-    with pytest.raises(FileFormatError, match="is not a journal, or its beginning is damaged"):
+    with pytest.raises(FileFormatError, match="is not a journal, or all of it is damaged"):
         read_journal(folder / "a.jsonl")
     with pytest.raises(FileFormatError, match="version 99, not 1"):
         read_journal(folder / "c.jsonl")
@@ -355,7 +391,7 @@ def test_undo_after_recovery_is_bounded(tmp_path):
     assert len(history.state.side(L).placed) == 20
 
 
-def test_a_line_that_is_missing_ends_what_is_believed(tmp_path):
+def test_a_line_that_is_missing_is_counted_and_what_follows_is_kept(tmp_path):
     session = new_session(tmp_path)
     for i in range(4):
         session.do(SetThreshold(i))
@@ -363,4 +399,6 @@ def test_a_line_that_is_missing_ends_what_is_believed(tmp_path):
     (path,) = (tmp_path / "journals").glob("*.jsonl")
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join([*lines[:2], *lines[3:]]))
-    assert [entry.text for entry in read_journal(path).entries] == ["set threshold to 0"]
+    read = read_journal(path)
+    assert [entry.text for entry in read.entries] == [f"set threshold to {i}" for i in (0, 2, 3)]
+    assert read.damage.startswith("1 edit in ")
