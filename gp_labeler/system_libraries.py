@@ -137,7 +137,7 @@ def _known_to_apt(packages: list[str]) -> set[str]:
 def _main(extras: str, how: str = "") -> None:
     lacking = missing(extras.split(","))
     if lacking and how == "--say":
-        sys.stdout.write(f"gp-labeler needs more of the system than is there; {advice(lacking)}\n")
+        sys.stdout.write(f"System packages are missing; {advice(lacking)}\n")
     elif lacking:
         sys.stdout.write(" ".join(packages_of(lacking)) + "\n")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from window_cases import MIDDLE
+from window_cases import MIDDLE, settle
 
 from gp_core import Atlas, Side
 from gp_labeler.scene.colours import DARK
@@ -81,7 +81,8 @@ def test_a_doubted_point_shows_where_it_should_be(window, qtbot, monkeypatch) ->
         _place(desk.session, code)
     _place(desk.session, "RWL", shift=2.0)
     desk.session.set_active(Active(Side.LEFT, "RWL"))
-    qtbot.waitUntil(lambda: drawn_ghosts(desk) != [])
+    settle(qtbot, window)  # doubts are known a moment before the views are told of them
+    assert drawn_ghosts(desk) != []
     view.grab()
     (ghost,) = view._painter._points.ghosts
     assert (ghost.key, ghost.label) == ("L:RWL", "RWL?")
