@@ -85,8 +85,8 @@ def cut_rows() -> Iterator[Action]:
     yield row("cut_flip", "Cut: leave the other side", ("Shift+X",), _flip)
     yield row("cut_here", "Cut: through the crosshair", ("Shift+H",), _cut_here,
               hint="Bring the cut to where the crosshair is now")
-    yield row("cut_deeper", "Cut: deeper", ("Shift+]", "}"), _move(_STEP_MM), hint="By half a millimetre")
-    yield row("cut_shallower", "Cut: less deep", ("Shift+[", "{"), _move(-_STEP_MM),
+    yield row("cut_deeper", "Cut: deeper", ("Shift+]",), _move(_STEP_MM), hint="By half a millimetre")
+    yield row("cut_shallower", "Cut: less deep", ("Shift+[",), _move(-_STEP_MM),
               hint="By half a millimetre")
     yield row("slices_visible", "Slices in the 3D view", ("Shift+D",), _toggle_slices, _has_scan,
               checked=lambda desk: desk.session.view.state.slices_visible, group="slices")
