@@ -171,15 +171,16 @@ def qt_facts() -> dict[str, Any]:
     from PySide6.QtGui import QFontDatabase, QFontInfo, QGuiApplication
 
     from gp_labeler.views.application import make_application
+    from gp_labeler.views.fonts import base_font
 
     app = make_application()
     screens = [
-        f"{screen.name()} {screen.size().width()} x {screen.size().height()}, "
-        f"scale {100 * screen.devicePixelRatio():.0f} %"
+        f"screen {screen.name()} {screen.size().width()} x {screen.size().height()}, ".replace("  ", " ")
+        + f"scale {100 * screen.devicePixelRatio():.0f} %"
         for screen in app.screens()
     ]
     families = QFontDatabase.families()
-    shown = QFontInfo(app.font())
+    shown = QFontInfo(base_font())
     return {
         "display": [f"Qt's platform {QGuiApplication.platformName()}", *screens],
         "fonts": [f"{shown.family()} {shown.pixelSize()} px, of {len(families)} families"],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from collections.abc import Callable
 from importlib import import_module
 from types import FrameType
 from typing import Any
@@ -15,7 +16,7 @@ __all__ = ["core", "labeler"]
 def core() -> int:
     """Run ``gp-core``."""
     before = _stop_at_once("gp-core")
-    main = import_module("gp_core.cli").main
+    main = _main_of("gp_core.cli", "gp-core")
     signal.signal(signal.SIGINT, before)
     return int(main())
 
@@ -23,7 +24,19 @@ def core() -> int:
 def labeler() -> int:
     """Run ``gp-labeler``, to be stopped at once at any time: each edit is in the journal, files are whole."""
     _stop_at_once("gp-labeler")
-    return int(import_module("gp_labeler.__main__").main())
+    return int(_main_of("gp_labeler.__main__", "gp-labeler")())
+
+
+def _main_of(module: str, command: str) -> Callable[[], int]:
+    """Return a command's main function, or one that says in a line that NumPy or the like is damaged."""
+    try:
+        main: Callable[[], int] = import_module(module).main
+    except ImportError as error:
+        first = str(error).strip().splitlines()[0]
+        mend = "pip install --upgrade --force-reinstall gp-labeler"
+        sys.stderr.write(f"{command}: the installation is damaged ({first}). Run {mend}\n")
+        return lambda: 2
+    return main
 
 
 def _stop_at_once(command: str) -> Any:

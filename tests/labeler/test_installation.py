@@ -112,6 +112,15 @@ def test_every_failed_import_has_a_line(error, words) -> None:
     assert "\n" not in text
 
 
+@pytest.mark.parametrize("command", ["core", "labeler"])
+def test_a_damaged_numpy_is_one_line(command, tmp_path) -> None:
+    (tmp_path / "numpy.py").write_text("raise ImportError('cannot load its C library\\nread this page')")
+    code = f"import sys; from gp_labeler.start import {command}; sys.exit({command}())"
+    env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(ROOT)])}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env, check=False)
+    refused(done, "the installation is damaged (cannot load its C library)")
+
+
 def test_the_doctor_finds_nothing_wrong_where_the_tests_run(tmp_path) -> None:
     done = run(tmp_path, "doctor")
     assert done.returncode == 0, done.stdout
