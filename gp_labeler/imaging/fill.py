@@ -50,20 +50,20 @@ class Fill:
         return np.asarray(here if self.outside is None else here & self.outside)
 
 
-def find_fill(array: _Array) -> tuple[Fill, ...]:
-    """Find the values of a (z, y, x) scan that stand for nothing.
+def find_fill(array: _Array, known: float | None = None) -> tuple[Fill, ...]:
+    """Find the values of a (z, y, x) scan that stand for nothing; the file may say one that does.
 
     A fill is one exact value. It is known by its place, the same part of every slice around a middle that has
     other values, as outside a scanner's circle; or by standing apart from all others, as the lowest or
     highest, around a part without dents, as a scanner's field is. Air that a program masked or cut off is no
     fill: bone begins there.
     """
-    found: list[Fill] = []
+    found: list[Fill] = [] if known is None else [Fill(float(known))]
     if array.dtype.kind == "f" and not all(np.isfinite(plane).all() for plane in array):
         found.append(Fill(np.nan))
     ks, js, is_ = (_spread(n, most) for n, most in zip(array.shape, (_SLICES, _ACROSS, _ACROSS), strict=True))
     sample = array[np.ix_(ks, js, is_)]
-    left = np.isfinite(sample)
+    left = np.isfinite(sample) & (True if known is None else sample != known)
     for _ in range(3):
         fill = _circle(array, sample, left, ks) or _extreme(sample, left)
         if fill is None:

@@ -143,7 +143,7 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 def _load(plan: ImportPlan, report: Report) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
         array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
-    fill, filled = replace_fill(array, find_fill(array))
+    fill, filled = replace_fill(array, find_fill(array, plan.fill))
     volume = Volume(
         array,
         plan.T_scan_voxel(),

@@ -93,13 +93,14 @@ def _plan(
     first = grid.there[0]
     files = tuple(dict.fromkeys(one.file.path for one in grid.there))
     one_file = len(files) == 1 and len(grid.there) > 1
+    source = DicomSource(grid.slices, options.channel)
     return ImportPlan(
         path=folder,
         format="DICOM multi-frame" if one_file else "DICOM series",
         files=files,
         size=(first.file.shape[1], first.file.shape[0], len(grid.slices)),
         stored_dtype=value_dtype(grid.there),
-        source=DicomSource(grid.slices, options.channel),
+        source=source,
         geometry=_geometry(first, grid),
         found=(*found, *series.found, *grid.problems, *_pixel_problems(grid.there)),
         notes=value_notes(grid.there),
@@ -107,6 +108,7 @@ def _plan(
         choice=choice,
         options=options,
         name=first.file.path.stem if one_file else folder.name,
+        fill=source.fill,
     )
 
 

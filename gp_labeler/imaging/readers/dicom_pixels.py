@@ -42,24 +42,35 @@ class DicomSource:
     slices: tuple[DicomSlice | None, ...]
     channel: int | None = None
 
+    @property
+    def fill(self) -> float | None:
+        """The value that stands for no measurement, in all slices that of the first; None: they know none."""
+        padded = next((one for one in self.slices if one is not None and one.file.padding), None)
+        if padded is None or padded.file.padding is None:
+            return None
+        return float(_values(np.array(padded.file.padding[0]), padded))
+
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
         there = np.array([n for n, one in enumerate(self.slices) if one is not None])
-        unpacked = lru_cache(maxsize=2)(_unpacked)
+        unpacked, fill = lru_cache(maxsize=2)(_unpacked), self.fill
         for number in wanted:
             nearest = self.slices[there[np.abs(there - number).argmin()]]
             assert nearest is not None
-            with failing_as_volume_error(nearest.file.path):
-                if nearest.file.stored is not None:
-                    yield _values(_lying(nearest, nearest.file.stored), nearest)
-                elif nearest.file.channels > 1:
-                    yield to_grey(unpacked(nearest.file)[nearest.frame], self.channel)
-                else:
-                    yield _values(unpacked(nearest.file)[nearest.frame], nearest)
+            file = nearest.file
+            with failing_as_volume_error(file.path):
+                if file.channels > 1:
+                    yield to_grey(unpacked(file)[nearest.frame], self.channel)
+                    continue
+                found = unpacked(file)[nearest.frame] if file.stored is None else _lying(nearest, file.stored)
+                plane = _values(found if file.stored is None else _used_bits(found, file.stored), nearest)
+                if file.padding is not None and fill is not None:
+                    plane = _filled(plane, found, file.padding, fill)
+                yield plane
 
 
 def _lying(one: DicomSlice, stored: Stored) -> Plane:
-    """Read the stored numbers of a slice from the file, their unused bits removed."""
+    """Read the numbers of a slice from the file, as they lie there."""
     n_pixels = one.file.shape[0] * one.file.shape[1]
     start = n_pixels * one.frame
     before, after = (start % 2, (start + n_pixels) % 2) if stored.exchanged else (0, 0)
@@ -70,11 +81,22 @@ def _lying(one: DicomSlice, stored: Stored) -> Plane:
     if stored.exchanged:
         found = found[: found.size // 2 * 2].reshape(-1, 2)[:, ::-1].ravel()[before : before + n_pixels]
     plane: Plane = found.reshape(one.file.shape)
+    return plane
+
+
+def _used_bits(plane: Plane, stored: Stored) -> Plane:
+    """Remove the unused bits, in which old files keep overlays."""
     size = 8 * stored.dtype.itemsize
     if stored.dtype.kind == "f" or stored.bits == size:
         return plane
-    above = max(0, size - 1 - stored.high)  # old files keep overlays there
+    above = max(0, size - 1 - stored.high)
     return (plane.astype(stored.dtype.newbyteorder("=")) << above) >> (size - stored.bits)
+
+
+def _filled(plane: Plane, stored: Plane, padding: tuple[float, float], fill: float) -> Plane:
+    """Put one value where a slice was padded, whatever its own slope makes of the padding."""
+    padded = (stored >= padding[0]) & (stored <= padding[1])
+    return np.where(padded, fill, plane) if padded.any() else plane
 
 
 def _unpacked(file: DicomFile) -> Plane:
@@ -128,7 +150,11 @@ def value_dtype(slices: Sequence[DicomSlice]) -> np.dtype[np.generic]:
     """Return the smallest type that holds every value the slices can have."""
     if not all(_is_whole(one) for one in slices):
         return np.dtype(np.float32)
-    ends = [end * one.slope + one.intercept for one in slices for end in one.file.stored_range]
+    ends = [
+        end * one.slope + one.intercept
+        for one in slices
+        for end in (*one.file.stored_range, *(one.file.padding or ()))
+    ]
     for name in ("uint8", "int16", "uint16", "int32", "uint32"):
         if np.iinfo(name).min <= min(ends) and max(ends) <= np.iinfo(name).max:
             return np.dtype(name)

@@ -25,6 +25,7 @@ _TAGS = [
     "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness",
     "NominalScannedPixelSpacing", "GridFrameOffsetVector", "SpacingBetweenSlices", "Rows", "Columns",
     "NumberOfFrames", "SamplesPerPixel", "PhotometricInterpretation", "PixelPaddingValue",
+    "PixelPaddingRangeLimit",
     "BitsAllocated", "BitsStored", "HighBit", "PixelRepresentation", "RescaleSlope", "RescaleIntercept",
     "ModalityLUTSequence", "SharedFunctionalGroupsSequence", "PerFrameFunctionalGroupsSequence",
 ]  # fmt: skip
@@ -84,8 +85,8 @@ class DicomFile:
         Whether it calls itself a scout image.
     stored : Stored, optional
         Where its pixels lie; None where they are packed or in colour.
-    padding : float, optional
-        PixelPaddingValue, as stored.
+    padding : (2,) float, optional
+        Lowest and highest stored number that stands for no measurement (PixelPaddingValue).
     """
 
     path: Path
@@ -103,7 +104,7 @@ class DicomFile:
     inverted: bool
     localizer: bool
     stored: Stored | None
-    padding: float | None
+    padding: tuple[float, float] | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -240,7 +241,7 @@ def _file(path: Path, tags: Any, measures: Any, pixel_header: bytes, offset: int
         inverted=str(tags.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
         localizer="LOCALIZER" in [str(word).upper() for word in _listed(tags.get("ImageType"))],
         stored=_stored(tags, element, pixel_header, offset),
-        padding=(_numbers(tags, "PixelPaddingValue", 1) or (None,))[0],
+        padding=_padding(tags, signed=signed),
     )
 
 
@@ -370,6 +371,17 @@ def _stored(tags: Any, element: int, header: bytes, offset: int) -> Stored | Non
     high = _whole(tags, "HighBit") or bits - 1
     words = not little and allocated == 8 and header[4:6] == b"OW"
     return Stored(offset - 4 if implicit else offset, dtype, bits, high, words)
+
+
+def _padding(tags: Any, *, signed: bool) -> tuple[float, float] | None:
+    """Return the range of padding; its numbers may have been written with the other sign than the pixels."""
+    said = [_numbers(tags, name, 1) for name in ("PixelPaddingValue", "PixelPaddingRangeLimit")]
+    ends = [end[0] for end in said if end is not None]
+    if not ends:
+        return None
+    n = 2.0 ** (_whole(tags, "BitsAllocated") or 16)
+    shifted = [(end + n / 2) % n - n / 2 if signed else end % n for end in ends]
+    return min(shifted), max(shifted)
 
 
 def _rescaling(rescale: Any, tags: Any) -> tuple[float, float, str]:

@@ -100,6 +100,8 @@ class ImportPlan:
         As they stand now.
     name : str
         What the volume will be called.
+    fill : float, optional
+        The value by which the file marks voxels that were not measured, where it says so.
     """
 
     path: Path
@@ -115,6 +117,7 @@ class ImportPlan:
     choice: str | None = None
     options: ImportOptions = field(default_factory=ImportOptions)
     name: str = "volume"
+    fill: float | None = None
 
     @property
     def spacing(self) -> Spacing | None:

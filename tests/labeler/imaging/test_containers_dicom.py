@@ -422,6 +422,47 @@ def test_frames_with_offsets_from_one_position(tmp_path: Path) -> None:
     assert off_by(tmp_path / "a.dcm") < 0.1
 
 
+PADDED: dict[str, Change] = {
+    "signed": lambda data, n: put_pixels(data, framed(RAW[n].astype("int16") - 1024, -3024)),
+    "unsigned, written as signed": lambda data, n: put_pixels(data, framed(RAW[n], 63536)),
+    "below the stored bits": lambda data, n: (
+        put_pixels(data, framed((RAW[n].astype("int16") - 1024), -3024)),
+        setting(BitsStored=12, HighBit=11)(data, n),
+    ),
+    "a slope for each slice": lambda data, n: (
+        put_pixels(data, framed(np.rint(RAW[n] / (1 + n % 2)).astype("int16"), -2000)),
+        setting(RescaleSlope=str(1 + n % 2), RescaleIntercept="-1024")(data, n),
+    ),
+    "packed": lambda data, n: (
+        put_pixels(data, framed(RAW[n].astype("int16") - 1024, -3024)),
+        data.compress(RLELossless, generate_instance_uid=False),
+    ),
+}
+
+
+def framed(plane: np.ndarray, value: int) -> np.ndarray:
+    padded = plane.copy()
+    padded[:3], padded[-3:], padded[:, :4] = value, value, value
+    return padded
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")
+@pytest.mark.parametrize("name", PADDED)
+def test_padding_is_one_fill_below_all_values(name: str, tmp_path: Path) -> None:
+    def change(data: FileDataset, n: int) -> None:
+        value = -2000 if "slope" in name or "unsigned" in name else -3024
+        data.add_new("PixelPaddingValue", "SS", value)
+        PADDED[name](data, n)
+
+    volume = read_volume(write(tmp_path, slices(), change))
+    assert volume.fill is not None
+    padded = np.zeros(volume.array.shape, bool)
+    padded[:, :3], padded[:, -3:], padded[..., :4] = True, True, True
+    np.testing.assert_array_equal(volume.array == volume.fill, padded)
+    shift = 0 if "unsigned" in name else 1024
+    np.testing.assert_allclose(volume.array[~padded] + shift, RAW[~padded], atol=1)
+
+
 def test_floats(tmp_path: Path) -> None:
     data: Dataset = enhanced()
     del data.PixelData
