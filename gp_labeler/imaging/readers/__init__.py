@@ -143,15 +143,15 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 def _load(plan: ImportPlan, report: Report) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
         array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
-    fill, filled = replace_fill(array, find_fill(array, plan.fill))
-    volume = Volume(
-        array,
-        plan.T_scan_voxel(),
-        name=plan.name,
-        path=Path(plan.path).resolve(),
-        notes=(*plan.all_notes(), *filled),
-        choices=plan.options.as_json(),
-        fill=fill,
-    )
-    volume.checksum  # noqa: B018 - computed here, off the UI thread
+        fill, filled = replace_fill(array, find_fill(array, plan.fill))
+        volume = Volume(
+            array,
+            plan.T_scan_voxel(),
+            name=plan.name,
+            path=Path(plan.path).resolve(),
+            notes=(*plan.all_notes(), *filled),
+            choices=plan.options.as_json(),
+            fill=fill,
+        )
+        volume.checksum  # noqa: B018 - computed here, off the UI thread
     return volume

@@ -64,8 +64,9 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
     kind = _kind(head)
     if kind is None:
         raise not_a("NIfTI" if "nii" in path.name.lower() else "Analyze or NIfTI", path)
-    head, found = _with_offset(head, kind, voxel_file if getattr(kind, "is_single", False) else None)
+    head, said = _with_offset(head, kind)
     header, complaints = _checked(kind, head)
+    found = _offset_problems(header, said, voxel_file)
     shape = (*(int(n) for n in header.get_data_shape()), 1, 1)[: max(3, len(header.get_data_shape()))]
     dtype = header.get_data_dtype()
     colours = len(dtype.names or ()) or 1
@@ -120,21 +121,27 @@ def _kind(head: bytes) -> Any:
     return None
 
 
-def _with_offset(head: bytes, kind: Any, single: Path | None) -> tuple[bytes, tuple[Problem, ...]]:
-    """Set a `vox_offset` that points into the header, mostly 0, to where the header ends."""
-    if single is None:
-        return head, ()
+def _with_offset(head: bytes, kind: Any) -> tuple[bytes, float | None]:
+    """Set a `vox_offset` within the header, mostly 0, to where the header ends; return what it was."""
     header = kind(head[: kind.sizeof_hdr], check=False)
-    offset, first = float(header["vox_offset"]), kind.single_vox_offset
-    if offset >= first:
-        return head, ()
-    header["vox_offset"] = first
+    if not getattr(kind, "is_single", False) or header["vox_offset"] >= kind.single_vox_offset:
+        return head, None
+    said = float(header["vox_offset"])
+    header["vox_offset"] = kind.single_vox_offset
+    return header.binaryblock, said
+
+
+def _offset_problems(header: Any, said: float | None, path: Path) -> tuple[Problem, ...]:
+    """Return a warning where the file is as long as the mended offset makes it, else a question."""
+    if said is None:
+        return ()
+    first = header.single_vox_offset
     n_bytes = int(np.prod(header.get_data_shape(), dtype=np.float64)) * header.get_data_dtype().itemsize
-    text = f"its vox_offset is {offset:g}, which lies within its header"
-    if _packing(single) == "none" and single.stat().st_size == first + n_bytes:
-        return header.binaryblock, (warning("vox-offset", f"{text}; the voxels begin at {first}"),)
+    text = f"its vox_offset is {said:g}, which lies within its header"
+    if _packing(path) == "none" and path.stat().st_size == first + n_bytes:
+        return (warning("vox-offset", f"{text}; the voxels begin at {first}"),)
     remedy = f"If its voxels begin right after the header, at byte {first}, go on (--accept vox-offset)."
-    return header.binaryblock, (Problem("vox-offset", text, remedy=remedy, resolved_by=("accept",)),)
+    return (Problem("vox-offset", text, remedy=remedy, resolved_by=("accept",)),)
 
 
 def _checked(kind: Any, head: bytes) -> tuple[Any, tuple[Problem, ...]]:
@@ -214,7 +221,7 @@ def _forms(header: Any) -> tuple[list[tuple[str, FloatArray]], tuple[Problem, ..
             continue
         try:
             matrix = np.asarray(getattr(header, f"get_{name}")(), dtype=np.float64)
-        except HeaderDataError:
+        except (HeaderDataError, ValueError):  # a quaternion longer than 1
             matrix = np.zeros((4, 4))
         if np.isfinite(matrix).all() and abs(np.linalg.det(matrix[:3, :3])) > 0:
             forms.append((f"{name} (code {code})", matrix))
