@@ -1,0 +1,88 @@
+"""Simulated users who label drawn animals with ghosts, and how often the ghosts' regions hold the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.shape import predict
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.session import labelling
+from gp_labeler.session.ghosts import CHI2_95
+from gp_labeler.session.session import Session
+from gp_labeler.session.workflow import OPENING, Active
+
+SEES_MM = 0.1
+"""Standard deviation of a coordinate of where the user sees a feature."""
+
+CONFIRMS_MM = 0.3
+"""A ghost is confirmed so near to where the user sees the feature; else the feature is placed there."""
+
+
+@dataclass
+class Coverage:
+    """How often the 95 % region of a ghost held its feature, by number of observations and by feature."""
+
+    by_stage: dict[int, list[bool]] = field(default_factory=dict)
+    by_feature: dict[str, list[bool]] = field(default_factory=dict)
+    n_confirmed: int = 0
+    n_placed: int = 0
+
+    @property
+    def whole(self) -> float:
+        """Of all ghosts at all stages."""
+        return float(np.mean([held for group in self.by_stage.values() for held in group]))
+
+    def note(self, session: Session, side: Side, truth: LandmarkSet) -> None:
+        """Take down every ghost of one side as it stands."""
+        stage = sum(code != "CO" for code in session.landmarks(side).placed)
+        for code, ghost in session.ghosts(side).items():
+            off = ghost.position - truth[code]
+            held = bool(off @ np.linalg.solve(ghost.covariance, off) <= CHI2_95)
+            self.by_stage.setdefault(stage, []).append(held)
+            self.by_feature.setdefault(code, []).append(held)
+
+
+def label(session: Session, side: Side, truth: LandmarkSet, rng: np.random.Generator) -> Iterator[None]:
+    """Label one side as the program proposes it; stop at each stage before any ghost is accepted."""
+    for code in OPENING:
+        labelling.place(session, _seen(truth, code, rng), side=side, code=code)
+    session.set_active(Active(side, OPENING[-1]))
+    labelling.skip(session)
+    while session.active.side is side and session.active.code is not None and session.ghosts(side):
+        yield
+        code, seen = session.active.code, _seen(truth, session.active.code, rng)
+        labelling.accept_all_ghosts(session)  # without limit, and without any effect on what follows
+        suggested = np.array(session.landmarks(side).suggested[code].position)
+        if np.linalg.norm(suggested - seen) <= CONFIRMS_MM:
+            labelling.confirm(session, side=side, code=code)
+        else:
+            labelling.place(session, seen, side=side, code=code)
+        for other in list(session.landmarks(side).suggested):
+            labelling.clear(session, side=side, code=other)  # its ghost is to be seen again
+        session.set_active(Active(side, code))
+        labelling.skip(session)
+
+
+def measured(n_animals: int, seed: int = 0) -> Coverage:
+    """Let a user label the left sides of drawn animals; the atlas is the published one."""
+    atlas, rng, found = Atlas.published(), np.random.default_rng(seed), Coverage()
+    for _ in range(n_animals):
+        truth = draw_animal(atlas, rng=rng, tilt_deg=5.0).side("L")
+        session = Session(predict=partial(predict, atlas))
+        for _ in label(session, Side.LEFT, truth, rng):
+            found.note(session, Side.LEFT, truth)
+        hows = [mark.provenance.how.value for mark in session.state.landmarks.values() if mark.provenance]
+        found.n_confirmed += hows.count("confirmed suggestion")
+        found.n_placed += len(hows) - hows.count("confirmed suggestion")
+    return found
+
+
+def _seen(truth: LandmarkSet, code: str, rng: np.random.Generator) -> np.ndarray:
+    return truth[code] + SEES_MM * rng.standard_normal(3)

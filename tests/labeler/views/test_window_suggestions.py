@@ -1,0 +1,290 @@
+"""Suggestions and re-placing in the window: real clicks and keys on real views."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import QEvent, QPoint, Qt
+from PySide6.QtGui import QKeyEvent
+from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QApplication
+from window_cases import MIDDLE, settle
+
+from gp_core.landmarks.features import Side
+from gp_labeler.scene.planes import Plane
+from gp_labeler.session import labelling
+from gp_labeler.session.state import How
+from gp_labeler.session.workflow import PointState
+from gp_labeler.views.drawn import drawn_marks
+from gp_labeler.views.panels.export_dialog import ExportDialog
+
+L = Side.LEFT
+INSIDE = MIDDLE + np.array([2.1, -1.7, 0.125])
+AWAY = MIDDLE + np.array([-2.0, 2.2, 0.125])
+
+
+@pytest.fixture
+def suggested(window):
+    """The ball with MN suggested at `INSIDE`, seen from so far away that nobody can judge it."""
+    session = window.workbench.session
+    labelling.suggest(session, INSIDE, radius_95=0.8, source="atlas", side=L, code="MN")
+    window.workbench.go_to(L, "MN")
+    for view in window.grid.views:
+        view.zoom_to(INSIDE, 100.0)
+    return window
+
+
+def status_of(window, code):
+    return window.workbench.session.point_states(L, wait=False)[code]
+
+
+def click(view, position) -> None:
+    x, y = view.pixel_at(position)
+    QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(int(x), int(y)))
+
+
+def hover(view, position) -> Qt.CursorShape:
+    x, y = view.pixel_at(position)
+    QTest.mouseMove(view, QPoint(int(x) + 3, int(y)))
+    QTest.mouseMove(view, QPoint(int(x), int(y)))
+    return view.cursor().shape()
+
+
+def axial_of(window):
+    return window.grid.slice_views[Plane.AXIAL]
+
+
+# Confirming
+
+
+def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(suggested) -> None:
+    axial, voxel = axial_of(suggested), 0.25
+    axial.setFocus()
+    assert axial.voxel_pixels(INSIDE, voxel) < 2.0
+    QTest.keyClick(axial, Qt.Key.Key_Return)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    assert "Is MN left right here?" in suggested.status.next_click.text()
+    assert axial.voxel_pixels(INSIDE, voxel) >= 2.0
+    QTest.keyClick(axial, Qt.Key.Key_Return)
+    assert status_of(suggested, "MN") is PointState.PLACED
+    assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.CONFIRMED
+    np.testing.assert_array_equal(suggested.workbench.session.landmarks(L)["MN"], INSIDE)
+
+
+def test_a_key_that_is_held_down_confirms_nothing(suggested) -> None:
+    axial = axial_of(suggested)
+    axial.setFocus()
+    QTest.keyPress(axial, Qt.Key.Key_Return)
+    no = Qt.KeyboardModifier.NoModifier
+    for _ in range(20):
+        repeat = QKeyEvent(QEvent.Type.ShortcutOverride, Qt.Key.Key_Return, no, "\r", True)
+        QApplication.sendEvent(axial, repeat)
+        QApplication.sendEvent(axial, QKeyEvent(QEvent.Type.KeyPress, Qt.Key.Key_Return, no, "\r", True))
+    QTest.keyRelease(axial, Qt.Key.Key_Return)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+
+
+def test_a_slice_elsewhere_does_not_show_the_point(suggested) -> None:
+    desk, axial = suggested.workbench, axial_of(suggested)
+    desk.confirm(L, "MN")  # brings it close
+    desk.session.set_crosshair(INSIDE + np.array([3.0, 3.0, 2.0]))
+    desk.session.view.update(layout="axial")
+    assert not suggested.grid.can_judge(INSIDE)
+    axial.setFocus()
+    QTest.keyClick(axial, Qt.Key.Key_Return)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    assert suggested.grid.can_judge(INSIDE)
+
+
+def test_what_bone_hides_in_the_3d_view_is_judged_on_slices(qtbot, suggested) -> None:
+    desk, scene = suggested.workbench, suggested.grid.scene_view
+    desk.session.view.update(layout="3d")
+    settle(qtbot, suggested)
+    scene.setFocus()
+    for _ in range(3):
+        if status_of(suggested, "MN") is PointState.PLACED:
+            break
+        assert desk.session.view.state.layout == "3d" or suggested.grid.can_judge(INSIDE)
+        QTest.keyClick(scene, Qt.Key.Key_Return)
+        settle(qtbot, suggested)
+    assert desk.session.view.state.layout == "four-up"
+    assert status_of(suggested, "MN") is PointState.PLACED
+
+
+def test_the_button_of_the_card_confirms_as_enter_does(qtbot, suggested) -> None:
+    card = suggested.steps["label"].card
+    assert card.content.state == "suggested"
+    assert card.content.action_text == "Confirm"
+    assert "atlas, 95 % within 0.80 mm" in card.content.status
+    qtbot.mouseClick(card.primary, Qt.MouseButton.LeftButton)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    qtbot.mouseClick(card.primary, Qt.MouseButton.LeftButton)
+    assert status_of(suggested, "MN") is PointState.PLACED
+
+
+# Correcting
+
+
+def test_a_dragged_suggestion_is_placed_and_escape_leaves_it_suggested(suggested) -> None:
+    axial = axial_of(suggested)
+    axial.zoom_to(INSIDE, 10.0)
+    x, y = (int(n) for n in axial.pixel_at(INSIDE))
+    QTest.mousePress(axial, Qt.MouseButton.LeftButton, pos=QPoint(x, y))
+    QTest.mouseMove(axial, QPoint(x + 20, y))
+    axial.setFocus()
+    QTest.keyClick(axial, Qt.Key.Key_Escape)
+    QTest.mouseRelease(axial, Qt.MouseButton.LeftButton, pos=QPoint(x + 20, y))
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    np.testing.assert_allclose(suggested.workbench.session.crosshair, INSIDE)
+    QTest.mousePress(axial, Qt.MouseButton.LeftButton, pos=QPoint(x, y))
+    QTest.mouseMove(axial, QPoint(x + 20, y))
+    QTest.mouseRelease(axial, Qt.MouseButton.LeftButton, pos=QPoint(x + 20, y))
+    assert status_of(suggested, "MN") is PointState.PLACED
+    assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.SLICE
+
+
+def test_a_nudge_and_a_click_elsewhere_place_it_and_a_click_on_it_only_chooses_it(suggested) -> None:
+    desk, axial = suggested.workbench, axial_of(suggested)
+    axial.zoom_to(INSIDE, 10.0)
+    click(axial, INSIDE)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    axial.setFocus()
+    QTest.keyClick(axial, Qt.Key.Key_Up)
+    assert status_of(suggested, "MN") is PointState.PLACED
+    assert desk.session.undo()
+    click(axial, INSIDE + np.array([1.0, 1.0, 0.0]))
+    assert status_of(suggested, "MN") is PointState.PLACED
+
+
+# Shown
+
+
+def test_it_has_a_shape_of_its_own_everywhere(suggested) -> None:
+    (mark,) = drawn_marks(suggested.workbench)
+    assert (mark.key, mark.state) == ("L:MN", "suggested")
+    table = suggested.steps["label"].table
+    row = [table.model.index(n, 1) for n in range(table.model.rowCount())]
+    assert "suggested" in [index.data() for index in row]
+    assert table.model.headerData(1, Qt.Orientation.Horizontal) == "Left 0/20  \N{WHITE SQUARE}1"
+    axial = axial_of(suggested)
+    axial.zoom_to(INSIDE, 10.0)
+    x, y = (int(n) for n in axial.pixel_at(INSIDE))
+    labelling.go_to(suggested.workbench.session, L, "CA")  # without the ring of the chosen one
+    before = axial.grab().toImage().copy(x - 8, y - 8, 17, 17)
+    labelling.confirm(suggested.workbench.session, side=L, code="MN")
+    after = axial.grab().toImage().copy(x - 8, y - 8, 17, 17)
+    assert before.pixelColor(8, 8) != after.pixelColor(8, 8)  # open, then full
+
+
+def test_the_export_dialog_leaves_suggestions_out_unless_ticked(suggested, tmp_path) -> None:
+    desk = suggested.workbench
+    labelling.place(desk.session, AWAY, How.SLICE, side=L, code="CA")
+    dialog = ExportDialog(desk, tmp_path)
+    assert not dialog.suggested.isChecked()
+    assert "_suggested" not in dialog.files.text()
+    dialog.suggested.setChecked(True)
+    assert "_L_suggested.mrk.json" in dialog.files.text().replace("\u200b", "")
+    dialog.export.click()
+    assert sorted(path.name for path in tmp_path.glob("*.json")) == [
+        "ball_L.mrk.json",
+        "ball_L_suggested.mrk.json",
+    ]
+
+
+# No accident
+
+
+@pytest.fixture
+def placed(window):
+    """The ball with CA placed at `INSIDE` and its row chosen, in the step Label."""
+    window.workbench.session.view.update(auto_advance=False)
+    labelling.place(window.workbench.session, INSIDE, How.SLICE, side=L, code="CA")
+    window.workbench.go_to(L, "CA")
+    return window
+
+
+def position_of(window):
+    return window.workbench.session.landmarks(L)["CA"]
+
+
+@pytest.mark.parametrize("name", ["axial", "3d"])
+def test_a_click_elsewhere_leaves_a_placed_point_where_it_is(placed, name) -> None:
+    view = placed.grid.scene_view if name == "3d" else axial_of(placed)
+    assert hover(view, AWAY) is Qt.CursorShape.ArrowCursor
+    click(view, AWAY)
+    np.testing.assert_array_equal(position_of(placed), INSIDE)
+    assert not np.allclose(placed.workbench.session.crosshair, INSIDE)  # it looks there
+    assert "CA left is placed" in placed.status.next_click.text()
+
+
+def test_a_point_is_re_placed_by_one_click_on_purpose(placed) -> None:
+    axial = axial_of(placed)
+    assert hover(axial, AWAY) is Qt.CursorShape.ArrowCursor
+    QTest.keyClick(placed, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
+    assert axial.cursor().shape() is Qt.CursorShape.CrossCursor  # at once, under a pointer that rests
+    assert placed.status.next_click.text().startswith("The next click moves CA left there")
+    click(axial, AWAY)
+    np.testing.assert_allclose(position_of(placed), AWAY, atol=0.1)
+    click(axial, INSIDE + np.array([0.0, 3.0, 0.0]))
+    np.testing.assert_allclose(position_of(placed), AWAY, atol=0.1)  # one click, no more
+    placed.workbench.session.undo()
+    np.testing.assert_array_equal(position_of(placed), INSIDE)
+
+
+@pytest.mark.parametrize("think_better", ["escape", "again", "other row", "other step"])
+def test_re_placing_can_be_thought_better_of(placed, think_better) -> None:
+    axial = axial_of(placed)
+    placed.commands.run("point.replace")
+    assert placed.workbench.replacing
+    if think_better == "escape":
+        axial.setFocus()
+        QTest.keyClick(axial, Qt.Key.Key_Escape)
+    elif think_better == "again":
+        placed.commands.run("point.replace")
+    elif think_better == "other row":
+        placed.workbench.go_to(L, "CB")
+    else:
+        placed.set_step("pose")
+    assert not placed.workbench.replacing
+    click(axial, AWAY)
+    np.testing.assert_array_equal(position_of(placed), INSIDE)
+
+
+def test_a_locked_point_is_not_re_placed(placed) -> None:
+    labelling.lock(placed.workbench.session)
+    assert not placed.commands.run("point.replace")
+    assert not placed.commands.actions["point.place"].isEnabled()
+
+
+@pytest.mark.parametrize("step", ["scan", "atlas", "pose"])
+@pytest.mark.parametrize("name", ["axial", "3d"])
+def test_a_click_outside_the_step_label_looks_and_places_nothing(window, step, name) -> None:
+    view = window.grid.scene_view if name == "3d" else axial_of(window)
+    window.set_step(step)
+    before = window.workbench.session.state
+    where = MIDDLE - [0, 6.0, 0] if name == "3d" else INSIDE
+    window.grid.scene_view.view_from("A")
+    assert hover(view, where) is Qt.CursorShape.ArrowCursor
+    click(view, where)
+    assert window.workbench.session.state is before
+    np.testing.assert_allclose(window.workbench.session.crosshair, where, atol=0.3)
+
+
+def test_p_goes_back_to_the_step_where_clicks_place(window) -> None:
+    window.set_step("scan")
+    QTest.keyClick(window, Qt.Key.Key_P)
+    assert window.rail.step == "label"
+    assert window.workbench.tool == "place"
+    click(axial_of(window), INSIDE)
+    assert window.workbench.session.progress(L).n_placed == 1
+
+
+def test_on_the_scan_is_off_again_in_another_step(window) -> None:
+    window.set_step("pose")
+    window.commands.run("pose.touch")
+    assert hover(axial_of(window), INSIDE) is Qt.CursorShape.CrossCursor
+    assert window.status.next_click.text().startswith("Click on bone or a slice where")
+    window.set_step("atlas")
+    click(axial_of(window), INSIDE)
+    assert not window.workbench.session.state.touches
+    assert not window.workbench.session.state.landmarks
