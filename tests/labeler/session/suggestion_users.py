@@ -16,7 +16,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session import labelling
 from gp_labeler.session.ghosts import CHI2_95
 from gp_labeler.session.session import Session
-from gp_labeler.session.workflow import OPENING, Active
+from gp_labeler.session.workflow import OPENING, Active, next_point
 
 SEES_MM = 0.1
 """Standard deviation of a coordinate of where the user sees a feature."""
@@ -40,9 +40,12 @@ class Coverage:
         return float(np.mean([held for group in self.by_stage.values() for held in group]))
 
     def note(self, session: Session, side: Side, truth: LandmarkSet) -> None:
-        """Take down every ghost of one side as it stands."""
+        """Take down every ghost of one side, with all other ghosts accepted."""
         stage = sum(code != "CO" for code in session.landmarks(side).placed)
-        for code, ghost in session.ghosts(side).items():
+        for code in session.landmarks(side).suggested:
+            labelling.clear(session, side=side, code=code)
+            ghost = session.ghosts(side)[code]
+            labelling.accept_ghost(session, side=side, code=code)
             off = ghost.position - truth[code]
             held = bool(off @ np.linalg.solve(ghost.covariance, off) <= CHI2_95)
             self.by_stage.setdefault(stage, []).append(held)
@@ -50,24 +53,21 @@ class Coverage:
 
 
 def label(session: Session, side: Side, truth: LandmarkSet, rng: np.random.Generator) -> Iterator[None]:
-    """Label one side as the program proposes it; stop at each stage before any ghost is accepted."""
+    """Label one side as the program proposes it; stop at each stage, once all ghosts are accepted."""
     for code in OPENING:
         labelling.place(session, _seen(truth, code, rng), side=side, code=code)
-    session.set_active(Active(side, OPENING[-1]))
-    labelling.skip(session)
-    while session.active.side is side and session.active.code is not None and session.ghosts(side):
+    code = OPENING[-1]
+    while ghosts := session.ghosts(side):
+        code = next_point(session.state, Active(side, code), session.ghosts).code
+        labelling.accept_all_ghosts(session, side=side)
         yield
-        code, seen = session.active.code, _seen(truth, session.active.code, rng)
-        labelling.accept_all_ghosts(session)  # without limit, and without any effect on what follows
-        suggested = np.array(session.landmarks(side).suggested[code].position)
-        if np.linalg.norm(suggested - seen) <= CONFIRMS_MM:
+        seen = _seen(truth, code, rng)
+        if np.linalg.norm(ghosts[code].position - seen) <= CONFIRMS_MM:
             labelling.confirm(session, side=side, code=code)
         else:
             labelling.place(session, seen, side=side, code=code)
-        for other in list(session.landmarks(side).suggested):
-            labelling.clear(session, side=side, code=other)  # its ghost is to be seen again
-        session.set_active(Active(side, code))
-        labelling.skip(session)
+        for other in session.landmarks(side).suggested:
+            labelling.clear(session, side=side, code=other)  # to be accepted anew, where it is now expected
 
 
 def measured(n_animals: int, seed: int = 0) -> Coverage:
