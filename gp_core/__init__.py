@@ -25,7 +25,7 @@ from gp_core.atlas.reading_state import read_as
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
-from gp_core.landmarks.features import CODES, EXTERNAL, FEATURES, PROBE, TRAINING, Feature, Side
+from gp_core.landmarks.features import CODES, EXTERNAL, FEATURES, PROBE, RECOMMENDED, TRAINING, Feature, Side
 from gp_core.landmarks.files import (
     import_mat,
     load_specimens,
@@ -55,6 +55,7 @@ __all__ = [
     "EXTERNAL",
     "FEATURES",
     "PROBE",
+    "RECOMMENDED",
     "TRAINING",
     "Atlas",
     "CochleaPose",

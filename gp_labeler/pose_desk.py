@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
+from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.next_touch import TouchGain, gains
 from gp_core.atlas.pose import CochleaPose
 from gp_core.errors import GpError
-from gp_core.landmarks.features import EXTERNAL, PROBE, Side
+from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
 from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.estimating import Estimating
@@ -29,8 +30,9 @@ if TYPE_CHECKING:
 
 __all__ = ["ORDER", "OverlayOptions", "PoseDesk"]
 
-ORDER = (*PROBE, *(code for code in EXTERNAL if code not in PROBE))
-"""The paper's six features first, as they give most of the pose."""
+_FIRST = (*RECOMMENDED, "ZL")
+ORDER = (*_FIRST, *(code for code in EXTERNAL if code not in _FIRST))
+"""The paper's six features first, as they give most of the pose; then IN, which tells the side; else ZL."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +140,13 @@ class PoseDesk:
             return ()
         if self._gains is None or self._gains[0] is not estimate:
             touches = replace(estimate.touches, extra={})
-            found = gains(touches, estimate.atlas, probe_noise=estimate.settings.probe_noise)
+            settings = estimate.settings
+            found = gains(
+                touches,
+                estimate.atlas,
+                probe_noise=settings.probe_noise,
+                shared_error=settings.shared_error,
+            )
             self._gains = (estimate, found)
         return self._gains[1]
 
@@ -222,7 +230,7 @@ class PoseDesk:
 
     @property
     def swapped(self) -> tuple[str, str] | None:
-        """Two touched features that look as if each had the other's name, by any method."""
+        """Two touched features that look, or may be, as if each had the other's name, by any method."""
         poses = () if self.estimate is None else self.estimate.poses.values()
         return next((pose.swapped for pose in poses if pose.swapped is not None), None)
 
@@ -231,6 +239,24 @@ class PoseDesk:
         if self.swapped is None:
             raise GpError("no two touches look as if each had the other's name")
         touching.swap_touches(self._desk.session, self.side, *self.swapped)
+
+    def take_likelier(self) -> Hypothesis | None:
+        """Read the touches as they are likeliest to be meant; None where that is how they are named.
+
+        Raises
+        ------
+        GpError
+            They would go to the other side, which was touched too.
+        """
+        pose = None if self.estimate is None else self.estimate.poses.get("robust")
+        best = None if pose is None else pose.likelier_reading
+        if best is None:
+            return None
+        if best.exchanged is not None:
+            touching.swap_touches(self._desk.session, self.side, *best.exchanged)
+        else:
+            self.change_side()
+        return best
 
     def show(self, name: str) -> None:
         """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""

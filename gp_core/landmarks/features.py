@@ -17,6 +17,7 @@ __all__ = [
     "EXTERNAL",
     "FEATURES",
     "PROBE",
+    "RECOMMENDED",
     "TRAINING",
     "Feature",
     "Side",
@@ -97,6 +98,8 @@ CODES: tuple[str, ...] = tuple(f.code for f in FEATURES)
 EXTERNAL: tuple[str, ...] = tuple(f.code for f in FEATURES if f.external)
 TRAINING: tuple[str, ...] = named_set("training")
 PROBE: tuple[str, ...] = named_set("probe")
+RECOMMENDED: tuple[str, ...] = (*PROBE, "IN")
+"""What to touch: the paper's six, and IN, far from their plane. Where IN cannot be reached, ZL."""
 
 _INDEX = {code: i for i, code in enumerate(CODES)}
 

@@ -23,7 +23,7 @@ from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import angle_between_deg
-from gp_core.landmarks.features import EXTERNAL, PROBE
+from gp_core.landmarks.features import EXTERNAL, PROBE, RECOMMENDED
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.study.leave_one_out import held_out_sides
 from gp_core.study.mapping import run_map
@@ -44,7 +44,6 @@ from gp_core.study.subsets import check_labels
 
 __all__ = ["GROUPS", "ConditionRow", "ConditionsReport", "TouchCondition", "conditions", "touch_conditions"]
 
-SEVEN = (*PROBE, "IN")
 _DEFAULT = DEFAULT_SHARED_ERROR_MM
 _CAREFUL = 0.1
 _RESAMPLES = 1000
@@ -105,7 +104,7 @@ def touch_conditions(groups: Sequence[str] = GROUPS) -> tuple[TouchCondition, ..
 
 def _all_conditions() -> Iterator[TouchCondition]:
     for noise in (0.0, 0.1, 0.25, 0.4):
-        for codes in (PROBE, SEVEN):
+        for codes in (PROBE, RECOMMENDED):
             yield TouchCondition("noise", f"noise {noise:g}", codes, noise)
     yield TouchCondition("noise", "noise 0.1, 0.4 in depth", disturbances=(anisotropic(4.0),))
     for n in (3, 4):
@@ -128,11 +127,11 @@ def _all_conditions() -> Iterator[TouchCondition]:
         for codes in (PROBE, EXTERNAL):
             yield TouchCondition("size", f"size {factor:g}", codes, disturbances=(other_size(factor),))
     for noise in (0.1, 0.25):
-        for codes in (PROBE, SEVEN):
+        for codes in (PROBE, RECOMMENDED):
             off = (mistouch("MN", 3.0),)
             yield TouchCondition("mistouch", f"MN 3 mm off, noise {noise:g}", codes, noise, disturbances=off)
     for noise in (0.1, 0.25, 0.4):
-        for codes in (PROBE, SEVEN):
+        for codes in (PROBE, RECOMMENDED):
             yield TouchCondition(
                 "side", f"wrong side, noise {noise:g}", codes, noise, disturbances=(wrong_side,)
             )

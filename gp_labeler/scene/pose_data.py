@@ -10,7 +10,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core import CochleaPose, RigidTransform
+from gp_core import CochleaPose, Hypothesis, RigidTransform
+from gp_core.atlas.uncertainty import cone_95
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
 
@@ -107,10 +108,25 @@ class DrawnPose:
             key or f"{pose.side.value} {pose.method}",
             T_scan_touches.matrix @ pose.transform,
             turn @ pose.covariance @ turn.T,
-            pose.cone_95,
+            pose.plain_cone_95,
             pose.side,
             label,
             METHOD_ROLES.get(pose.method, "pose"),
+        )
+
+    @classmethod
+    def of_reading(cls, reading: Hypothesis, T_scan_touches: RigidTransform) -> DrawnPose:
+        """Bring another reading of the touches into the scan, dotted."""
+        turn = np.kron(np.eye(2), T_scan_touches.rotation)
+        percent = f"{reading.probability:.0%}" if reading.probability >= 0.01 else "< 1%"
+        return cls(
+            f"{reading.side.value} {reading.label}",
+            T_scan_touches.matrix @ reading.transform_to_touches.matrix,
+            turn @ reading.covariance @ turn.T,
+            cone_95(reading.covariance, reading.axis),
+            reading.side,
+            f"{percent} {reading.label}",
+            style="dotted",
         )
 
     @property

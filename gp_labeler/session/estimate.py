@@ -5,8 +5,9 @@ Nothing here changes: an `Estimate` is made anew whenever touches, labels, setti
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.expected import expected_features
 from gp_core.atlas.pose import CochleaPose, estimate_pose
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform, angle_between_deg
@@ -23,6 +25,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
 from gp_labeler.session.state import SpecimenState
+from gp_labeler.session.touches import TouchHow
 
 __all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", "make_estimate"]
 
@@ -48,6 +51,8 @@ class EstimateSettings:
         ``auto``, the skull's where there are enough.
     round_window : str
         Which round window y of the cochlea frame points to: ``touched`` or ``expected``.
+    shared_error : float
+        RMS length of one offset that all touches of the session share, mm; the regions allow for it.
     """
 
     side: Side = Side.LEFT
@@ -55,6 +60,7 @@ class EstimateSettings:
     probe_noise: float | None = None
     registration: str = "auto"
     round_window: str = "touched"
+    shared_error: float = DEFAULT_SHARED_ERROR_MM
 
 
 @dataclass(frozen=True, eq=False)
@@ -288,7 +294,7 @@ def make_estimate(
     problems: dict[str, str] = {}
     for method in settings.methods:
         try:
-            poses[method] = _pose(touches, settings, atlas, specimens, method)
+            poses[method] = _pose(state, touches, settings, atlas, specimens, method)
         except GpError as error:
             problems[method] = str(error)
     registered = None
@@ -301,6 +307,7 @@ def make_estimate(
 
 
 def _pose(
+    state: SpecimenState,
     touches: LandmarkSet,
     settings: EstimateSettings,
     atlas: Atlas,
@@ -320,7 +327,21 @@ def _pose(
         specimens=animals,
         probe_noise=noise,
         round_window=settings.round_window,
+        shared_error=settings.shared_error,
+        times=_times(state, settings.side, touches.placed),
     )
+
+
+def _times(state: SpecimenState, side: Side, codes: Iterable[str]) -> dict[str, float] | None:
+    """Return when each feature was touched, s; None unless all were touched with a tracked probe."""
+    touches = [state.touches[side, code] for code in codes]
+    if not all(touch.how is TouchHow.TRACKED and touch.time for touch in touches):
+        return None
+    try:
+        moments = [datetime.fromisoformat(touch.time).timestamp() for touch in touches]
+    except ValueError:  # a file of elsewhere
+        return None
+    return dict(zip(codes, moments, strict=True))
 
 
 def _check_joint(touches: LandmarkSet, specimens: Sequence[Specimen]) -> None:

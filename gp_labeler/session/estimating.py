@@ -10,6 +10,7 @@ from psygnal import Signal
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS
+from gp_core.atlas.systematic import Systematic
 from gp_core.checks import check_option
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -84,6 +85,7 @@ class Estimating:
         noise = settings.probe_noise
         if noise is not None and not 0 < noise < 20:
             raise GpError(f"probe noise must lie between 0 and 20 mm, got {noise!r}")
+        Systematic(settings.shared_error)  # refuses what cannot be
         for method in settings.methods:
             check_option(method, "method", METHODS)
         check_option(settings.registration, "registration", REGISTRATIONS)

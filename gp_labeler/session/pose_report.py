@@ -123,6 +123,10 @@ class PoseReport:
         yield f"Origin CO, {frame} frame, mm", [_numbers(pose.origin, 2) for _, pose in poses]
         yield "Modiolar axis CB&rarr;CA", [_numbers(pose.axis, 3) for _, pose in poses]
         yield "95 % region", [_region(pose) for _, pose in poses]
+        if any(pose.has_parts for _, pose in poses):
+            yield "95 % region, as named", [_plain_region(pose) for _, pose in poses]
+        yield "Shared error in it", [_shared_error(pose) for _, pose in poses]
+        yield "State", [pose.state for _, pose in poses]
         yield "Robot's y to the round window", [f"as {pose.round_window}" for _, pose in poses]
         yield "Atlas", [escape(pose.atlas) for _, pose in poses]
         if estimate.registered is not None:
@@ -231,6 +235,14 @@ def _bar(residual: float, colour: str) -> str:
 
 def _region(pose: CochleaPose) -> str:
     return f"{pose.radius_95:.2f} mm, cone {np.degrees(pose.cone_95):.1f}&deg;"
+
+
+def _plain_region(pose: CochleaPose) -> str:
+    return f"{pose.plain_radius_95:.2f} mm, cone {np.degrees(pose.plain_cone_95):.1f}&deg;"
+
+
+def _shared_error(pose: CochleaPose) -> str:
+    return "not considered" if pose.shared_error is None else f"{pose.shared_error:g} mm"
 
 
 def _moved(mm: float, degrees: float) -> str:

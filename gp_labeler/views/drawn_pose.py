@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gp_core.atlas.mixture import UNDECIDED
 from gp_core.checks import FloatArray
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import (
@@ -60,15 +61,23 @@ def _parts(options: OverlayOptions) -> frozenset[str]:
 
 def _poses(estimate: Estimate) -> tuple[DrawnPose, ...]:
     assert estimate.registered is not None
-    many = len(estimate.poses) > 1
-    return tuple(
+    many, T_scan_touches = len(estimate.poses) > 1, estimate.registered.T_scan_touches
+    drawn = [
         DrawnPose.of(
             pose,
-            estimate.registered.T_scan_touches,
+            T_scan_touches,
             label=_METHOD_WORDS[method] if many else f"CO ±{pose.radius_95:.1f} mm",
         )
         for method, pose in estimate.poses.items()
-    )
+    ]
+    robust = estimate.poses.get("robust")
+    if robust is not None and robust.has_parts:  # its 95 % region is where all of these are
+        drawn += [
+            DrawnPose.of_reading(reading, T_scan_touches)
+            for reading in robust.hypotheses
+            if reading.probability >= UNDECIDED
+        ]
+    return tuple(drawn)
 
 
 def _truths(estimate: Estimate) -> tuple[DrawnTruth, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from PySide6.QtCore import Qt, Signal
 from PySide6.QtGui import QCloseEvent, QKeyEvent
@@ -17,7 +17,7 @@ from PySide6.QtWidgets import (
 )
 
 from gp_core.atlas.pose_quality import pose_quality
-from gp_core.landmarks.features import CODES, Side, feature
+from gp_core.landmarks.features import CODES, RECOMMENDED, Side, feature
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
@@ -35,6 +35,8 @@ _SKIP = (Qt.Key.Key_S, Qt.Key.Key_Right)
 
 _RECORD_HINT = "Space, Page down or a foot pedal"
 _DONE_HINT = f"{_RECORD_HINT}: closes the guide"
+_TELLS_SIDE = ("IN", "ZL")
+
 _TRUST = "font-size: 36px; font-weight: 700"
 """Look of the word of trust; its role gives the colour."""
 
@@ -72,10 +74,10 @@ class GuideWindow(QWidget):
         pose = self._desk.pose
         target, touched = pose.target, pose.names_touched
         row = feature(target) if target in CODES else None
-        self.counter.setText(f"{pose.side.word.capitalize()} ear · {len(touched)} touched")
+        self.counter.setText(f"{pose.side.word.capitalize()} ear · {_progress(touched)}")
         self.code.setText(target or "All touched")
         self.name.setText(row.name if row else "Skull feature" if target else "")
-        self.definition.setText(row.definition if row else "")
+        self.definition.setText(row.definition + _seventh(row.code, touched) if row else "")
         self.picture.show_feature(target if row else None, pose.side)
         self.picture.setVisible(row is not None)
         self.record.setText("Record" if target else "Done")
@@ -250,3 +252,16 @@ def _row(*widgets: QWidget) -> QHBoxLayout:
     for widget in widgets:
         row.addWidget(widget)
     return row
+
+
+def _progress(touched: Collection[str]) -> str:
+    """Return how many are touched, and how many of those to be touched at least are left."""
+    missing = sum(code not in touched for code in RECOMMENDED)
+    return f"{len(touched)} touched, {missing} to go" if missing else f"{len(touched)} touched"
+
+
+def _seventh(target: str, touched: Collection[str]) -> str:
+    """Return what a feature far from the others is good for, while none such is touched."""
+    if target not in _TELLS_SIDE or any(code in touched for code in _TELLS_SIDE):
+        return ""
+    return "\n\nFar from the other points: it tells the side, and shows where MN was touched wrongly."

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.disk import write_text
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
@@ -175,6 +176,7 @@ class Recorder(QObject):
             side=side,
             method=list(settings.methods),
             probe_noise=settings.probe_noise,
+            shared_error=None if settings.shared_error == DEFAULT_SHARED_ERROR_MM else settings.shared_error,
             round_window=window,
         )
         is_fitted = pose.estimate is not None and pose.estimate.registered is not None

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gp_core import PROBE, Atlas, CochleaPose, fit_atlas, load_specimens
+from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import modiolar_axis
@@ -59,6 +60,9 @@ class Estimated:
         return {
             "side": self.pose.side.value,
             "method": self.pose.method,
+            "side_state": self.pose.side_state,
+            "names_state": self.pose.names_state,
+            "shared_error_mm": self.pose.shared_error,
             "radius_95_mm": self.pose.radius_95,
             "cone_95_deg": float(np.degrees(self.pose.cone_95)),
             "error_mm": None if errors is None else errors[0],
@@ -95,6 +99,11 @@ class Estimate(Step):
         ``robust``, ``jrmpc`` or both; the first is the one that is told and written.
     probe_noise : float, optional
         Ordinary error of a touch, mm a coordinate; by default found from the touches.
+    shared_error : float
+        RMS length of one offset that all touches share, mm; it widens the 95 % region.
+    take_best : bool
+        Where the other ear, or an exchange of two names, is likelier than what is given, take that; the pose
+        is then of the side that was taken.
     round_window : str
         What y of the cochlea frame points to: the ``touched`` round window, or the ``expected`` one.
     path : text or texts
@@ -112,6 +121,8 @@ class Estimate(Step):
     specimens: tuple[str, ...] = ()
     method: tuple[str, ...] = ("robust",)
     probe_noise: float | None = None
+    shared_error: float = DEFAULT_SHARED_ERROR_MM
+    take_best: bool = False
     round_window: str = "touched"
     path: tuple[str, ...] = ("pose.json",)
 
@@ -125,9 +136,13 @@ class Estimate(Step):
             side=self.side,
             methods=self.method,
             probe_noise=self.probe_noise,
+            shared_error=self.shared_error,
             round_window=self.round_window,
         )
         estimate = current_estimate(rig, self.side)
+        if self.take_best and (taken := rig.desk.pose.take_likelier()) is not None:
+            rig.desk.say(f"Taken as {taken.label}, which is likelier than what was given", "warning")
+            estimate = current_estimate(rig, taken.side)
         for method in self.method:
             if method not in estimate.poses:
                 raise GpError(estimate.problems.get(method, f"{method} gave no pose"))
@@ -136,9 +151,10 @@ class Estimate(Step):
         for method in self.method:
             for warning in estimate.poses[method].warnings:
                 rig.desk.say(f"{method}: {warning}", "warning")
-        rig.poses[self.side] = Estimated(estimate, pose, _truth(rig, self.side))
+        side = estimate.side
+        rig.poses[side] = Estimated(estimate, pose, _truth(rig, side))
         files = [rig.desk.pose.export(rig.to_write(path)) for path in self.path]
-        return _told(rig.poses[self.side], rig.wrote(*files))
+        return _told(rig.poses[side], rig.wrote(*files))
 
     def _take_atlas(self, rig: Rig) -> None:
         if self.specimens:

@@ -1,4 +1,4 @@
-"""What an estimate is made with: side, method, probe noise, atlas."""
+"""What an estimate is made with: side, method, probe noise, shared error, atlas."""
 
 from __future__ import annotations
 
@@ -52,6 +52,12 @@ class HeadCard(Card):
             "Ordinary error of a touch in mm a coordinate; empty: found from the touches themselves"
         )
         self.found = text_label("", "hint")
+        self.shared = NumberField("Shared error", widest="0.25")
+        self.shared.step = 0.05
+        self.shared.setToolTip(
+            "RMS length of one offset that all touches of the session share: of the tip, the reference "
+            "marker, soft tissue. The touches do not show it. It widens the 95 % region and moves nothing"
+        )
         self.atlas = ElidedLabel()
         self.problem = text_label("", "warning", wrap=True)
         self.problem.setAccessibleName("Why the atlas chosen last is not in use")
@@ -61,6 +67,7 @@ class HeadCard(Card):
         self.method.chosen.connect(lambda name: self._choose(methods=_METHODS[name]))
         self.noise.value_chosen.connect(lambda mm: self._choose(probe_noise=mm))
         self.noise.textEdited.connect(self._on_edited)
+        self.shared.value_chosen.connect(lambda mm: self._choose(shared_error=mm))
         self.to_atlas.clicked.connect(self.atlas_asked)
         self.specimen.editingFinished.connect(self._rename)
         self.new.clicked.connect(self.new_asked)
@@ -75,6 +82,7 @@ class HeadCard(Card):
         self.side.set_value(settings.side.value)
         self.method.set_value(next(name for name, methods in _METHODS.items() if methods == settings.methods))
         self.noise.set_value(settings.probe_noise)
+        self.shared.set_value(settings.shared_error)
         pose = None if estimate is None else estimate.poses.get("robust")
         is_found = settings.probe_noise is None and pose is not None and pose.probe_noise is not None
         self.found.setText(f"mm, found {pose.probe_noise:.2f}" if is_found and pose is not None else "mm")
@@ -95,9 +103,14 @@ class HeadCard(Card):
         choices.addWidget(self.side, 2)
         choices.addWidget(self.method, 3)
         self._named = QWidget()
-        name, noise, atlas = QHBoxLayout(self._named), QHBoxLayout(), QHBoxLayout()
+        name, noise, shared, atlas = QHBoxLayout(self._named), QHBoxLayout(), QHBoxLayout(), QHBoxLayout()
         name.setContentsMargins(0, 0, 0, 0)
-        for row, caption in ((name, "Specimen"), (noise, "Probe noise"), (atlas, "Atlas")):
+        for row, caption in (
+            (name, "Specimen"),
+            (noise, "Probe noise"),
+            (shared, "Shared error"),
+            (atlas, "Atlas"),
+        ):
             row.setSpacing(6)
             row.addWidget(_caption(caption))
         name.addWidget(self.specimen, 1)
@@ -105,9 +118,12 @@ class HeadCard(Card):
         noise.addWidget(self.noise)
         noise.addWidget(self.found)
         noise.addStretch(1)
+        shared.addWidget(self.shared)
+        shared.addWidget(text_label("mm, of all touches alike", "hint"))
+        shared.addStretch(1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
-        for what in (self._named, choices, noise, atlas, self.problem):
+        for what in (self._named, choices, noise, shared, atlas, self.problem):
             self.add(what)
 
     def _rename(self) -> None:
@@ -129,5 +145,5 @@ class HeadCard(Card):
 def _caption(name: str) -> QLabel:
     """Return what stands before a field: all as wide as the longest."""
     words = text_label(name, "hint")
-    fit(words, lambda: words.setFixedWidth(text_width(words, "Probe noise")))
+    fit(words, lambda: words.setFixedWidth(text_width(words, "Shared error")))
     return words

@@ -20,8 +20,10 @@ from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import Notices, Verdict, link, numbers
 from gp_labeler.views.panels.pose_words import (
     METHOD_WORDS,
+    allowance_text,
     fine_mm,
     gain_text,
+    likely_text,
     region_text,
     sentence,
     triple,
@@ -84,16 +86,26 @@ class ResultCard(Card):
             trust = pose_quality(pose)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
         wrong = pose is not None and (pose.side_state == "wrong" or bool(_misnamed(self._desk)))
-        self.other_side.setVisible(wrong)
-        self.other_side.setText(f"They are of the {desk.side.other.word} side")
-        self.swap.setVisible(desk.swapped is not None)
-        self.swap.setText(f"Swap {' and '.join(desk.swapped or ())}")
+        self._offer_readings(pose, wrong=wrong)
         self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
         self._show_gain(wanted=not wrong and desk.swapped is None)
 
     def set_large(self, large: bool) -> None:
         """Show the estimate in large type, where there is room."""
         self.one.set_large(large)
+
+    def _offer_readings(self, pose: CochleaPose | None, *, wrong: bool) -> None:
+        """Offer the other side and the exchange of two names, where they are not ruled out."""
+        desk = self._desk.pose
+        undecided = pose is not None and pose.side_state == "undecided"
+        self.other_side.setVisible(wrong or undecided)
+        side = f"the {desk.side.other.word} side"
+        likely = _likely(pose, desk.swapped)
+        self.other_side.setText(f"They are of {side}" if wrong else f"Take as {side}  ({likely[0]})")
+        self.swap.setVisible(desk.swapped is not None)
+        names = f"Swap {' and '.join(desk.swapped or ())}"
+        sure = pose is None or pose.names_state != "undecided"
+        self.swap.setText(names if sure else f"{names}  ({likely[1]})")
 
     def _show_gain(self, *, wanted: bool) -> None:
         gains = self._desk.pose.gains() if wanted else ()
@@ -117,11 +129,13 @@ class _OnePose(QWidget):
         grid.setHorizontalSpacing(10)
         grid.setVerticalSpacing(3)
         self.origin, self.axis, self.region = numbers(), numbers(), numbers()
+        self.allowance = text_label("", "hint", wrap=True)
         self.set_large(False)
         for row, (caption, label) in enumerate((("CO", self.origin), ("Axis", self.axis))):
             grid.addWidget(text_label(caption, "hint"), row, 0, Qt.AlignmentFlag.AlignBaseline)
             grid.addWidget(label, row, 1, Qt.AlignmentFlag.AlignBaseline)
         grid.addWidget(self.region, 2, 0, 1, 2)
+        grid.addWidget(self.allowance, 3, 0, 1, 2)
         grid.setColumnStretch(1, 1)
 
     def set_large(self, large: bool) -> None:
@@ -138,6 +152,8 @@ class _OnePose(QWidget):
         self.axis.setText(unit_triple(pose.axis))
         self.axis.setToolTip("Unit vector along the modiolar axis, from the base CB to the apex CA")
         self.region.setText(region_text(pose))
+        self.allowance.setText(allowance_text(pose))
+        self.allowance.setVisible(bool(self.allowance.text()))
         self.region.setToolTip("The true origin and axis are in this ball and in this cone with 95 %")
 
 
@@ -176,6 +192,14 @@ def _column(word: str, pose: CochleaPose) -> tuple[str, ...]:
     cone = f"{math.degrees(pose.cone_95):.1f}°"
     origin, axis = triple(pose.origin).split(), unit_triple(pose.axis).split()
     return (word, *origin, *axis, fine_mm(pose.radius_95), cone)
+
+
+def _likely(pose: CochleaPose | None, pair: tuple[str, str] | None) -> tuple[str, str]:
+    """Return how likely the other side is, and the exchange of a pair."""
+    readings = () if pose is None else pose.hypotheses
+    side = sum(reading.probability for reading in readings if reading.exchanged is None)
+    swap = sum(reading.probability for reading in readings if reading.exchanged == pair)
+    return likely_text(side), likely_text(swap)
 
 
 def _heading(estimate: Estimate | None) -> str:

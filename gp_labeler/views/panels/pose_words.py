@@ -15,9 +15,11 @@ from gp_labeler.views.bind import NONE, degrees_text
 
 __all__ = [
     "METHOD_WORDS",
+    "allowance_text",
     "change_text",
     "fine_mm",
     "gain_text",
+    "likely_text",
     "name_of",
     "parse_position",
     "region_text",
@@ -86,6 +88,25 @@ def region_text(pose: CochleaPose) -> str:
     """Return where the cochlea is with 95 %; of JRMPC, which does not know that, how the animals scatter."""
     within = "95 % within" if pose.method == "robust" else "Animals scatter by"
     return f"{within} {fine_mm(pose.radius_95)}  ·  cone {degrees_text(pose.cone_95)}"
+
+
+def allowance_text(pose: CochleaPose) -> str:
+    """Return what a region allows for, and the plain one; empty for a method that allows for nothing.
+
+    The plain region is that of the touches as they are named, where other readings are not ruled out.
+    """
+    if pose.shared_error is None:
+        return ""
+    text = f"With a shared error of {pose.shared_error:g} mm"
+    if not pose.has_parts:
+        return text
+    plain = f"{fine_mm(pose.plain_radius_95)}  ·  cone {degrees_text(pose.plain_cone_95)}"
+    return f"As named: {plain}\nThe region above is of several parts. {text}"
+
+
+def likely_text(probability: float) -> str:
+    """Return how likely a reading is, such as ``9 % likely``."""
+    return f"{100 * probability:.0f} % likely" if probability >= 0.01 else "less than 1 % likely"
 
 
 def gain_text(gain: TouchGain) -> str:

@@ -8,7 +8,7 @@ from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QWidget
 from tracker_cases import POINTS, TIP, SimulatorProcess
 
-from gp_core import Atlas, Side
+from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.pose_quality import pose_quality
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.session.touches import TouchHow
@@ -189,7 +189,7 @@ def test_guided_touching_by_a_foot_pedal(qtbot, desk, top, simulator):
 
     press_until_touched(Qt.Key.Key_PageDown)
     assert guide.code.text() == desk.pose.target != names[0]
-    assert guide.counter.text() == "Left ear · 1 touched"
+    assert guide.counter.text() == "Left ear · 1 touched, 6 to go"
     assert guide.redo.text() == f"Redo {names[0]}"
     qtbot.keyClick(guide, Qt.Key.Key_Backspace)
     assert desk.pose.target == names[0]
@@ -216,6 +216,20 @@ def test_the_guide_tells_the_estimate_and_why_nothing_was_recorded(qtbot, desk, 
     assert len(desk.session.state.touches) == 4
     qtbot.keyClick(guide, Qt.Key.Key_Escape)
     assert not guide.isVisible()
+
+
+def test_the_guide_proposes_in_as_the_seventh_touch_and_says_what_for(qtbot, desk, top):
+    guide = GuideWindow(desk, top)
+    guide.show()
+    touch(desk, *PROBE)
+    assert (guide.code.text(), guide.counter.text()) == ("IN", "Left ear · 6 touched, 1 to go")
+    assert "it tells the side" in guide.definition.text()
+    desk.pose.skip()
+    assert guide.code.text() == "ZL"
+    assert "it tells the side" in guide.definition.text()
+    touch(desk, "IN")
+    assert guide.counter.text() == "Left ear · 7 touched"
+    assert "it tells the side" not in guide.definition.text()
 
 
 def touch(desk, *codes, noise=0.0):

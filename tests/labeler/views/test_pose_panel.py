@@ -390,6 +390,58 @@ def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbo
     assert panel.result.swap.isVisible()
 
 
+def test_a_side_that_is_undecided_is_offered_with_its_odds(desk, panel, qtbot):
+    touch(desk, "OS", "MN", "RWA")
+    assert panel.result.verdict.label.text() == "Side undecided"
+    assert panel.result.other_side.isVisible()
+    assert panel.result.other_side.text() == "Take as the right side  (3 % likely)"
+    pose = desk.pose.estimate.pose
+    assert f"{pose.radius_95:.2f} mm" in panel.result.one.region.text()
+    beside = panel.result.one.allowance.text()
+    assert f"As named: {pose.plain_radius_95:.2f} mm" in beside
+    assert "several parts" in beside
+    before = touches(desk)
+    qtbot.mouseClick(panel.result.other_side, CLICK)
+    assert (desk.pose.side, touches(desk, Side.RIGHT)) == (Side.RIGHT, before)
+    touch_in = ANIMAL["IN"] + THERE
+    desk.session.undo()
+    desk.pose.record(touch_in, TouchHow.TYPED, name="IN")
+    touch(desk, "CL", "LLI", "RWP")
+    assert panel.result.verdict.label.text() == "Good"
+    assert not panel.result.other_side.isVisible()
+    assert "As named" not in panel.result.one.allowance.text()
+
+
+def test_the_shared_error_is_the_users_and_stated_with_the_region(desk, panel, qtbot):
+    touch(desk, *PROBE)
+    assert panel.head.shared.text() == "0.2"
+    assert panel.result.one.allowance.text() == "With a shared error of 0.2 mm"
+    before, origin = desk.pose.estimate.pose.radius_95, desk.pose.estimate.pose.origin
+    panel.head.shared.setFocus()
+    panel.head.shared.selectAll()
+    qtbot.keyClicks(panel.head.shared, "0.8")
+    qtbot.keyClick(panel.head.shared, Qt.Key.Key_Return)
+    pose = desk.pose.estimate.pose
+    assert (pose.shared_error, desk.pose.estimating.settings.shared_error) == (0.8, 0.8)
+    assert pose.radius_95 > 2 * before
+    np.testing.assert_array_equal(pose.origin, origin)
+    assert panel.result.one.allowance.text() == "With a shared error of 0.8 mm"
+    assert desk.pose.gains()[0].radius_95_now == pytest.approx(pose.plain_radius_95)
+    with pytest.raises(GpError, match="shared error must be from 0 to 20 mm"):
+        desk.pose.choose(shared_error=-1)
+
+
+def test_the_likelier_reading_is_taken_in_one_step(desk, panel):
+    touch(desk, *PROBE)
+    assert desk.pose.take_likelier() is None
+    at = touches(desk)
+    desk.pose.record(at["CL"], TouchHow.TYPED, name="OS")
+    desk.pose.record(at["OS"], TouchHow.TYPED, name="CL")
+    taken = desk.pose.take_likelier()
+    assert set(taken.exchanged) == {"CL", "OS"}
+    assert touches(desk) == at
+
+
 def test_an_atlas_that_is_not_the_one_chosen_is_told_beside_the_estimate(desk, panel):
     assert not panel.head.problem.isVisible()
     desk.atlas_problem = "The atlas of own.json cannot be had any more: own.json: does not exist."
