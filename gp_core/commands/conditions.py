@@ -6,9 +6,16 @@ import argparse
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from gp_core.commands.options import Subparsers, add_command, add_json, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_names,
+    labelled_specimens,
+    save_json,
+    say,
+)
 from gp_core.commands.study_options import add_seed, add_workers, executor_of, rng_of
-from gp_core.landmarks.files import load_specimens
 from gp_core.study.conditions import GROUPS, ConditionsReport, conditions, touch_conditions
 
 __all__ = ["add", "condition_lines"]
@@ -38,6 +45,7 @@ def add(commands: Subparsers) -> None:
         summary="measure how often the 95 % regions hold the truth, and how often side and names are told",
         example="gp-core conditions --groups shared size --repeats 20 --json conditions.json",
     )
+    add_names(parser)
     parser.add_argument(
         "specimens",
         nargs="*",
@@ -60,7 +68,7 @@ def add(commands: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Measure, print, and write what was asked for."""
-    specimens = load_specimens(args.specimens) if args.specimens else None
+    specimens = labelled_specimens(args) if args.specimens else None
     with executor_of(args) as executor:
         report = conditions(
             specimens,

@@ -18,7 +18,17 @@ from gp_core.atlas.pose_gate import doubt_about
 from gp_core.atlas.reading_state import read_as, with_names_exchanged
 from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.checks import FloatArray
-from gp_core.commands.options import Subparsers, add_command, add_json, blaming, read_atlas, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_names,
+    blaming,
+    lab_names,
+    read_atlas,
+    save_json,
+    say,
+)
 from gp_core.errors import GpError
 from gp_core.landmarks.files import read_touches
 from gp_core.landmarks.files.naming import named_side
@@ -48,6 +58,7 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "touches", metavar="TOUCHES", help=".dat, .csv, .mrk.json or .fcsv with three or more touches"
     )
+    add_names(parser)
     parser.add_argument("--side", required=True, choices=("L", "R"), help="side of the head")
     parser.add_argument(
         "--atlas",
@@ -137,7 +148,7 @@ def _add_path(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Estimate, print, and write what was asked for."""
     path = _path_of(args)
-    touches = read_touches(args.touches, args.side)
+    touches = read_touches(args.touches, args.side, names=lab_names(args))
     if args.exchange is not None:
         with blaming(args.touches):
             touches = with_names_exchanged(touches, args.exchange)

@@ -14,6 +14,8 @@ from gp_core.commands.options import (
     add_command,
     add_json,
     add_specimens,
+    lab_names,
+    labelled_specimens,
     read_atlas,
     save_json,
     say,
@@ -24,7 +26,6 @@ from gp_core.landmarks.files import (
     check_plausible_size,
     import_mat,
     landmarks_of,
-    load_specimens,
     read_points,
     specimen_of,
 )
@@ -72,7 +73,7 @@ def add(commands: Subparsers) -> None:
 
 def run_fit(args: argparse.Namespace) -> int:
     """Fit, write, and say what the atlas holds."""
-    specimens = load_specimens(args.specimens)
+    specimens = labelled_specimens(args)
     atlas = fit_atlas(specimens, name=args.name)
     atlas.save(args.output)
     spread = np.sqrt(atlas.variances(atlas.codes))
@@ -92,9 +93,7 @@ def run_import_mat(args: argparse.Namespace) -> int:
 
 def run_check(args: argparse.Namespace) -> int:
     """Print what there is to look at; status 1 where a label is doubtful."""
-    specimens = (
-        load_specimens(args.specimens) if args.side is None else [_one_side(args.specimens, args.side)]
-    )
+    specimens = labelled_specimens(args) if args.side is None else [_one_side(args)]
     atlas, others = read_atlas(args.atlas)
     report = {s.name: check_specimen(s, _atlas_for(s, atlas, others)) for s in specimens}
     save_json(args.json, {name: [f.as_dict() for f in findings] for name, findings in report.items()})
@@ -107,12 +106,13 @@ def run_check(args: argparse.Namespace) -> int:
     return int(any(f.is_doubt for findings in report.values() for f in findings))
 
 
-def _one_side(files: list[str], side: str) -> Specimen:
+def _one_side(args: argparse.Namespace) -> Specimen:
     """Read the one file whose side was said."""
+    files: list[str] = args.specimens
     if len(files) > 1:
         raise GpError(f"--side is for one file, got {len(files)}", remedy="Check them one by one.")
-    points = read_points(files[0])
-    landmarks = with_cochlea_origin(landmarks_of(points, side=side))
+    points = read_points(files[0], names=lab_names(args))
+    landmarks = with_cochlea_origin(landmarks_of(points, side=args.side))
     check_plausible_size(landmarks, files[0])
     return Specimen(specimen_of(points), {landmarks.side: landmarks})
 

@@ -14,7 +14,8 @@ from typing import Any
 from gp_core.atlas.atlas import Atlas
 from gp_core.disk import is_protected, is_stream, protected_inputs, read_head, write_text
 from gp_core.errors import GpError
-from gp_core.landmarks.files import landmark_files, load_specimens
+from gp_core.landmarks.files import landmark_files, load_specimens, read_lab_names
+from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import Specimen
 
 __all__ = [
@@ -22,9 +23,12 @@ __all__ = [
     "Subparsers",
     "add_command",
     "add_json",
+    "add_names",
     "add_specimens",
     "blaming",
     "keeping_inputs",
+    "lab_names",
+    "labelled_specimens",
     "read_atlas",
     "save_json",
     "say",
@@ -64,6 +68,26 @@ def add_specimens(parser: argparse.ArgumentParser) -> None:
         metavar="SPECIMENS",
         help="landmark files of labelled animals, or folders of them",
     )
+    add_names(parser)
+
+
+def add_names(parser: argparse.ArgumentParser) -> None:
+    """Add ``--names FILE``."""
+    parser.add_argument(
+        "--names",
+        metavar="FILE",
+        help="a table of two columns, your own name of a point and the feature's code (CA, or CA_L)",
+    )
+
+
+def lab_names(args: argparse.Namespace) -> LabelNames | None:
+    """Return the names that ``--names`` gives; None without it."""
+    return None if args.names is None else read_lab_names(args.names)
+
+
+def labelled_specimens(args: argparse.Namespace) -> list[Specimen]:
+    """Return the animals of the command line, under the names that ``--names`` gives."""
+    return load_specimens(args.specimens, names=lab_names(args))
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from gp_core.commands.options import Subparsers, add_command, add_json, add_specimens, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_specimens,
+    labelled_specimens,
+    save_json,
+    say,
+)
 from gp_core.commands.study_options import (
     add_features,
     add_figure,
@@ -15,7 +23,6 @@ from gp_core.commands.study_options import (
     save_figure_of,
     settings_of,
 )
-from gp_core.landmarks.files import load_specimens
 from gp_core.registration.jrmpc import ESTIMATION
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out, summarise
@@ -53,7 +60,7 @@ def add(commands: Subparsers) -> None:
 
 def run_distances(args: argparse.Namespace) -> int:
     """Measure, print, and write what was asked for."""
-    table = distances(load_specimens(args.specimens))
+    table = distances(labelled_specimens(args))
     save_json(args.json, table.as_dict())
     if args.csv:
         table.save_csv(args.csv)
@@ -74,7 +81,7 @@ def run_leave_one_out(args: argparse.Namespace) -> int:
     """Estimate, print, and write what was asked for."""
     training, probe = features_of(args)
     report = leave_one_out(
-        load_specimens(args.specimens),
+        labelled_specimens(args),
         method=args.method,
         training=training,
         probe=probe,

@@ -5,7 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from gp_core.commands.options import Subparsers, add_command, add_json, add_specimens, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_names,
+    add_specimens,
+    labelled_specimens,
+    save_json,
+    say,
+)
 from gp_core.commands.study_options import (
     add_features,
     add_figure,
@@ -21,7 +30,6 @@ from gp_core.commands.study_options import (
 )
 from gp_core.disk import read_json
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.files import load_specimens
 from gp_core.registration.jrmpc import ESTIMATION
 from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.simulation import SimulationReport, simulate
@@ -68,6 +76,7 @@ def add(commands: Subparsers) -> None:
         summary="compare JRMPC and the robust method as touch errors rise",
         example="gp-core compare --figure compare.png --csv compare.csv",
     )
+    add_names(versus)
     versus.add_argument(
         "specimens",
         nargs="*",
@@ -94,7 +103,7 @@ def run_simulate(args: argparse.Namespace) -> int:
     physical = [error for file in args.physical for error in _physical_errors(file, args.method)]
     with executor_of(args) as executor:
         report = simulate(
-            load_specimens(args.specimens),
+            labelled_specimens(args),
             n=args.n,
             rng=rng_of(args),
             method=args.method,
@@ -146,7 +155,7 @@ def _simulation_lines(report: SimulationReport) -> Iterator[str]:
 
 def run_compare(args: argparse.Namespace) -> int:
     """Compare, print, and write what was asked for."""
-    specimens = load_specimens(args.specimens) if args.specimens else None
+    specimens = labelled_specimens(args) if args.specimens else None
     with executor_of(args) as executor:
         report = compare(
             specimens,

@@ -5,7 +5,16 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from gp_core.commands.options import Subparsers, add_command, add_json, read_atlas, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_names,
+    lab_names,
+    read_atlas,
+    save_json,
+    say,
+)
 from gp_core.commands.study_options import add_figure, add_seed, rng_of, save_figure_of
 from gp_core.landmarks.files import read_landmarks, read_touches
 from gp_core.registration.stl import read_stl
@@ -55,17 +64,18 @@ def add(commands: Subparsers) -> None:
         "--noise", type=float, default=0.0, metavar="MM", help="SD of their touch errors; default: 0"
     )
     add_seed(drawn)
+    add_names(parser)
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
     """Test, print, and write what was asked for."""
     atlas, specimens = read_atlas(args.atlas)
-    touches = read_touches(args.touches, args.side, unknown="extra")
+    touches = read_touches(args.touches, args.side, unknown="extra", names=lab_names(args))
     rng = rng_of(args)
     report = physical_test(
         touches,
-        read_landmarks(args.ct_landmarks, side=args.side, unknown="extra"),
+        read_landmarks(args.ct_landmarks, side=args.side, unknown="extra", names=lab_names(args)),
         atlas=atlas,
         specimens=specimens,
         bone=None if args.bone is None else read_stl(args.bone),

@@ -5,7 +5,15 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 
-from gp_core.commands.options import Subparsers, add_command, add_json, add_specimens, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_specimens,
+    labelled_specimens,
+    save_json,
+    say,
+)
 from gp_core.commands.study_options import (
     ProgressLine,
     add_figure,
@@ -18,7 +26,6 @@ from gp_core.commands.study_options import (
     settings_of,
 )
 from gp_core.landmarks.features import CODES, PROBE
-from gp_core.landmarks.files import load_specimens
 from gp_core.registration.jrmpc import DEFAULTS
 from gp_core.study.leave_one_out import summarise
 from gp_core.study.nested import NestedReport, nested_search
@@ -63,7 +70,7 @@ def add(commands: Subparsers) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Search, print, and write what was asked for."""
-    specimens = load_specimens(args.specimens)
+    specimens = labelled_specimens(args)
     training = codes_of(args.training, "--training", CODES, CODES)
     search = nested_search if args.nested else search_features
     report: SearchReport | NestedReport

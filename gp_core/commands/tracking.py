@@ -8,7 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.atlas.pose_files import tfm_text
-from gp_core.commands.options import Subparsers, add_command, add_json, blaming, save_json, say
+from gp_core.commands.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_names,
+    blaming,
+    lab_names,
+    save_json,
+    say,
+)
 from gp_core.disk import write_text
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.files import read_landmarks, read_touches
@@ -32,6 +41,7 @@ def add(commands: Subparsers) -> None:
         "touches", metavar="TOUCHES", help="touched features and skull features (S1, S2, ...)"
     )
     register.add_argument("ct_landmarks", metavar="CT_LANDMARKS", help="the same ones in the CT")
+    add_names(register)
     register.add_argument("--side", required=True, choices=("L", "R"), help="side of the head")
     add_json(register)
     register.add_argument(
@@ -55,8 +65,10 @@ def add(commands: Subparsers) -> None:
 
 def run_register(args: argparse.Namespace) -> int:
     """Register, print, and write what was asked for."""
-    touches = read_touches(args.touches, args.side, unknown="extra")
-    ct = with_cochlea_origin(read_landmarks(args.ct_landmarks, side=args.side, unknown="extra"))
+    touches = read_touches(args.touches, args.side, unknown="extra", names=lab_names(args))
+    ct = with_cochlea_origin(
+        read_landmarks(args.ct_landmarks, side=args.side, unknown="extra", names=lab_names(args))
+    )
     with blaming(f"{args.touches} and {args.ct_landmarks}"):
         found = register_fiducials(named_points(touches), named_points(ct), dst=ct.frame, src=touches.frame)
     content = found.as_dict() | _at_cochlea(found, ct)

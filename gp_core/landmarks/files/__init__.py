@@ -4,6 +4,7 @@ from gp_core.disk import write_text
 from gp_core.landmarks.files.dat import skull_feature_names
 from gp_core.landmarks.files.fcsv import write_fcsv
 from gp_core.landmarks.files.header import FileHeader
+from gp_core.landmarks.files.lab_names import read_lab_names
 from gp_core.landmarks.files.markups import write_markups, write_suggestions
 from gp_core.landmarks.files.mat import import_mat, read_authors_mat
 from gp_core.landmarks.files.naming import landmark_file_name, natural_key
@@ -14,6 +15,7 @@ from gp_core.landmarks.files.reading import (
     read_landmarks,
     read_points,
     read_touches,
+    sides_of,
     specimen_of,
 )
 from gp_core.landmarks.files.scale import check_plausible_size
@@ -33,9 +35,11 @@ __all__ = [
     "load_specimens",
     "natural_key",
     "read_authors_mat",
+    "read_lab_names",
     "read_landmarks",
     "read_points",
     "read_touches",
+    "sides_of",
     "skull_feature_names",
     "specimen_of",
     "write_csv",

@@ -33,6 +33,7 @@ _HEADER = """\
 # columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID
 """
 _SYSTEM = re.compile(r"#\s*CoordinateSystem\s*=(.*)", re.IGNORECASE)
+_MOST_COLUMNS = 16
 _STATUSES = tuple(STATUS_WORDS.values())  # in the order of Slicer's numbers
 
 
@@ -51,10 +52,11 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
         Wrong number of columns, an unknown status or system, or a position that is not three finite numbers.
     """
     lines = split_lines(read_text(path), path)
-    system = next((m[1].strip() for _, line in lines if (m := _SYSTEM.match(line))), None)
-    rows = [
-        (number, split_fields(line, ",", number, path)) for number, line in lines if not line.startswith("#")
-    ]
+    heads = [line.lstrip('" ') for _, line in lines]
+    system = next((m[1].strip(' ",;') for line in heads if (m := _SYSTEM.match(line))), None)
+    body = [numbered for numbered, head in zip(lines, heads, strict=True) if not head.startswith("#")]
+    mark = ";" if body and body[0][1].count(";") >= 4 else ","  # as a spreadsheet saves it
+    rows = [(number, _unpadded(split_fields(line, mark, number, path))) for number, line in body]
     old = bool(rows) and all(4 <= len(fields) <= 7 for _, fields in rows)
     if system is None and not old:
         _log.warning("%s: no coordinate system is named; taken as LPS", path)
@@ -66,6 +68,13 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
         for number, fields in rows
     ]
     return PointList(tuple(points), Path(path))
+
+
+def _unpadded(fields: list[str]) -> list[str]:
+    """Return the fields of a row without the empty ones that a spreadsheet appends to it."""
+    while len(fields) > _MOST_COLUMNS and not fields[-1]:
+        fields = fields[:-1]
+    return fields
 
 
 def _markups_point(fields: list[str], number: int, flip_xy: bool, file: str | PathLike[str]) -> LabelledPoint:

@@ -11,9 +11,11 @@ from gp_core.landmarks.features import Side
 __all__ = ["is_named_suggested", "landmark_file_name", "name_parts", "named_side", "natural_key"]
 
 _SUGGESTED_ENDING = re.compile(r"[ _.\-]+suggested$", re.IGNORECASE)
-# GP01_L, GP01-left, "GP01 right", GP01.R
-_SIDE_ENDING = re.compile(
-    r"(?P<specimen>.*[^ _.\-])[ _.\-]+(?P<side>l|r|left|right)", re.IGNORECASE | re.DOTALL
+_MARKS = " _.-"
+# left_GP01, GP01_L_final: a whole word, wherever it stands
+_SIDE_WORDS = tuple(
+    re.compile(rf"(?<![^ _.\-])(?P<side>{words})(?![^ _.\-])", re.IGNORECASE)
+    for words in ("left|right", "l|r")
 )
 
 
@@ -28,7 +30,10 @@ def is_named_suggested(path: str | PathLike[str], suffix: str) -> bool:
 
 
 def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None]:
-    """Return the specimen and the side that a file is named for; no side where the name ends otherwise.
+    """Return the specimen and the side that a file is named for; no side where the name tells none.
+
+    The side is a word of the name, wherever it stands: ``left`` or ``right``, else ``L`` or ``R``. A name
+    that has both tells none.
 
     Examples
     --------
@@ -36,13 +41,26 @@ def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None
     ('LG.J_7', <Side.LEFT: 'L'>)
     >>> name_parts("GP01_R_suggested.mrk.json", ".mrk.json")
     ('GP01', <Side.RIGHT: 'R'>)
+    >>> name_parts("Left ear GP01.fcsv", ".fcsv")
+    ('ear GP01', <Side.LEFT: 'L'>)
     """
     name = Path(path).name
     stem = _SUGGESTED_ENDING.sub("", name[: len(name) - len(suffix)])
-    match = _SIDE_ENDING.fullmatch(stem)
-    if match is None:
-        return stem, None
-    return match["specimen"], Side.parse(match["side"])
+    for pattern in _SIDE_WORDS:
+        found = list(pattern.finditer(stem))
+        sides = {Side.parse(word["side"]) for word in found}
+        if len(sides) == 1:
+            return _without(stem, found[-1]) or stem, sides.pop()
+        if sides:
+            break
+    return stem, None
+
+
+def _without(stem: str, word: re.Match[str]) -> str:
+    """Return a name without one of its words, and without the marks that are left over."""
+    before, after = stem[: word.start()], stem[word.end() :]
+    kept = before if not after.strip(_MARKS) else f"{before.rstrip(_MARKS)}{after}" if before else after
+    return kept.strip(_MARKS)
 
 
 def named_side(path: str | PathLike[str]) -> Side | None:

@@ -14,7 +14,7 @@ import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError
-from gp_core.landmarks.features import FEATURES, Feature
+from gp_core.landmarks.features import FEATURES, Feature, Side
 from gp_core.landmarks.files.header import FileHeader
 from gp_core.landmarks.files.text import parse_position
 from gp_core.landmarks.sets import LandmarkSet, Status
@@ -50,7 +50,7 @@ _SUGGESTED = re.compile(
 
 
 class LabelledPoint(NamedTuple):
-    """One point of a file: label, (3,) position in mm or None, how far it is, free text.
+    """One point of a file: label, (3,) position in mm or None, how far it is, free text, side if it says one.
 
     A suggested point has no `position`, which would be an observation, but a `suggestion`.
     """
@@ -60,6 +60,7 @@ class LabelledPoint(NamedTuple):
     status: Status
     description: str = ""
     suggestion: Suggestion | None = None
+    side: Side | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,6 +100,21 @@ class PointList:
     def labels(self) -> tuple[str, ...]:
         """Labels, in the file's order."""
         return tuple(point.label for point in self.points)
+
+    @property
+    def sides(self) -> frozenset[Side]:
+        """Sides of the head that the points themselves tell, in their labels or a column of the table."""
+        return frozenset(point.side for point in self.points if point.side is not None)
+
+    def of_side(self, side: Side) -> PointList:
+        """Return the points of one side, and those that lie on both or tell none.
+
+        Raises
+        ------
+        FileFormatError
+            There are none.
+        """
+        return replace(self, points=tuple(p for p in self.points if p.side in (side, None)))
 
     @property
     def positions(self) -> FloatArray:

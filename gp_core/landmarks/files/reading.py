@@ -21,10 +21,18 @@ from gp_core.landmarks.files.points import LabelledPoint, PointList, as_suggeste
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.files.table import read_table
 from gp_core.landmarks.files.text import shown
-from gp_core.landmarks.labels import is_skull_feature, tidy_label
+from gp_core.landmarks.labels import LabelNames, is_skull_feature, parse_label, tidy_label
 from gp_core.landmarks.sets import LandmarkSet, Status
 
-__all__ = ["label_names", "landmarks_of", "read_landmarks", "read_points", "read_touches", "specimen_of"]
+__all__ = [
+    "label_names",
+    "landmarks_of",
+    "read_landmarks",
+    "read_points",
+    "read_touches",
+    "sides_of",
+    "specimen_of",
+]
 
 Unknown = Literal["error", "extra"]
 
@@ -51,17 +59,20 @@ def _suffix(path: str | PathLike[str]) -> str:
     return found
 
 
-def read_points(path: str | PathLike[str]) -> PointList:
+def read_points(path: str | PathLike[str], *, names: LabelNames | None = None) -> PointList:
     """Read the labelled points of a landmark file, whatever their labels are.
 
     Parameters
     ----------
     path : path
         ``.mrk.json``, ``.json``, ``.fcsv``, ``.csv``, ``.tsv`` or ``.dat``.
+    names : LabelNames, optional
+        A lab's own names of the features.
 
     Returns
     -------
     PointList
+        Sides in labels, such as ``CA_L`` or ``left CA``, are taken out of them.
         Positions in mm; LPS, but of a ``.dat`` in the tracker frame. Points that the file marks as suggested,
         in their description or because its name ends in ``_suggested``, have no position but a suggestion.
 
@@ -69,16 +80,38 @@ def read_points(path: str | PathLike[str]) -> PointList:
     ------
     FileFormatError
         Another kind of file, or one that cannot be read.
+    FeatureError
+        A label tells another side than the table's column.
     """
     suffix = _suffix(path)
     points = _READERS[suffix](path)
+    known = names or LabelNames({})
+    taken = tuple(_with_name(p, known, path) for p in points.points if not known.leaves_out(p.label))
+    points = replace(points, points=taken)
     if not is_named_suggested(path, suffix):
         return points
     return replace(points, points=tuple(as_suggested(point) for point in points.points))
 
 
+def _with_name(point: LabelledPoint, names: LabelNames, file: str | PathLike[str]) -> LabelledPoint:
+    """Return a point under the name that its label stands for, with the side that the label tells."""
+    name, side = parse_label(names.translate(point.label))
+    if side is not None and point.side not in (None, side):
+        raise FeatureError(
+            f"is of the {side.word} side by its label, of the {side.other.word} by its column",
+            file=file,
+            landmark=point.label[:40],
+            remedy="Correct one of them.",
+        )
+    return point._replace(label=name, side=side or point.side)
+
+
 def read_landmarks(
-    path: str | PathLike[str], *, side: Side | str | None = None, unknown: Unknown = "error"
+    path: str | PathLike[str],
+    *,
+    side: Side | str | None = None,
+    unknown: Unknown = "error",
+    names: LabelNames | None = None,
 ) -> LandmarkSet:
     """Read the landmarks of one side of a head.
 
@@ -87,11 +120,13 @@ def read_landmarks(
     path : path
         See `read_points`.
     side : Side or str, optional
-        Needed only where neither the file's ``gpLabeler`` object nor the ending of its name
-        (``_L``, ``-left``, ...) says it.
+        Needed only where neither the file's ``gpLabeler`` object, nor its labels (``CA_L``), nor a column
+        ``side``, nor its name (``_L``, ``left``, ...) says it, or where the file holds both sides.
     unknown : {"error", "extra"}
         What to do with labels outside the feature table: refuse, or keep in `LandmarkSet.extra`.
         Skull features ``S1``, ``S2``, ... and what this program wrote as extra are always kept.
+    names : LabelNames, optional
+        A lab's own names of the features.
 
     Returns
     -------
@@ -113,17 +148,31 @@ def read_landmarks(
     >>> read_landmarks("GP01_L.mrk.json").side  # doctest: +SKIP
     <Side.LEFT: 'L'>
     """
-    return landmarks_of(read_points(path), side=side, unknown=unknown)
+    return landmarks_of(read_points(path, names=names), side=side, unknown=unknown)
 
 
 def landmarks_of(
     points: PointList, *, side: Side | str | None = None, unknown: Unknown = "error"
 ) -> LandmarkSet:
-    """Make landmarks of the points of a file; see `read_landmarks`."""
-    return _landmark_set(points, _side_of(points, side), points.frame, unknown)
+    """Make landmarks of one side of the points of a file; see `read_landmarks`."""
+    chosen = _side_of(points, side)
+    return _landmark_set(_one_side(points, chosen), chosen, points.frame, unknown)
 
 
-def read_touches(path: str | PathLike[str], side: Side | str, *, unknown: Unknown = "error") -> LandmarkSet:
+def sides_of(points: PointList, *, unknown: Unknown = "error") -> tuple[LandmarkSet, ...]:
+    """Make landmarks of each side that a file holds; see `read_landmarks`."""
+    if len(points.sides) < 2:
+        return (landmarks_of(points, unknown=unknown),)
+    return tuple(landmarks_of(points, side=side, unknown=unknown) for side in Side)
+
+
+def read_touches(
+    path: str | PathLike[str],
+    side: Side | str,
+    *,
+    unknown: Unknown = "error",
+    names: LabelNames | None = None,
+) -> LandmarkSet:
     """Read what was touched with the probe on one side of a head.
 
     Parameters
@@ -134,6 +183,8 @@ def read_touches(path: str | PathLike[str], side: Side | str, *, unknown: Unknow
         Side of the head.
     unknown : {"error", "extra"}
         See `read_landmarks`.
+    names : LabelNames, optional
+        A lab's own names of the features.
 
     Returns
     -------
@@ -149,9 +200,10 @@ def read_touches(path: str | PathLike[str], side: Side | str, *, unknown: Unknow
     GeometryError
         All points are at one place, or are not in millimetres.
     """
-    points = read_points(path)
+    points = read_points(path, names=names)
     wanted = Side.parse(side)
     _check_side(wanted, points.header.side if points.header else None, points)
+    points = _one_side(points, wanted)
     seen = replace(points, points=tuple(_without_sentinel(point) for point in points.points))
     touches = _landmark_set(seen, wanted, "tracker", unknown)
     check_plausible_size(touches, path)
@@ -171,9 +223,19 @@ def _without_sentinel(point: LabelledPoint) -> LabelledPoint:
 
 
 def _side_of(points: PointList, side: Side | str | None) -> Side:
-    said = points.header.side if points.header else None
-    said = said or name_parts(points.source, _suffix(points.source))[1]
     given = None if side is None else Side.parse(side)
+    if len(points.sides) > 1:
+        if given is None:
+            raise FeatureError(
+                "holds both sides of the head, as its labels or its column 'side' say",
+                file=points.source,
+                remedy="Give the side (L or R) that is wanted.",
+            )
+        return given
+    if given is not None and points.sides:
+        return given
+    said = points.header.side if points.header else next(iter(points.sides), None)
+    said = said or name_parts(points.source, _suffix(points.source))[1]
     if given is not None:
         _check_side(given, said, points)
     if (found := said or given) is None:
@@ -183,6 +245,32 @@ def _side_of(points: PointList, side: Side | str | None) -> Side:
             remedy="Give the side (L or R), or let the file's name end in _L or _R.",
         )
     return found
+
+
+def _one_side(points: PointList, side: Side) -> PointList:
+    """Return the points of one side; in a file that tells sides, only what both share may tell none."""
+    told = points.sides
+    if not told:
+        return points
+    if told == {side.other}:
+        raise FeatureError(
+            f"holds points of the {side.other.word} side, as its labels or its column 'side' say, but was "
+            f"asked for as the {side.word} side",
+            file=points.source,
+            remedy=f"Give the side {side.other.value}, or correct the file.",
+        )
+    if len(told) == 1:
+        return points
+    without = (p.label for p in points.points if p.side is None and p.label in CODES)
+    lost = next((label for label in without if not feature(label).shared), None)
+    if lost is not None:
+        raise FeatureError(
+            "tells no side, although other points of the file do",
+            file=points.source,
+            landmark=lost,
+            remedy=f"Call it {lost}_L or {lost}_R.",
+        )
+    return points.of_side(side)
 
 
 def _check_side(wanted: Side, said: Side | None, points: PointList) -> None:

@@ -12,8 +12,9 @@ from gp_core.errors import FeatureError, FileFormatError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.naming import natural_key
-from gp_core.landmarks.files.reading import landmarks_of, read_points, specimen_of
+from gp_core.landmarks.files.reading import read_points, sides_of, specimen_of
 from gp_core.landmarks.files.scale import check_plausible_size
+from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 __all__ = ["landmark_files", "load_specimens"]
@@ -24,6 +25,8 @@ _IN_FOLDERS = (".mrk.json", ".fcsv")
 
 def load_specimens(
     paths: str | PathLike[str] | Iterable[str | PathLike[str]],
+    *,
+    names: LabelNames | None = None,
 ) -> list[Specimen]:
     """Read landmark files, or folders of them, and put the sides of each animal together.
 
@@ -31,7 +34,9 @@ def load_specimens(
     ----------
     paths : path or iterable of path
         Landmark files of any kind, and folders; these are searched, not deeper, for ``.mrk.json`` and
-        ``.fcsv``.
+        ``.fcsv``. A file may hold both sides, told by its labels (``CA_L``) or a column ``side``.
+    names : LabelNames, optional
+        A lab's own names of the features.
 
     Returns
     -------
@@ -52,9 +57,10 @@ def load_specimens(
     files = _files([paths] if isinstance(paths, (str, PathLike)) else list(paths))
     sides: dict[str, dict[Side, LandmarkSet]] = {}
     sources: dict[tuple[str, Side, bool], Path] = {}
-    for file in files:
-        points = read_points(file)
-        name, landmarks = specimen_of(points), landmarks_of(points)
+    read = ((file, read_points(file, names=names)) for file in files)
+    for file, name, landmarks in (
+        (file, specimen_of(points), one) for file, points in read for one in sides_of(points)
+    ):
         check_plausible_size(landmarks, file)
         only_suggested = bool(landmarks.suggested) and not landmarks.placed
         earlier = sources.setdefault((name, landmarks.side, only_suggested), file)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 
 from gp_core.disk import write_text
-from gp_core.errors import FileFormatError
+from gp_core.errors import FeatureError, FileFormatError
+from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.disk import read_text
 from gp_core.landmarks.files.points import (
     STATUS_WORDS,
@@ -39,6 +40,8 @@ _AXES = {"lps": False, "ras": True, "xyz": False}  # whether x and y change sign
 _UNIT_MM = re.compile(r"\s*[\[(_ ]\s*mm\s*[\])]?$")  # x_mm, "x (mm)", "x [mm]"
 _HEADER = ("label", "l", "p", "s", "defined", "selected", "visible", "locked", "description", "status")
 _NO = ("0", "false", "no")
+_SEPARATOR_LINE = re.compile(r"\"?sep=([,;\t|])\"?[,;]*", re.IGNORECASE)  # for Excel, in the first line
+_SIDE_COLUMNS = ("side", "ear", "laterality")
 
 
 @dataclass(frozen=True)
@@ -56,8 +59,9 @@ def read_table(path: str | PathLike[str]) -> PointList:
     """Read a table of named points.
 
     With a header, columns are found by name: ``label`` (or ``name``, ``landmark``, ...); ``l,p,s``,
-    ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``defined``, ``status`` and
-    ``description``. Without one, the columns are name, x, y, z.
+    ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``side``, ``defined``, ``status`` and
+    ``description``. Without one, the columns are name, x, y, z. Row names as R writes them, whose column has
+    no name, are labels; the first line ``sep=;`` of a spreadsheet is understood.
 
     Returns
     -------
@@ -70,11 +74,24 @@ def read_table(path: str | PathLike[str]) -> PointList:
         Columns are missing, a row has the wrong number of them, or a position is not three finite numbers.
     """
     rows = read_rows(path)
-    names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]] if rows else []
+    names = _header_names(rows)
     has_header = any(name in _NAME_COLUMNS for name in names)
     columns = _columns(names, path) if has_header else _Columns(0, (1, 2, 3), 4, False, {})
     points = tuple(_point(fields, columns, number, path) for number, fields in rows[has_header:])
     return PointList(points, Path(path))
+
+
+def _header_names(rows: list[tuple[int, list[str]]]) -> list[str]:
+    """Return the names of the columns by the first row; that of R's row names is empty, or not there."""
+    if not rows:
+        return []
+    names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]]
+    if any(name in _NAME_COLUMNS for name in names) or not any(set(axes) <= set(names) for axes in _AXES):
+        return names
+    if not names[0]:
+        return ["name", *names[1:]]
+    unnamed = len(rows) > 1 and len(rows[1][1]) == len(names) + 1
+    return ["name", *names] if unnamed else names
 
 
 def read_rows(
@@ -101,7 +118,10 @@ def read_rows(
         for number, line in split_lines(read_text(path), path, at_most=at_most)
         if not line.startswith("#")
     ]
-    delimiter = _delimiter_of(lines[0][1]) if lines else ","
+    stated = _SEPARATOR_LINE.fullmatch(lines[0][1].strip()) if lines else None
+    if stated is not None:
+        lines = lines[1:]
+    delimiter = stated[1] if stated is not None else _delimiter_of(lines[0][1]) if lines else ","
     if aligned and delimiter == " ":
         lines = [(number, " ".join(line.split())) for number, line in lines]
     return [(number, split_fields(line, delimiter, number, path)) for number, line in lines]
@@ -148,7 +168,21 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         file=file,
         description=of_csv_cell(other("description")),
         flip_xy=columns.flip_xy,
-    )
+    )._replace(side=_side(other, label, file))
+
+
+def _side(other: Callable[[str], str], label: str, file: str | PathLike[str]) -> Side | None:
+    """Return the side that a row tells in a column of its own; None where it is empty."""
+    word = next((found for name in _SIDE_COLUMNS if (found := other(name))), "")
+    try:
+        return Side.parse(word) if word else None
+    except FeatureError:
+        raise FileFormatError(
+            f"its column 'side' must hold L, R, left or right, got {shown(word)}",
+            file=file,
+            landmark=label[:40],
+            remedy="Correct it, or leave it empty.",
+        ) from None
 
 
 def _status(word: str, defined: str, label: str, file: str | PathLike[str]) -> Status:
