@@ -6,15 +6,19 @@ loading it and what can be chosen. `read_volume` loads what was looked into, or 
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from gp_labeler.imaging.fill import find_fill, replace_fill
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
+from gp_labeler.imaging.readers.grey import needs_float64
 from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.plan import ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, quiet
@@ -142,16 +146,34 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 
 def _load(plan: ImportPlan, report: Report) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
+        _check_memory(plan)
         array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
+        wide = needs_float64(plan.stored_dtype, array)
+        if wide:
+            array = assemble(plan.source, plan.size, np.float64, plan.options, report)
         fill, filled = replace_fill(array, find_fill(array, plan.fill))
         volume = Volume(
             array,
             plan.T_scan_voxel(),
             name=plan.name,
             path=Path(plan.path).resolve(),
-            notes=(*plan.all_notes(), *filled),
+            notes=(*plan.all_notes(narrowed=not wide), *filled),
             choices=plan.options.as_json(),
             fill=fill,
         )
         volume.checksum  # noqa: B018 - computed here, off the UI thread
     return volume
+
+
+def _check_memory(plan: ImportPlan) -> None:
+    """Refuse what no memory of this machine can hold, where the system says how much it has."""
+    try:
+        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):
+        return
+    if plan.n_bytes > there:
+        need, have = (f"{n / (1 << 30):.0f} GB" for n in (plan.n_bytes, there))
+        raise VolumeError(
+            f"it takes {need} of memory, and this machine has {have}",
+            remedy="Load every second voxel (--stride 2), or a region.",
+        )

@@ -9,10 +9,11 @@ from numpy.typing import DTypeLike, NDArray
 
 from gp_core.errors import GpError
 
-__all__ = ["loaded_dtype", "narrowing", "palette_as_grey", "to_grey"]
+__all__ = ["loaded_dtype", "narrowing", "needs_float64", "palette_as_grey", "to_grey"]
 
 _KEPT = ("uint8", "int16", "uint16", "int32", "uint32", "float32")
 _WIDENED = {"bool": "uint8", "int8": "int16"}
+_SAMPLES, _FINE_ENOUGH = 200_000, 1e-3
 _LUMINANCE = (299, 587, 114)  # ITU-R BT.601, in thousandths
 
 
@@ -36,6 +37,20 @@ def narrowing(dtype: DTypeLike) -> str | None:
     """Return a note where `loaded_dtype` changes the type, else None."""
     stored, loaded = np.dtype(dtype), loaded_dtype(dtype)
     return None if stored.name == loaded.name else f"{stored.name} values were converted to {loaded.name}"
+
+
+def needs_float64(stored: DTypeLike, loaded: NDArray[Any]) -> bool:
+    """Return whether 64-bit values that were loaded as float32 differ too little beside their size for it."""
+    if np.dtype(stored).itemsize < 8 or loaded.dtype != np.float32:
+        return False
+    stride = max(1, round((loaded.size / _SAMPLES) ** (1 / 3)))
+    sample = loaded[::stride, ::stride, ::stride]
+    sample = sample[np.isfinite(sample)]
+    if not sample.size:
+        return False
+    low, high = np.percentile(sample, (0.1, 99.9))
+    step = float(np.spacing(np.float32(max(abs(low), abs(high)))))
+    return step > _FINE_ENOUGH * (float(high) - float(low))
 
 
 def to_grey(plane: NDArray[Any], channel: int | None = None) -> NDArray[Any]:

@@ -125,13 +125,20 @@ def stack_geometry(size: PixelSize, z_factor: float = 1.0) -> Geometry:
     """
     if size.x is None or size.y is None:
         return Geometry(sides_known=False, reason=size.reason)
+    if size.z is not None and z_factor == 1:
+        return Geometry((size.x, size.y, size.z), sides_known=False)
     if size.z is not None:
-        return Geometry((size.x, size.y, size.z * z_factor), sides_known=False)
+        reason = (
+            f"{size.said_by} gives slices {shown((size.z,))} apart, but their numbers run in steps of "
+            f"{z_factor:g}: if slices were taken out, they are farther apart"
+        )
+        suggested: Spacing = (size.x, size.y, size.z * z_factor)
+        return Geometry(sides_known=False, suggested=suggested, reason=reason)
     if is_screen_resolution(size.x):
         dpi = round(25.4 / size.x)
         reason = f"the voxel size is not in the file: its {dpi} dpi are a screen's or printer's"
         return Geometry(sides_known=False, reason=reason)
-    suggested: Spacing = (size.x, size.y, size.x * z_factor)
+    suggested = (size.x, size.y, size.x * z_factor)
     reason = size.reason or (
         f"{size.said_by} gives pixels of {shown((size.x, size.y))}, but nothing gives the distance of slices"
     )

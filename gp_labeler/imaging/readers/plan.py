@@ -223,10 +223,16 @@ class ImportPlan:
         )
         return (warning("sides-unknown", text),)
 
-    def all_notes(self) -> tuple[str, ...]:
-        """Return what goes on record with the volume: decisions, warnings and what was chosen."""
+    def all_notes(self, *, narrowed: bool = True) -> tuple[str, ...]:
+        """Return what goes on record with the volume: decisions, warnings and what was chosen.
+
+        Parameters
+        ----------
+        narrowed : bool
+            Whether the voxels came to be of the type `dtype`, and not wider.
+        """
         spacing, options = self.geometry.spacing, self.options
-        notes = [narrowing(self.stored_dtype), *self.notes]
+        notes = [narrowing(self.stored_dtype) if narrowed else None, *self.notes]
         if options.spacing is not None:
             said = "did not say" if spacing is None else f"said {shown(spacing)}"
             notes.append(f"voxel size {shown(options.spacing)} was given; the file {said}")

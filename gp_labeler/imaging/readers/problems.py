@@ -101,7 +101,8 @@ def failing_as_volume_error(path: Path) -> Iterator[None]:
     except (
         Exception
     ) as problem:  # parsers of broken files raise anything: struct.error, SyntaxError, KeyError
-        text = str(problem).strip().splitlines()
+        broken = isinstance(problem, LookupError)  # its text is a mere number or name
+        text = ["its structure is broken"] if broken else str(problem).strip().splitlines()
         raise VolumeError(
             f"it cannot be read: {text[-1] if text else type(problem).__name__}",
             file=path,

@@ -24,6 +24,7 @@ _MAGIC = b"CTDATA-HEADER_V1"
 _AIM_V3 = b"AIMDATA_V030   "
 _AIM_V2 = struct.pack("<2i", 20, 140)  # the lengths of its first two headers
 _BLOCK = 512
+_SAME_STEP = 0.02
 
 
 def inspect_scanco(path: Path, options: ImportOptions) -> ImportPlan:
@@ -58,6 +59,15 @@ def _inspect_isq(path: Path, head: bytes, options: ImportOptions) -> ImportPlan:
     source = RawSource(path, (blocks + 1) * _BLOCK, np.dtype("<i2"), (ny, nx), nz)
     known = min(x_um, y_um, z_um) > 0
     spacing: Spacing | None = (x_um / nx / 1000, y_um / ny / 1000, z_um / nz / 1000) if known else None
+    geometry = Geometry(spacing, sides_known=False)
+    (step_um,) = struct.unpack("<i", head[72:76])
+    if spacing is not None and step_um > 0 and abs(step_um - z_um / nz) > max(1, _SAME_STEP * step_um):
+        reason = (
+            f"its header gives slices {step_um / 1000:g} mm apart, but {nz} of them in {z_um / 1000:g} mm"
+        )
+        geometry = Geometry(
+            sides_known=False, suggested=(spacing[0], spacing[1], step_um / 1000), reason=reason
+        )
     return ImportPlan(
         path=path,
         format="Scanco ISQ",
@@ -65,7 +75,7 @@ def _inspect_isq(path: Path, head: bytes, options: ImportOptions) -> ImportPlan:
         size=(nx, ny, nz),
         stored_dtype=np.dtype(np.int16),
         source=source,
-        geometry=Geometry(spacing, sides_known=False),
+        geometry=geometry,
         found=source.shortage(),
         notes=("values are the scanner's own, not calibrated",),
         options=options,

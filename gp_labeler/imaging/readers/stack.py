@@ -10,24 +10,17 @@ from pathlib import Path
 
 import numpy as np
 import tifffile
-from PIL import Image
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.choosing import FEW, Choice, choose
 from gp_labeler.imaging.readers.formats import TIFF_SUFFIXES
-from gp_labeler.imaging.readers.grey import palette_as_grey, to_grey
+from gp_labeler.imaging.readers.image_files import image_header, image_pixel_size, read_image
 from gp_labeler.imaging.readers.naming import Numbering, SliceGroup, group_slices, number_slices
 from gp_labeler.imaging.readers.ome import ome_images
 from gp_labeler.imaging.readers.options import ImportOptions
-from gp_labeler.imaging.readers.orientation import ORIENTATION_TAG, oriented, swaps_axes
-from gp_labeler.imaging.readers.pixel_size import (
-    UNKNOWN,
-    PixelSize,
-    dots_per_inch,
-    stack_geometry,
-    tiff_pixel_size,
-)
+from gp_labeler.imaging.readers.orientation import swaps_axes
+from gp_labeler.imaging.readers.pixel_size import PixelSize, stack_geometry, tiff_pixel_size
 from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 from gp_labeler.imaging.readers.skyscan import SkyScanLog, find_log, log_geometry
@@ -143,13 +136,7 @@ def _tiff_slice(path: Path) -> _Slice:
 
 
 def _image_slice(path: Path) -> _Slice:
-    with Image.open(path) as image:
-        wide = {"I": "int32", "F": "float32"}
-        dtype = np.dtype(wide.get(image.mode, "uint16" if ";16" in image.mode else "uint8"))
-        orientation = _exif_orientation(image)
-        stored = (image.height, image.width)
-        shape = stored[::-1] if swaps_axes(orientation) else stored
-        return _Slice(shape, dtype, len(image.getbands()), image.mode in ("P", "PA"), orientation)
+    return _Slice(*image_header(path))
 
 
 def _pixel_size(path: Path, orientation: int) -> PixelSize:
@@ -165,9 +152,7 @@ def _stored_pixel_size(path: Path) -> PixelSize:
             shape = {"X": page.imagewidth, "Y": page.imagelength}
             fitting = (image for image in images if all(image.sizes[a] == n for a, n in shape.items()))
             return tiff_pixel_size(tif, page, next(fitting, None))
-    with Image.open(path) as image:
-        dpi = image.info.get("dpi")
-        return dots_per_inch(float(dpi[0]), float(dpi[1])) if dpi else UNKNOWN
+    return image_pixel_size(path)
 
 
 def _plan(
@@ -318,28 +303,7 @@ def _decode(path: Path, channel: int | None) -> Plane:
         with tifffile.TiffFile(path) as tif:
             page = full_page(tif, path)
             return finishing(page, channel if page.samplesperpixel > 1 else None)(page.asarray(maxworkers=1))
-    with Image.open(path) as image:
-        return np.asarray(oriented(_grey(image, channel), _exif_orientation(image)))
-
-
-def _grey(image: Image.Image, channel: int | None) -> Plane:
-    if image.mode in ("P", "PA"):
-        colours = np.array(image.getpalette("RGB"), np.uint8).reshape(-1, 3)
-        indices = np.asarray(image)
-        return palette_as_grey(indices if indices.ndim == 2 else indices[..., 0], colours, channel)
-    usual = image.convert("RGB") if image.mode in ("CMYK", "YCbCr", "LAB", "HSV") else image
-    return to_grey(np.asarray(usual), channel)
-
-
-def _exif_orientation(image: Image.Image) -> int:
-    """Return the tag Orientation of an open image, 1 where it has none; reads no pixels."""
-    raw = image.info.get("exif")
-    if not raw:
-        return 1
-    exif = Image.Exif()
-    exif.load(raw)
-    value = exif.get(ORIENTATION_TAG, 1)
-    return value if isinstance(value, int) and 1 <= value <= 8 else 1
+    return read_image(path, channel)
 
 
 def _times(shape: tuple[int, int]) -> str:

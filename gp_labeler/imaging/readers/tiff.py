@@ -16,7 +16,7 @@ from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.orientation import swaps_axes
 from gp_labeler.imaging.readers.pixel_size import stack_geometry, tiff_pixel_size
 from gp_labeler.imaging.readers.plan import ImportPlan
-from gp_labeler.imaging.readers.problems import Problem, names, warning
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 from gp_labeler.imaging.readers.source import Plane, RawSource, SliceSource, in_threads
 from gp_labeler.imaging.readers.tiff_pages import (
     check_page,
@@ -33,8 +33,16 @@ __all__ = ["inspect_tiff", "is_multi_page"]
 
 
 def is_multi_page(path: Path) -> bool:
-    """Return whether a TIFF file holds several slices: smaller copies and masks of a slice are none."""
+    """Return whether a TIFF file holds several slices: smaller copies and masks of a slice are none.
+
+    Raises
+    ------
+    VolumeError
+        It holds nothing.
+    """
     with tifffile.TiffFile(path) as tif:
+        if not len(tif.pages):
+            raise VolumeError("it holds no image", file=path, remedy="Copy it again.")
         first = tif.pages.first
         if isinstance(first, tifffile.TiffPage) and first.imagedepth > 1:
             return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,11 +12,12 @@ import tifffile
 
 from gp_labeler.imaging.readers.grey import palette_as_grey, to_grey
 from gp_labeler.imaging.readers.orientation import ORIENTATION_TAG, orienting, swaps_axes
-from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 from gp_labeler.imaging.readers.source import Plane
 
 __all__ = [
     "PALETTE",
+    "check_orientations",
     "check_page",
     "finishing",
     "full_page",
@@ -32,6 +33,8 @@ PALETTE = 3
 _MIN_IS_WHITE, _YCBCR = 0, 6
 _GREY_OR_COLOUR = {_MIN_IS_WHITE, 1, 2, PALETTE, _YCBCR}
 _REDUCED, _MASK = 1, 4
+_UNPACKED_AT_MOST = {1: 1, 5: 1400, 8: 1032, 32946: 1032, 32773: 64}
+"""Bytes that one stored byte can stand for at most: none, LZW, Deflate, PackBits."""
 
 
 def is_reduced(page: Any) -> bool:
@@ -69,6 +72,18 @@ def orientation_of(page: tifffile.TiffPage) -> int:
     return value if isinstance(value, int) and 1 <= value <= 8 else 1
 
 
+def check_orientations(pages: Sequence[tifffile.TiffPage], path: Path) -> None:
+    """Raise `VolumeError` where slices of one file are turned differently; the first may speak for all."""
+    said = {page.tags.valueof(ORIENTATION_TAG, default=None) for page in pages[1:]} - {None}
+    if said - {orientation_of(pages[0])}:
+        values = names([str(value) for value in sorted({*said, orientation_of(pages[0])})])
+        raise VolumeError(
+            f"its pages have the tag Orientation {values}: they do not lie on each other",
+            file=path,
+            remedy="Save the slices again, all turned alike.",
+        )
+
+
 def page_shape(page: tifffile.TiffPage) -> tuple[int, int]:
     """Return the (rows, columns) of the picture."""
     shape = (page.imagelength, page.imagewidth)
@@ -104,6 +119,15 @@ def check_page(page: tifffile.TiffPage, path: Path) -> None:
             file=path,
             remedy="Install it (pip install imagecodecs), or save the file without compression.",
         ) from None
+
+    have, most = sum(page.databytecounts), _UNPACKED_AT_MOST.get(int(page.compression))
+    need = int(np.prod(page.shape)) * int(np.max(page.bitspersample)) // 8
+    if most is not None and have * most < need:
+        raise VolumeError(
+            f"a page of it holds {have:,} bytes, too few for {need:,}: it is incomplete",
+            file=path,
+            remedy="Copy it again.",
+        )
 
 
 def _name(value: Any) -> str:

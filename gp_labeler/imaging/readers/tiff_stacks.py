@@ -15,7 +15,7 @@ from gp_core.errors import GpError
 from gp_labeler.imaging.readers.choosing import FEW
 from gp_labeler.imaging.readers.ome import OmeImage, ome_images
 from gp_labeler.imaging.readers.problems import VolumeError
-from gp_labeler.imaging.readers.tiff_pages import is_reduced, orientation_of
+from gp_labeler.imaging.readers.tiff_pages import check_orientations, is_reduced
 
 __all__ = ["PageStack", "page_stacks"]
 
@@ -106,7 +106,7 @@ def page_stacks(
         return [one_ifd]
     described = any(getattr(tif, f"is_{kind}", False) for kind in _DESCRIBED) and not companion
     found = list(_described(tif, images, channel)) if described else []
-    found = found or _gathered(pages)
+    found = found or _gathered(pages, path)
     if not found:
         raise VolumeError(
             f"it holds no stack of slices, but {len(tif.pages)} pages that differ",
@@ -194,7 +194,7 @@ def _imagej_in_one_ifd(
     return PageStack(numbers, first, offset=first.dataoffsets[0], aside=aside, axis=axis)
 
 
-def _gathered(tif: tifffile.TiffFile) -> list[PageStack]:
+def _gathered(tif: tifffile.TiffFile, path: Path) -> list[PageStack]:
     """Gather pages of the same size and type, as programs leave them that write page by page.
 
     Single pages of another kind in between are slices gone wrong; many of them are something else.
@@ -204,7 +204,7 @@ def _gathered(tif: tifffile.TiffFile) -> list[PageStack]:
     for number, page in enumerate(tif.pages):
         if not isinstance(page, tifffile.TiffPage) or is_reduced(page):
             continue
-        kind = (page.shape, page.dtype, page.photometric, page.samplesperpixel, orientation_of(page))
+        kind = (page.shape, page.dtype, page.photometric, page.samplesperpixel)
         kinds[kind].append(number)
         pages[number] = page
     stacks = [numbers for numbers in kinds.values() if len(numbers) > 1]
@@ -214,6 +214,7 @@ def _gathered(tif: tifffile.TiffFile) -> list[PageStack]:
         between = strange if len(strange) <= FEW * len(numbers) or len(strange) == 1 else []
         slices = sorted({*numbers, *between})
         first = pages[numbers[0]]
+        check_orientations([pages[m] for m in numbers], path)
         name = f"pages of {first.imagewidth} x {first.imagelength}"
         found.append(
             PageStack(

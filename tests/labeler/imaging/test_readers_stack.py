@@ -491,3 +491,36 @@ def test_a_preview_is_coarse_and_needs_no_voxel_size(tmp_path: Path) -> None:
     preview = read_preview(plan, reverse=True)
     np.testing.assert_array_equal(preview.array, scan.array[::-1][::2, ::2, ::2])
     assert preview.spacing == (2.0, 2.0, 2.0)
+
+
+NAMES = {
+    "hexadecimal": lambda k: f"im_{k + 3:04x}.tif",
+    "hexadecimal, capital": lambda k: f"face{k:04X}.tif",
+    "position": lambda k: f"head_z{0.3 * k:.2f}.tif",
+    "position in the middle": lambda k: f"head_{0.125 * k:07.3f}mm.tif",
+    "time": lambda k: f"2024-05-03_12-{k // 60:02d}-{k % 60:02d}_slice{k:04d}.tif",
+    "time to the second alone": lambda k: f"rec 12-{10 + k // 60:02d}-{k % 60:02d} no {k}.tif",
+    "of": lambda k: f"slice {k + 1} of 61.tif",
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_slices_are_counted_however_they_are_named(name: str, tmp_path: Path) -> None:
+    scan = cropped()
+    for k, plane in enumerate(scan.array):
+        tifffile.imwrite(tmp_path / NAMES[name](k), plane, metadata=None)
+    assert codes(inspect_volume(tmp_path)) == (["spacing-missing"], [])
+    assert_same_values(tmp_path, scan)
+
+
+def test_a_counter_that_goes_on_does_not_join_two_stacks() -> None:
+    files = [Path(f"ear{1 + k // 20}_{k:03d}.tif") for k in range(40)]
+    assert [len(group.files) for group in group_slices(files)] == [20, 20]
+    files = [Path(f"v{1 + k // 20}.{k % 20:03d}.tif") for k in range(40)]
+    assert [len(group.files) for group in group_slices(files)] == [20, 20]
+
+
+def test_a_hexadecimal_slice_that_is_missing_is_named() -> None:
+    files = [Path(f"im_{k:03x}.tif") for k in range(40) if k != 27]
+    (group,) = group_slices(files)
+    assert number_slices(group).missing == (27,)
