@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike, fspath
 
 from gp_core.terminal import printable
 
-__all__ = ["FeatureError", "FileFormatError", "FrameError", "GeometryError", "GpError"]
+__all__ = ["FeatureError", "FileFormatError", "FrameError", "GeometryError", "GpError", "blaming"]
 
 
 class GpError(Exception):
@@ -64,3 +66,14 @@ class GeometryError(GpError):
 
 class FrameError(GpError):
     """Coordinates of different frames meet."""
+
+
+@contextmanager
+def blaming(file: str | PathLike[str]) -> Iterator[None]:
+    """Name a file in the errors that name no other, nor a specimen."""
+    try:
+        yield
+    except GpError as error:
+        if error.file or error.specimen:
+            raise
+        raise type(error)(error.problem, file=file, landmark=error.landmark, remedy=error.remedy) from None

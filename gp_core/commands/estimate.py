@@ -23,13 +23,12 @@ from gp_core.commands.options import (
     add_command,
     add_json,
     add_names,
-    blaming,
     lab_names,
     read_atlas,
     save_json,
     say,
 )
-from gp_core.errors import GpError
+from gp_core.errors import GpError, blaming
 from gp_core.landmarks.files import read_touches
 from gp_core.landmarks.files.naming import named_side
 from gp_core.landmarks.sets import LandmarkSet, Specimen

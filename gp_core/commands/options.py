@@ -25,7 +25,6 @@ __all__ = [
     "add_json",
     "add_names",
     "add_specimens",
-    "blaming",
     "keeping_inputs",
     "lab_names",
     "labelled_specimens",
@@ -159,17 +158,6 @@ def _is_atlas_file(word: str) -> bool:
     if b'"gpAtlas"' in read_head(path, 1000):
         return True
     return name.endswith(".json") and not name.endswith(".mrk.json")
-
-
-@contextmanager
-def blaming(file: str) -> Iterator[None]:
-    """Name a file in the errors that name no other, nor a specimen."""
-    try:
-        yield
-    except GpError as error:
-        if error.file or error.specimen:
-            raise
-        raise type(error)(error.problem, file=file, landmark=error.landmark, remedy=error.remedy) from None
 
 
 def save_json(path: str | None, content: Any) -> None:

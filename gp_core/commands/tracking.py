@@ -13,12 +13,12 @@ from gp_core.commands.options import (
     add_command,
     add_json,
     add_names,
-    blaming,
     lab_names,
     save_json,
     say,
 )
 from gp_core.disk import write_text
+from gp_core.errors import blaming
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.files import read_landmarks, read_touches
 from gp_core.landmarks.sets import LandmarkSet

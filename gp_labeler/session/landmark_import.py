@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
-from gp_core.errors import GpError
+from gp_core.errors import GpError, blaming
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.files import PointList, landmarks_of, read_points
 from gp_core.landmarks.sets import LandmarkSet
@@ -89,7 +89,8 @@ def import_landmarks(
         "accept_misfit": accept_misfit,
     }
     new = provenance(session, How.IMPORTED, source=source)
-    session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
+    with blaming(source):
+        session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
     return (*_doubtful_origin(session, lists), *off_bone, *_suggested(sets))
 
 

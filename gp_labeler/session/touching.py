@@ -8,7 +8,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from gp_core.errors import GpError
+from gp_core.errors import GpError, blaming
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.files import label_names, read_points, read_touches
 from gp_core.landmarks.files.naming import named_side
@@ -93,7 +93,8 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
     about: dict[str, Any] = {"how": TouchHow.FILE, "time": session.now(), "by": session.author}
     points = {**touched.as_mapping(), **touched.extra}
     source = Path(path).name
-    taken = {name: Touch(as_position(p, name), source=source, **about) for name, p in points.items()}
+    with blaming(path):
+        taken = {name: Touch(as_position(p, name), source=source, **about) for name, p in points.items()}
     if not taken:
         raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
     session.do(TakeTouches(Side.parse(side), taken))
@@ -139,7 +140,8 @@ def load_skull(session: Session, path: str | PathLike[str]) -> tuple[str, ...]:
         raise GpError(
             "names no skull feature", file=path, remedy="Name them as the touches do, such as S1 to S8."
         )
-    session.do(SetSkull({name: as_position(point, name) for name, point in skull.items()}))
+    with blaming(path):
+        session.do(SetSkull({name: as_position(point, name) for name, point in skull.items()}))
     return tuple(skull)
 
 

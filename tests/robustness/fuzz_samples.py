@@ -1,0 +1,175 @@
+"""A good file of every kind that the program reads, small, made here: what a fuzz run begins with."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from pathlib import Path
+from types import MappingProxyType
+
+import numpy as np
+
+from gp_core import CODES, PROBE, Atlas, estimate_pose, read_touches
+from gp_core.atlas.draw import draw_animal
+from gp_core.landmarks.files import write_csv, write_fcsv, write_markups
+from gp_core.landmarks.sets import LandmarkSet
+
+__all__ = ["make_samples"]
+
+SIDE = "L"
+
+
+def make_samples(folder: Path) -> dict[str, list[Path]]:
+    """Write the samples and return them by kind; each a file, or a folder that belongs together."""
+    rng = np.random.default_rng(0)
+    folder.mkdir(parents=True, exist_ok=True)
+    samples = _landmarks(folder / "landmarks", rng)
+    samples |= _tables(folder / "tables", rng)
+    samples |= _sessions(folder / "sessions")
+    samples["scan"] = _scans(folder / "scans", rng)
+    return samples
+
+
+def _landmarks(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
+    atlas = Atlas.published()
+    animals = folder / "animals"
+    animals.mkdir(parents=True)
+    for name in "ABCD":
+        animal = draw_animal(atlas, rng=rng)
+        for side in "LR":
+            write_markups(animals / f"{name}_{side}.mrk.json", animal.side(side), specimen=name)
+    one = draw_animal(atlas, rng=rng).side(SIDE)
+    skull = {f"S{i}": rng.normal(scale=15, size=3) for i in range(1, 9)}
+    with_skull = LandmarkSet(one.points, one.side, one.frame, extra=MappingProxyType(skull))
+    write_markups(folder / "one_L.mrk.json", with_skull, specimen="one")
+    write_fcsv(folder / "one_L.fcsv", with_skull)
+    write_csv(folder / "one_L.csv", with_skull)
+    touched = [f"{code},{','.join(repr(float(x)) for x in one[code])}" for code in PROBE]
+    touched += [f"{name},{','.join(repr(float(x)) for x in p + 0.1)}" for name, p in skull.items()]
+    (folder / "touches.csv").write_text("name,x,y,z\n" + "\n".join(touched) + "\n")
+    (folder / "touches.tsv").write_text("name\tx\ty\tz\n" + "\n".join(touched).replace(",", "\t") + "\n")
+    np.savetxt(folder / "touches.dat", rng.normal(scale=10, size=(16, 3)), delimiter="\t")
+    marks = [folder / f"one_L{suffix}" for suffix in (".mrk.json", ".fcsv", ".csv")]
+    touches = [folder / f"touches{suffix}" for suffix in (".csv", ".tsv", ".dat")]
+    atlas.save(folder / "atlas.json")
+    estimate_pose(read_touches(touches[0], SIDE, unknown="extra"), SIDE).save(folder / "pose.json")
+    return {
+        "landmarks": marks,
+        "touches": touches,
+        "animals": [animals],
+        "atlas": [folder / "atlas.json"],
+        "pose": [folder / "pose.json"],
+    }
+
+
+def _tables(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
+    from scipy.io import savemat
+    from scipy.spatial.transform import Rotation
+
+    folder.mkdir()
+    turns = Rotation.random(40, random_state=rng).as_matrix()
+    poses = np.tile(np.eye(4), (40, 1, 1))
+    poses[:, :3, :3] = turns
+    poses[:, :3, 3] = turns @ np.array([0.0, 0.0, 100.0])
+    np.savetxt(folder / "poses.csv", poses.reshape(-1, 16), delimiter=",")
+    np.savetxt(folder / "poses.txt", poses[:, :3].reshape(-1, 12))
+    angle = np.linspace(0, 9, 60)
+    spiral = np.stack([0.2 * angle, 1.5 * np.cos(angle), 1.5 * np.sin(angle)], axis=1)
+    np.savetxt(folder / "path.csv", spiral, delimiter=",")
+    sets = {f"cc_{side}": rng.normal(scale=3, size=(len(CODES), 3, 3)) for side in "LR"}
+    savemat(folder / "sets.mat", sets, do_compression=True)
+    savemat(folder / "plain.mat", sets)
+    corners = rng.normal(size=(20, 3, 3))
+    record = np.zeros(20, np.dtype([("n", "<f4", 3), ("c", "<f4", (3, 3)), ("a", "<u2")]))
+    record["c"] = corners
+    (folder / "bone.stl").write_bytes(bytes(80) + np.uint32(20).tobytes() + record.tobytes())
+    lines = [f"vertex {a} {b} {c}" for a, b, c in corners.reshape(-1, 3).tolist()]
+    (folder / "words.stl").write_text("solid x\nfacet\n" + "\n".join(lines) + "\nendsolid\n")
+    row = {"registration": "icp", "method": "jrmpc", "e_co_mm": 0.5, "e_ma_deg": 4.0}
+    (folder / "physical.json").write_text(json.dumps({"rows": [row, row]}))
+    (folder / "checkpoint.json").write_text(json.dumps({"gpCheckpoint": 1, "key": "0" * 32, "results": {}}))
+    return {
+        "poses": [folder / "poses.csv", folder / "poses.txt"],
+        "path": [folder / "path.csv"],
+        "mat": [folder / "sets.mat", folder / "plain.mat"],
+        "stl": [folder / "bone.stl", folder / "words.stl"],
+        "physical": [folder / "physical.json"],
+        "checkpoint": [folder / "checkpoint.json"],
+    }
+
+
+def _sessions(folder: Path) -> dict[str, list[Path]]:
+    from gp_labeler.session.opening import new_session
+    from gp_labeler.session.specimen_edits import SetNotes, SetThreshold
+    from gp_labeler.session.touching import load_skull, load_touches, record_touch
+
+    folder.mkdir()
+    session = new_session(folder / "state", specimen="GP-014")
+    for value in range(5):
+        session.do(SetThreshold(value))
+    session.do(SetNotes("notes"))
+    load_touches(session, folder.parent / "landmarks" / "touches.dat", SIDE)
+    load_skull(session, folder.parent / "landmarks" / "one_L.csv")
+    record_touch(session, "R", "OS", (1, 2, 3))
+    saved = session.save(folder / "GP-014")
+    session.do(SetNotes("more"))
+    session.undo()
+    session.do(SetThreshold(9))
+    (journal,) = (folder / "state" / "journals").glob("*.jsonl")
+    shutil.copy(journal, folder / "journal.jsonl")
+    session.close(discard=True)
+    (folder / "script.toml").write_text(
+        'specimens = ["a"]\n[[step]]\ndo = "open"\npath = "{specimen}.nrrd"\n[[step]]\ndo = "place"\n'
+        'feature = "CA"\nside = "L"\nat = [1.0, 2, 3]\n[[step]]\ndo = "save"\n'
+    )
+    (folder / "script.json").write_text(json.dumps([{"do": "open", "phantom": 0}, {"do": "export"}]))
+    (folder / "recent.json").write_text(json.dumps({"files": ["/a", "/b"]}))
+    return {
+        "specimen": [saved],
+        "journal": [folder / "journal.jsonl"],
+        "script": [folder / "script.toml", folder / "script.json"],
+        "state": [folder / "recent.json"],
+    }
+
+
+def _scans(folder: Path, rng: np.random.Generator) -> list[Path]:
+    sys.path.append(str(Path(__file__).resolve().parents[1] / "labeler" / "imaging"))
+    import dicom_makers
+    import SimpleITK
+    import tifffile
+    from PIL import Image
+
+    folder.mkdir()
+    voxels = (200 * (rng.random((10, 12, 14)) > 0.4) + 20 * rng.random((10, 12, 14))).astype(np.uint16)
+    image = SimpleITK.GetImageFromArray(voxels)
+    image.SetSpacing((0.1, 0.1, 0.2))
+    found = []
+    for name in ("a.nrrd", "a.mha", "a.nii", "a.nii.gz", "a.vtk"):
+        SimpleITK.WriteImage(image, str(folder / name), useCompression=name in ("a.nrrd", "a.nii.gz"))
+        found.append(folder / name)
+    for name in ("b.nhdr", "b.mhd", "b.hdr"):
+        pair = folder / name.replace(".", "_")
+        pair.mkdir()
+        SimpleITK.WriteImage(image, str(pair / name))
+        found.append(pair)
+    tifffile.imwrite(folder / "pages.tif", voxels, imagej=True, resolution=(10, 10), metadata={"unit": "mm"})
+    tifffile.imwrite(folder / "o.ome.tif", voxels, metadata={"axes": "ZYX", "PhysicalSizeX": 100.0})
+    found += [folder / "pages.tif", folder / "o.ome.tif"]
+    for suffix in ("png", "bmp", "jpg", "tif"):
+        stack = folder / f"stack_{suffix}"
+        stack.mkdir()
+        for n, plane in enumerate(voxels.astype(np.uint8)):
+            Image.fromarray(plane).save(stack / f"s{n:03d}.{suffix}")
+        (stack / "scan.log").write_text("[System]\nScanner=SkyScan1172\n[Acquisition]\nPixel Size (um)=100\n")
+        found.append(stack)
+    dicom = folder / "dicom"
+    dicom.mkdir()
+    found += [dicom_makers.write(dicom, dicom_makers.slices()[:4]), folder / "many.dcm", folder / "a.isq"]
+    dicom_makers.enhanced().save_as(folder / "many.dcm", enforce_file_format=True)
+    head = bytearray(512)
+    head[:16] = b"CTDATA-HEADER_V1"
+    head[16:20] = np.int32(3).tobytes()
+    head[44:68] = np.array([14, 12, 10, 1400, 1200, 2000], "<i4").tobytes()
+    (folder / "a.isq").write_bytes(bytes(head) + voxels.astype("<i2").tobytes())
+    return found
