@@ -145,6 +145,11 @@ def _pixel_problems(slices: Sequence[DicomSlice]) -> list[Problem]:
         text = f"PixelSpacing of {other.name} differs from that of {first.name}"
         remedy = "Choose another series, or accept the first's (--accept pixel-size)."
         found.append(Problem("pixel-size", text, remedy=remedy, resolved_by=("accept",)))
+    plain = next((one for one in slices if not one.scaled), None)
+    if plain is not None and any((one.slope, one.intercept) != (1.0, 0.0) for one in slices):
+        text = f"{plain.name} has no RescaleSlope, other slices have"
+        remedy = "Correct it, or accept its values as they are stored (--accept scaling)."
+        found.append(Problem("scaling", text, remedy=remedy, resolved_by=("accept",)))
     doubtful = next((one for one in slices if one.trouble), None)
     if doubtful is not None:
         text = f"of {doubtful.name}, {doubtful.trouble}"

@@ -67,7 +67,7 @@ def on_grid(slices: Sequence[DicomSlice]) -> Grid:
         return _sorted(slices, along, None, (warning("no-orientation", text),))
     locations = [one.location for one in slices if one.location is not None]
     if len(locations) == len(slices) and np.ptp(locations) > 0:
-        text = "the slices have no positions: they are ordered by their SliceLocation, and lie as far apart"
+        text = f"{_lacking(slices)}: they are ordered by their SliceLocation, and lie as far apart"
         return _sorted(slices, np.array(locations), None, (warning("no-positions", text),))
     return _by_number(slices)
 
@@ -206,11 +206,19 @@ def _apart(one: DicomSlice, axes: FloatArray) -> float:
     return 0.0 if one.axes is None else float(np.abs(one.axes - axes).max())
 
 
+def _lacking(slices: Sequence[DicomSlice]) -> str:
+    """Say that slices have no positions, or which."""
+    lacking = [one.name for one in slices if one.position is None]
+    if not 0 < len(lacking) < len(slices):
+        return "the slices have no positions"
+    return f"slices have no ImagePositionPatient, {names(lacking)}"
+
+
 def _by_number(slices: Sequence[DicomSlice]) -> Grid:
     """Sort slices without places by their number, then by name."""
     ordered = sorted(slices, key=lambda one: (one.number, one.file.path.name, one.frame))
     distance = ordered[0].file.between
-    text = "the slices have no positions: they are ordered by their instance numbers"
+    text = f"{_lacking(slices)}: they are ordered by their instance numbers"
     if distance is not None:
         text += f", and lie {distance:.4g} mm apart (SpacingBetweenSlices)"
     return Grid(tuple(ordered), distance, None, False, (warning("no-positions", text),))

@@ -21,7 +21,8 @@ __all__ = ["DicomFile", "DicomSlice", "Stored", "is_dicom", "is_dicomdir", "scan
 
 _TAGS = [
     "SOPClassUID", "ImageType", "SeriesInstanceUID", "SeriesNumber", "SeriesDescription", "InstanceNumber",
-    "ConcatenationUID", "AcquisitionNumber", "TemporalPositionIdentifier", "EchoNumbers", "SliceLocation",
+    "ConcatenationUID", "AcquisitionNumber", "TriggerTime", "ConvolutionKernel",
+    "TemporalPositionIdentifier", "EchoNumbers", "SliceLocation",
     "ImagePositionPatient", "ImageOrientationPatient", "PixelSpacing", "SliceThickness",
     "NominalScannedPixelSpacing", "GridFrameOffsetVector", "SpacingBetweenSlices", "Rows", "Columns",
     "NumberOfFrames", "SamplesPerPixel", "PhotometricInterpretation", "PixelPaddingValue",
@@ -131,6 +132,8 @@ class DicomSlice:
         From stored numbers to values.
     trouble : str
         What is wrong with these two.
+    scaled : bool
+        Whether the file says a slope.
     parts : dict
         Tags by which slices at one place may differ.
     """
@@ -146,6 +149,7 @@ class DicomSlice:
     slope: float
     intercept: float
     trouble: str
+    scaled: bool
     parts: dict[str, str]
 
     @property
@@ -271,6 +275,7 @@ def _slice(
         slope=slope,
         intercept=intercept,
         trouble=trouble,
+        scaled="RescaleSlope" in rescale,
         parts=_parts(tags, content),
     )
 
@@ -286,6 +291,8 @@ def _parts(tags: Any, content: Any) -> dict[str, str]:
         "time point": "TemporalPositionIdentifier",
         "acquisition": "AcquisitionNumber",
         "echo": "EchoNumbers",
+        "trigger time": "TriggerTime",
+        "kernel": "ConvolutionKernel",
         "image type": "ImageType",
     }
     parts = {word: "" if content is None else str(content.get(name, "")) for word, name in of_frame.items()}

@@ -59,7 +59,7 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
         head = file.read(HEADER_BYTES)
     end = re.search(rb"^[ \t]*ElementDataFile[^\n]*\n?", head, re.MULTILINE)
     fields = text_fields(decoded(head[: end.end() if end else len(head)]), "=:")
-    if end is None or not {"ndims", "dimsize", "elementtype"} <= fields.keys():
+    if end is None or not {"ndims", "dimsize", "elementtype", "elementdatafile"} <= fields.keys():
         raise not_a("MetaImage", path)
     layout = _layout(fields)
     said = fields["elementdatafile"]

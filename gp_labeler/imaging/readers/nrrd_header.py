@@ -117,6 +117,7 @@ def _layout(fields: dict[str, str]) -> tuple[Layout, list[str | None]]:
         )
     said = fields.get("spacedirections")
     axes: list[str | None] = [None] * n if said is None else re.findall(r"\([^)]*\)|none", said)
+    axes = ["none" if axis is not None and "nan" in axis.lower() else axis for axis in axes]
     if len(axes) != n:
         raise VolumeError(f"its space directions are {said!r}, for {n} axes", remedy="Correct its header.")
     kinds = _words(fields, "kinds", n, "???")
@@ -189,7 +190,7 @@ def _geometry(
     directions = [axes[axis] for axis in layout.space]
     if None in directions:
         return _by_spacings(fields, layout)
-    units, unknown, note = lengths_in_mm(_quoted(fields, "spaceunits", 3))
+    units, unknown, note = lengths_in_mm(_space_units(fields, layout))
     to_lps = np.diag(np.array(flips or (1, 1, 1)) * units)
     matrix = to_lps @ np.column_stack([_vector("space directions", text or "") for text in directions])
     origin = to_lps @ _vector("space origin", fields.get("spaceorigin", "(0,0,0)"))
@@ -203,6 +204,14 @@ def _geometry(
     return _with_units(
         Geometry(spacing, _three(origin), matrix / lengths, sides_known=flips is not None), unknown
     ), note
+
+
+def _space_units(fields: dict[str, str], layout: Layout) -> list[str]:
+    """Return the unit of each axis of space; some writers give one for all axes of the grid instead."""
+    if "spaceunits" in fields:
+        return _quoted(fields, "spaceunits", 3)
+    of_grid = {_quoted(fields, "units", len(layout.sizes))[axis] for axis in layout.space}
+    return [of_grid.pop() if len(of_grid) == 1 else ""] * 3
 
 
 def _by_spacings(fields: dict[str, str], layout: Layout) -> tuple[Geometry, tuple[str, ...]]:

@@ -100,8 +100,8 @@ def voxels_in(
         if len(files) > 1:
             raise VolumeError("its voxels are text in several files", remedy="Save it as one file.")
         return Whole(partial(_typed_out, files[0], stored, layout), finish)
-    each, rest = divmod(layout.n_planes, len(files))
-    if rest or not each:
+    each, rest = divmod(layout.n_planes, max(1, len(files)))
+    if rest or not each or not files:
         raise VolumeError(
             f"its {layout.n_planes} slices cannot be shared out among {len(files)} files",
             remedy="Correct its header.",

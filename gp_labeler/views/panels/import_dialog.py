@@ -138,7 +138,7 @@ class ImportDialog(QDialog):
         column.setSpacing(6)
         column.addWidget(text_label("Which side is left?", "heading"))
         words = (
-            "A stack of slices does not say it. Look for something that you know to be on one side, "
+            "The file does not say it for sure. Look for something that you know to be on one side, "
             "and reverse the slices if it is on the wrong one. The choice is kept with the specimen."
         )
         column.addWidget(text_label(words, "hint", wrap=True))

@@ -138,6 +138,18 @@ NRRDS: dict[str, Write] = {
         space_directions=" ".join(vector(axis * 1000) for axis in np.diag(SPACING)),
         space_origin=vector(ORIGIN * 1000),
     ),
+    "micrometres along the grid": attached(
+        PLAIN,
+        'units: "um" "um" "um"',
+        space_directions=" ".join(vector(axis * 1000) for axis in np.diag(SPACING)),
+        space_origin=vector(ORIGIN * 1000),
+    ),
+    "no direction is (nan, nan, nan)": attached(
+        np.stack([RAW, RAW // 3]).tobytes(),
+        dimension="4",
+        sizes=f"{SIZES} 2",
+        space_directions=" ".join(vector(axis) for axis in np.diag(SPACING)) + " (nan,nan,nan)",
+    ),
     "a unit for each axis": attached(
         PLAIN,
         'space units: "mm" "mm" "cm"',

@@ -314,6 +314,26 @@ ASKED: dict[str, tuple[Make, str]] = {
         changed(setting(ModalityLUTSequence=lambda n: [group(LUTDescriptor=[2, 0, 16])])),
         "ModalityLUTSequence",
     ),
+    "a slope in some slices": (
+        changed(lambda data, n: n < 9 or setting(RescaleSlope="2", RescaleIntercept="0")(data, n)),
+        "i000.dcm has no RescaleSlope, other slices have.*--accept scaling",
+    ),
+    "one slice without a position": (
+        changed(
+            lambda data, n: (
+                setting(SpacingBetweenSlices="0.6")(data, n),
+                n != 7 or delattr(data, "ImagePositionPatient"),
+                n != 7 or delattr(data, "PixelSpacing"),
+            )
+        ),
+        "PixelSpacing of i007.dcm differs",
+    ),
+    "kernels": (
+        lambda folder: write(
+            folder, [*slices(), *slices(HALF)], setting(ConvolutionKernel=lambda n: "BS"[n // N])
+        ),
+        "2 scans: series 1, kernel B: 34 slices",
+    ),
     "time points": (
         lambda folder: write(
             folder,
