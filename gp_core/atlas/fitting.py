@@ -3,30 +3,35 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import DEFINING, PLACED, Atlas
+from gp_core.atlas.generalised_procrustes import align_shapes, covariances, label_weights
 from gp_core.checks import FloatArray
-from gp_core.errors import FeatureError, GeometryError, GpError
-from gp_core.landmarks.anatomy import cochlea_frame, mirror_right
-from gp_core.landmarks.features import CODES, Side, check_codes
+from gp_core.errors import FeatureError, GpError
+from gp_core.landmarks.anatomy import mirror_right
+from gp_core.landmarks.features import CODES, check_codes
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.registration.procrustes import weighted_procrustes
 
-__all__ = ["fit_atlas", "left_shapes", "per_feature_covariance"]
+if TYPE_CHECKING:
+    from gp_core.atlas.screening import Screened
 
-_MAX_ITERATIONS = 50
-_TOLERANCE_MM = 1e-9
-_LABELLING_SD_MM = 0.05
-"""Floor of a feature's scatter, mm: no hand labels finer than this, and no weight grows without bound."""
+__all__ = ["as_left", "fit_atlas", "fit_consensus", "fit_plain_atlas", "fit_screened_atlas", "left_shapes"]
 
 
 def fit_atlas(
-    specimens: Sequence[Specimen], *, features: Iterable[str] | None = None, name: str | None = None
+    specimens: Sequence[Specimen],
+    *,
+    features: Iterable[str] | None = None,
+    name: str | None = None,
+    keep_doubtful: bool = False,
 ) -> Atlas:
     """Fit an atlas to labelled specimens, both sides pooled through the mirror.
+
+    Labels that `gp_core.atlas.screening.screen_labels` doubts are left out, and their animals count little.
+    Where nothing is in doubt, this is `fit_plain_atlas`, to the bit.
 
     Parameters
     ----------
@@ -36,6 +41,41 @@ def fit_atlas(
         What the atlas holds; by default every placed feature that at least two sides have.
     name : str, optional
         By default says how many specimens there are.
+    keep_doubtful : bool
+        Believe all labels: `fit_plain_atlas`.
+
+    Returns
+    -------
+    Atlas
+
+    Raises
+    ------
+    GpError
+        As `fit_plain_atlas`, for what is left.
+    """
+    if keep_doubtful:
+        return fit_plain_atlas(specimens, features=features, name=name)
+    from gp_core.atlas.screening import screen_labels  # it fits atlases
+
+    return fit_screened_atlas(screen_labels(specimens), features=features, name=name)
+
+
+def fit_screened_atlas(
+    screened: Screened, *, features: Iterable[str] | None = None, name: str | None = None
+) -> Atlas:
+    """Fit an atlas to what `screen_labels` left, each animal with its weight; see `fit_atlas`."""
+    return _fit(screened.specimens, screened.weights, features, name)
+
+
+def fit_plain_atlas(
+    specimens: Sequence[Specimen], *, features: Iterable[str] | None = None, name: str | None = None
+) -> Atlas:
+    """Fit an atlas in which every label of every animal counts alike: what the study of the paper needs.
+
+    Parameters
+    ----------
+    specimens, features, name
+        As for `fit_atlas`.
 
     Returns
     -------
@@ -55,16 +95,56 @@ def fit_atlas(
     Schäfer and Strimmer, "A shrinkage approach to large-scale covariance matrix estimation", 2005
     (target D). https://doi.org/10.2202/1544-6115.1175
     """
+    return _fit(specimens, np.ones(len(specimens)), features, name)
+
+
+def fit_consensus(specimens: Sequence[Specimen], *, name: str = "these animals") -> Atlas:
+    """Fit an atlas to what most animals agree on, wrong labels among them: not to keep, but to judge them by.
+
+    Raises
+    ------
+    GpError
+        As `fit_plain_atlas`.
+    """
+    owners, shapes, codes = _shapes_of(specimens, None)
+    weights = label_weights(shapes, codes, owners)
+    return _fit_shapes(specimens, shapes, codes, owners, weights, name)
+
+
+def _fit(
+    specimens: Sequence[Specimen], of_animals: FloatArray, features: Iterable[str] | None, name: str | None
+) -> Atlas:
+    owners, shapes, codes = _shapes_of(specimens, features)
+    weights = None
+    if not (of_animals == 1).all():
+        of_sides = np.repeat(of_animals, [len(specimen.sides) for specimen in specimens])
+        weights = np.repeat(of_sides[:, None], len(codes), axis=1)
+    return _fit_shapes(specimens, shapes, codes, owners, weights, name or f"{len(specimens)} specimens")
+
+
+def _shapes_of(
+    specimens: Sequence[Specimen], features: Iterable[str] | None
+) -> tuple[list[str], FloatArray, tuple[str, ...]]:
     owners, shapes = left_shapes(specimens)
     if len(shapes) < 3:
         raise GpError(f"an atlas needs at least three labelled sides, got {len(shapes)}")
     codes = _choose(shapes, features)
-    rows = [CODES.index(code) for code in codes]
-    mean, aligned = _generalised_procrustes(shapes[:, rows], codes, owners)
+    return owners, shapes[:, [CODES.index(code) for code in codes]], codes
+
+
+def _fit_shapes(
+    specimens: Sequence[Specimen],
+    shapes: FloatArray,
+    codes: tuple[str, ...],
+    owners: list[str],
+    weights: FloatArray | None,
+    name: str,
+) -> Atlas:
+    mean, aligned = align_shapes(shapes, codes, owners, weights)
     animals = [i for i, specimen in enumerate(specimens) for _ in specimen.sides]
-    scatter, covariance = _covariances(aligned - mean, animals)
+    scatter, covariance = covariances(aligned - mean, animals, weights)
     return Atlas(
-        name=name or f"{len(specimens)} specimens",
+        name=name,
         codes=codes,
         mean=mean,
         covariance=covariance,
@@ -95,12 +175,6 @@ def as_left(landmarks: LandmarkSet) -> FloatArray:
     return mirror_right(landmarks.points, landmarks.side)
 
 
-def per_feature_covariance(covariance: FloatArray) -> FloatArray:
-    """Return the covariance with every feature on its own, its variance the same in all directions."""
-    variances = covariance.diagonal().reshape(-1, 3).mean(axis=1)
-    return np.diag(np.repeat(variances, 3))
-
-
 def _choose(shapes: FloatArray, features: Iterable[str] | None) -> tuple[str, ...]:
     counts = np.isfinite(shapes).all(axis=2).sum(axis=0)
     common = tuple(code for code in PLACED if counts[CODES.index(code)] >= 2)
@@ -112,115 +186,3 @@ def _choose(shapes: FloatArray, features: Iterable[str] | None) -> tuple[str, ..
                 f"fewer than two sides have {code}", landmark=code, remedy="Label it in more specimens."
             )
     return tuple(code for code in PLACED if code in {*chosen, *DEFINING})
-
-
-def _generalised_procrustes(
-    shapes: FloatArray, codes: tuple[str, ...], owners: list[str]
-) -> tuple[FloatArray, FloatArray]:
-    """Align the shapes (S, n, 3) to their mean; return it (n, 3) in its own CO frame, and them."""
-    placed = ~np.isnan(shapes[:, :, 0])
-    mean = shapes[int(np.argmax(placed.sum(axis=1)))]
-    mean = _complete_start(mean, shapes, placed, codes, owners)
-    weights = np.ones(len(codes))
-    for _ in range(_MAX_ITERATIONS):
-        aligned = np.array(
-            [_align(s, p, mean, weights, o, codes) for s, p, o in zip(shapes, placed, owners, strict=True)]
-        )
-        updated = np.nanmean(aligned, axis=0)
-        variances = np.nansum((aligned - updated) ** 2, axis=(0, 2)) / (
-            3 * np.maximum(placed.sum(axis=0) - 1, 1)
-        )
-        weights = 1 / (variances + _LABELLING_SD_MM**2)
-        moved = np.abs(updated - mean).max()
-        mean = updated
-        if moved < _TOLERANCE_MM:
-            break
-    T_cochlea_mean = cochlea_frame(_as_landmarks(mean, codes)).inverse()
-    turned = [T_cochlea_mean.apply(shape) for shape in aligned]
-    return T_cochlea_mean.apply(mean), np.array(turned)
-
-
-def _complete_start(
-    mean: FloatArray,
-    shapes: FloatArray,
-    placed: NDArray[np.bool_],
-    codes: tuple[str, ...],
-    owners: list[str],
-) -> FloatArray:
-    """Fill features that the first shape lacks from the shapes that have them, aligned to it."""
-    start = mean.copy()
-    for row in np.flatnonzero(np.isnan(mean).any(axis=1)):
-        known = np.isfinite(start).all(axis=1)
-        donor = int(np.argmax(np.where(placed[:, row], (placed & known).sum(axis=1), -1)))
-        shared = placed[donor] & known
-        names = [code for code, has in zip(codes, shared, strict=True) if has]
-        try:
-            rotation, translation = weighted_procrustes(shapes[donor][shared], start[shared], names=names)
-        except GeometryError as error:
-            raise GeometryError(
-                f"{codes[row]} cannot be put to the others: {error.problem}",
-                specimen=owners[donor],
-                remedy="Label more features on each side.",
-            ) from None
-        start[row] = rotation @ shapes[donor][row] + translation
-    return start
-
-
-def _align(
-    shape: FloatArray,
-    placed: NDArray[np.bool_],
-    mean: FloatArray,
-    weights: FloatArray,
-    owner: str,
-    codes: tuple[str, ...],
-) -> FloatArray:
-    names = [code for code, has in zip(codes, placed, strict=True) if has]
-    try:
-        rotation, translation = weighted_procrustes(shape[placed], mean[placed], weights[placed], names=names)
-    except GeometryError as error:
-        raise GeometryError(error.problem, specimen=owner, remedy=error.remedy) from None
-    return shape @ rotation.T + translation
-
-
-def _as_landmarks(points: FloatArray, codes: tuple[str, ...]) -> LandmarkSet:
-    return LandmarkSet.from_mapping(dict(zip(codes, points, strict=True)), Side.LEFT, frame="mean")
-
-
-def _covariances(deviations: FloatArray, animals: Sequence[int]) -> tuple[FloatArray, FloatArray]:
-    """Return the sample covariance (3 n, 3 n) of deviations (S, n, 3), and the same shrunk.
-
-    NaN marks missing features; `animals` (S,) says whose sides they are: the two sides of an animal are
-    alike, so animals, not sides, are what the shrinkage counts as independent.
-    """
-    flat = deviations.reshape(len(deviations), -1)
-    known = np.isfinite(flat).astype(np.float64)
-    filled = np.nan_to_num(flat)
-    scatter = filled.T @ filled / np.maximum(known.T @ known - 1, 1)
-    floor = _LABELLING_SD_MM**2 / 10 * np.eye(len(scatter))
-    target = per_feature_covariance(scatter) + floor
-    intensity = _shrinkage(filled / np.sqrt(target.diagonal()), np.asarray(animals))
-    return _positive(scatter), _positive((1 - intensity) * scatter + intensity * target)
-
-
-def _shrinkage(unit: FloatArray, animals: NDArray[np.intp]) -> float:
-    """Return the share of the target that minimises the expected squared error of the correlations.
-
-    `unit` (S, 3 n): deviations in units of each feature's own SD.
-    """
-    products = np.array(
-        [unit[animals == animal].T @ unit[animals == animal] for animal in np.unique(animals)]
-    )
-    n, sides = len(products), len(unit)
-    mean = products.mean(axis=0)
-    variance = ((products - mean) ** 2).sum(axis=0) * n / (n - 1) / max(sides - 1, 1) ** 2
-    correlation = products.sum(axis=0) / max(sides - 1, 1)
-    off = ~np.eye(len(mean), dtype=bool)
-    return float(np.clip(variance[off].sum() / (correlation[off] ** 2).sum(), 0.0, 1.0))
-
-
-def _positive(covariance: FloatArray) -> FloatArray:
-    """Lift eigenvalues that pairwise-complete sums leave at or below zero."""
-    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
-    floor = 1e-6 * values.max()
-    lifted: FloatArray = (vectors * np.maximum(values, floor)) @ vectors.T
-    return lifted

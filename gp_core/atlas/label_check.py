@@ -154,6 +154,8 @@ class Finding:
     @property
     def severity(self) -> float:
         """Grows with how wrong the labels are, for sorting."""
+        if not self.is_doubt:
+            return -1.0
         farthest = max((away.n_sd for away in self.departures), default=0.0)
         return 1e6 * _RANKS.get(self.kind, 0) + farthest
 

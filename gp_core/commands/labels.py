@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.fitting import fit_atlas, fit_plain_atlas, fit_screened_atlas
 from gp_core.atlas.label_check import Finding, check_specimen
+from gp_core.atlas.screening import Screened, screen_labels
 from gp_core.commands.options import (
     Subparsers,
     add_command,
@@ -46,6 +48,13 @@ def add(commands: Subparsers) -> None:
     add_specimens(fit)
     fit.add_argument("-o", "--output", required=True, metavar="ATLAS", help="atlas file to write (.json)")
     fit.add_argument("--name", help="name of the atlas, by default the number of animals")
+    fit.add_argument(
+        "--keep-doubtful",
+        action="store_true",
+        help="believe labels that the check doubts, too; by default they are left out, and their animals "
+        "hardly count",
+    )
+    add_json(fit)
     mat = add_command(
         commands,
         "import-mat",
@@ -74,14 +83,49 @@ def add(commands: Subparsers) -> None:
 def run_fit(args: argparse.Namespace) -> int:
     """Fit, write, and say what the atlas holds."""
     specimens = labelled_specimens(args)
-    atlas = fit_atlas(specimens, name=args.name)
+    screened = screen_labels(specimens)
+    if args.keep_doubtful:
+        atlas = fit_plain_atlas(specimens, name=args.name)
+    else:
+        atlas = fit_screened_atlas(screened, name=args.name or f"{len(specimens)} specimens")
     atlas.save(args.output)
+    save_json(args.json, _fit_report(atlas, screened, kept=args.keep_doubtful))
+    _say_screened(screened, kept=args.keep_doubtful)
     spread = np.sqrt(atlas.variances(atlas.codes))
     say(f"Atlas of {len(specimens)} animals, {atlas.n_samples} sides: {args.output}")
     say("  feature   SD between animals, mm a coordinate")
     for code, sd in zip(atlas.codes, spread, strict=True):
         say(f"  {code:<9} {sd:5.2f}")
     return 0
+
+
+def _say_screened(screened: Screened, *, kept: bool) -> None:
+    """Say what the check found, the worst animal first, and what became of it."""
+    for name in dict.fromkeys(finding.specimen for finding in screened.findings):
+        _say_findings(name, [finding for finding in screened.findings if finding.specimen == name])
+    for note in screened.notes:
+        say(note)
+    if screened.left_out and kept:
+        say("All of these labels were believed (--keep-doubtful).")
+    elif screened.left_out:
+        n = len({finding.specimen for finding in screened.left_out})
+        say(
+            "Exchanged names and labels beyond 5 SD were left out; "
+            f"{_count(n, 'animal')} with such labels hardly {'count' if n > 1 else 'counts'}. "
+            "To believe them, add --keep-doubtful."
+        )
+
+
+def _fit_report(atlas: Atlas, screened: Screened, *, kept: bool) -> dict[str, Any]:
+    left_out = () if kept else screened.left_out
+    return {
+        "name": atlas.name,
+        "n_samples": atlas.n_samples,
+        "features": list(atlas.codes),
+        "findings": [finding.as_dict() for finding in screened.findings],
+        "left_out": [finding.as_dict() for finding in left_out],
+        "notes": list(screened.notes),
+    }
 
 
 def run_import_mat(args: argparse.Namespace) -> int:
@@ -98,11 +142,7 @@ def run_check(args: argparse.Namespace) -> int:
     report = {s.name: check_specimen(s, _atlas_for(s, atlas, others)) for s in specimens}
     save_json(args.json, {name: [f.as_dict() for f in findings] for name, findings in report.items()})
     for name, findings in report.items():
-        say(f"{name}: {_verdict(findings)}")
-        for finding in findings:
-            mark = "!" if finding.is_doubt else " "
-            codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
-            say(f"  {mark} {finding.side.word:<5} {codes:<8} {finding.text}")
+        _say_findings(name, findings)
     return int(any(f.is_doubt for findings in report.values() for f in findings))
 
 
@@ -120,6 +160,19 @@ def _one_side(args: argparse.Namespace) -> Specimen:
 def _atlas_for(specimen: Specimen, atlas: Atlas | None, others: list[Specimen] | None) -> Atlas:
     """Return the atlas, fitted without the animal that is held against it."""
     return atlas or fit_atlas([other for other in others or [] if other.name != specimen.name])
+
+
+def _say_findings(name: str, findings: list[Finding]) -> None:
+    say(f"{name}: {_verdict(findings)}")
+    for finding in findings:
+        mark = "!" if finding.is_doubt else " "
+        codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
+        remedy = f". {finding.remedy}" if finding.remedy else ""
+        say(f"  {mark} {finding.side.word:<5} {codes:<8} {finding.text}{remedy}")
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'' if n == 1 else 's'}"
 
 
 def _verdict(findings: list[Finding]) -> str:

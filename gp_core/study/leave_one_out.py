@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.fitting import fit_plain_atlas
 from gp_core.atlas.jrmpc_pose import training_sides
 from gp_core.atlas.pose import METHODS
 from gp_core.checks import FloatArray, check_option
@@ -218,7 +218,7 @@ def held_out_sides(
     wanted = {specimen.name for specimen in specimens} if names is None else set(names)
     features = tuple(features)
     atlases = {
-        name: fit_atlas([s for s in specimens if s.name != name], features=features) for name in wanted
+        name: fit_plain_atlas([s for s in specimens if s.name != name], features=features) for name in wanted
     }
     held_out = [
         (specimens[i].name, with_cochlea_origin(specimens[i].side(side)))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.fitting import fit_plain_atlas
 from gp_core.atlas.jrmpc_pose import training_sides
 from gp_core.atlas.pose import METHODS
 from gp_core.checks import FloatArray, check_option
@@ -145,7 +145,7 @@ def simulate(
     check_noise(noise)
     if n < 1:
         raise GpError(f"the number of animals to draw must be 1 or more, got {n}")
-    atlas = fit_atlas(specimens, features=features) if method == "robust" else None
+    atlas = fit_plain_atlas(specimens, features=features) if method == "robust" else None
     errors = {}
     for side, _ in sides_of(specimens):
         drawn = simulate_sides(specimens, side, n, features=features, settings=settings, rng=rng)

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import gp_core
+from gp_core.atlas.draw import draw_animal
 from gp_core.cli import main
 from gp_core.landmarks.files import write_csv
 
@@ -122,6 +123,27 @@ def test_check_finds_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture
     write_csv(tmp_path / "GP01_L.csv", gp_core.LandmarkSet.from_mapping(points, "L"))
     assert main(["check", str(tmp_path / "GP01_L.csv")]) == 1
     assert "FPA and LLI look exchanged" in capsys.readouterr().out
+
+
+def test_fit_leaves_out_what_check_doubts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    rng = np.random.default_rng(3)
+    for name in ("GP1", "GP2", "GP3", "GP4"):
+        for side in draw_animal(gp_core.Atlas.published(), rng=rng, name=name).sides.values():
+            if (name, side.side.value) == ("GP2", "L"):
+                side = side.with_point("CA", side["CB"]).with_point("CB", side["CA"])
+            gp_core.write_markups(tmp_path / f"{name}_{side.side.value}.mrk.json", side, specimen=name)
+    atlases = [tmp_path / "a.json", tmp_path / "kept.json"]
+    capsys.readouterr()
+    assert main(["fit", str(tmp_path), "-o", str(atlases[0]), "--json", str(tmp_path / "fit.json")]) == 0
+    told = capsys.readouterr().out
+    assert "! left  CA CB    CA and CB look exchanged. Exchange the names of CA and CB." in told
+    assert "--keep-doubtful" in told
+    (left_out,) = json.loads((tmp_path / "fit.json").read_text())["left_out"]
+    assert (left_out["kind"], left_out["landmarks"], left_out["side"]) == ("swapped", ["CA", "CB"], "L")
+    (tmp_path / "fit.json").unlink()
+    assert main(["fit", str(tmp_path), "-o", str(atlases[1]), "--keep-doubtful"]) == 0
+    without, kept = (gp_core.Atlas.load(path) for path in atlases)
+    assert kept.variances(["CA"])[0] > 10 * without.variances(["CA"])[0]
 
 
 def test_bad_input_is_one_line_and_status_2(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

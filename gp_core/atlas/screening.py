@@ -1,0 +1,183 @@
+"""What of the labels of many animals an atlas is fitted to: not what is known to be wrong.
+
+Every animal is checked by `gp_core.atlas.label_check` against the published atlas. Where that contradicts
+many labels of most sides, it is no atlas of such animals, and they are checked against what most of them
+agree on.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.fitting import fit_consensus
+from gp_core.atlas.label_check import FEWEST, Finding, check_specimen
+from gp_core.checks import FloatArray
+from gp_core.errors import GpError
+from gp_core.landmarks.features import FEATURES, Side
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+
+__all__ = ["Screened", "mean_shared_points", "screen_labels"]
+
+DOUBTFUL_WEIGHT = 0.02
+"""How much an animal counts in which labels are left out: where one is wrong, others may be."""
+
+_LEAVES_OUT = ("other side", "swapped", "duplicate", "far")
+_FOREIGN = 0.25
+"""Where more of the labels of most sides are far from where an atlas has them, it is of other animals."""
+
+_FEWEST_SIDES = 3
+"""That must have a feature elsewhere before that counts as their way to label it."""
+
+_SHARED_AT_MOST_MM = 5.0
+"""Farther apart, two labels of one point are not two tries at it."""
+
+
+@dataclass(frozen=True)
+class Screened:
+    """Labelled animals without the labels that are known to be wrong.
+
+    Attributes
+    ----------
+    specimens : tuple of Specimen
+        What is left of them; an animal of which too little is left is not among them.
+    weights : (n,) array
+        How much each of them counts.
+    findings : tuple of Finding
+        What the check of each animal found, the worst first.
+    notes : tuple of str
+        What else a person should know, one sentence each.
+    """
+
+    specimens: tuple[Specimen, ...]
+    weights: FloatArray
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def doubts(self) -> tuple[Finding, ...]:
+        """Those of the findings that say that a label is wrong."""
+        return tuple(finding for finding in self.findings if finding.is_doubt)
+
+    @property
+    def left_out(self) -> tuple[Finding, ...]:
+        """Those of the findings whose labels are left out."""
+        return tuple(finding for finding in self.findings if finding.kind in _LEAVES_OUT)
+
+
+def screen_labels(
+    specimens: Sequence[Specimen], *, confirmed: Collection[tuple[str, Side, str]] = ()
+) -> Screened:
+    """Check animals, and leave out labels that are exchanged, or beyond 5 SD from where they belong.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+    confirmed : collection of (str, Side, str)
+        Labels (animal, side, feature) that a person has looked at again and found right: they stay.
+    """
+    published = Atlas.published()
+    found = [_found(specimen, published, confirmed) for specimen in specimens]
+    notes = []
+    if _is_foreign(specimens, found):
+        try:
+            consensus = fit_consensus(specimens)
+        except GpError:  # too few of them: there is nothing else to hold them against
+            pass
+        else:
+            found = [_found(specimen, consensus, confirmed) for specimen in specimens]
+            notes.append("These animals are unlike the published atlas: each is checked against the others.")
+    else:
+        found, notes = _without_habits(specimens, found)
+    left = [_without(specimen, doubts) for specimen, doubts in zip(specimens, found, strict=True)]
+    kept = [i for i, specimen in enumerate(left) if specimen.sides]
+    weights = np.array([DOUBTFUL_WEIGHT if _leave_out(found[i]) else 1.0 for i in kept])
+    return Screened(
+        tuple(mean_shared_points(left[i]) for i in kept),
+        weights / weights.max(initial=DOUBTFUL_WEIGHT),
+        tuple(sorted((f for findings in found for f in findings), key=lambda f: -f.severity)),
+        tuple(notes),
+    )
+
+
+def mean_shared_points(specimen: Specimen) -> Specimen:
+    """Return an animal with the same IN on both sides: the mean of the two labels."""
+    sides = dict(specimen.sides)
+    frames = {side.frame for side in sides.values()}
+    if len(sides) < 2 or len(frames) > 1 or "cochlea" in frames:  # which is another for each side
+        return specimen
+    for code in (row.code for row in FEATURES if row.shared):
+        if all(code in side for side in sides.values()):
+            one, other = (side[code] for side in sides.values())
+            if 0 < np.linalg.norm(one - other) <= _SHARED_AT_MOST_MM:
+                sides = {key: side.with_point(code, (one + other) / 2) for key, side in sides.items()}
+    return Specimen(specimen.name, sides)
+
+
+def _found(specimen: Specimen, atlas: Atlas, confirmed: Collection[tuple[str, Side, str]]) -> list[Finding]:
+    return [
+        finding
+        for finding in check_specimen(specimen, atlas)
+        if not finding.landmarks
+        or not all((specimen.name, finding.side, code) in confirmed for code in finding.landmarks)
+    ]
+
+
+def _leave_out(findings: Sequence[Finding]) -> bool:
+    return any(finding.kind in _LEAVES_OUT for finding in findings)
+
+
+def _is_foreign(specimens: Sequence[Specimen], found: Sequence[Sequence[Finding]]) -> bool:
+    """Whether most sides have many labels far from where the atlas has them."""
+    foreign = []
+    for specimen, findings in zip(specimens, found, strict=True):
+        for side, landmarks in specimen.sides.items():
+            n_far = sum(finding.kind == "far" for finding in findings if finding.side is side)
+            foreign.append(n_far > _FOREIGN * len(landmarks.placed))
+    return sum(foreign) > len(foreign) / 2
+
+
+def _without_habits(
+    specimens: Sequence[Specimen], found: Sequence[Sequence[Finding]]
+) -> tuple[list[list[Finding]], list[str]]:
+    """Leave alone a feature that most sides have elsewhere: so it is labelled here."""
+    labelled = Counter(
+        code for specimen in specimens for side in specimen.sides.values() for code in side.placed
+    )
+    far = Counter(f.landmarks[0] for findings in found for f in findings if f.kind == "far")
+    habits = {code for code, n in far.items() if n >= _FEWEST_SIDES and n > labelled[code] / 2}
+    notes = [
+        f"{code} is far from its published place on {far[code]} of {labelled[code]} sides: it is kept."
+        for code in sorted(habits)
+    ]
+    kept = [[f for f in findings if f.kind != "far" or f.landmarks[0] not in habits] for findings in found]
+    return kept, notes
+
+
+def _without(specimen: Specimen, findings: Sequence[Finding]) -> Specimen:
+    """Return what is left of an animal."""
+    if not _leave_out(findings):
+        return specimen
+    sides = {}
+    for side, landmarks in specimen.sides.items():
+        left = _side_without(landmarks, [finding for finding in findings if finding.side is side])
+        if sum(code != "CO" for code in left.placed) >= FEWEST:
+            sides[side] = left
+    return Specimen(specimen.name, sides)
+
+
+def _side_without(landmarks: LandmarkSet, findings: Sequence[Finding]) -> LandmarkSet:
+    far = {code for finding in findings if finding.kind in ("far", "swapped") for code in finding.landmarks}
+    for finding in findings:
+        if finding.kind == "other side":
+            return LandmarkSet.empty(landmarks.side, frame=landmarks.frame)
+        if finding.kind == "duplicate" and far.intersection(finding.landmarks):
+            continue  # it is known which of the two it is
+        if finding.kind in _LEAVES_OUT:
+            for code in finding.landmarks:
+                landmarks = landmarks.with_point(code, None)
+    return landmarks
