@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import importlib
 import logging
 import os
@@ -10,7 +11,7 @@ import traceback
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QLocale, Qt, QTimer
+from PySide6.QtCore import QLocale, QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
 from PySide6.QtWidgets import QApplication
 
 from gp_core.errors import GpError
@@ -52,6 +53,9 @@ def make_application() -> QApplication:
     app.setApplicationName("gp-labeler")
     app.setApplicationDisplayName("gp-labeler")
     app.setStyle("Fusion")
+    if app.platformName() == "offscreen":
+        qInstallMessageHandler(_tell)
+        atexit.register(qInstallMessageHandler, None)  # no Python may be called once it has ended
     return app
 
 
@@ -129,6 +133,12 @@ def _has_display() -> bool:
     """Whether a window can be seen, or somebody said which platform Qt shall draw on."""
     named = ("DISPLAY", "WAYLAND_DISPLAY", "QT_QPA_PLATFORM")
     return not sys.platform.startswith("linux") or any(os.environ.get(name) for name in named)
+
+
+def _tell(_: QtMsgType, __: QMessageLogContext, text: str) -> None:
+    """Pass on Qt's messages, but for what its offscreen platform says of windows with a smallest size."""
+    if "propagateSizeHints" not in text:
+        sys.stderr.write(f"{text}\n")
 
 
 def _report(

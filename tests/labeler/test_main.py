@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
@@ -96,6 +97,25 @@ def test_the_window_opens_from_the_command_line_and_says_what_is_wrong(ball_file
     assert "Traceback" not in done.stderr
     assert (tmp_path / "state" / "window.json").exists()
     assert (tmp_path / "state" / "recent.json").read_text().count("ball.nrrd") == 1
+
+
+def test_a_script_says_nothing_but_its_steps(ball_file, tmp_path) -> None:
+    script = tmp_path / "look.json"
+    steps = [{"do": "open", "path": str(ball_file)}, {"do": "screenshot", "path": "w.png"}]
+    script.write_text(json.dumps(steps))
+    command = [
+        sys.executable,
+        "-m",
+        "gp_labeler",
+        "--offscreen",
+        str(script),
+        "--output",
+        str(tmp_path / "out"),
+    ]
+    env = dict(os.environ, QT_QPA_PLATFORM="offscreen")
+    done = subprocess.run(command, capture_output=True, text=True, timeout=600, env=env, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert len(done.stdout.splitlines()) == 3, done.stdout
 
 
 def test_a_simulated_tracker_is_one_command_away(capsys) -> None:
