@@ -38,7 +38,8 @@ def preview_planes(volume: Volume) -> tuple[PreviewPlane, PreviewPlane]:
     """Return the middle axial and coronal slice, the patient's right at the left as slices are shown."""
     array, (dx, dy, dz) = _along_lps(volume)
     low, high = volume.intensity_range
-    grey = ((array.astype(np.float32) - low) * (255 / max(high - low, 1e-6))).clip(0, 255).astype(np.uint8)
+    above = np.subtract(array, low, dtype=np.float64)
+    grey = (above * (255 / max(high - low, 1e-6))).clip(0, 255).astype(np.uint8)
     nz, ny, _ = grey.shape
     axial = PreviewPlane("axial", np.ascontiguousarray(grey[nz // 2]), dy / dx, "RLPA")
     coronal = PreviewPlane("coronal", np.ascontiguousarray(grey[::-1, ny // 2]), dz / dx, "RLIS")

@@ -71,6 +71,10 @@ def _table(scale: WindowLevel, dtype: str) -> Grey:
 
 
 def _scaled(scale: WindowLevel, values: NDArray[Any]) -> Grey:
-    shown = (values.astype(np.float32) - np.float32(scale.low)) * np.float32(255 / scale.width)
+    wide = values.dtype.itemsize > 2 and values.dtype != np.float32  # float32 would lose small differences
+    above = (
+        values.astype(np.float64) - scale.low if wide else values.astype(np.float32) - np.float32(scale.low)
+    )
+    shown = above * above.dtype.type(255 / scale.width)
     whole: Grey = np.nan_to_num(shown, nan=0.0, posinf=255.0, neginf=0.0).clip(0, 255).astype(np.uint8)
     return whole

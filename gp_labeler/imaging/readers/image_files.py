@@ -66,6 +66,8 @@ def _is_wide_colour(path: Path) -> bool:
 def _wide_colours(path: Path, channel: int | None) -> Plane:
     import imagecodecs  # takes a while, and is rarely needed
 
+    with Image.open(path) as image:
+        image.verify()  # libpng writes to the terminal where a checksum is wrong
     return to_grey(np.asarray(imagecodecs.png_decode(path.read_bytes())), channel)
 
 

@@ -532,6 +532,22 @@ def test_a_scanco_header_that_contradicts_itself_is_asked_about(step_um: int, tm
         assert is_right(tmp_path / "a.isq")
 
 
+@pytest.mark.parametrize("packing", ["lzw", "deflate", "zstd"])
+def test_each_page_is_decoded_once(packing: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pillow walked from the first page on for each of them, which is quadratic."""
+    tifffile.imwrite(tmp_path / "a.tif", body(), compression=packing, metadata=None, photometric=1)
+    asked: list[int] = []
+    unpacked = tifffile.TiffPage.asarray
+
+    def counted(page: tifffile.TiffPage, **how: object) -> np.ndarray:
+        asked.append(page.index)
+        return unpacked(page, **how)
+
+    monkeypatch.setattr(tifffile.TiffPage, "asarray", counted)
+    read_volume(tmp_path / "a.tif", **GIVEN)
+    assert sorted(asked) == list(range(SIZE[2]))
+
+
 # Costs ---------------------------------------------------------------------------------------------
 
 
