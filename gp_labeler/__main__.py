@@ -11,6 +11,7 @@ from pathlib import Path
 from gp_core import __version__
 from gp_core.errors import GpError
 from gp_core.terminal import leave_output, plain_terminal
+from gp_labeler.export_command import run_export
 from gp_labeler.installation import explain_import
 from gp_labeler.mesh_command import run_mesh
 from gp_labeler.plain_numbers import use_plain_numbers
@@ -23,6 +24,7 @@ _EXAMPLE = """examples:
   gp-labeler --demo                   the window with a synthetic head
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
+  gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
   gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
   gp-labeler doctor                   what this machine has, and what it lacks
 """
@@ -75,6 +77,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         if given[:1] == ["mesh"]:
             return run_mesh(given[1:])
+        if given[:1] == ["export"]:
+            return run_export(given[1:])
         if given[:1] == ["simulate-tracker"]:
             from gp_labeler.tracker.simulator import main as simulate  # here: nothing else needs a server
 

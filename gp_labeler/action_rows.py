@@ -84,13 +84,17 @@ def _is_suggested(desk: Workbench) -> bool:
     return mark is not None and mark.suggestion is not None
 
 
+def _is_shown(desk: Workbench) -> bool:
+    return _is_placed(desk) or _is_suggested(desk)
+
+
 def _can_confirm(desk: Workbench) -> bool:
     return _is_free(desk) and (_has_ghost(desk) or _is_suggested(desk))
 
 
 def _can_place(desk: Workbench) -> bool:
-    """Whether placing the chosen point moves none that is placed, or is asked for."""
-    return _has_scan(desk) and _is_free(desk) and (desk.replacing or not _is_placed(desk))
+    """Whether placing the chosen point moves none that has a place already, or is asked for."""
+    return _has_scan(desk) and _is_free(desk) and (desk.replacing or not _is_shown(desk))
 
 
 # What is done
@@ -328,7 +332,7 @@ def landmark_rows() -> Iterator[Action]:
               icon="label")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),
               lambda d, ui: d.arm_replacing(not d.replacing),
-              lambda d: _has_scan(d) and _is_free(d) and _is_placed(d), checked=lambda d: d.replacing,
+              lambda d: _has_scan(d) and _is_free(d) and _is_shown(d), checked=lambda d: d.replacing,
               hint="One click moves the chosen point; without this, a click leaves it where it is")
     yield row("point.skip", "Skip for now", ("N",), lambda d, ui: labelling.skip(d.session), _has_active,
               icon="skip")

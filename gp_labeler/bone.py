@@ -11,6 +11,7 @@ from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.surface import SMALLEST_PART_MM, box_around
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.session import labelling
 from gp_labeler.work import MeshEars, Meshes, MeshFirst, MeshOverview, ProposeThreshold
 
 if TYPE_CHECKING:
@@ -100,14 +101,12 @@ class Bone:
         return before is None or float(np.linalg.norm(before - place)) > _MOVED_MM
 
     def _ear(self, side: Side) -> FloatArray | None:
-        """Return about where the middle of an ear is, (3,) mm: from its labels, else from the ghosts."""
-        session = self._desk.session
-        landmarks, ghosts = session.landmarks(side), session.ghosts(side)
-        placed = [code for code in _NEAR if code in landmarks]
-        expected = [ghosts[code].position for code in _NEAR if code in ghosts]
-        if not placed and not expected:
+        """Return about where the middle of an ear is, (3,) mm: from its labels, suggestions and ghosts."""
+        places = [labelling.place_of(self._desk.session, side, code) for code in _NEAR]
+        known = [place for place in places if place is not None]
+        if not known:
             return None
-        middle: FloatArray = np.array([*(landmarks[code] for code in placed), *expected]).mean(axis=0)
+        middle: FloatArray = np.array(known).mean(axis=0)
         return middle
 
     def _take_proposal(self, threshold: float) -> None:

@@ -70,7 +70,7 @@ class DeskSignals:
     """The `Drag` that goes on; None when it is over."""
     tool_changed = Signal(str)
     replacing_changed = Signal(bool)
-    """Whether the next click moves the chosen point, which is placed already."""
+    """Whether the next click moves the chosen point, which is placed or suggested already."""
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into sight, mm."""
     import_asked = Signal(object)

@@ -99,7 +99,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.sight: Sight | None = None  # of the window, if there is one
         self.tool = "place"
         self.is_labelling = True  # whether a plain click may place
-        self.replacing = False  # whether the next click moves the chosen, placed point
+        self.replacing = False  # whether the next click moves the chosen point
         self._author = author
         self._last: tuple[Side, str] | None = None
         self._abandoned: SpecimenState | None = None
@@ -238,17 +238,17 @@ class Workbench(AtlasDesk, BoneDesk):
             self.set_tool("touch")
 
     def arm_replacing(self, on: bool = True) -> None:
-        """Let the next click, and no other, move the chosen point, which is placed; or think better of it.
+        """Let the next click, and no other, move the chosen point, or think better of it.
 
         Raises
         ------
         GpError
-            No placed point is chosen, or it is locked.
+            No placed or suggested point is chosen, or it is locked.
         """
         if on:
             active = self.session.active
             mark = None if active.code is None else self.session.state.landmark(active.side, active.code)
-            if active.code is None or mark is None or mark.position is None:
+            if active.code is None or mark is None or mark.shown_position is None:
                 raise GpError("no placed point is chosen to re-place", remedy="Choose one in the table.")
             require_free(self.session.state, [point_key(active.side, active.code)])
         if on != self.replacing:

@@ -1,4 +1,8 @@
-"""The demo: a phantom labelled by clicks, exported and checked, and a cochlea estimated from touches."""
+"""The demo: a phantom labelled, exported and checked, and a cochlea estimated from touches.
+
+On the left, suggestions are judged one by one: confirmed where they lie within a voxel of the truth, else
+re-placed by a click. On the right, everything is placed by clicks.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +31,17 @@ def demo_script(seed: int = 0, voxel_mm: float = 0.2) -> Script:
 
 def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "open", "phantom": seed, "spacing": voxel_mm}
-    for side in Side:
-        for code in _order(side):
-            yield {"do": "place", "feature": code, "side": side.value, "at": "truth", "within": voxel_mm}
-    yield {"do": "expect", "placed": 2 * len(FEATURES)}
+    left, right = list(_order(Side.LEFT)), list(_order(Side.RIGHT))
+    yield from _placed(left[: len(OPENING)], Side.LEFT, voxel_mm)
+    yield {"do": "action", "id": "point.accept_all"}
+    n_suggested = len(left) - len(OPENING)
+    yield {"do": "expect", "side": "L", "placed": len(OPENING), "suggested": n_suggested}
+    yield {"do": "screenshot", "path": "suggestions.png", "what": "window"}
+    for code in left[len(OPENING) :]:
+        judged = {"within": voxel_mm, "correct": True}
+        yield {"do": "confirm", "feature": code, "side": "L", **judged}
+    yield from _placed(right, Side.RIGHT, voxel_mm)
+    yield {"do": "expect", "placed": 2 * len(FEATURES), "suggested": 0}
     yield {"do": "export", "complete": True}
     yield {"do": "check", "path": "check.json", "strict": True}
     yield {"do": "save"}
@@ -47,6 +58,11 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "view", "opacity": 0.5}
     yield {"do": "screenshot", "path": "overlay.png", "what": "views", "size": [1400, 1000]}
     yield {"do": "save"}
+
+
+def _placed(codes: list[str], side: Side, voxel_mm: float) -> Iterator[dict[str, Any]]:
+    for code in codes:
+        yield {"do": "place", "feature": code, "side": side.value, "at": "truth", "within": voxel_mm}
 
 
 def _order(side: Side) -> Iterator[str]:

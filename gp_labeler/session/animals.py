@@ -148,7 +148,9 @@ class _Reading:
         side, what = landmarks.side, f"{name} {landmarks.side.word} ({file.name})"
         n_placed = sum(code != "CO" for code in landmarks.placed)
         if n_placed < FEWEST_PLACED:
-            self.skipped.append(Skipped(what, f"{n_placed} placed, {FEWEST_PLACED} or more are needed"))
+            others = f" and {len(landmarks.suggested)} only suggested" if landmarks.suggested else ""
+            words = f"{n_placed} placed{others}, {FEWEST_PLACED} or more are needed"
+            self.skipped.append(Skipped(what, words))
         elif side not in self.sides.get(name, {}):
             self.sides.setdefault(name, {})[side] = landmarks
             self.sources[name, side] = file

@@ -149,7 +149,15 @@ class PoseReport:
                 f", {len(registered.fiducials.names)} points: FRE {registered.fre_mm:.2f} mm, "
                 f"TRE at CO {registered.tre_mm(placed.origin):.2f} mm"
             )
-        return f"<p>{text}</p>"
+        return f"<p>{text}{self._unconfirmed()}</p>"
+
+    def _unconfirmed(self) -> str:
+        """Say which labels the registration and the errors leave out, since nobody has looked at them."""
+        codes = self.state.side(self.estimate.side).suggested
+        if not codes:
+            return ""
+        what = "label is" if len(codes) == 1 else "labels are"
+        return f"<br>{len(codes)} {what} only suggested and not used: {' '.join(codes)}"
 
     def _warnings(self) -> Iterator[str]:
         many = len(self.estimate.poses) > 1

@@ -156,7 +156,7 @@ def click_text(state: SpecimenState, active: Active) -> str:
     if landmark.locked:
         return f"{point} is locked"
     if landmark.suggestion is not None:
-        return f"{point} is suggested · Enter confirms it where it can be judged, a click places it"
+        return f"{point} is suggested · confirm it (Enter), or drag or re-place it to correct it"
     if landmark.position is not None:
         return f"{point} is placed · drag, nudge or re-place it to move it"
     after_all = " after all" if landmark.unseen else ""

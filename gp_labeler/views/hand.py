@@ -10,7 +10,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
 from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.session import labelling
-from gp_labeler.session.state import How
+from gp_labeler.session.state import How, Landmark
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.drawn import point_of
 from gp_labeler.views.panels.landmark_menu import landmark_menu
@@ -76,7 +76,7 @@ class Hand:
         """Take a click at a scan position (None: it missed) and on a mark (None: on none).
 
         A point that is to do is placed, one that shall be re-placed moves here; else a mark is chosen, or the
-        crosshair comes here. A click never moves a placed point just because its row is chosen.
+        crosshair comes here. A click never moves a placed or suggested point just because its row is chosen.
         """
         desk = self._desk
         if desk.replacing:
@@ -99,17 +99,18 @@ class Hand:
             desk.session.set_crosshair(position)
 
     def _is_to_place(self) -> bool:
-        """Whether a point is chosen that is not placed."""
-        active, state = self._desk.session.active, self._desk.session.state
-        return active.code is not None and state.landmark(active.side, active.code).position is None
+        """Whether a point is chosen that is neither placed nor suggested anywhere."""
+        mark = self._chosen()
+        return mark is not None and mark.shown_position is None
 
     def _is_to_do(self) -> bool:
         """Whether a point is chosen of which nothing is known: it may lie where another is placed."""
+        mark = self._chosen()
+        return mark is not None and mark.shown_position is None and not mark.unseen
+
+    def _chosen(self) -> Landmark | None:
         active, state = self._desk.session.active, self._desk.session.state
-        if active.code is None:
-            return False
-        mark = state.landmark(active.side, active.code)
-        return not mark.settled and mark.suggestion is None
+        return None if active.code is None else state.landmark(active.side, active.code)
 
     def take_back(self) -> None:
         """Take back the point that the first click of a double click placed."""

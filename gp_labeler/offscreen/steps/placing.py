@@ -65,8 +65,8 @@ class Place(Step):
         _ = rig.voxel
         before, since = rig.desk.session.state, len(rig.messages)
         rig.choose(self.side, code)
-        if self.at != "ghost" and rig.placed(self.side, code) is not None:
-            rig.desk.arm_replacing()  # a click alone leaves a placed point where it is
+        if self.at != "ghost" and rig.shown_at(self.side, code) is not None:
+            rig.desk.arm_replacing()  # a click alone leaves a point where it is
         name = self._hit(rig, code)
         rig.settle(in_passing=False)
         if rig.desk.session.state is before:
@@ -231,6 +231,8 @@ class Confirm(Step):
         Which side.
     within : float, optional
         Fail, and confirm nothing, where it lies farther than this from its true place in the phantom, mm.
+    correct : bool
+        Place it at its true place instead of failing, as a person does who sees that the suggestion is wrong.
     """
 
     do: ClassVar[str] = "confirm"
@@ -238,11 +240,14 @@ class Confirm(Step):
     feature: str
     side: Side
     within: float | None = None
+    correct: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         code = feature(self.feature).code
         rig.choose(self.side, code)
-        found = "" if self.within is None else self._judged(rig, code, self.within)
+        off = None if self.within is None else self._off(rig, code)
+        if off is not None and self.within is not None and off > self.within:
+            return self._refuse(rig, code, off)
         for _ in range(_MOST_LOOKS):
             if rig.desk.session.state.landmark(self.side, code).settled:
                 break
@@ -250,19 +255,22 @@ class Confirm(Step):
             rig.settle(in_passing=False)
         if rig.placed(self.side, code) is None:
             raise GpError(f"{code} {self.side.word} has no suggestion to confirm", landmark=code)
-        return found
+        return "" if off is None else f"{off:.3f} mm from there"
 
-    def _judged(self, rig: Rig, code: str, within: float) -> str:
+    def _off(self, rig: Rig, code: str) -> float:
+        """Return how far it is suggested from its true place, mm."""
         where = labelling.place_of(rig.desk.session, self.side, code)
         if where is None:
             raise GpError(f"{code} {self.side.word} has no suggestion to confirm", landmark=code)
-        off = float(np.linalg.norm(where - rig.truth(self.side, code)))
-        if off > within:
-            raise GpError(
-                f"{code} {self.side.word} is suggested {off:.3f} mm off, allowed are {within:g}",
-                landmark=code,
-            )
-        return f"{off:.3f} mm from there"
+        return float(np.linalg.norm(where - rig.truth(self.side, code)))
+
+    def _refuse(self, rig: Rig, code: str, off: float) -> str:
+        """Correct a suggestion that is too far off, or fail."""
+        if not self.correct:
+            problem = f"{code} {self.side.word} is suggested {off:.3f} mm off, allowed are {self.within:g}"
+            raise GpError(problem, landmark=code)
+        placed = Place(self.feature, self.side, at="truth", within=self.within).run(rig)
+        return f"suggested {off:.3f} mm off, so placed: {placed}"
 
 
 _MOST_LOOKS = 3

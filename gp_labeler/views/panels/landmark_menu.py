@@ -49,7 +49,7 @@ def _add_edits(add: Callable[..., None], workbench: Workbench, side: Side, code:
     add(
         "Re-place with the next click",
         lambda: _arm_replacing(workbench, side, code),
-        enabled=placed and free and workbench.volume is not None,
+        enabled=(placed or suggested) and free and workbench.volume is not None,
     )
     checked = mark.checked
     add(

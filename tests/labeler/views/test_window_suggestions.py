@@ -143,7 +143,7 @@ def test_a_dragged_suggestion_is_placed_and_escape_leaves_it_suggested(suggested
     assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.SLICE
 
 
-def test_a_nudge_and_a_click_elsewhere_place_it_and_a_click_on_it_only_chooses_it(suggested) -> None:
+def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(suggested) -> None:
     desk, axial = suggested.workbench, axial_of(suggested)
     axial.zoom_to(INSIDE, 10.0)
     click(axial, INSIDE)
@@ -152,8 +152,14 @@ def test_a_nudge_and_a_click_elsewhere_place_it_and_a_click_on_it_only_chooses_i
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.PLACED
     assert desk.session.undo()
-    click(axial, INSIDE + np.array([1.0, 1.0, 0.0]))
+    elsewhere = INSIDE + np.array([1.0, 1.0, 0.0])
+    click(axial, elsewhere)
+    QTest.keyClick(axial, Qt.Key.Key_Space)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    QTest.keyClick(suggested, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
+    click(axial, elsewhere)
     assert status_of(suggested, "MN") is PointState.PLACED
+    np.testing.assert_allclose(desk.session.landmarks(L)["MN"], elsewhere, atol=0.1)
 
 
 # Shown

@@ -1,0 +1,67 @@
+"""The command ``gp-labeler export``: the landmark files of specimens, without a window."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from gp_core.disk import protected_inputs
+
+__all__ = ["make_export_parser", "run_export"]
+
+_EXAMPLE = """examples:
+  gp-labeler export GP-014.gpspecimen.json -o landmarks
+  gp-labeler export *.gpspecimen.json -o landmarks --suggested
+
+Accepted ghosts that nobody has confirmed are suggestions, not observations: the landmark files leave them
+out. --suggested writes them too, into <specimen>_L_suggested.mrk.json and _R_.
+"""
+
+
+def make_export_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``gp-labeler export``."""
+    parser = argparse.ArgumentParser(
+        prog="gp-labeler export",
+        description="Write the landmarks of specimens as files for 3D Slicer and gp-core.",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("specimens", type=Path, nargs="+", metavar="SPECIMEN", help="a .gpspecimen.json file")
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR", help="where to write")
+    parser.add_argument(
+        "--format",
+        action="append",
+        metavar="SUFFIX",
+        help=".mrk.json (the default), .fcsv or .csv; may be given several times",
+    )
+    parser.add_argument("--suggested", action="store_true", help="write suggestions too, apart")
+    parser.add_argument("--replace", action="store_true", help="replace files of the same names")
+    return parser
+
+
+def run_export(arguments: Sequence[str]) -> int:
+    """Read, write, and say what was written and what is missing.
+
+    Raises
+    ------
+    GpError
+        A specimen cannot be read, nothing is placed in it, or a file is there already or cannot be written.
+    """
+    args = make_export_parser().parse_args(arguments)
+    from gp_labeler.session.landmark_export import export_landmarks  # here: `--help` need not wait
+    from gp_labeler.session.specimen_file import read_specimen
+
+    states = [read_specimen(path) for path in args.specimens]
+    with protected_inputs(args.specimens):
+        for state in states:
+            report = export_landmarks(
+                state,
+                args.output,
+                formats=tuple(args.format or (".mrk.json",)),
+                overwrite=args.replace,
+                suggested=args.suggested,
+            )
+            sys.stdout.write(f"{report.text}\n")
+    return 0
