@@ -12,6 +12,7 @@ from gp_core.commands import (
     conditions,
     estimate,
     labels,
+    recorded,
     study,
     study_errors,
     study_physical,
@@ -24,7 +25,17 @@ from gp_core.terminal import leave_output, plain_terminal
 
 __all__ = ["main", "make_parser"]
 
-_COMMANDS = (estimate, tracking, labels, study, study_search, study_errors, study_physical, conditions)
+_COMMANDS = (
+    estimate,
+    tracking,
+    recorded,
+    labels,
+    study,
+    study_search,
+    study_errors,
+    study_physical,
+    conditions,
+)
 
 
 def make_parser() -> argparse.ArgumentParser:

@@ -17,13 +17,15 @@ from gp_core.commands.options import (
     save_json,
     say,
 )
+from gp_core.commands.recorded import add_transforms
 from gp_core.disk import write_text
 from gp_core.errors import blaming
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.files import read_landmarks, read_touches
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.fiducials import FiducialRegistration, named_points, register_fiducials
-from gp_core.registration.pivot import PivotCalibration, calibrate_pivot, read_marker_poses
+from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
+from gp_core.registration.recordings import read_recording
 
 __all__ = ["add"]
 
@@ -57,9 +59,10 @@ def add(commands: Subparsers) -> None:
     pivot.add_argument(
         "poses",
         metavar="FILE",
-        help="marker to tracker, mm: a 4x4 matrix in each row, 16 numbers or the first 12, after a time stamp"
-        " or not; or four rows of four",
+        help="marker to tracker, mm: a sequence of PLUS or 3D Slicer (.igs.mha, .mha, .nrrd), or a table "
+        "with a 4x4 matrix or a quaternion in each row",
     )
+    add_transforms(pivot)
     add_json(pivot)
 
 
@@ -114,9 +117,9 @@ def _register_lines(found: FiducialRegistration, content: dict[str, Any]) -> Ite
 
 def run_pivot(args: argparse.Namespace) -> int:
     """Calibrate, print, and write what was asked for."""
-    poses = read_marker_poses(args.poses)
+    recording = read_recording(args.poses, transform=args.transform, reference=args.reference)
     with blaming(args.poses):
-        found = calibrate_pivot(poses)
+        found = calibrate_pivot(recording.poses)
     save_json(args.json, found.as_dict())
     for line in _pivot_lines(found, Path(args.poses).name):
         say(line)

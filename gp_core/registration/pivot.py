@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from os import PathLike
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gp_core.checks import FloatArray
-from gp_core.errors import FileFormatError, GeometryError, GpError
-from gp_core.landmarks.files.table import read_rows
-from gp_core.landmarks.files.text import shown
+from gp_core.errors import GeometryError, GpError
 
-__all__ = ["PivotCalibration", "calibrate_pivot", "read_marker_poses"]
+__all__ = ["PivotCalibration", "calibrate_pivot"]
 
 _FEWEST = 10
 _LEAST_SPREAD_DEG = 5.0
@@ -26,6 +23,8 @@ _MAXWELL_MEDIAN = 1.5382  # of the length of a Gaussian vector of scale one
 _EXACT_MM = 1e-6
 _NOT_RIGID = 1e-2
 _SHORTEST_PROBE_MM = 3.0
+_LONGEST_PROBE_MM = 500.0
+_NO_TRACKER_MM = 5.0
 _LARGE_RMS_MM = 1.0
 _LARGEST_RMS_MM = 5.0
 _KEEP_STILL = (
@@ -35,10 +34,6 @@ _KEEP_STILL = (
 _FARTHEST_MM = 1e5
 _N_REWEIGHTED = 40
 _N_ROUNDS = 5
-_MAX_ROWS = 200_000  # an hour at 60 Hz
-_NOT_SEEN = ("", "na", "nan", "null")
-_COLUMNS = {16: 0, 17: 1, 12: 0, 13: 1}
-"""Numbers in a row that holds a whole pose, and how many before it are a time stamp."""
 
 
 @dataclass(frozen=True)
@@ -160,6 +155,7 @@ def calibrate_pivot(T_tracker_marker: ArrayLike) -> PivotCalibration:
             f"the tip was not at rest, or the poses are not in mm: it moved by {rms:.3g} mm rms",
             remedy=_KEEP_STILL,
         )
+    _check_plausible(poses[kept], tip, pivot)
     rotations = poses[kept, :3, :3]
     return PivotCalibration(
         tip_offset=tip,
@@ -171,6 +167,25 @@ def calibrate_pivot(T_tracker_marker: ArrayLike) -> PivotCalibration:
         left_out=tuple(np.flatnonzero(seen & ~kept).tolist()),
         unseen=tuple(np.flatnonzero(~seen).tolist()),
     )
+
+
+def _check_plausible(poses: FloatArray, tip: FloatArray, pivot: FloatArray) -> None:
+    """Refuse poses in metres, and those of the tracker in the marker's frame.
+
+    These fit as well the other way round, with tip and pivot exchanged, so only their lengths tell.
+    """
+    if np.abs(poses[:, :3, 3]).max() < _NO_TRACKER_MM:
+        raise GeometryError(
+            f"the poses seem to be in metres: the marker stays within {_NO_TRACKER_MM:g} mm of its tracker",
+            remedy="Give them in mm.",
+        )
+    length, distance = (float(np.linalg.norm(vector)) for vector in (tip, pivot))
+    if length > _LONGEST_PROBE_MM and distance < _LONGEST_PROBE_MM:
+        raise GeometryError(
+            f"the tip would lie {length:.0f} mm from its marker, and {distance:.0f} mm from the tracker: "
+            "the poses seem to be those of the tracker in the marker's frame",
+            remedy="Give marker to tracker: invert each matrix.",
+        )
 
 
 def _tip_covariance(rotations: FloatArray, rms: float) -> FloatArray:
@@ -205,6 +220,11 @@ def _is_rigid(poses: FloatArray) -> NDArray[np.bool_]:
 
 def _check_frames(poses: FloatArray, kept: NDArray[np.bool_], seen: NDArray[np.bool_]) -> None:
     n_kept, n_seen = int(kept.sum()), int(seen.sum())
+    if n_seen >= _FEWEST and not _is_rigid(poses[seen]).any():
+        raise GeometryError(
+            f"none of the {n_seen} poses is a rigid motion",
+            remedy="Export 4x4 matrices row by row, or quaternions under a header (qw,qx,qy,qz,tx,ty,tz).",
+        )
     if n_seen < _FEWEST:
         raise GeometryError(
             f"a pivot calibration needs at least {_FEWEST} frames, got {n_seen}"
@@ -257,58 +277,3 @@ def _solve(poses: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArr
     residuals = np.full(len(poses), np.inf)
     residuals[counts] = np.linalg.norm(rotations @ tip + arms - mean @ tip, axis=1)
     return tip, mean @ tip + middle, residuals
-
-
-def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
-    """Read the poses of a marker from a table of numbers, with or without a header.
-
-    A row is a whole pose: the 16 numbers of its 4x4 matrix row by row, or the first 12, either after a time
-    stamp or not; or four rows of four are one. Empty cells, NA and NaN mean that the marker was not seen.
-
-    Returns
-    -------
-    (N, 4, 4) array
-        ``T_tracker_marker``, mm; NaN where it was not seen.
-
-    Raises
-    ------
-    FileFormatError
-        Not such a table.
-    """
-    rows = _read_rows(path)
-    width = len(rows[0]) if rows else 0
-    if (
-        any(len(row) != width for row in rows)
-        or width not in (*_COLUMNS, 4)
-        or (width == 4 and len(rows) % 4)
-    ):
-        raise FileFormatError(
-            f"must hold a pose in every row, as 16 or 12 numbers, or 4 numbers in every four rows; got "
-            f"{len(rows)} rows of {width or 'no'} columns"
-            + ("" if all(len(row) == width for row in rows) else " and others"),
-            file=path,
-            remedy="Export the marker's 4x4 matrices row by row.",
-        )
-    numbers = np.array(rows)
-    if width == 4:
-        return numbers.reshape(-1, 4, 4)
-    numbers = numbers[:, _COLUMNS[width] :]
-    poses = np.tile(np.eye(4), (len(numbers), 1, 1))
-    n_rows = numbers.shape[1] // 4
-    poses[:, :n_rows] = numbers.reshape(-1, n_rows, 4)
-    return poses
-
-
-def _read_rows(path: str | PathLike[str]) -> list[list[float]]:
-    found = []
-    for i, (number, fields) in enumerate(read_rows(path, aligned=True, at_most=_MAX_ROWS)):
-        try:
-            found.append([float(field) if field.lower() not in _NOT_SEEN else np.nan for field in fields])
-        except ValueError:
-            if i > 0:
-                raise FileFormatError(
-                    f"line {number} must hold numbers only, got {shown(' '.join(fields))}",
-                    file=path,
-                    remedy="Write decimal points, and commas between numbers.",
-                ) from None
-    return found

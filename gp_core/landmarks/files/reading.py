@@ -51,6 +51,12 @@ _MIN_TO_TELL_A_POINT_FROM_A_SHAPE = 3
 def _suffix(path: str | PathLike[str]) -> str:
     name = fspath(path).lower()
     found = next((suffix for suffix in _READERS if name.endswith(suffix)), None)
+    if found is None and name.endswith((".mha", ".mhd", ".nrrd")):
+        raise FileFormatError(
+            "is an image, or a recording of a tracker, and holds no named points",
+            file=path,
+            remedy="Make touches of a recording with 'gp-core touches'.",
+        )
     if found is None:
         check_file(path)
         raise FileFormatError(

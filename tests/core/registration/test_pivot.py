@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError, GeometryError, GpError
-from gp_core.registration.pivot import calibrate_pivot, read_marker_poses
+from gp_core.registration.pivot import calibrate_pivot
+from gp_core.registration.recordings import read_marker_poses
 
 TIP = np.array([12.0, -4.0, 163.0])
 PIVOT = np.array([-80.0, 240.0, -900.0])
@@ -157,14 +158,15 @@ def test_what_is_no_recording_is_refused() -> None:
     for wrong in wrongs:
         with pytest.raises(GpError, match="marker poses must"):
             calibrate_pivot(wrong)
-    with pytest.raises(GeometryError, match="only 0 of 30 frames"):
+    with pytest.raises(GeometryError, match="none of the 30 poses is a rigid motion"):
         calibrate_pivot(np.zeros((30, 4, 4)))
 
 
-def test_metres_are_suspected() -> None:
+def test_metres_are_refused() -> None:
     poses = recorded()
     poses[:, :3, 3] /= 1000
-    assert "are the poses in mm" in calibrate_pivot(poses).warnings[0]
+    with pytest.raises(GeometryError, match=r"seem to be in metres.*Give them in mm"):
+        calibrate_pivot(poses)
 
 
 def _text(rows: NDArray[Any], mark: str) -> str:
