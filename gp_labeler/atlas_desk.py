@@ -64,6 +64,7 @@ class AtlasDesk(DeskSignals):
         self.atlas_source: AtlasSource | None = None
         self.atlas_problem = ""  # why the one chosen last is not in use
         self.animals: Animals | None = None
+        self.keep_doubtful = False  # in the fits to come
         self.trial: Trial | None = None
         self.session_replaced.connect(self._hold_against)
         self.jobs.cancelled.connect(self._on_cancelled)
@@ -82,6 +83,19 @@ class AtlasDesk(DeskSignals):
     def is_published_atlas(self) -> bool:
         """Whether the atlas in use is the one that the program comes with."""
         return self._atlas is not None and self._atlas is Atlas.published()
+
+    @property
+    def keeps_doubtful(self) -> bool:
+        """Whether the atlas in use was fitted to doubtful labels as well."""
+        return self.atlas_source is not None and self.atlas_source.keep_doubtful
+
+    @property
+    def atlas_words(self) -> str:
+        """Which atlas ghosts and doubts come from, where it is not the published one."""
+        if self._atlas is None or self.is_published_atlas:
+            return ""
+        without = f" without {self.session.state.specimen}" if self.is_held_out else ""
+        return f"the atlas of {self._atlas.name}{without}"
 
     @property
     def can_try_atlas(self) -> bool:
@@ -108,6 +122,7 @@ class AtlasDesk(DeskSignals):
         if self._atlas is not None:
             return
         source = None if self.atlas_memory is None else self.atlas_memory.recall()
+        self.keep_doubtful = source is not None and source.keep_doubtful
         if source is None:
             self._begin_with_published()
         else:
@@ -132,16 +147,38 @@ class AtlasDesk(DeskSignals):
 
         self.jobs.submit(ReadAtlas(file), take, key="atlas")
 
-    def fit_atlas(self, paths: Iterable[str | PathLike[str]]) -> None:
-        """Read labelled animals in the background, fit an atlas to them, and take it."""
+    def set_keep_doubtful(self, keep: bool) -> None:
+        """Believe doubtful labels in the fits to come, or leave them out; a fit in use is made again."""
+        if keep == self.keep_doubtful:
+            return
+        self.keep_doubtful = keep
+        source = self.atlas_source
+        if source is not None and source.animals and source.keep_doubtful != keep:
+            self.fit_atlas(source.animals)
+        self.atlas_details_changed.emit()
+
+    def fit_atlas(self, paths: Iterable[str | PathLike[str]], *, keep_doubtful: bool | None = None) -> None:
+        """Read labelled animals in the background, fit an atlas to them, and take it.
+
+        Parameters
+        ----------
+        paths : iterable of path
+            Files and folders.
+        keep_doubtful : bool, optional
+            Believe labels that `screening.screen_labels` would leave out; by default as set by
+            `set_keep_doubtful`.
+        """
         animals = tuple(map(Path, paths))
+        if keep_doubtful is not None:
+            self.keep_doubtful = keep_doubtful
+        keep_doubtful = self.keep_doubtful
 
         def take(fitted: FittedAtlas) -> None:
-            source = AtlasSource(animals=animals)
+            source = AtlasSource(animals=animals, keep_doubtful=keep_doubtful)
             self._take_fitted(fitted, source)
             self._remember_source(source)
 
-        self.jobs.submit(FitAtlas(animals), take, key="atlas")
+        self.jobs.submit(FitAtlas(animals, keep_doubtful), take, key="atlas")
 
     def save_atlas(self, path: str | PathLike[str]) -> None:
         """Write the atlas in use; raises `GpError` where there is none, or it cannot be written."""
@@ -245,7 +282,9 @@ class AtlasDesk(DeskSignals):
         name = self.session.state.specimen
         others = tuple(animal for animal in self._atlas_specimens if animal.name != name)
         if self.is_held_out and sum(len(animal.sides) for animal in others) >= FEWEST_ANIMALS:
-            self.jobs.submit(RefitAtlas(others), self._hold_out, key="atlas without")
+            confirmed = frozenset() if self.animals is None else self.animals.confirmed
+            job = RefitAtlas(others, keep_doubtful=self.keeps_doubtful, confirmed=confirmed)
+            self.jobs.submit(job, self._hold_out, key="atlas without")
         else:
             self._judge(Side, after=0.0)
 

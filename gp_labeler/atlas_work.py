@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_atlas
+from gp_core.atlas.fitting import fit_plain_atlas, fit_screened_atlas
+from gp_core.atlas.screening import screen_labels
 from gp_core.errors import GpError
 from gp_core.landmarks.features import PROBE, TRAINING, Side
 from gp_core.landmarks.sets import Specimen
@@ -62,9 +63,18 @@ class FittedAtlas:
 
 @dataclass(frozen=True)
 class FitAtlas:
-    """Read labelled animals, and fit an atlas to them."""
+    """Read labelled animals, and fit an atlas to them.
+
+    Parameters
+    ----------
+    paths : tuple of Path
+        Files and folders.
+    keep_doubtful : bool
+        Believe the labels that the check doubts, too.
+    """
 
     paths: tuple[Path, ...]
+    keep_doubtful: bool = False
     title = "Fitting the atlas"
 
     def run(self, progress: Progress) -> FittedAtlas:
@@ -79,9 +89,15 @@ class FitAtlas:
         animals = read_animals(self.paths, lambda fraction: progress(0.9 * fraction))
         progress(0.9)
         try:
-            return FittedAtlas(fit_atlas(animals.specimens, name=animals.text), animals)
+            return FittedAtlas(_fitted(animals, keep_doubtful=self.keep_doubtful), animals)
         except GpError as error:
             raise _with_reasons(error, animals) from None
+
+
+def _fitted(animals: Animals, *, keep_doubtful: bool) -> Atlas:
+    if keep_doubtful or animals.screened is None:
+        return fit_plain_atlas(animals.specimens, name=animals.text)
+    return fit_screened_atlas(animals.screened, name=animals.text)
 
 
 @dataclass(frozen=True)
@@ -112,7 +128,7 @@ class RecallAtlas:
         file = self.source.file
         try:
             if file is None:
-                return Recalled(FitAtlas(self.source.animals).run(progress))
+                return Recalled(FitAtlas(self.source.animals, self.source.keep_doubtful).run(progress))
             return Recalled(FittedAtlas(ReadAtlas(file).run(progress), Animals(())))
         except (GpError, OSError) as error:
             problem = f"{str(error).rstrip('.')}."
@@ -124,12 +140,16 @@ class RefitAtlas:
     """Fit an atlas to animals that were read before."""
 
     specimens: tuple[Specimen, ...]
+    keep_doubtful: bool = False
+    confirmed: frozenset[tuple[str, Side, str]] = frozenset()
     title = "Fitting the atlas to the other animals"
 
     def run(self, progress: Progress) -> Atlas:
         """Fit."""
         progress(0.0)
-        return fit_atlas(self.specimens)
+        if self.keep_doubtful:
+            return fit_plain_atlas(self.specimens)
+        return fit_screened_atlas(screen_labels(self.specimens, confirmed=self.confirmed))
 
 
 @dataclass(frozen=True)

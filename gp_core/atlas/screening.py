@@ -8,7 +8,7 @@ agree on.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +70,10 @@ class Screened:
 
 
 def screen_labels(
-    specimens: Sequence[Specimen], *, confirmed: Collection[tuple[str, Side, str]] = ()
+    specimens: Sequence[Specimen],
+    *,
+    confirmed: Collection[tuple[str, Side, str]] = (),
+    tell: Callable[[float], object] = lambda fraction: None,
 ) -> Screened:
     """Check animals, and leave out labels that are exchanged, or beyond 5 SD from where they belong.
 
@@ -79,9 +82,14 @@ def screen_labels(
     specimens : sequence of Specimen
     confirmed : collection of (str, Side, str)
         Labels (animal, side, feature) that a person has looked at again and found right: they stay.
+    tell : callable
+        Receives the fraction done, and may raise to stop.
     """
     published = Atlas.published()
-    found = [_found(specimen, published, confirmed) for specimen in specimens]
+    found = []
+    for n, specimen in enumerate(specimens):
+        tell(n / len(specimens))
+        found.append(_found(specimen, published, confirmed))
     notes = []
     if _is_foreign(specimens, found):
         try:

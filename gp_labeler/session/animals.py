@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
 import numpy as np
 
-from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.label_check import Finding, check_specimen
+from gp_core.atlas.label_check import Finding
+from gp_core.atlas.screening import Screened, screen_labels
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.files import load_specimens
@@ -50,13 +50,33 @@ class Animals:
         By name; only sides that can be used.
     skipped : tuple of Skipped
         What cannot be used.
-    doubts : tuple of Finding
-        Labels that are used, but that a person should look at.
+    screened : Screened, optional
+        What is left of them without the labels that are known to be wrong, and what was found.
+    files : mapping of (str, Side) to Path
+        Where each side was read from.
+    confirmed : frozenset of (str, Side, str)
+        Labels that a person marked as checked: animal, side, feature.
     """
 
     specimens: tuple[Specimen, ...]
     skipped: tuple[Skipped, ...] = ()
-    doubts: tuple[Finding, ...] = ()
+    screened: Screened | None = None
+    files: Mapping[tuple[str, Side], Path] = field(default_factory=dict)
+    confirmed: frozenset[tuple[str, Side, str]] = frozenset()
+
+    @property
+    def doubts(self) -> tuple[Finding, ...]:
+        """Labels that a person should look at, the worst first."""
+        found = () if self.screened is None else self.screened.doubts
+        return tuple(finding for finding in found if finding.kind != "other side")  # those are skipped
+
+    def specimen_file(self, name: str, side: Side) -> Path | None:
+        """Return the specimen file of an animal: what was read, or one of its name beside that."""
+        read = self.files.get((name, side))
+        if read is None or read.name.endswith(SUFFIX):
+            return read
+        beside = read.with_name(f"{name}{SUFFIX}")
+        return beside if beside.is_file() else None
 
     @property
     def n_sides(self) -> int:
@@ -90,7 +110,7 @@ def read_animals(
     Returns
     -------
     Animals
-        Sides with too few labels, or labelled on the wrong side, are left out.
+        Sides with too few labels, or labelled on the wrong side, are left out. Doubtful labels are not.
 
     Raises
     ------
@@ -102,16 +122,25 @@ def read_animals(
     for n, file in enumerate(files):
         tell(0.3 * n / max(len(files), 1))
         reading.read(file)
-    names = sorted(reading.sides, key=natural_key)
-    checked = []
-    for n, name in enumerate(names):
-        tell(0.3 + 0.7 * n / len(names))
-        checked.append(reading.checked(name))
-    return Animals(
-        tuple(specimen for specimen in checked if specimen.sides),
-        tuple(reading.skipped),
-        tuple(reading.doubts),
+    specimens = [Specimen(name, reading.sides[name]) for name in sorted(reading.sides, key=natural_key)]
+    screened = screen_labels(
+        specimens, confirmed=reading.confirmed, tell=lambda fraction: tell(0.3 + 0.7 * fraction)
     )
+    exchanged = {(f.specimen, f.side): f for f in screened.findings if f.kind == "other side"}
+    skipped = [Skipped(f"{name} {side.word}", f.text) for (name, side), f in exchanged.items()]
+    usable = [_without_sides(specimen, exchanged) for specimen in specimens]
+    return Animals(
+        tuple(specimen for specimen in usable if specimen.sides),
+        (*reading.skipped, *skipped),
+        screened,
+        reading.sources,
+        frozenset(reading.confirmed),
+    )
+
+
+def _without_sides(specimen: Specimen, unwanted: Collection[tuple[str, Side]]) -> Specimen:
+    name = specimen.name
+    return Specimen(name, {s: marks for s, marks in specimen.sides.items() if (name, s) not in unwanted})
 
 
 class _Reading:
@@ -121,12 +150,12 @@ class _Reading:
         self.sides: dict[str, dict[Side, LandmarkSet]] = {}
         self.sources: dict[tuple[str, Side], Path] = {}
         self.skipped: list[Skipped] = []
-        self.doubts: list[Finding] = []
+        self.confirmed: set[tuple[str, Side, str]] = set()
 
     def read(self, file: Path) -> None:
         """Take in the sides that a file holds."""
         try:
-            specimens = _specimens_in(file)
+            specimens = self._specimens_in(file)
         except GpError as error:
             self.skipped.append(Skipped(file.name, error.problem.rstrip(".")))
             return
@@ -134,15 +163,20 @@ class _Reading:
             for landmarks in specimen.sides.values():
                 self._take(specimen.name, landmarks, file)
 
-    def checked(self, name: str) -> Specimen:
-        """Return an animal with the sides that can be used, and note what to look at."""
-        animal = Specimen(name, self.sides[name])
-        findings = [f for f in check_specimen(animal, Atlas.published()) if f.is_doubt]
-        exchanged = {finding.side: finding for finding in findings if finding.kind == "other side"}
-        for side, finding in exchanged.items():
-            self.skipped.append(Skipped(f"{name} {side.word}", finding.text))
-        self.doubts += [finding for finding in findings if finding.side not in exchanged]
-        return Specimen(name, {s: marks for s, marks in animal.sides.items() if s not in exchanged})
+    def _specimens_in(self, file: Path) -> list[Specimen]:
+        if not file.name.endswith(SUFFIX):
+            return load_specimens(file)
+        state = read_specimen(file)
+        sides = {side: landmarks for side in Side if _has_own_labels(landmarks := state.side(side))}
+        if not sides:
+            raise GpError("nothing is placed in it", file=file)
+        self.confirmed |= {
+            (state.specimen, side, code)
+            for side, landmarks in sides.items()
+            for code in landmarks.placed
+            if not feature(code).computed and state.landmark(side, code).checked
+        }
+        return [Specimen(state.specimen, sides)]
 
     def _take(self, name: str, landmarks: LandmarkSet, file: Path) -> None:
         side, what = landmarks.side, f"{name} {landmarks.side.word} ({file.name})"
@@ -157,16 +191,6 @@ class _Reading:
         elif not _are_same(self.sides[name][side], landmarks):
             earlier = self.sources[name, side].name
             self.skipped.append(Skipped(what, f"this side is in {earlier} too, with other labels"))
-
-
-def _specimens_in(file: Path) -> list[Specimen]:
-    if not file.name.endswith(SUFFIX):
-        return load_specimens(file)
-    state = read_specimen(file)
-    sides = {side: landmarks for side in Side if _has_own_labels(landmarks := state.side(side))}
-    if not sides:
-        raise GpError("nothing is placed in it", file=file)
-    return [Specimen(state.specimen, sides)]
 
 
 def _has_own_labels(landmarks: LandmarkSet) -> bool:

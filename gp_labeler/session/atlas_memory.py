@@ -24,10 +24,13 @@ class AtlasSource:
         A saved atlas.
     animals : tuple of Path
         Labelled animals, files or folders of them, to fit it to.
+    keep_doubtful : bool
+        Whether labels that the check doubts are believed.
     """
 
     file: Path | None = None
     animals: tuple[Path, ...] = ()
+    keep_doubtful: bool = False
 
     @property
     def text(self) -> str:
@@ -62,7 +65,8 @@ class AtlasMemory:
         if isinstance(file, str) and file:
             return AtlasSource(Path(file))
         if isinstance(animals, list) and animals and all(isinstance(path, str) and path for path in animals):
-            return AtlasSource(animals=tuple(map(Path, animals)))
+            keep = content.get("keep_doubtful") is True
+            return AtlasSource(animals=tuple(map(Path, animals)), keep_doubtful=keep)
         return None
 
     def remember(self, source: AtlasSource | None) -> None:
@@ -73,6 +77,7 @@ class AtlasMemory:
                 content = {"file": str(absolute_path(source.file))}
             elif source is not None:
                 content = {"animals": [str(absolute_path(path)) for path in source.animals]}
+                content |= {"keep_doubtful": True} if source.keep_doubtful else {}
             self._path.parent.mkdir(parents=True, exist_ok=True)
             write_text(self._path, json.dumps(content, indent=1))
         except (OSError, GpError):

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from gp_core.atlas.label_check import Finding
+from gp_core.landmarks.features import feature
+from gp_labeler.views.bind import attempt
 from gp_labeler.views.ui_part import UiPart
 
 __all__ = ["AtlasUi"]
@@ -37,6 +40,22 @@ class AtlasUi(UiPart):
             self._remember_folder(paths[0])
             self._window.set_step("atlas")
             self._desk.fit_atlas(paths)
+
+    def show_finding(self, finding: Finding) -> None:
+        """Open the animal of a finding, and go to its first point."""
+        desk, name, side = self._desk, finding.specimen, finding.side
+        if desk.session.state.specimen != name:
+            file = None if desk.animals is None else desk.animals.specimen_file(name, side)
+            if file is None:
+                desk.say(f"{name} has no specimen file: open its scan and import its landmarks", "warning")
+                return
+            self.open_path(file)
+            if desk.session.state.specimen != name:
+                return
+        self._window.set_step("label")
+        code = next((code for code in finding.landmarks if not feature(code).computed), None)
+        if code is not None:
+            attempt(desk, lambda: desk.go_to(side, code))
 
     def ask_save_atlas(self) -> None:
         """Ask where, and write the atlas in use."""

@@ -197,6 +197,7 @@ class MainWindow(QMainWindow):
         self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
         self._scan.mesh.action_asked.connect(self.commands.run)
         self._atlas.asked.connect(self.commands.run)
+        self._atlas.animal_asked.connect(self.ui.show_finding)
         self._pose.touch_file_asked.connect(partial(self.commands.run, "pose.open_touches"))
         self._pose.skull_file_asked.connect(partial(self.commands.run, "pose.open_skull"))
         for asked, action in (

@@ -272,7 +272,9 @@ class Recorder(QObject):
         elif source is not None and source.file is not None:
             self.tables.append(step("atlas", path=str(source.file.absolute())))
         elif source is not None:
-            self.tables.append(step("atlas", specimens=[str(path.absolute()) for path in source.animals]))
+            kept = {"keep_doubtful": True} if source.keep_doubtful else {}
+            specimens = [str(path.absolute()) for path in source.animals]
+            self.tables.append(step("atlas", specimens=specimens, **kept))
 
     def _on_path(self, path: InsertionPath | None) -> None:
         if path is not None:

@@ -21,6 +21,10 @@ class UiPart:
     _desk: Workbench
     prompts: Prompts
 
+    def open_path(self, path: Path) -> None:
+        """Open a scan, specimen or atlas; `WindowUi` does."""
+        raise NotImplementedError
+
     @property
     def _folder(self) -> str:
         return self._window.memory.get("folder", str, str(Path.home()))  # type: ignore[no-any-return]

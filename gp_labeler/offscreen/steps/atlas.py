@@ -6,7 +6,9 @@ import json
 from dataclasses import dataclass
 from typing import ClassVar
 
-from gp_core import Atlas, Specimen, check_specimen, fit_atlas, load_specimens
+from gp_core import Atlas, Specimen, check_specimen, load_specimens
+from gp_core.atlas.fitting import fit_plain_atlas, fit_screened_atlas
+from gp_core.atlas.screening import screen_labels
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -26,17 +28,23 @@ class Fit(Step):
         Landmark files, or folders of them.
     path : str
         The atlas file.
+    keep_doubtful : bool
+        Believe labels that the check doubts, too; by default they are left out, and named.
     """
 
     do: ClassVar[str] = "fit"
     specimens: tuple[str, ...]
     path: str = "atlas.json"
+    keep_doubtful: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         specimens = load_specimens([rig.to_read(each) for each in self.specimens])
-        atlas, file = fit_atlas(specimens), rig.to_write(self.path)
+        screened, file = screen_labels(specimens), rig.to_write(self.path)
+        atlas = fit_plain_atlas(specimens) if self.keep_doubtful else fit_screened_atlas(screened)
         atlas.save(file)
-        return f"{rig.wrote(file)}, {len(specimens)} animals"
+        kept = "believed" if self.keep_doubtful else "left out"
+        doubts = [f"{f.specimen} {f.side.word}: {f.text}, {kept}." for f in screened.left_out]
+        return " ".join((f"{rig.wrote(file)}, {len(specimens)} animals.", *doubts))
 
 
 @dataclass(frozen=True)
@@ -49,18 +57,21 @@ class UseAtlas(Step):
         An atlas file, or ``published``.
     specimens : text or texts
         Instead: labelled animals, files or folders of them, to fit one to.
+    keep_doubtful : bool
+        Fit it to labels that the check doubts, too.
     """
 
     do: ClassVar[str] = "atlas"
     path: str | None = None
     specimens: tuple[str, ...] = ()
+    keep_doubtful: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         desk = rig.desk
         if (self.path is None) == (not self.specimens):
             raise GpError("atlas needs path or specimens, one of them")
         if self.specimens:
-            desk.fit_atlas([rig.to_read(each) for each in self.specimens])
+            desk.fit_atlas([rig.to_read(each) for each in self.specimens], keep_doubtful=self.keep_doubtful)
         elif self.path == "published":
             desk.use_published_atlas()
         else:

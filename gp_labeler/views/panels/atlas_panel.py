@@ -7,6 +7,7 @@ from typing import Any
 from PySide6.QtCore import QSize, Qt, Signal
 from PySide6.QtWidgets import (
     QBoxLayout,
+    QCheckBox,
     QGridLayout,
     QHBoxLayout,
     QProgressBar,
@@ -15,21 +16,22 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
+from gp_core.atlas.label_check import Finding
 from gp_labeler.atlas_work import FEWEST_ANIMALS, FitAtlas
 from gp_labeler.session.animals import Animals
 from gp_labeler.session.jobs import Task
-from gp_labeler.views.bind import follow
+from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.atlas_table import AtlasTable
+from gp_labeler.views.panels.finding_list import FindingList, FindingRow
 from gp_labeler.views.panels.import_words import sentence
-from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, emptied, scrolled, text_label
 from gp_labeler.views.panels.pose_parts import Notices
 from gp_labeler.workbench import Workbench
 
 __all__ = ["AtlasPanel"]
 
 _WIDEST = 1000
-_N_NOTICES = 4
 _METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
 
 
@@ -46,6 +48,8 @@ class AtlasPanel(QWidget):
 
     asked = Signal(str)
     """Id of an action of the menu Atlas."""
+    animal_asked = Signal(object)
+    """A `Finding` whose animal the user wants to see."""
 
     def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -55,6 +59,7 @@ class AtlasPanel(QWidget):
         self.trial, self.labels = TrialCard(workbench), LabelsCard(workbench)
         for asking in (self.which, self.own, self.trial):
             asking.asked.connect(self.asked)
+        self.own.animal_asked.connect(self.animal_asked)
         content = QWidget()
         content.setProperty("role", "panel")
         fit(content, lambda: content.setMaximumWidth(pixels(content, _WIDEST)))
@@ -186,6 +191,9 @@ def _made_from(desk: Workbench) -> str:
 class OwnCard(_AskingCard):
     """Fitting an atlas to labelled animals, and what was read for it."""
 
+    animal_asked = Signal(object)
+    """A `Finding` whose animal the user wants to see."""
+
     def __init__(self, workbench: Workbench) -> None:
         super().__init__("Fit to labelled animals")
         self._desk = workbench
@@ -198,11 +206,19 @@ class OwnCard(_AskingCard):
             row, "atlas.fit_folder", "From a folder…", "It is searched, and the folders in it"
         )
         self.add(row)
+        self.keep_doubtful = QCheckBox("Believe doubtful labels too")
+        self.keep_doubtful.setToolTip(
+            "Exchanged names and labels beyond 5 SD are left out, and their animals hardly count, unless you "
+            "tick this"
+        )
+        self.keep_doubtful.toggled.connect(self._keep_doubtful)
+        self.add(self.keep_doubtful)
         self._add_progress()
-        self.findings = QVBoxLayout()
-        self.findings.setSpacing(5)
+        self.findings = FindingList()
+        self.findings.chosen.connect(self.animal_asked)
         self.add(self.findings)
-        follow(self, workbench.atlas_changed, self.refresh)
+        for signal in (workbench.atlas_changed, workbench.atlas_details_changed):
+            follow(self, signal, self.refresh)
         for signal in (workbench.jobs.started, workbench.jobs.progressed):
             follow(self, signal, self._on_progress)
         for signal in (workbench.jobs.done, workbench.jobs.failed, workbench.jobs.cancelled):
@@ -211,18 +227,10 @@ class OwnCard(_AskingCard):
 
     def refresh(self, *_: object) -> None:
         """Show what was read."""
-        emptied(self.findings)
         animals = self._desk.animals
-        if animals is None:
-            return
-        self.findings.addWidget(Notice("good", f"{animals.text} were read."))
-        findings = _findings(animals)
-        for words, remedy in findings[:_N_NOTICES]:
-            self.findings.addWidget(Notice("warning", words, remedy))
-        if len(findings) > _N_NOTICES:
-            rest = text_label(f"and {len(findings) - _N_NOTICES} more", "hint")
-            rest.setToolTip("\n".join(" ".join(finding) for finding in findings[_N_NOTICES:]))
-            self.findings.addWidget(rest)
+        with blocked(self.keep_doubtful):
+            self.keep_doubtful.setChecked(self._desk.keep_doubtful)
+        self.findings.show_rows([] if animals is None else _findings(animals, self._desk.keeps_doubtful))
 
     def _add_progress(self) -> None:
         self.progress, self.stop = QProgressBar(), QPushButton("Stop")
@@ -247,23 +255,36 @@ class OwnCard(_AskingCard):
     def _on_end(self, _: Task[Any]) -> None:
         self._work.setVisible(any(isinstance(task.job, FitAtlas) for task in self._desk.jobs.running))
 
+    def _keep_doubtful(self, keep: bool) -> None:
+        self._desk.set_keep_doubtful(keep)
+
     def _stop(self) -> None:
         for task in self._desk.jobs.running:
             if isinstance(task.job, FitAtlas):
                 task.cancel()
 
 
-def _findings(animals: Animals) -> list[tuple[str, str]]:
-    """Return what was skipped, and what should be looked at."""
-    skipped = [(f"Skipped {each.what}", sentence(each.why)) for each in animals.skipped]
-    doubts = [
-        (
-            f"{each.specimen} {each.side.word} {' '.join(each.landmarks[:2])}",
-            sentence(f"{each.text}: look again"),
+def _words(finding: Finding) -> str:
+    """Return what was found, and where; a text about several landmarks names them itself."""
+    named = f" {finding.landmarks[0]}" if len(finding.landmarks) == 1 else ""
+    return f"{finding.specimen} {finding.side.word}{named}: {finding.text}"
+
+
+def _findings(animals: Animals, kept: bool) -> list[FindingRow]:
+    """Return what was left out or should be looked at, the worst first, and what was skipped."""
+    left_out = () if kept or animals.screened is None else animals.screened.left_out
+    rows = [FindingRow(f"{animals.text} were read.", level="good")]
+    rows += [
+        FindingRow(
+            _words(each),
+            f"Left out. {each.remedy}" if each in left_out else each.remedy,
+            target=each,
         )
         for each in animals.doubts
     ]
-    return skipped + doubts
+    rows += [FindingRow(f"Skipped {each.what}", sentence(each.why)) for each in animals.skipped]
+    notes = () if animals.screened is None else animals.screened.notes
+    return rows + [FindingRow(note, level="info") for note in notes]
 
 
 class LabelsCard(Card):
@@ -311,7 +332,7 @@ class TrialCard(_AskingCard):
         self._grid.setHorizontalSpacing(8)
         self._grid.setVerticalSpacing(3)
         self.add(self._table)
-        self.findings = QVBoxLayout()
+        self.findings = FindingList()
         self.add(self.findings)
         row = QHBoxLayout()
         self.run = self._button(
@@ -344,7 +365,8 @@ class TrialCard(_AskingCard):
         """Show the errors, or what it takes to find them."""
         trial = self._desk.trial
         emptied(self._grid)
-        emptied(self.findings)
+        skipped = () if trial is None else trial.skipped
+        self.findings.show_rows([FindingRow(f"Left out: {each.text}") for each in skipped])
         self._table.setVisible(trial is not None)
         self.words.setText(self._sentence())
         self._on_jobs()
@@ -357,12 +379,6 @@ class TrialCard(_AskingCard):
                 self._grid.addWidget(_figure(words, "" if column else "heading"), row, column)
         for column in range(5):
             self._grid.setColumnStretch(column, 1)
-        for skipped in trial.skipped[:_N_NOTICES]:
-            self.findings.addWidget(Notice("warning", f"Left out: {skipped.text}"))
-        if len(trial.skipped) > _N_NOTICES:
-            rest = text_label(f"and {len(trial.skipped) - _N_NOTICES} more", "hint")
-            rest.setToolTip("\n".join(skipped.text for skipped in trial.skipped[_N_NOTICES:]))
-            self.findings.addWidget(rest)
 
     def _sentence(self) -> str:
         desk, trial = self._desk, self._desk.trial

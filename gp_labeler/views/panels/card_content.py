@@ -60,7 +60,7 @@ class CardContent:
     can_unsee: bool = True
 
 
-def content_of(session: Session, *, has_scan: bool) -> CardContent:
+def content_of(session: Session, *, has_scan: bool, atlas: str = "") -> CardContent:
     """Return what the card says now.
 
     Parameters
@@ -69,6 +69,9 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
         What the user is doing.
     has_scan : bool
         Whether there is a scan to place anything on.
+    atlas : str
+        Which atlas is behind ghosts and doubts, such as ``the atlas of 8 animals``; empty for the published
+        one.
     """
     active = session.active
     if not has_scan:
@@ -78,6 +81,8 @@ def content_of(session: Session, *, has_scan: bool) -> CardContent:
     side, row = active.side, feature(active.code)
     state, mark = session.point_states(side, wait=False)[row.code], session.state.landmark(side, row.code)
     status, role = _status(session, side, row.code, state)
+    if atlas and role in ("ghost", "danger"):
+        status = f"{status} By {atlas}."
     action, words = ("unlock", "Unlock") if mark.locked else _next_action(session, side, row.code, state)
     aside, hint = _SHARED if row.shared else _EXTERNAL if row.external else ("", "")
     return CardContent(

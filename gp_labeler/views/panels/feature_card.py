@@ -74,7 +74,9 @@ class FeatureCard(QWidget):
     def refresh(self, *_: object) -> None:
         """Show the active feature as it stands."""
         session = self._workbench.session
-        self._content = now = content_of(session, has_scan=self._workbench.volume is not None)
+        self._content = now = content_of(
+            session, has_scan=self._workbench.volume is not None, atlas=self._workbench.atlas_words
+        )
         self._eyebrow.setText(now.eyebrow)
         self._title.setText(f"{now.code}  {now.name}" if now.code else now.name)
         for label, text in ((self._aside, now.aside), (self._where, now.where), (self._status, now.status)):

@@ -8,16 +8,21 @@ import numpy as np
 import pytest
 from animal_cases import drawn_animals, write_animals, write_side
 from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
+from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from PySide6.QtGui import QDropEvent, QFontMetrics
-from PySide6.QtWidgets import QApplication
+from PySide6.QtWidgets import QApplication, QPushButton
 from window_cases import close, settle
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.features import Side, feature
 from gp_labeler.session import labelling
+from gp_labeler.session.edited_specimen import utc_now
+from gp_labeler.session.landmark_import import ImportLandmarks
+from gp_labeler.session.specimen_file import write_specimen
+from gp_labeler.session.state import How, Provenance, SpecimenState
 from gp_labeler.views.panels.atlas_panel import AtlasCard, AtlasPanel
 from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
+from gp_labeler.views.panels.card_content import content_of
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 from gp_labeler.workbench import Workbench
@@ -213,3 +218,65 @@ def test_a_damaged_atlas_dropped_on_the_window_is_named(make_window, tmp_path, q
     settle(qtbot, window)
     assert "half.json" in window.status.next_click.text()
     assert window.workbench.is_published_atlas
+
+
+def _wrong_animals(tmp_path):
+    """Six animals as specimen files, three of them with mistakes, eight findings in all."""
+    animals = drawn_animals(6)
+    folder = tmp_path / "specimens"
+    folder.mkdir()
+    for animal in animals:
+        sides = dict(animal.sides)
+        if animal.name == "GP02":
+            sides[L] = sides[L].with_point("CA", sides[L]["CB"]).with_point("CB", sides[L]["CA"])
+        if animal.name == "GP04":
+            for code in ("LLI", "MH", "DTM", "FPA", "RWA", "RWL", "RWP"):
+                sides[R] = sides[R].with_point(
+                    code, sides[R][code] + np.random.default_rng(1).normal(size=3) * 9
+                )
+        edit = ImportLandmarks(tuple(sides.values()), Provenance(How.IMPORTED, "AB", utc_now()))
+        write_specimen(folder / f"{animal.name}.gpspecimen.json", edit.apply(SpecimenState(animal.name)))
+    return folder
+
+
+def _tick(qtbot, box) -> None:
+    qtbot.mouseClick(box, CLICK, pos=QPoint(10, box.height() // 2))  # its words end before its middle
+
+
+def test_what_is_left_out_is_listed_and_opens_where_it_is(make_window, tmp_path, qtbot) -> None:
+    folder = _wrong_animals(tmp_path)
+    window = make_window(atlas=True)
+    settle(qtbot, window)
+    desk, own = window.workbench, window.findChild(AtlasPanel).own
+    qtbot.mouseClick(window.rail.buttons["atlas"], CLICK)
+    desk.fit_atlas([folder])
+    settle(qtbot, window)
+    words = [notice.words for notice in own.findings.findChildren(Notice)]
+    assert words[1] == "GP02 left: CA and CB look exchanged"
+    assert len(words) == 5
+    more = next(b for b in own.findings.findChildren(QPushButton) if "more" in b.text())
+    qtbot.mouseClick(more, CLICK)
+    assert len(own.findings.findChildren(Notice)) > 5
+    assert list(cut_words(window.findChild(AtlasPanel))) == []
+    spread = desk.atlas.variances(["CA"])[0]
+    _tick(qtbot, own.keep_doubtful)
+    settle(qtbot, window)
+    assert desk.atlas.variances(["CA"])[0] > 10 * spread
+    _tick(qtbot, own.keep_doubtful)
+    settle(qtbot, window)
+    assert desk.atlas.variances(["CA"])[0] == spread
+    show = next(b for b in own.findings.findChildren(QPushButton) if "GP02" in b.accessibleName())
+    qtbot.mouseClick(show, CLICK)
+    settle(qtbot, window)
+    assert desk.session.state.specimen == "GP02"
+    assert (desk.session.active.side, desk.session.active.code) == (L, "CA")
+
+
+def test_the_card_names_the_atlas_that_is_not_the_published_one(desk, folder) -> None:
+    place(desk, "CA", "RWP", "OS")
+    desk.go_to(L, "CB")
+    assert "By the atlas" not in content_of(desk.session, has_scan=True, atlas=desk.atlas_words).status
+    desk.fit_atlas([folder])
+    deliver(desk)
+    status = content_of(desk.session, has_scan=True, atlas=desk.atlas_words).status
+    assert status.endswith("By the atlas of 3 animals, 6 sides.")
