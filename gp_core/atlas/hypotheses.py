@@ -19,7 +19,14 @@ from itertools import combinations
 
 import numpy as np
 
-from gp_core.atlas.named_fit import NamedFit, TouchModel, careful_misfit, fit_named_points, quick_misfit
+from gp_core.atlas.named_fit import (
+    NamedFit,
+    TouchModel,
+    best_exchange,
+    careful_misfit,
+    fit_named_points,
+    quick_misfit,
+)
 from gp_core.atlas.settling import NU, PRIOR_WEIGHT, TYPICAL_NOISE_MM
 from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
@@ -39,7 +46,7 @@ _LEAST = 1e-3
 _WORTH_A_FIT = 16.0
 """Misfit above that of the names as given beyond which an exchange is not fitted to the end."""
 
-_NO_CHANCE = 60.0
+_NO_CHANCE = 25.0
 """Difference in -2 log likelihood of careful touches beyond which the other ear is not looked at."""
 
 _N_SIGMA, _N_WEIGHTS = 9, 10
@@ -126,6 +133,8 @@ def _exchanges(
     if n > _FEW_TOUCHES and not fit.rough:
         return
     limit = fit.misfit + _WORTH_A_FIT
+    if best_exchange(model, points, fit, limit)[2] > limit:
+        return
     for i, j in combinations(range(n), 2):
         exchanged = points.copy()
         exchanged[[i, j]] = points[[j, i]]
@@ -155,9 +164,9 @@ def log_evidence(model: TouchModel, fit: NamedFit) -> float:
     shares = np.exp(logs - largest[..., None]) * _WEIGHT_PRIOR
     sums = shares.sum(axis=2)
     precision = (shares / variance).sum(axis=2) / sums
-    jacobian = fit.jacobian.reshape(len(precision[0]), 3, 6)
-    information = np.tensordot(precision, np.einsum("jca,jcb->jab", jacobian, jacobian), axes=1)
-    log_volume = -0.5 * np.linalg.slogdet(information)[1]
+    jacobian = fit.jacobian.reshape(-1, 3, 6)
+    of_touch = (jacobian.transpose(0, 2, 1) @ jacobian).reshape(-1, 36)
+    log_volume = -0.5 * np.linalg.slogdet((precision @ of_touch).reshape(-1, 6, 6))[1]
     total = (largest + np.log(sums)).sum(axis=1) + log_volume + prior
     top = float(total.max())
     return top + float(np.log(np.exp(total - top).sum()))

@@ -15,7 +15,6 @@ from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.named_fit import (
     NamedFit,
     TouchModel,
-    best_exchange,
     compile_if_repeated,
     fit_named_points,
     motion_jacobian,
@@ -85,7 +84,7 @@ def estimate_robust(
     systematic = Systematic(shared_error, _elapsed(times, model))
     fit = fit_named_points(model, points)
     named, *others = readings(model, points, fit)
-    better = _better_exchanged(model, points, fit, others) if fit.rough else None
+    better = _better_exchanged(model, fit, others) if fit.rough else None
     suspects = _suspects(model, fit)
     frame, covariance = _posed(atlas, model, fit, touches, systematic)
     pose = CochleaPose(
@@ -265,15 +264,13 @@ def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
     return tuple(compress(model.codes, _suspicious(fit).tolist()))
 
 
-def _better_exchanged(
-    model: TouchModel, points: FloatArray, fit: NamedFit, others: Sequence[Reading]
-) -> tuple[str, str] | None:
-    """Return two features whose exchange fits much better than the names as given and than the other ear."""
-    below = min(
-        fit.misfit - _MUCH_BETTER, *(other.fit.misfit for other in others if other.mirrored), fit.misfit
-    )
-    i, j, misfit = best_exchange(model, points, fit, below)
-    return (model.codes[i], model.codes[j]) if misfit < below else None
+def _better_exchanged(model: TouchModel, fit: NamedFit, others: Sequence[Reading]) -> tuple[str, str] | None:
+    """Return two features whose exchange fits much better than the names as given, and than the other ear."""
+    best = min(others, key=lambda other: other.fit.misfit, default=None)
+    if best is None or best.exchanged is None or best.fit.misfit > fit.misfit - _MUCH_BETTER:
+        return None
+    i, j = best.exchanged
+    return model.codes[i], model.codes[j]
 
 
 def _warnings(fit: NamedFit, pose: CochleaPose) -> Iterator[str]:
