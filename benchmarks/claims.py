@@ -2,7 +2,8 @@
 
 Run from the top of a checkout: ``python benchmarks/claims.py labelled/``, labelled animals as for gp-core.
 Each is estimated with an atlas that has seen nothing of it, by the paper's six touched features. It takes
-half a minute; ``--seed N`` draws other touches.
+half a minute; ``--seed N`` draws other touches. ``--conditions N`` prints the table of all conditions,
+each side touched N times: that of ``gp-core conditions labelled/ --repeats N``, in some minutes.
 """
 
 from __future__ import annotations
@@ -25,12 +26,14 @@ from gp_core import (  # noqa: E402
     GpError,
     LandmarkSet,
     Specimen,
+    conditions,
     estimate_pose,
     fit_atlas,
     gains,
     load_specimens,
 )
 from gp_core.atlas.draw import draw_animal  # noqa: E402
+from gp_core.commands.conditions import condition_lines  # noqa: E402
 from gp_core.frames import angle_between_deg  # noqa: E402
 from gp_core.landmarks.anatomy import with_cochlea_origin  # noqa: E402
 from gp_core.study.trials import make_trial  # noqa: E402
@@ -66,11 +69,17 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("specimens", nargs="+", metavar="SPECIMENS")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--conditions", type=int, default=0, metavar="N")
     args = parser.parse_args()
     try:
         animals = load_specimens(args.specimens)
     except GpError as error:
         raise SystemExit(str(error)) from None
+    if args.conditions:
+        rng = np.random.default_rng(args.seed)
+        for line in condition_lines(conditions(animals, repeats=args.conditions, rng=rng)):
+            print(line)
+        return
     sides = list(held_out(animals))
     for table in (regions, mistouched, turns, published, next_touches):
         print(table.__doc__.splitlines()[0])
@@ -167,7 +176,7 @@ def next_touches(sides: Sequence[HeldOut], rng: np.random.Generator) -> Iterator
             found = gains(before, atlas)
             best = found[0]
             after = estimate_pose(before.with_point(best.code, points[best.code]), "L", atlas)
-            ratios.append((after.radius_95 / best.radius_95, after.cone_95 / best.cone_95))
+            ratios.append((after.plain_radius_95 / best.radius_95, after.plain_cone_95 / best.cone_95))
             larger += [gain.radius_95 / gain.radius_95_now for gain in found]
         medians, means = np.median(ratios, axis=0), np.mean(ratios, axis=0)
         yield (
