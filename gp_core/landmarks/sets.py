@@ -170,10 +170,13 @@ class LandmarkSet:
         rows = [index_of(code) for code in codes]
         for row in rows:
             if np.isnan(self.points[row]).any():
+                word, verb = "", "Label"
+                if CODES[row] in self.suggested:
+                    word, verb = ", it is only suggested", "Confirm"
                 raise FeatureError(
-                    f"the {self.side.word} side has no {CODES[row]}",
+                    f"the {self.side.word} side has no {CODES[row]}{word}",
                     landmark=CODES[row],
-                    remedy="Label it, or leave it out of the feature subset.",
+                    remedy=f"{verb} it, or leave it out of the feature subset.",
                 )
         return self.points[rows]
 

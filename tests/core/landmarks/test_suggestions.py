@@ -39,7 +39,7 @@ def test_no_accessor_that_means_observation_sees_a_suggestion() -> None:
     assert crowded.as_mapping().keys() == set(PLACED)
     assert "RWA" not in crowded
     assert np.isnan(crowded["RWA"]).all()
-    with pytest.raises(FeatureError, match="has no RWA"):
+    with pytest.raises(FeatureError, match=r"has no RWA, it is only suggested\. Confirm it"):
         crowded.array(["RWA"])
     assert "CO" not in with_cochlea_origin(crowded)
 

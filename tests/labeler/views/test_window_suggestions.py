@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QEvent, QPoint, Qt
@@ -160,6 +162,30 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(sugg
     click(axial, elsewhere)
     assert status_of(suggested, "MN") is PointState.PLACED
     np.testing.assert_allclose(desk.session.landmarks(L)["MN"], elsewhere, atol=0.1)
+
+
+# Files of earlier versions
+
+
+def test_the_window_says_once_that_accepted_ghosts_are_suggestions_now(qtbot, window, tmp_path) -> None:
+    provenance = {"how": "accepted ghost"}
+    marks = {"CA": {"position": [1, 2, 3], "provenance": provenance}, "OS": {"position": [4, 5, 6]}}
+    content = {"format": "gp-labeler specimen", "version": 2, "specimen": "old", "landmarks": {"L": marks}}
+    file = tmp_path / "old.gpspecimen.json"
+    file.write_text(json.dumps(content))
+    said = []
+    window.workbench.message.connect(lambda text, level: said.append((text, level)))
+    window.workbench.open_specimen(file)
+    settle(qtbot, window)
+    assert [text for text, level in said if "accepted ghost" in text and level == "warning"] == [
+        "1 point was an accepted ghost that nobody had confirmed: it counts as a suggestion now (CA L). "
+        "Confirm or correct each in the table."
+    ]
+    assert window.workbench.session.progress(L).text == "1 placed, 1 suggested"
+    window.workbench.session.save()
+    window.workbench.begin()
+    window.workbench.open_specimen(file)
+    assert sum("accepted ghost" in text for text, _ in said) == 1
 
 
 # Shown
