@@ -4,11 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from types import MappingProxyType
 
-__all__ = ["DARK", "LIGHT", "SceneColours", "rgb"]
+import numpy as np
+
+__all__ = ["DARK", "LIGHT", "SceneColours", "contrast", "legible", "rgb"]
 
 Rgb = tuple[float, float, float]
+
+_WORD_CONTRAST = 6.0
+"""Of words in the scene with the edge around them, and with the background; small ones need at least 4.5."""
 
 
 def rgb(text: str) -> Rgb:
@@ -36,6 +42,34 @@ _STATES = MappingProxyType(
 )
 
 
+def contrast(one: str, other: str) -> float:
+    """Return the contrast of two colours ``#RRGGBB``, 1 to 21.
+
+    References
+    ----------
+    Web Content Accessibility Guidelines 2.1, relative luminance; 4.5 is its level AA for text.
+    """
+    lighter, darker = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (lighter + 0.05) / (darker + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    channels = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in rgb(colour))
+    red, green, blue = channels
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+@lru_cache(256)
+def legible(colour: str, grounds: tuple[str, ...], least: float) -> str:
+    """Return a colour made lighter or darker until words in it have a contrast on every ground."""
+    towards = 1.0 if _luminance(grounds[0]) < 0.5 else 0.0
+    for share in np.linspace(0.0, 1.0, 41):
+        mixed = "#" + "".join(f"{round(255 * (c + share * (towards - c))):02X}" for c in rgb(colour))
+        if min(contrast(mixed, ground) for ground in grounds) >= least:
+            return mixed
+    return mixed
+
+
 @dataclass(frozen=True, eq=False)
 class SceneColours:
     """The colours of one theme, as ``#RRGGBB``.
@@ -58,6 +92,10 @@ class SceneColours:
     text: str = "#E8EDF2"
     halo: str = "#0B0F14"
     states: Mapping[str, str] = field(default_factory=lambda: _STATES)
+
+    def word(self, state: str) -> str:
+        """Return the colour of words about a state: as its marks, but legible on all that is behind."""
+        return legible(self.states.get(state, self.text), (self.halo, self.top, self.bottom), _WORD_CONTRAST)
 
 
 DARK = SceneColours()

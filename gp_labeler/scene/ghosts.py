@@ -113,7 +113,7 @@ class GhostActor:
         self._rings.draw(rings, [colour] * len(rings), widths)
         return [
             Label(
-                Text(ghost.label, colour, bold=ghost.active),
+                Text(ghost.label, self._stage.colours.word(self._state), bold=ghost.active),
                 _upper_right(ring),
                 3 * scale,
                 float(ghost.active),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gp_core.checks import FloatArray
 
-__all__ = ["place_labels"]
+__all__ = ["lines_within", "place_labels"]
 
 _SIDES = np.array([[1, -0.6], [-1, -0.6], [1, 0.6], [-1, 0.6], [0, -1], [0, 1], [1, 0], [-1, 0]])
 """Directions from a mark in which its label may lie, the preferred first."""
@@ -44,8 +46,8 @@ def place_labels(
     gaps : (N,) array_like
         Distance between each mark and its label, pixels.
     ranks : (N,) array_like
-        Labels of a higher rank are placed earlier; one of a positive rank is never left out, nor cut off by
-        the edge of the view if it is no longer than that, and those of a negative one only fill free room.
+        Labels of a higher rank are placed earlier; one of a positive rank is never left out, and those of a
+        negative one only fill free room. None is cut off by the edge of a view that is as long as it.
 
     Returns
     -------
@@ -63,9 +65,7 @@ def place_labels(
     weights = np.full(len(taken), _MARK_WEIGHT)
     placed = np.flatnonzero(inside & size.all(axis=1))  # what has no size only keeps its place free
     for n in placed[np.argsort(-rank[placed], kind="stable")]:
-        boxes = _candidates(marks[n], size[n], gap[n])
-        if rank[n] > 0:
-            boxes = _pushed_inside(boxes, view)
+        boxes = _pushed_inside(_candidates(marks[n], size[n], gap[n]), view)
         bad = (_covered(boxes, taken) @ weights + _outside(boxes, view)) / size[n].prod()
         best = int((bad + _RELUCTANCE * np.arange(len(boxes))).argmin())
         allowed = _COVERED_AT_MOST if rank[n] >= 0 else _COVERED_AT_MOST_MINOR
@@ -73,6 +73,31 @@ def place_labels(
             corners[n], shown[n] = boxes[best, :2], True
             taken, weights = np.vstack([taken, boxes[best]]), np.append(weights, 1.0)
     return corners, shown
+
+
+def lines_within(text: str, width: float, measure: Callable[[str], float]) -> list[str]:
+    """Break a text between words into lines that a view is wide enough for.
+
+    Parameters
+    ----------
+    text : str
+    width : float
+        Of the view, pixels.
+    measure : callable
+        Returns the width of a text, pixels.
+    """
+    if not text or measure(text) <= width:
+        return [text]
+    lines: list[str] = []
+    for word in text.split():
+        if lines and measure(f"{lines[-1]} {word}") <= width:
+            lines[-1] += f" {word}"
+        else:
+            lines.append(word)
+    return [line.removeprefix(_DOT).removesuffix(_DOT).strip() for line in lines]
+
+
+_DOT = "\N{MIDDLE DOT}"
 
 
 def _candidates(mark: FloatArray, size: FloatArray, gap: float) -> FloatArray:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from gp_core.checks import FloatArray
 from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.label_layout import place_labels
+from gp_labeler.scene.label_layout import lines_within, place_labels
 from gp_labeler.scene.sprites import SpriteSheet, Text
 from gp_labeler.scene.stage import Stage
 
 __all__ = ["LABEL_PIXELS", "Label", "LabelActor"]
+
+_WIDE_LETTERS = 1.1
+"""How much wider than the mean of its text some of its letters may be."""
 
 LABEL_PIXELS = 13.0
 """Font size, logical pixels."""
@@ -63,6 +66,9 @@ class LabelActor:
         """Draw these labels in place of those before."""
         shown_labels = list(labels) if self.visible else []
         self._write(tuple(label.text for label in shown_labels))
+        wide = self._sheet.sizes[:, 0] > view.size[0] if shown_labels else ()
+        if np.any(wide):
+            self._write(tuple(map(self._broken(view.size[0]), (label.text for label in shown_labels))))
         anchors = np.array([label.anchor for label in shown_labels]).reshape(-1, 2)
         corners, shown = place_labels(
             anchors,
@@ -73,6 +79,17 @@ class LabelActor:
         )
         faint = np.array([label.faint for label in shown_labels], dtype=bool)
         self._sheet.draw(np.flatnonzero(shown), corners[shown], faint[shown])
+
+    def _broken(self, width: int) -> Callable[[Text], Text]:
+        """Return what breaks a text into lines that are no longer than the view."""
+        sizes = dict(zip(self._written[0], self._sheet.sizes[:, 0], strict=True))  # type: ignore[call-overload]
+
+        def broken(text: Text) -> Text:
+            letter = sizes[text] / max(len(text.text), 1) * _WIDE_LETTERS
+            lines = lines_within(text.text, width, lambda words: letter * len(words))
+            return replace(text, text="\n".join(lines))
+
+        return broken
 
     def close(self) -> None:
         """Let go of the texts."""

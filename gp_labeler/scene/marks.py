@@ -172,7 +172,13 @@ class MarkActor:
             + (_RING_PIXELS * self._stage.scale if mark.active else 0.0)
         )
         rank = 2.0 if mark.active else -float(hidden)
-        return Label(Text(mark.label, self._colour(mark)), pixel, gap, rank, hidden and not mark.active)
+        return Label(
+            Text(mark.label, self._stage.colours.word(mark.state)),
+            pixel,
+            gap,
+            rank,
+            hidden and not mark.active,
+        )
 
     def _ring_active(self, pixels: FloatArray, radii: FloatArray) -> None:
         scale, turn = self._stage.scale, np.linspace(0, 2 * np.pi, 49)

@@ -124,13 +124,13 @@ def names_of(scene: PoseScene, view: Viewpoint, stage: Stage) -> list[Label]:
     if not len(places):
         return []
     pixels = view.display(places)[:, :2]
-    states, scale = stage.colours.states, stage.scale
+    colours, scale = stage.colours, stage.scale
     labels = [
-        Label(Text(name.text, states[name.role]), pixel, name.gap * scale, name.rank)
+        Label(Text(name.text, colours.word(name.role)), pixel, name.gap * scale, name.rank)
         for name, pixel in zip(names, pixels[: len(names)], strict=True)
     ]
     free = [
-        Label(Text("", stage.colours.text), pixel, gap * scale, -2.0)
+        Label(Text("", colours.text), pixel, gap * scale, -2.0)
         for gap, pixel in zip(gaps, pixels[len(names) :], strict=True)
     ]
     return labels + free

@@ -46,6 +46,7 @@ __all__ = [
     "field_width",
     "fit",
     "font_of",
+    "heading_width",
     "line_height",
     "nearest_text_size",
     "pixels",
@@ -66,8 +67,8 @@ _FALLBACKS = ("Inter", "Segoe UI", "SF Pro Text", "Noto Sans", "DejaVu Sans")
 _DESKTOP_PX = 40 / 3
 """Text of 10 points at 96 dots an inch: what most desktops begin with."""
 _LARGEST_SCALE = 2.0
-_FIELD_PADDING = 22
-"""Frame, padding and cursor of a field, as the style sheet has them."""
+_FIELD_PADDING, _HEADING_PADDING = 22, 28
+"""Frame, padding and cursor of a field, and margins of a heading, as the style sheet has them."""
 _PROPERTY, _STYLE = "gpTextScale", "gpTextStyle"
 
 _state: dict[str, str] = {}
@@ -166,6 +167,11 @@ def text_width(widget: QWidget | None, *texts: str, size: float = TEXT, bold: bo
 def field_width(widget: QWidget | None, *texts: str) -> int:
     """Return the width of an entry field in which the longest of some texts can be read, logical pixels."""
     return text_width(widget, *texts) + _FIELD_PADDING
+
+
+def heading_width(widget: QWidget | None, text: str) -> int:
+    """Return the width of a column in which its heading can be read, logical pixels."""
+    return text_width(widget, text) + _HEADING_PADDING if text else 0
 
 
 def line_height(widget: QWidget | None, size: float = TEXT) -> int:

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Collection
 
 from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent
+from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
 from PySide6.QtWidgets import (
     QHBoxLayout,
-    QLabel,
     QProgressBar,
     QPushButton,
     QSizePolicy,
@@ -21,7 +20,9 @@ from gp_core.landmarks.features import CODES, RECOMMENDED, Side, feature
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
-from gp_labeler.views.panels.parts import text_label
+from gp_labeler.views.fonts import fit, pixels, styled, text_scale
+from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.parts import scrolled, text_label
 from gp_labeler.views.panels.pose_words import sentence
 from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
 from gp_labeler.workbench import Workbench
@@ -37,8 +38,10 @@ _RECORD_HINT = "Space, Page down or a foot pedal"
 _DONE_HINT = f"{_RECORD_HINT}: closes the guide"
 _TELLS_SIDE = ("IN", "ZL")
 
-_TRUST = "font-size: 36px; font-weight: 700"
-"""Look of the word of trust; its role gives the colour."""
+_HUGE, _TRUST, _LARGE, _BIG, _BUTTON = 64, 36, 28, 20, 22
+"""Heights of the letters in a window of `_ROOM`, logical pixels: they grow and shrink with it."""
+
+_ROOM, _SMALLEST = (1280, 800), 0.6
 
 
 class GuideWindow(QWidget):
@@ -59,13 +62,14 @@ class GuideWindow(QWidget):
         super().__init__(parent, Qt.WindowType.Window)
         self._desk, self._refusal = workbench, ""
         self._last: tuple[Side, str] | None = None
+        self._scale, self._text_scale = 0.0, 0.0
         self.setWindowTitle("Guided touching")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setProperty("role", "panel")
-        self.setMinimumSize(960, 640)
         self._make_widgets()
         self._lay_out()
+        fit(self, self._fit)
         self._listen()
         self.refresh()
 
@@ -176,13 +180,12 @@ class GuideWindow(QWidget):
         self.name, self.definition = text_label(role="large", wrap=True), text_label(role="big", wrap=True)
         self.result, self.warning = text_label(role="large"), text_label(role="big-warning", wrap=True)
         self.trust, self.reason = text_label(), text_label(role="big", wrap=True)
-        self.trust.setStyleSheet(_TRUST)
         self.state, self.told = text_label(wrap=True), text_label(role="large-danger", wrap=True)
+        self.caption = text_label("Cochlea, within 95 %", "large-hint")
         self.picture = FeaturePicture()
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.progress = QProgressBar()
         self.progress.setTextVisible(False)
-        self.progress.setFixedHeight(20)
         self.record = _big("Record", _RECORD_HINT, self._press)
         self.record.setProperty("role", "huge-primary")
         self.redo = _big("Redo", "Backspace or Page up: touch the last one again", self._redo)
@@ -190,8 +193,36 @@ class GuideWindow(QWidget):
         self.connect_button = _big("Connect…", "Choose the tracker", self.settings_asked.emit)
         self.leave = _big("Close", "Escape", self.close)
 
+    def _fit(self) -> None:
+        """Write as large as the window allows."""
+        width, height = _ROOM
+        scale = max(min(self.width() / width, self.height() / height), _SMALLEST)
+        if scale == self._scale and self._text_scale == text_scale(self):
+            return
+        self._scale, self._text_scale = scale, text_scale(self)
+        for size, bold, labels in (
+            (_HUGE, True, (self.code,)),
+            (_TRUST, True, (self.trust,)),
+            (_LARGE, True, (self.name, self.result, self.record)),
+            (_BUTTON, False, (self.redo, self.skip, self.connect_button, self.leave)),
+            (_BIG, False, (self.counter, self.state, self.definition, self.reason, self.warning, self.told)),
+            (_BIG, False, (self.caption,)),
+        ):
+            for label in labels:
+                styled(label, size * scale, bold=bold)
+        self.progress.setFixedHeight(pixels(self, _BIG * scale))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
+        super().resizeEvent(event)
+        self._fit()
+
     def _lay_out(self) -> None:
-        whole = QVBoxLayout(self)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        around = QVBoxLayout(self)
+        around.setContentsMargins(0, 0, 0, 0)
+        around.addWidget(scrolled(content))
+        whole = QVBoxLayout(content)
         whole.setContentsMargins(32, 24, 32, 24)
         whole.setSpacing(16)
         head = _row(self.counter, self.state, self.connect_button, self.leave)
@@ -207,9 +238,10 @@ class GuideWindow(QWidget):
             words.addWidget(label)
         words.addStretch(1)
         words.addWidget(self.told)
-        words.addWidget(_caption("Cochlea, within 95 %"))
-        estimate = _row(self.result, self.trust)
-        estimate.addStretch(1)
+        words.addWidget(self.caption)
+        estimate = FlowLayout(spacing=16)
+        for label in (self.result, self.trust):
+            estimate.addWidget(label)
         words.addLayout(estimate)
         words.addWidget(self.reason)
         words.addWidget(self.warning)
@@ -237,13 +269,8 @@ def _big(words: str, hint: str, call: Callable[[], object]) -> QPushButton:
     button.setProperty("role", "huge")
     button.setToolTip(hint)
     button.setFocusPolicy(Qt.FocusPolicy.NoFocus)  # keys are the window's: Space always records
-    button.setMinimumHeight(64)
     button.clicked.connect(lambda: call())
     return button
-
-
-def _caption(words: str) -> QLabel:
-    return text_label(words, "large-hint")
 
 
 def _row(*widgets: QWidget) -> QHBoxLayout:

@@ -52,7 +52,7 @@ class PoseOverlay(QObject):
         names, places, gaps = written_in(self._scene)
         pixels, off = shown.scan_to_pixel(places) + 0.5, np.abs(shown.off_slice(places))
         written = [
-            SliceName(name.text, pixel, DARK.states[name.role], name.gap, name.rank)
+            SliceName(name.text, pixel, DARK.word(name.role), name.gap, name.rank)
             for name, pixel, away in zip(names, pixels[: len(names)], off[: len(names)], strict=True)
             if away <= name.reach_mm
         ]

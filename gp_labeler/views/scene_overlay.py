@@ -18,6 +18,9 @@ from gp_labeler.views.theme import theme_of
 __all__ = ["cut_text", "paint_crosshair", "paint_cut", "paint_pointer"]
 
 _GAP_MM, _ARM_MM = 0.8, 4.0
+_CHIP_ROOM = 26
+"""Beside words on a card: a chip before them, and some air, logical pixels."""
+
 _WORDS = {"R": "right", "L": "left", "A": "anterior", "P": "posterior", "S": "superior", "I": "inferior"}
 
 
@@ -47,8 +50,9 @@ def paint_cut(painter: QPainter, view: QWidget, cut: Cut | None) -> None:
     theme, font = theme_of(view), font_of(view)
     painter.setFont(font)
     text = cut_text(cut)
-    words = QFontMetricsF(font).boundingRect(text)
-    box = QRectF(10, 10, words.width() + 26, words.height() + 8)
+    room = QRectF(0, 0, max(view.width() - 20 - _CHIP_ROOM, 1), view.height())
+    words = QFontMetricsF(font).boundingRect(room, Qt.TextFlag.TextWordWrap, text)
+    box = QRectF(10, 10, words.width() + _CHIP_ROOM, words.height() + 8)
     painter.setPen(Qt.PenStyle.NoPen)
     ground = QColor(theme.card)
     ground.setAlpha(225)
@@ -57,7 +61,8 @@ def paint_cut(painter: QPainter, view: QWidget, cut: Cut | None) -> None:
     painter.setBrush(QColor(theme.views["3d" if cut.plane == "view" else cut.plane]))
     painter.drawRoundedRect(QRectF(box.left() + 6, box.center().y() - 4, 8, 8), 2, 2)
     painter.setPen(QColor(theme.text))
-    painter.drawText(box.adjusted(20, 0, 0, 0), Qt.AlignmentFlag.AlignVCenter, text)
+    wrapped = Qt.AlignmentFlag.AlignVCenter | Qt.TextFlag.TextWordWrap
+    painter.drawText(box.adjusted(20, 0, -2, 0), wrapped, text)
 
 
 def paint_pointer(

@@ -10,16 +10,20 @@ from PySide6.QtWidgets import (
     QHBoxLayout,
     QLabel,
     QPushButton,
-    QScrollArea,
     QVBoxLayout,
     QWidget,
 )
 
 from gp_labeler.actions import ACTIONS, MENUS, gestures
+from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.parts import open_at, scrolled
 
 __all__ = ["ShortcutsSheet", "keys_text"]
 
-_KEYS_WIDTH = 128
+_LONGEST_KEYS = "Middle drag, Shift+drag"
+"""What the keys of all blocks are lined up to."""
+
 _COLUMNS = (("In the 3D view", "On a slice", "Estimate"), ("View",), ("Landmarks", "File", "Edit", "Help"))
 
 
@@ -36,33 +40,32 @@ class ShortcutsSheet(QDialog):
         self.setWindowTitle("Keyboard and mouse")
         sheet = QWidget()
         sheet.setProperty("role", "panel")
-        columns = QHBoxLayout(sheet)
+        columns = FlowLayout(sheet, spacing=36)
         columns.setContentsMargins(20, 12, 20, 12)
-        columns.setSpacing(36)
         blocks = _blocks()
         for names in _COLUMNS:
-            column = QVBoxLayout()
+            part = QWidget()
+            column = QVBoxLayout(part)
+            column.setContentsMargins(0, 0, 0, 0)
             column.setSpacing(4)
             for name in names:
                 _add_block(column, name, blocks[name])
             column.addStretch(1)
-            columns.addLayout(column)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
-        scroll.setWidget(sheet)
+            columns.addWidget(part)
         close = QPushButton("Close")
         close.setProperty("role", "primary")
         close.clicked.connect(self.accept)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 8, 0, 12)
-        whole.addWidget(scroll)
+        whole.addWidget(scrolled(sheet))
         row = QHBoxLayout()
         row.setContentsMargins(20, 0, 20, 0)
         row.addStretch(1)
         row.addWidget(close)
         whole.addLayout(row)
+        open_at(self, 0, 760)
         hint = sheet.sizeHint()
-        self.resize(hint.width() + 24, min(hint.height() + 90, 760))
+        self.resize(min(hint.width() + 40, self.screen().availableSize().width()), self.height())
 
 
 def _blocks() -> dict[str, list[tuple[str, str]]]:
@@ -82,7 +85,7 @@ def _add_block(column: QVBoxLayout, name: str, rows: list[tuple[str, str]]) -> N
     grid.setHorizontalSpacing(14)
     grid.setVerticalSpacing(1)
     grid.setColumnStretch(1, 1)
-    grid.setColumnMinimumWidth(0, _KEYS_WIDTH)
+    fit(heading, lambda: grid.setColumnMinimumWidth(0, text_width(heading, _LONGEST_KEYS)))
     for n, (keys, text) in enumerate(rows):
         key = QLabel(keys)
         key.setProperty("role", "ghost")

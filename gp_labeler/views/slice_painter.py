@@ -11,7 +11,7 @@ from PySide6.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath,
 from gp_core.checks import FloatArray
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import Ghost, ellipse
-from gp_labeler.scene.label_layout import place_labels
+from gp_labeler.scene.label_layout import lines_within, place_labels
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.segments import Segment
@@ -238,7 +238,7 @@ class SlicePainter:
             if ghost.label and in_view:
                 upper_right = corners[int((corners[:, 0] - corners[:, 1]).argmax())]
                 beside = np.clip(upper_right, 1.0, np.array(shown.size) - 1.0)
-                names.append(SliceName(ghost.label, beside, colour.name(), 4.0, 3.0))
+                names.append(SliceName(ghost.label, beside, DARK.word("ghost"), 4.0, 3.0))
         return names
 
     def _paint_marks(
@@ -309,7 +309,7 @@ _SHAPES = {"computed": "rhomb", "doubtful": "triangle", "suggested": "square"}
 
 def _name(mark: Mark, pixel: FloatArray) -> SliceName:
     gap, rank = (12.0, 2.0) if mark.active else (8.0, 0.0)
-    return SliceName(mark.label, pixel, _on_black(mark.state), gap, rank)
+    return SliceName(mark.label, pixel, DARK.word(mark.state), gap, rank)
 
 
 def _draw_names(
@@ -319,14 +319,17 @@ def _draw_names(
     font.setPixelSize(round(text * ratio))
     font.setBold(True)
     metrics = QFontMetricsF(font)
-    high = metrics.capHeight() + 4 * ratio
+    high, step = metrics.capHeight() + 4 * ratio, metrics.lineSpacing()
+    lines = [lines_within(name.text, size[0] - 8 * ratio, metrics.horizontalAdvance) for name in names]
     corners, shown = place_labels(
         [name.pixel for name in names],
-        [(metrics.horizontalAdvance(name.text), high) for name in names],
+        [(max(map(metrics.horizontalAdvance, of)), high + step * (len(of) - 1)) for of in lines],
         size,
         gaps=[name.gap * ratio for name in names],
         ranks=[name.rank for name in names],
     )
     for n in np.flatnonzero(shown):
-        word = word_picture(names[n].text, text, names[n].colour, ratio)
-        word.draw(painter, corners[n][0], corners[n][1] + metrics.capHeight() + 2 * ratio)
+        left, top = corners[n]
+        for row, line in enumerate(lines[n]):
+            word = word_picture(line, text, names[n].colour, ratio)
+            word.draw(painter, left, top + row * step + metrics.capHeight() + 2 * ratio)

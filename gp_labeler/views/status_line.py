@@ -186,7 +186,7 @@ class _Work(QWidget):
     """The oldest running task that matters to the user, how far it is, and a button that stops it."""
 
     changed = Signal()
-    """There is work to show, or none any more."""
+    """There is work to show, other work, or none any more."""
 
     def __init__(self, workbench: Workbench) -> None:
         super().__init__()
@@ -246,9 +246,11 @@ class _Work(QWidget):
             self._was_busy = self.is_busy
             self.changed.emit()
         if task is not None:
-            self.text.setText(task.text or task.job.title)
             self.bar.setRange(0, 100 if task.fraction > 0 else 0)
             self.bar.setValue(round(100 * task.fraction))
+            if (words := task.text or task.job.title) != self.text.text():
+                self.text.setText(words)
+                self.changed.emit()
 
     def _stop(self) -> None:
         if self._task is not None:

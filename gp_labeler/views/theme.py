@@ -16,7 +16,7 @@ from PySide6.QtWidgets import QApplication, QWidget
 
 from gp_labeler.scene.colours import DARK as DARK_SCENE
 from gp_labeler.scene.colours import LIGHT as LIGHT_SCENE
-from gp_labeler.scene.colours import SceneColours
+from gp_labeler.scene.colours import SceneColours, contrast
 from gp_labeler.views.fonts import base_font, set_text_scale
 from gp_labeler.views.stylesheet import stylesheet
 
@@ -232,20 +232,3 @@ def theme_of(widget: QWidget | None) -> Theme:
         widget = window.parentWidget()
     app = QApplication.instance()
     return THEMES.get(app.property(_PROPERTY), DARK) if app is not None else DARK
-
-
-def contrast(one: str, other: str) -> float:
-    """Return the contrast of two colours ``#RRGGBB``, 1 to 21.
-
-    References
-    ----------
-    Web Content Accessibility Guidelines 2.1, relative luminance; 4.5 is its level AA for text.
-    """
-    lighter, darker = sorted((_luminance(one), _luminance(other)), reverse=True)
-    return (lighter + 0.05) / (darker + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    channels = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    red, green, blue = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in channels)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

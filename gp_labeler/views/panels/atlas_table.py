@@ -22,7 +22,7 @@ from gp_core.atlas.label_check import Departure
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
-from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
+from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
@@ -175,7 +175,7 @@ class AtlasTable(QTableView):
         """Return the room that all but the names take: in a narrow window the codes alone are shown."""
         row = self.verticalHeader().defaultSectionSize()
         height = self.horizontalHeader().height() + row * max(len(self.rows.codes), 1) + 4
-        first = max(_PAD + _code_width(self), text_width(self, _HEADINGS[0]) + 2 * _PAD)
+        first = max(_PAD + _code_width(self), heading_width(self, _HEADINGS[0]))
         return QSize(first + sum(self._widths()) + 4, height)
 
     def _arrange(self) -> None:
@@ -201,7 +201,7 @@ class AtlasTable(QTableView):
         chip = pixels(self, _CHIP) + 5
         needed = [text_width(self, words) + (chip if n else 0) for n, words in enumerate(_WIDEST)]
         return [
-            max(text_width(self, heading), words) + 2 * _PAD
+            max(heading_width(self, heading), words + 2 * _PAD)
             for heading, words in zip(_HEADINGS[1:], needed, strict=True)
         ]
 

@@ -24,7 +24,15 @@ from gp_core.landmarks.sets import Status
 from gp_labeler.session.landmark_export import FORMATS, export_landmarks, export_names
 from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import follow
-from gp_labeler.views.panels.parts import ElidedLabel, Notice, breakable, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import (
+    ElidedLabel,
+    Notice,
+    breakable,
+    emptied,
+    open_at,
+    scrolled,
+    text_label,
+)
 from gp_labeler.workbench import Workbench
 
 __all__ = ["ExportDialog"]
@@ -64,12 +72,11 @@ class ExportDialog(QDialog):
         self.setWindowTitle("Export landmarks")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(True)
-        self.setMinimumSize(520, 420)
-        self.resize(540, 500)
         self._make_widgets(str(folder))
         self._lay_out()
         follow(self, workbench.doubts_changed, self.refresh)
         self.refresh()
+        open_at(self, 560, 520)
 
     def refresh(self, *_: object) -> None:
         """Say what would be written, and what would be missing."""

@@ -8,11 +8,12 @@ from PySide6.QtWidgets import QSizePolicy, QWidget
 
 from gp_labeler.imaging.histogram import Histogram
 from gp_labeler.views.bind import value_text
+from gp_labeler.views.fonts import fit, font_of, line_height, pixels
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["HistogramSlider"]
 
-_EDGE, _FOOT = 8.0, 16.0
+_EDGE, _HEIGHT = 8.0, 76
 _STEPS = {
     Qt.Key.Key_Left: -0.004,
     Qt.Key.Key_Down: -0.004,
@@ -43,6 +44,7 @@ class HistogramSlider(QWidget):
         self.setAccessibleName("Bone threshold")
         self.setToolTip("Drag to where bone begins; arrow keys move it finely")
         self.setCursor(Qt.CursorShape.SplitHCursor)
+        fit(self, self.updateGeometry)
 
     @property
     def value(self) -> float | None:
@@ -68,10 +70,15 @@ class HistogramSlider(QWidget):
         return _EDGE + fraction * (self.width() - 2 * _EDGE)
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(240, 92)
+        return QSize(240, pixels(self, _HEIGHT) + self._foot)
 
     def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
-        return QSize(120, 92)
+        return QSize(120, self.sizeHint().height())
+
+    @property
+    def _foot(self) -> int:
+        """Height of the line of words below the bins, logical pixels."""
+        return line_height(self) + 1
 
     def mousePressEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802 - Qt's name
         if event.button() is Qt.MouseButton.LeftButton and self._histogram is not None:
@@ -124,6 +131,7 @@ class HistogramSlider(QWidget):
         theme = theme_of(self)
         painter = QPainter(self)
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
+        painter.setFont(font_of(self))
         frame = QRectF(self.rect()).adjusted(0.5, 0.5, -0.5, -0.5)
         painter.setPen(QColor(theme.accent_text if self.hasFocus() else theme.border_strong))
         painter.setBrush(QColor(theme.field))
@@ -141,7 +149,7 @@ class HistogramSlider(QWidget):
     def _paint_histogram(self, painter: QPainter, histogram: Histogram) -> None:
         """Draw the bins: those of bone in bone's colour, the others in grey."""
         theme = theme_of(self)
-        floor, room = self.height() - _FOOT, self.height() - _FOOT - 8
+        floor, room = self.height() - self._foot, self.height() - self._foot - 8
         width = (self.width() - 2 * _EDGE) / len(histogram.heights)
         bone = QColor(theme.scene.bone if theme.is_dark else "#A98F5F")
         painter.setPen(Qt.PenStyle.NoPen)
@@ -153,14 +161,14 @@ class HistogramSlider(QWidget):
 
     def _paint_ends(self, painter: QPainter, histogram: Histogram) -> None:
         painter.setPen(QColor(theme_of(self).muted))
-        foot = QRectF(_EDGE, self.height() - _FOOT, self.width() - 2 * _EDGE, _FOOT)
+        foot = QRectF(_EDGE, self.height() - self._foot, self.width() - 2 * _EDGE, self._foot)
         middle = Qt.AlignmentFlag.AlignVCenter
         painter.drawText(foot, Qt.AlignmentFlag.AlignLeft | middle, value_text(histogram.low))
         painter.drawText(foot, Qt.AlignmentFlag.AlignRight | middle, value_text(histogram.high))
 
     def _paint_handle(self, painter: QPainter, value: float) -> None:
         theme, x = theme_of(self), self.x_of(value)
-        floor = self.height() - _FOOT
+        floor = self.height() - self._foot
         painter.setPen(QPen(QColor(theme.accent_text), 2))
         painter.drawLine(QPointF(x, 4), QPointF(x, floor))
         painter.setBrush(QColor(theme.accent_text))

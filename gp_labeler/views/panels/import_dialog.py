@@ -22,7 +22,17 @@ from gp_labeler.imaging.readers import ImportPlan, Problem
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.panels.import_words import MB, PreviewScan, bare, facts_of, remedy, sentence, why_not
-from gp_labeler.views.panels.parts import ElidedLabel, Facts, Notice, breakable, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import (
+    ElidedLabel,
+    Facts,
+    Notice,
+    breakable,
+    column_of_captions,
+    emptied,
+    open_at,
+    scrolled,
+    text_label,
+)
 from gp_labeler.views.panels.preview_picture import PreviewPicture
 from gp_labeler.views.panels.spacing_fields import SpacingFields
 from gp_labeler.work import InspectScan
@@ -54,13 +64,12 @@ class ImportDialog(QDialog):
         self.setWindowTitle("Open scan")
         self.setModal(True)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setMinimumSize(560, 420)
         self._make_widgets()
         self._lay_out()
         self._show_plan(plan)
         self._start_preview()
         follow(self, workbench.jobs.failed, self._on_failed)
-        self.resize(720, 480 if plan.sides_known else 700)
+        open_at(self, 720, 480 if plan.sides_known else 700)
 
     @property
     def plan(self) -> ImportPlan:
@@ -125,7 +134,7 @@ class ImportDialog(QDialog):
         rows = (("Which scan", self.series), ("Voxel size", self.spacing), ("Load", self.stride))
         for row, (name, widget) in enumerate(rows):
             caption = self._captions[name] = text_label(name, "hint")
-            caption.setFixedWidth(80)
+            column_of_captions(caption)
             form.addWidget(caption, row, 0, Qt.AlignmentFlag.AlignTop)
             form.addWidget(widget, row, 1)
         return form

@@ -20,7 +20,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import landmarks_of, read_points
 from gp_labeler.session.landmark_import import MisfitError, Predicate, import_landmarks
-from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkImportDialog"]
@@ -54,10 +54,10 @@ class LandmarkImportDialog(QDialog):
         self.setWindowTitle("Import landmarks")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(True)
-        self.setMinimumSize(520, 360)
         self._make_widgets()
         self._lay_out()
         self._look()
+        open_at(self, 560, 380)
 
     def _make_widgets(self) -> None:
         self.side = QComboBox()

@@ -19,7 +19,7 @@ from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.session.edits import ClearPoint
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
-from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
+from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
 from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.views.panels.landmark_model import (
     ACTIVE_ROLE,
@@ -212,7 +212,7 @@ def _state_width(view: QWidget) -> int:
     """Return how much a column of states takes: chip, word and lock."""
     chip = _PAD + pixels(view, _CHIP) + 4
     words = chip + text_width(view, *_WIDEST_STATES) + pixels(view, _CHIP) + 4
-    return max(words, text_width(view, _WIDEST_HEADING) + 2 * _PAD)
+    return max(words, heading_width(view, _WIDEST_HEADING))
 
 
 class _ChipDelegate(QStyledItemDelegate):

@@ -29,7 +29,9 @@ __all__ = [
     "Notice",
     "Scrolled",
     "breakable",
+    "column_of_captions",
     "emptied",
+    "open_at",
     "scrolled",
     "text_label",
 ]
@@ -77,6 +79,11 @@ class ElidedLabel(QLabel):
         self.setTextFormat(Qt.TextFormat.PlainText)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.set_words(words)
+
+    @property
+    def words(self) -> str:
+        """The whole of what it says."""
+        return self._words
 
     def set_words(self, words: str) -> None:
         """Show other words."""
@@ -137,6 +144,21 @@ class Scrolled(QScrollArea):
         if watched is self._content and event.type() is QEvent.Type.LayoutRequest:
             self.updateGeometry()
         return super().eventFilter(watched, event)
+
+
+def open_at(dialog: QWidget, width: int, height: int) -> None:
+    """Give a dialog the size to open at, no larger than its screen; what does not fit then scrolls.
+
+    Parameters
+    ----------
+    dialog : QWidget
+        Its content lies in a `Scrolled`, its buttons below that.
+    width, height : int
+        Logical pixels at the normal text size.
+    """
+    screen = dialog.screen().availableSize()
+    wanted = QSize(pixels(dialog, width), pixels(dialog, height)).expandedTo(dialog.minimumSizeHint())
+    dialog.resize(wanted.boundedTo(screen))
 
 
 _FEWEST_LINES = 4
@@ -205,7 +227,7 @@ class Facts(QWidget):
         layout.setContentsMargins(0, 0, 0, 0)
         layout.setSpacing(8)
         caption = text_label(name, "hint")
-        fit(caption, lambda: caption.setFixedWidth(text_width(caption, _LONGEST_FACT) + 4))
+        column_of_captions(caption)
         is_long = max(map(len, value.split()), default=0) > _LONGEST_WORD
         words = ElidedLabel(value) if is_long else text_label(value, wrap=True)
         words.setTextInteractionFlags(Qt.TextInteractionFlag.TextSelectableByMouse)
@@ -213,6 +235,11 @@ class Facts(QWidget):
         layout.addWidget(caption, 0, Qt.AlignmentFlag.AlignTop)
         layout.addWidget(words, 1)
         return row
+
+
+def column_of_captions(caption: QLabel) -> None:
+    """Make the name of a fact or field as wide as those above and below it."""
+    fit(caption, lambda: caption.setFixedWidth(text_width(caption, _LONGEST_FACT) + 4))
 
 
 class IconLabel(QLabel):

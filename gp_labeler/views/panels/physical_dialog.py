@@ -22,7 +22,7 @@ from gp_core.disk import write_bytes, write_text
 from gp_labeler.physical_work import PhysicalResult, PhysicalTest
 from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import attempt
-from gp_labeler.views.panels.parts import Notice, text_label
+from gp_labeler.views.panels.parts import ElidedLabel, Notice, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.workbench import Workbench
 
@@ -51,8 +51,7 @@ class PhysicalDialog(QDialog):
         side = workbench.pose.side
         self.setWindowTitle("Test against the scan")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setMinimumWidth(_FIGURE_WIDTH + 48)
-        self.title = text_label(f"{workbench.session.state.specimen}, {side.word} ear", "title")
+        self.title = ElidedLabel(f"{workbench.session.state.specimen}, {side.word} ear", "title")
         self.busy = QProgressBar()
         self.busy.setRange(0, 0)
         self.busy.setTextVisible(False)
@@ -64,6 +63,7 @@ class PhysicalDialog(QDialog):
         self.figure.setAccessibleName("Errors of this skull on those of simulated animals")
         self._lay_out()
         self._task = self._start()
+        open_at(self, _FIGURE_WIDTH + 72, 640)
 
     def _start(self) -> Task[PhysicalResult] | None:
         desk = self._desk
@@ -146,15 +146,22 @@ class PhysicalDialog(QDialog):
             buttons.addWidget(widget)
         buttons.addStretch(1)
         buttons.addWidget(close)
-        column = QVBoxLayout(self)
-        column.setContentsMargins(20, 16, 20, 16)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        column = QVBoxLayout(content)
+        column.setContentsMargins(20, 16, 20, 8)
         column.setSpacing(10)
         column.addWidget(self.title)
         column.addWidget(self.busy)
         column.addLayout(self.rows)
         column.addLayout(self.findings)
         column.addWidget(self.figure)
-        column.addLayout(buttons)
+        column.addStretch(1)
+        buttons.setContentsMargins(20, 4, 20, 14)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolled(content), 1)
+        layout.addLayout(buttons)
 
 
 def _write(path: Path, result: PhysicalResult | None) -> None:

@@ -10,7 +10,7 @@ from PySide6.QtWidgets import QWidget
 
 from gp_core.landmarks.features import FEATURES
 from gp_labeler.views.chips import draw_chip
-from gp_labeler.views.fonts import pixels, text_width
+from gp_labeler.views.fonts import heading_width, pixels, text_width
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.panels.pose_model import CLEAR, MISFIT, NAME, USE, XYZ, TouchRow
 from gp_labeler.views.panels.pose_words import name_of
@@ -39,7 +39,7 @@ def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) ->
     width : int
         Of the table; 0 for the least that it needs.
     """
-    heads = {column: text_width(view, words) + 2 * _PAD for column, words in headings.items()}
+    heads = {column: heading_width(view, words) for column, words in headings.items()}
     number = text_width(view, _WIDEST_NUMBER) + _GAP
     misfit = _misfit_width(view) + pixels(view, _BAR) + 2 * _GAP
     columns = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from PySide6.QtCore import Qt, QTimer, Signal
+from PySide6.QtCore import QEvent, QObject, Qt, QTimer, Signal
 from PySide6.QtGui import (
     QAction,
     QDragEnterEvent,
@@ -32,8 +32,8 @@ from gp_labeler.workbench import Workbench
 __all__ = ["PosePanel", "holds_touches"]
 
 _TOUCH_FILES = (".dat", ".csv", ".mrk.json", ".fcsv", ".txt")
-_WIDE, _WIDEST = 760, 1280
-"""From which width on cards stand in two columns, and how wide these become: at the normal text size."""
+_WIDEST = 1280
+"""How wide two columns become, logical pixels at the normal text size."""
 
 
 def holds_touches(path: Path) -> bool:
@@ -143,6 +143,7 @@ class PosePanel(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         self._area = scrolled(content)
+        body.installEventFilter(self)
         layout.addWidget(self._area)
 
     def _connect(self) -> None:
@@ -181,13 +182,28 @@ class PosePanel(QWidget):
         self._share_columns()
         super().resizeEvent(event)
 
+    @property
+    def _two_columns_width(self) -> int:
+        """What both columns take beside each other, with the scroll bar."""
+        margins, bar = self._columns.contentsMargins(), self._area.verticalScrollBar().sizeHint().width()
+        columns = 2 * max(column.minimumSize().width() for column in (self.left, self.right))
+        return columns + self._columns.spacing() + margins.left() + margins.right() + bar
+
     def _share_columns(self) -> None:
         """Put the cards in two columns where they have the whole window, and it is wide."""
         way = QBoxLayout.Direction
-        two = self._is_alone and self.width() >= pixels(self, _WIDE)
-        self._columns.setDirection(way.LeftToRight if two else way.TopToBottom)
+        two = self._is_alone and self.width() >= self._two_columns_width
+        direction = way.LeftToRight if two else way.TopToBottom
+        if direction is self._columns.direction():
+            return
+        self._columns.setDirection(direction)
         for column in (0, 1):
             self._columns.setStretch(column, int(two))
+
+    def eventFilter(self, watched: QObject, event: QEvent) -> bool:  # noqa: D102, N802 - Qt's name
+        if event.type() is QEvent.Type.LayoutRequest:  # a card shows more, or less
+            self._share_columns()
+        return super().eventFilter(watched, event)
 
     def dragEnterEvent(self, event: QDragEnterEvent) -> None:  # noqa: D102, N802 - Qt's name
         path = dropped_path(event)

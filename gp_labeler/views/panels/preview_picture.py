@@ -7,7 +7,7 @@ from PySide6.QtGui import QColor, QImage, QPainter, QPaintEvent
 from PySide6.QtWidgets import QWidget
 
 from gp_labeler.imaging.preview import PreviewPlane
-from gp_labeler.views.fonts import TEXT, font_of
+from gp_labeler.views.fonts import TEXT, fit, font_of, pixels
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["PreviewPicture"]
@@ -20,7 +20,7 @@ class PreviewPicture(QWidget):
         super().__init__(parent)
         self._plane: PreviewPlane | None = None
         self._words = "Reading a preview…"
-        self.setMinimumSize(140, 120)
+        fit(self, lambda: self.setMinimumSize(pixels(self, 140), pixels(self, 120)))
 
     @property
     def plane(self) -> PreviewPlane | None:

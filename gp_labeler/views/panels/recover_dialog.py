@@ -16,7 +16,8 @@ from PySide6.QtWidgets import (
 )
 
 from gp_labeler.session.recovery import Recovery
-from gp_labeler.views.panels.parts import IconLabel, text_label
+from gp_labeler.views.fonts import fit
+from gp_labeler.views.panels.parts import IconLabel, open_at, text_label
 
 __all__ = ["RecoverDialog"]
 
@@ -38,7 +39,6 @@ class RecoverDialog(QDialog):
         self.setWindowTitle("Unsaved work was found")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(True)
-        self.setMinimumSize(520, 300)
         self.list = QListWidget()
         self.list.setAccessibleName("Unsaved work")
         self.list.setWordWrap(True)
@@ -48,12 +48,14 @@ class RecoverDialog(QDialog):
         for recovery in recoveries:
             item = QListWidgetItem(_words(recovery), self.list)
             item.setData(Qt.ItemDataRole.UserRole, recovery)
+        fit(self.list, self.list.scheduleDelayedItemsLayout)  # rows are as high as their words
         self.list.setCurrentRow(0)
         self.list.currentRowChanged.connect(self._refresh)
         self.list.itemActivated.connect(self._recover)
         self._confirming = False
         self._lay_out()
         self._refresh()
+        open_at(self, 560, 340)
 
     def _lay_out(self) -> None:
         self.recover, self.later = QPushButton("Recover"), QPushButton("Later")

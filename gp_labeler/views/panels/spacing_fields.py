@@ -9,9 +9,14 @@ from gp_core.errors import GpError
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.typed_spacing import UNITS, spacing_in, typed_spacing
 from gp_labeler.views.bind import blocked, spacing_text
+from gp_labeler.views.fonts import field_width, fit
+from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import text_label
 
 __all__ = ["SpacingFields"]
+
+
+_WIDEST = "1000.00"
 
 
 class SpacingFields(QWidget):
@@ -39,9 +44,8 @@ class SpacingFields(QWidget):
             row.addWidget(text_label(name, "hint"))
             row.addWidget(field, 1)
         row.addWidget(self.unit)
-        below = QHBoxLayout()
+        below = FlowLayout()
         below.addWidget(self.same)
-        below.addStretch(1)
         below.addWidget(self.suggestion)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -85,7 +89,7 @@ class SpacingFields(QWidget):
     def _field(self, name: str) -> QLineEdit:
         field = QLineEdit()
         field.setAccessibleName(f"Voxel size along {name}")
-        field.setMinimumWidth(64)
+        fit(field, lambda: field.setMinimumWidth(field_width(field, _WIDEST)))
         field.textEdited.connect(self._on_typed)
         return field
 

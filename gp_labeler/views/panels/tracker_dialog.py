@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
 from PySide6.QtCore import Qt
@@ -25,8 +26,9 @@ from gp_core.errors import GpError
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.bind import follow, set_role
+from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.number_field import NumberField
-from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
 from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.workbench import Workbench
@@ -63,7 +65,6 @@ class TrackerDialog(QDialog):
         self._desk, self._memory = workbench, memory
         self.setWindowTitle("Tracked probe")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.setMinimumWidth(520)
         self._make_fields()
         self._make_buttons()
         self._lay_out()
@@ -72,6 +73,7 @@ class TrackerDialog(QDialog):
             follow(self, signal, self.refresh)
         self._recall()
         self.refresh()
+        open_at(self, 560, 640)
 
     # What it shows
 
@@ -252,6 +254,7 @@ class TrackerDialog(QDialog):
         for name, (caption, hint) in _HINTS.items():
             self.fields[name].setAccessibleName(caption)
             self.fields[name].setPlaceholderText(hint)
+            fit(self.fields[name], partial(_show_hint, self.fields[name], hint))
             self.fields[name].setToolTip(hint)
         self.words, self.pivot_words = text_label(wrap=True), text_label(role="hint", wrap=True)
         self.send_words, self.problem = (
@@ -263,7 +266,7 @@ class TrackerDialog(QDialog):
         self.turned.setTextVisible(False)
         self.send_port = QLineEdit(str(_SEND_PORT))
         self.send_port.setAccessibleName("Port to send the pose from")
-        self.send_port.setFixedWidth(72)
+        fit(self.send_port, lambda: self.send_port.setFixedWidth(field_width(self.send_port, "65535")))
         self.radius = NumberField("Largest 95 % radius of a pose that is sent, mm", widest="10.00")
         self.cone = NumberField("Largest 95 % cone of a pose that is sent, degrees", widest="10.00")
         for field in (self.radius, self.cone):
@@ -290,21 +293,26 @@ class TrackerDialog(QDialog):
             button.setAutoDefault(False)
 
     def _lay_out(self) -> None:
-        column = QVBoxLayout(self)
-        column.setContentsMargins(16, 16, 16, 16)
+        content = QWidget()
+        content.setProperty("role", "panel")
+        column = QVBoxLayout(content)
+        column.setContentsMargins(16, 16, 16, 8)
         column.setSpacing(8)
-        column.addWidget(self._link_card())
-        column.addWidget(self._tip_card())
-        column.addWidget(self._send_card())
-        column.addWidget(self.audible)
-        column.addWidget(self.problem)
+        for part in (self._link_card(), self._tip_card(), self._send_card(), self.audible):
+            column.addWidget(part)
+        column.addStretch(1)
         close = QPushButton("Close")
         close.setAutoDefault(False)
         close.clicked.connect(self.accept)
-        row = QHBoxLayout()
-        row.addStretch(1)
-        row.addWidget(close)
-        column.addLayout(row)
+        foot = QHBoxLayout()
+        foot.setContentsMargins(16, 4, 16, 12)
+        foot.addWidget(self.problem, 1)
+        foot.addStretch(0)
+        foot.addWidget(close, 0, Qt.AlignmentFlag.AlignRight)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(0, 0, 0, 0)
+        layout.addWidget(scrolled(content), 1)
+        layout.addLayout(foot)
 
     def _link_card(self) -> Card:
         card, form = Card("OpenIGTLink server"), _form()
@@ -353,6 +361,10 @@ class TrackerDialog(QDialog):
         limits.addStretch(1)
         card.add(limits)
         return card
+
+
+def _show_hint(field: QLineEdit, hint: str) -> None:
+    field.setMinimumWidth(field_width(field, hint))
 
 
 def _tip_text(offset: FloatArray) -> str:

@@ -7,12 +7,10 @@ from pathlib import Path
 from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QDragEnterEvent, QDragLeaveEvent, QDropEvent, QResizeEvent, QShowEvent
 from PySide6.QtWidgets import (
-    QFrame,
-    QGridLayout,
+    QBoxLayout,
     QHBoxLayout,
     QLabel,
     QPushButton,
-    QScrollArea,
     QSizePolicy,
     QVBoxLayout,
     QWidget,
@@ -21,8 +19,10 @@ from PySide6.QtWidgets import (
 from gp_core.landmarks.features import Side
 from gp_labeler.views.bind import set_role
 from gp_labeler.views.feature_picture import FeaturePicture
+from gp_labeler.views.fonts import elided, fit, font_of, pixels, text_width
 from gp_labeler.views.icons import icon, icon_pixmap
-from gp_labeler.views.panels.parts import emptied
+from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.parts import emptied, scrolled
 from gp_labeler.views.theme import theme_of
 from gp_labeler.workbench import Workbench
 
@@ -38,7 +38,7 @@ _STEPS = (
     ("export", "Export both sides", "Landmark files that open in 3D Slicer and feed the atlas."),
     ("pose", "Estimate a cochlea", "From a few touched points of another animal, with or without a scan."),
 )
-_N_RECENT = 7
+_N_RECENT, _AROUND = 7, 24
 
 
 class Welcome(QWidget):
@@ -60,7 +60,7 @@ class Welcome(QWidget):
     def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workbench = workbench
-        self._icons: list[tuple[QLabel, str, int]] = []
+        self._icons: list[tuple[QLabel, str]] = []
         self._button_icons: list[tuple[QPushButton, str, bool]] = []
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
@@ -86,7 +86,7 @@ class Welcome(QWidget):
 
     def _lay_out(self) -> None:
         page = QWidget()
-        page.setMaximumWidth(820)
+        fit(page, lambda: page.setMaximumWidth(pixels(page, 820)))
         column = QVBoxLayout(page)
         column.setContentsMargins(32, 24, 32, 24)
         column.setSpacing(8)
@@ -97,17 +97,16 @@ class Welcome(QWidget):
         column.addSpacing(4)
         column.addWidget(self._drop)
         column.addSpacing(16)
-        lower = QGridLayout()
-        lower.setHorizontalSpacing(24)
-        lower.setColumnStretch(0, 1)
-        lower.setColumnStretch(1, 1)
+        self._lower = QBoxLayout(QBoxLayout.Direction.LeftToRight)
+        self._lower.setSpacing(24)
         self._recent = QVBoxLayout()
         self._recent.setSpacing(2)
-        lower.addWidget(_text("Recent", "heading"), 0, 0)
-        lower.addWidget(_text("How it goes", "heading"), 0, 1)
-        lower.addLayout(self._recent, 1, 0)
-        lower.addLayout(self._tutorial(), 1, 1)
-        column.addLayout(lower)
+        for name, below in (("Recent", self._recent), ("How it goes", self._tutorial())):
+            part = QVBoxLayout()
+            part.addWidget(_text(name, "heading"))
+            part.addLayout(below)
+            self._lower.addLayout(part, 1)
+        column.addLayout(self._lower)
         column.addStretch(2)
         self._put(page)
 
@@ -123,7 +122,7 @@ class Welcome(QWidget):
         words.addStretch(1)
         self.picture = FeaturePicture()
         self.picture.show_feature("IN", Side.RIGHT)
-        self.picture.setFixedSize(300, 150)
+        fit(self.picture, lambda: self.picture.setFixedSize(pixels(self, 300), pixels(self, 150)))
         row = QHBoxLayout()
         row.setSpacing(24)
         row.addLayout(words, 1)
@@ -139,18 +138,12 @@ class Welcome(QWidget):
         row.addStretch(1)
         row.addWidget(page, 8)
         row.addStretch(1)
-        scroll = QScrollArea()
-        scroll.setWidgetResizable(True)
-        scroll.setFrameShape(QFrame.Shape.NoFrame)
-        scroll.setWidget(middle)
-        scroll.setFocusPolicy(Qt.FocusPolicy.NoFocus)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
-        layout.addWidget(scroll)
+        layout.addWidget(scrolled(middle))
 
-    def _buttons(self) -> QHBoxLayout:
-        row = QHBoxLayout()
-        row.setSpacing(8)
+    def _buttons(self) -> FlowLayout:
+        row = FlowLayout(spacing=8)
         self.open_scan = self._big("Open scan…", "scan", "primary", "A file or folder with a micro-CT")
         self.open_specimen = self._big("Open specimen…", "file", "", "Go on with a labelled specimen")
         self.demo = self._big("Try a demo head", "play", "", "A synthetic head to practise on; takes seconds")
@@ -159,14 +152,13 @@ class Welcome(QWidget):
         self.demo.clicked.connect(self.demo_asked)
         for button in (self.open_scan, self.open_specimen, self.demo):
             row.addWidget(button)
-        row.addStretch(1)
         return row
 
     def _big(self, text: str, icon_name: str, role: str, hint: str) -> QPushButton:
         button = QPushButton(text)
         button.setProperty("role", role)
-        button.setMinimumHeight(40)
-        button.setIconSize(QSize(18, 18))
+        fit(button, lambda: button.setMinimumHeight(pixels(button, 40)))
+        fit(button, lambda: button.setIconSize(QSize(pixels(button, 18), pixels(button, 18))))
         button.setToolTip(hint)
         self._button_icons.append((button, icon_name, role == "primary"))
         return button
@@ -178,8 +170,7 @@ class Welcome(QWidget):
             row, words, picture = QHBoxLayout(), QVBoxLayout(), QLabel()
             words.setSpacing(0)
             row.setSpacing(10)
-            self._icons.append((picture, icon_name, 20))
-            picture.setFixedSize(20, 20)
+            self._icons.append((picture, icon_name))
             words.addWidget(_text(title, ""))
             words.addWidget(_text(text, "hint", wrap=True))
             row.addWidget(picture, 0, Qt.AlignmentFlag.AlignTop)
@@ -189,15 +180,7 @@ class Welcome(QWidget):
         return column
 
     def _recent_button(self, path: Path) -> QPushButton:
-        button = QPushButton()
-        button.setObjectName("recent")
-        button.setProperty("role", "link")
-        button.setToolTip(str(path))
-        button.setAccessibleName(f"Open {path.name}")
-        folder = path.parent.name
-        words = button.fontMetrics().elidedText(path.name, Qt.TextElideMode.ElideMiddle, 230)
-        button.setText(f"{words}   in {folder}" if folder and len(path.name) + len(folder) < 34 else words)
-        button.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        button = _RecentButton(path)
         button.clicked.connect(lambda: self.path_chosen.emit(str(path)))
         self._button_icons.append((button, "folder" if path.is_dir() else "file", False))
         return button
@@ -205,7 +188,9 @@ class Welcome(QWidget):
     def _tint(self) -> None:
         """Draw the icons in the colours of the theme."""
         theme = theme_of(self)
-        for label, name, size in self._icons:
+        size = pixels(self, 20)
+        for label, name in self._icons:
+            label.setFixedSize(size, size)
             label.setPixmap(icon_pixmap(name, theme.accent_text, size, self.devicePixelRatioF()))
         for button, name, primary in self._button_icons:
             button.setIcon(icon(name, theme.on_accent if primary else theme.accent_text))
@@ -214,8 +199,13 @@ class Welcome(QWidget):
         set_role(self._drop, "good" if over else "hint")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
-        self.picture.setVisible(event.size().width() >= 720)
+        is_wide, ways = event.size().width() >= pixels(self, 720), QBoxLayout.Direction
+        self.picture.setVisible(is_wide)
+        self._lower.setDirection(ways.LeftToRight if is_wide else ways.TopToBottom)
         super().resizeEvent(event)
+
+    def minimumSizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
+        return QSize(pixels(self, 320), pixels(self, 120))
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().changeEvent(event)
@@ -240,6 +230,30 @@ class Welcome(QWidget):
         if path is not None:
             event.acceptProposedAction()
             self.path_chosen.emit(str(path))
+
+
+class _RecentButton(QPushButton):
+    """A file opened before: its name, shortened where there is no room, and the folder where there is."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__()
+        self._path = path
+        self.setObjectName("recent")
+        self.setProperty("role", "link")
+        self.setToolTip(str(path))
+        self.setAccessibleName(f"Open {path.name}")
+        self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Fixed)
+        fit(self, self._shorten)
+
+    def _shorten(self) -> None:
+        font, room = font_of(self), self.width() - self.iconSize().width() - _AROUND
+        whole = f"{self._path.name}   in {self._path.parent.name}"
+        fits = text_width(self, whole) <= room
+        self.setText(whole if fits else elided(font, self._path.name, max(room, 0)))
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
+        super().resizeEvent(event)
+        self._shorten()
 
 
 def dropped_path(event: QDropEvent) -> Path | None:

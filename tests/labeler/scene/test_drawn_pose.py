@@ -181,8 +181,8 @@ def test_names_are_written_where_nothing_else_is(scene) -> None:
     assert labels == {}
     scene.pose.show(ALL)
     labels = {label.text.text: label for label in scene.pose.refresh(scene.camera.viewpoint())}
-    assert labels["robust · off 2.50 mm, 0.0°"].text.colour == DARK.states["pose"]
-    assert labels["MN ?"].text.colour == DARK.states["doubtful"]
+    assert labels["robust · off 2.50 mm, 0.0°"].text.colour == DARK.word("pose")
+    assert labels["MN ?"].text.colour == DARK.word("doubtful")
 
 
 def test_a_theme_recolours_what_is_drawn(scene) -> None:

@@ -1,0 +1,134 @@
+"""No word is cut: the quick part of a walk over every state; and the walk finds what is.
+
+``tools/cut-words`` walks the whole matrix of fonts, screens, scales and text sizes.
+"""
+
+from __future__ import annotations
+
+import os
+
+import pytest
+from cut_words import cut_words
+from PySide6.QtGui import QFontDatabase
+from PySide6.QtWidgets import QApplication, QCheckBox, QDialog, QHBoxLayout, QLabel, QPushButton, QWidget
+from text_states import OWN, walk_states
+
+from gp_labeler.views import fonts
+from gp_labeler.views.guide import GuideWindow
+from gp_labeler.views.panels.parts import ElidedLabel, text_label
+from gp_labeler.views.theme import DARK, apply_theme
+
+SMALL, USUAL, LARGE = (853, 512), (1280, 800), (1366, 768)
+"""Screens, logical pixels: the first is what 1280 x 800 and 1366 x 768 leave at 150 %."""
+
+FAMILIES = ("DejaVu Sans", "Liberation Sans", "Noto Sans", "Inter")
+FULLEST = ("first page", "scan", "label, both sides", "pose, a mistouch", "atlas, tried out", "open a stack")
+WHOLE = "GP_CUT_WORDS" in os.environ
+"""Whether the whole matrix is walked, as ``tools/cut-words`` does."""
+
+
+@pytest.fixture
+def family():
+    """Set the family, and take it back at the end."""
+    yield fonts.use_family
+    fonts.use_family(None)
+
+
+def looks(state: str) -> list[tuple[str | None, int, tuple[int, int], str]]:
+    """Return family, text size (percent), screen and theme of each look that is had at a state."""
+    installed = [name for name in FAMILIES if name in QFontDatabase.families()]
+    if not WHOLE:  # to restyle a window takes its time: other fonts have a look at the fullest states
+        others = [(name, 100, SMALL, "dark") for name in installed] if state in FULLEST else []
+        return [(None, 100, SMALL, "dark"), *others]
+    scale = QApplication.primaryScreen().devicePixelRatio()
+    screens = [(round(w / scale), round(h / scale)) for w, h in ((1280, 800), (1366, 768), (1440, 900))]
+    found = [(name, 100, screen, "dark") for name in (None, *installed) for screen in screens]
+    return found + [(None, size, screens[0], "light") for size in (85, 115, 130, 150)]
+
+
+def test_no_word_is_cut_in_any_state(make_window, tmp_path, family) -> None:
+    window, found = make_window(), []
+
+    def look(state: str, root: QWidget) -> None:
+        for name, size, screen, theme in looks(state):
+            family(name)
+            if (window.text_size, window.theme_name) != (size, theme):
+                window.theme_name = theme
+                window.set_text_size(size)
+            else:
+                window.set_theme(theme)
+            window.resize(*screen)
+            if isinstance(root, QDialog | GuideWindow):
+                width, height = screen if isinstance(root, GuideWindow) else root.size().toTuple()
+                root.resize(min(width, screen[0]), min(height, screen[1]))
+            lines = cut_words(root, own=OWN, screen=screen)
+            found.extend(f"{state}, {name}, {size} %, {screen}, {theme}: {line}" for line in lines)
+
+    walk_states(window, tmp_path, look)
+    assert found == []
+
+
+@pytest.mark.parametrize("name", [None, *FAMILIES])
+def test_the_window_fits_the_smallest_screen(make_window, family, name) -> None:
+    if name is not None and name not in QFontDatabase.families():
+        pytest.skip(f"{name} is not installed")
+    window = make_window()
+    family(name)
+    for size in fonts.TEXT_SIZES:
+        window.set_text_size(size)
+        QApplication.processEvents()
+        least = window.minimumSizeHint()
+        assert least.width() <= SMALL[0]
+        assert least.height() <= SMALL[1]
+
+
+# The walk itself
+
+
+@pytest.fixture
+def parent(qtbot):
+    parent = QWidget()
+    apply_theme(parent, DARK)
+    qtbot.addWidget(parent)
+    QHBoxLayout(parent)
+    return parent
+
+
+def seen(parent: QWidget, widget: QWidget, width: int, height: int = 30) -> list[str]:
+    """Return what the walk says of a widget that is given so much room."""
+    parent.layout().addWidget(widget)
+    widget.setFixedSize(width, height)
+    parent.show()
+    return cut_words(parent)
+
+
+@pytest.mark.parametrize(
+    ("make", "enough"),
+    [
+        (lambda: QLabel("Round window anterior"), 170),
+        (lambda: text_label("Round window anterior and posterior", wrap=True), 270),
+        (lambda: QPushButton("Place at crosshair"), 170),
+        (lambda: QCheckBox("Leave out parts"), 170),
+    ],
+    ids=["label", "wrapped", "button", "check box"],
+)
+def test_the_walk_names_what_is_cut(parent, make, enough) -> None:
+    assert seen(parent, make(), enough) == []
+    assert any("Round" in line or "Place" in line or "Leave" in line for line in seen(parent, make(), 60))
+
+
+def test_only_names_of_the_user_may_be_shortened(parent) -> None:
+    label = ElidedLabel("a_long_name_of_a_scan.nrrd")
+    assert seen(parent, label, 60) != []
+    assert cut_words(parent, own=["a_long_name_of_a_scan"]) == []
+    label.setToolTip("")
+    assert cut_words(parent, own=["a_long_name_of_a_scan"]) != []
+
+
+def test_painted_words_are_looked_at_too(make_window, family) -> None:
+    window = make_window()
+    window.resize(*USUAL)
+    rail = window.rail
+    assert cut_words(rail) == []
+    rail.setFixedWidth(30)
+    assert any("paints '1 Scan'" in line for line in cut_words(rail))

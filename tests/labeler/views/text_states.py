@@ -1,0 +1,315 @@
+"""Every state of the window that shows other words: each step, panel, dialog and message in turn."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import tifffile
+from animal_cases import drawn_animals, write_animals
+from panel_cases import ATLAS, grey_volume, in_scan, place
+from PySide6.QtCore import QTimer
+from PySide6.QtWidgets import QApplication, QWidget
+
+from gp_core import PROBE, Side
+from gp_core.atlas.draw import draw_animal
+from gp_labeler.imaging.readers import inspect_volume
+from gp_labeler.session import labelling, touching
+from gp_labeler.session.landmark_export import export_landmarks
+from gp_labeler.session.touches import TouchHow
+from gp_labeler.session.workflow import Active
+from gp_labeler.views.guide import GuideWindow
+from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.panels.export_dialog import ExportDialog
+from gp_labeler.views.panels.import_dialog import ImportDialog
+from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.physical_dialog import PhysicalDialog
+from gp_labeler.views.panels.recover_dialog import RecoverDialog
+from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+
+__all__ = ["LONG_NAME", "OWN", "walk_states"]
+
+LEFT, RIGHT = Side.LEFT, Side.RIGHT
+THERE = np.array([1040.0, -1120.5, -1180.2])
+"""Where a tracker may well have its points."""
+LONG_NAME = "GP-2024-017_left_bulla_opened_after_perfusion_rescan_0.018mm"
+OWN = ("GP-014", "GP01", LONG_NAME, "torn", "unnamed", "touches of", "animals", "probe_of_monday")
+"""What a user named: may be shortened."""
+
+_ABOUT = (
+    "Labels guinea-pig heads in micro-CT, and estimates the pose of the cochlea from a few touched points."
+    "\n\nCoordinates are LPS, mm. Nothing is sent anywhere."
+)
+
+Look = Callable[[str, QWidget], object]
+
+
+def walk_states(window: MainWindow, folder: Path, look: Look) -> None:
+    """Bring a window that is shown from state to state.
+
+    Parameters
+    ----------
+    window : MainWindow
+        One that nothing was opened in yet, without an atlas.
+    folder : Path
+        Where files may be written.
+    look : callable
+        Is given the name of each state, and the widget that shows it.
+    """
+    desk = window.workbench
+    _without_scan(window, look)
+    desk.use_atlas(ATLAS)
+    desk.open_volume(grey_volume())
+    _settle(window)
+    _scan(window, look)
+    _label(window, look)
+    _messages(window, look)
+    _pose(window, look)
+    _atlas(window, folder, look)
+    _dialogs(window, folder, look)
+
+
+def _settle(window: MainWindow) -> None:
+    end = time.monotonic() + 180
+    while window.workbench.jobs.running and time.monotonic() < end:
+        QApplication.processEvents()
+        time.sleep(0.005)
+    QApplication.processEvents()
+
+
+def _without_scan(window: MainWindow, look: Look) -> None:
+    look("first page", window)
+    window.set_step("atlas")
+    look("atlas, alone, being loaded", window)
+    window.workbench.use_atlas(ATLAS)
+    look("atlas, alone", window)
+    window.set_step("pose")
+    look("pose, alone, nothing touched", window)
+    animal = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
+    for code in PROBE:
+        _touch(window, code, animal[code] + THERE)
+    _settle(window)
+    look("pose, alone, estimated", window)
+    touching.clear_touches(window.workbench.session, LEFT)
+    window.set_step("scan")
+
+
+def _scan(window: MainWindow, look: Look) -> None:
+    window.set_step("scan")
+    look("scan", window)
+    window.commands.run("view.cut_axial")
+    look("scan, cut", window)
+    window.commands.run("view.cut_axial")
+    for layout in ("axial", "four-up"):
+        window.workbench.session.view.update(layout=layout)
+        look(f"layout {layout}", window)
+    window.grid.hovered.emit(np.array([-12.34, 23.45, -34.56]))
+    look("pointer over a slice", window)
+
+
+def _label(window: MainWindow, look: Look) -> None:
+    desk, session = window.workbench, window.workbench.session
+    window.set_step("label")
+    look("label, nothing placed", window)
+    place(desk, "CA", "CB", "RWP")
+    _settle(window)
+    for state, code, edit in (
+        ("ghost", "RWA", lambda: None),
+        ("placed", "CA", lambda: None),
+        ("checked", "CB", lambda: window.commands.run("point.check")),
+        ("locked", "RWP", lambda: window.commands.run("point.lock")),
+        ("unseen", "RWM", lambda: labelling.mark_unseen(session, side=LEFT, code="RWM")),
+    ):
+        session.set_active(Active(LEFT, code))
+        edit()
+        _settle(window)
+        look(f"label, {state}", window)
+    place(desk, "OS", "LLI", "RWA")
+    labelling.place(session, np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
+    _settle(window)
+    session.set_active(Active(LEFT, "OI"))
+    look("label, doubtful", window)
+    for code in ("RWA", "DTL", "IN", "ZL", "MN", "FPP"):
+        session.set_active(Active(RIGHT, code))
+        look(f"label, {code} right", window.steps["label"])
+    place(desk, "CA", "CB", "RWA", "RWP", "OS", side=RIGHT)
+    _settle(window)
+    look("label, both sides", window)
+
+
+def _messages(window: MainWindow, look: Look) -> None:
+    desk = window.workbench
+    desk.say("Exported 40 points to GP-014_L.mrk.json and GP-014_R.mrk.json")
+    look("message", window)
+    desk.say(
+        f"/home/anatomy/2024/scans/{LONG_NAME}.nrrd: the values end before the header says they do: got "
+        "5123 kB, expected 9123 kB. Copy the file again from the scanner, or export it there once more.",
+        "error",
+    )
+    look("long error", window)
+    desk.set_tool("grey")
+    look("instruction, contrast", window)
+    desk.set_tool("place")
+
+
+def _touch(window: MainWindow, name: str, position: np.ndarray) -> None:
+    window.workbench.pose.record(position, TouchHow.TYPED, name=name)
+
+
+def _pose(window: MainWindow, look: Look) -> None:
+    desk, session = window.workbench, window.workbench.session
+    window.set_step("pose")
+    look("pose, nothing touched", window)
+    animal = {code: in_scan(code) for code in ("CA", "CB", *PROBE)}
+    moved = {code: position + THERE for code, position in animal.items()}
+    rng = np.random.default_rng(1)
+    for code in PROBE:
+        _touch(window, code, moved[code] + 0.05 * rng.normal(size=3))
+    for n, corner in enumerate(np.eye(3) * 9, 1):
+        touching.record_touch(session, LEFT, f"S{n}", corner)
+    _settle(window)
+    look("pose, estimated", window)
+    window.judge_pose("accept")
+    touching.leave_out(session, LEFT, "OS", True)
+    _settle(window)
+    look("pose, one left out, judged", window)
+    touching.leave_out(session, LEFT, "OS", False)
+    _touch(window, "MN", moved["MN"] + [3.0, 0, 0])
+    _settle(window)
+    look("pose, a mistouch", window)
+    _touch(window, "MN", moved["OS"])
+    _touch(window, "OS", moved["MN"])
+    _settle(window)
+    look("pose, names exchanged", window)
+    desk.pose.choose(side=RIGHT)
+    for code in PROBE:
+        _touch(window, code, moved[code])
+    _settle(window)
+    look("pose, wrong side", window)
+    desk.pose.choose(side=LEFT)
+    for code in PROBE:
+        _touch(window, code, moved[code])
+    window.steps["pose"].touches.model.show_skull(True)
+    window.steps["pose"].touches.refresh()
+    desk.pose.choose(registration="skull")
+    _settle(window)
+    look("pose, skull features", window)
+    desk.pose.choose(registration="auto", methods=("robust", "jrmpc"))
+    _settle(window)
+    look("pose, both methods, no animals", window)
+    desk.atlas_problem = f"The atlas of {LONG_NAME}.json cannot be had any more: it does not exist."
+    desk.atlas_details_changed.emit()
+    look("pose, atlas gone", window)
+    desk.set_tool("touch")
+    look("pose, touching on the scan", window)
+    desk.set_tool("look")
+
+
+def _atlas(window: MainWindow, folder: Path, look: Look) -> None:
+    desk = window.workbench
+    window.set_step("atlas")
+    look("atlas, chosen one gone", window)
+    desk.use_atlas(ATLAS)
+    look("atlas", window)
+    animals = write_animals(folder / "animals", drawn_animals(3))
+    (animals / "torn_L.mrk.json").write_text("{")
+    desk.fit_atlas([animals])
+    look("atlas, being fitted", window)
+    _settle(window)
+    look("atlas, fitted", window)
+    desk.try_atlas()
+    _settle(window)
+    look("atlas, tried out", window)
+    window.set_step("pose")
+    _settle(window)
+    look("pose, both methods", window)
+
+
+def _dialogs(window: MainWindow, folder: Path, look: Look) -> None:
+    for name, make in _dialog_makers(window, folder).items():
+        dialog = make()
+        dialog.show()
+        _settle(window)
+        look(name, dialog)
+        dialog.close()
+        QApplication.processEvents()
+    _questions(window, look)
+
+
+def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], QWidget]]:
+    desk = window.workbench
+    out = folder / "out"
+    out.mkdir(exist_ok=True)
+    export_landmarks(desk.session.state, out)
+    file = next(out.glob("*_L.mrk.json"))
+    bad = folder / f"{LONG_NAME}.mrk.json"
+    bad.write_text("{")
+    off_bone = lambda points: np.zeros(len(points), dtype=bool)  # noqa: E731
+    saving = SimpleNamespace(save_file=lambda *_: None)
+
+    def off() -> QWidget:
+        dialog = LandmarkImportDialog(desk, [file], off_bone, parent=window)
+        dialog.take.click()
+        return dialog
+
+    return {
+        "export": lambda: ExportDialog(desk, folder, parent=window),
+        "export, files there": lambda: ExportDialog(desk, out, parent=window),
+        "import landmarks": lambda: LandmarkImportDialog(desk, [file], parent=window),
+        "import landmarks, off the bone": off,
+        "import landmarks, torn": lambda: LandmarkImportDialog(desk, [bad], parent=window),
+        "open a stack": lambda: ImportDialog(desk, inspect_volume(_stack(folder)), parent=window),
+        "recover": lambda: RecoverDialog(_recoveries(), window),
+        "tracker": lambda: TrackerDialog(desk, window.memory, window),
+        "keys": lambda: ShortcutsSheet(window),
+        "guide": lambda: GuideWindow(desk, window),
+        "physical test": lambda: PhysicalDialog(desk, saving, window),
+    }
+
+
+def _stack(folder: Path) -> Path:
+    stack = folder / f"{LONG_NAME}_rec"
+    stack.mkdir(exist_ok=True)
+    for k in range(12):
+        plane = np.full((30, 50), 20, np.uint8)
+        plane[10:20, 5:15] = 120 + 3 * k
+        tifffile.imwrite(stack / f"{LONG_NAME}_{k:04d}.tif", plane)
+    return stack
+
+
+def _recoveries() -> list:
+    words = "GP-014: 12 unsaved edits, the last at 2026-11-22 13:41: mark RWM left as checked"
+    long = words.replace("GP-014", LONG_NAME)
+    return [SimpleNamespace(text=text, specimen_file=None) for text in (words, long)]
+
+
+def _questions(window: MainWindow, look: Look) -> None:
+    prompts = Prompts(window)
+    asks: dict[str, Callable[[], object]] = {
+        "question": lambda: prompts.choose(
+            "Not saved",
+            "Save the changes to GP-014?",
+            ["Save", "Do not save"],
+            detail="Without saving, they are lost when this specimen is closed.",
+        ),
+        "question of the insertion path": lambda: prompts.item(
+            "Insertion path", "Its numbers are in", ["mm", "µm", "m"]
+        ),
+        "number": lambda: prompts.number("Voxel size", "Voxel size of the slices, mm", 0.05),
+        "about": lambda: prompts.tell("About gp-labeler", f"gp-labeler 1.0\n\n{_ABOUT}"),
+    }
+    for name, ask in asks.items():
+
+        def leave(name: str = name) -> None:
+            dialog = QApplication.activeModalWidget()
+            if dialog is not None:
+                look(name, dialog)
+                dialog.close()
+
+        QTimer.singleShot(50, leave)
+        ask()
