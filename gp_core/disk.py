@@ -50,6 +50,7 @@ MAX_BYTES = 50_000_000
 """Size of the largest text or JSON file that is read."""
 
 _DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+)?", re.DOTALL)
+_CHUNK_BYTES = 1 << 20
 _LONGEST_NAME = 200  # bytes of a name in its draft's name; systems allow 255
 _FORGOTTEN_SECONDS = 3600.0  # after which the draft of any file counts as left behind
 _PATIENCE_SECONDS = 10.0  # for somebody who reads a pipe
@@ -94,11 +95,14 @@ def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
         if Path(path).is_dir():  # Windows cannot open one
             _check_kind(Path(path).stat(), path, what, max_bytes)
         with os.fdopen(os.open(path, flags), "rb") as file:
-            _check_kind(os.fstat(file.fileno()), path, what, max_bytes)
-            content = file.read(max_bytes + 1)
+            status = os.fstat(file.fileno())
+            _check_kind(status, path, what, max_bytes)
+            content = file.read(status.st_size + 1)
+            while len(content) <= max_bytes and (more := file.read(_CHUNK_BYTES)):  # it grows, or is in /proc
+                content += more
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
-    if len(content) > max_bytes:  # such as /proc, whose sizes say nothing
+    if len(content) > max_bytes:
         raise _too_large(path, what, max_bytes)
     return content
 

@@ -86,9 +86,9 @@ class Rig:
     def to_read(self, path: str) -> Path:
         """Return a path to read, relative to the script's folder; no step writes over it."""
         file = self.folder / path
-        own = {written.resolve() for written in self.files}
+        own = {os.path.realpath(written) for written in self.files}
         for read in labelled_files(file) if file.is_dir() else [file]:
-            if read.resolve() not in own:  # a step may read what an earlier one wrote
+            if os.path.realpath(read) not in own:  # a step may read what an earlier one wrote
                 protect(read)
         return file
 

@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import logging
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from fuzz_window import Window
 
 import gp_core
 from gp_core.atlas.atlas import Atlas
@@ -72,6 +75,15 @@ COMMANDS = (
     ("mat", "import-mat {in} {in} -o {dir}"),
 )
 
+STEPS: tuple[tuple[str, dict[str, object]], ...] = (
+    ("scan", {"do": "open", "path": "{in}"}),
+    ("specimen", {"do": "open", "path": "{in}"}),
+    ("atlas", {"do": "atlas", "path": "{in}"}),
+    ("animals", {"do": "atlas", "specimens": ["{in}"]}),
+    ("landmarks", {"do": "import", "files": ["{in}"], "side": "L"}),
+    ("touches", {"do": "touches", "side": "L", "points": "{in}"}),
+)
+
 OLD = b'{"what was": "there before"}\n'
 
 
@@ -125,6 +137,7 @@ def _command(main: Callable[[list[str]], int], *words: str) -> Callable[[Path, P
         output.write_bytes(OLD)
         named = {"{in}": str(path), "{out}": str(output), "{dir}": str(folder / "made")}
         said, error = io.StringIO(), io.StringIO()
+        logging.getLogger().handlers.clear()
         given = [_filled(word, named) for word in words]
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(error):
             try:
@@ -135,6 +148,22 @@ def _command(main: Callable[[list[str]], int], *words: str) -> Callable[[Path, P
         return Outcome(status, fault)
 
     return run
+
+
+def _in_window(table: dict[str, object]) -> Callable[[Path, Path], Outcome]:
+    def run(path: Path, folder: Path) -> Outcome:
+        def filled(value: object) -> object:
+            if isinstance(value, list):
+                return [filled(each) for each in value]
+            return value.replace("{in}", str(path)) if isinstance(value, str) else value
+
+        fault = WINDOW.fault({key: filled(value) for key, value in table.items()}, folder)
+        return Outcome(0, fault)
+
+    return run
+
+
+WINDOW = Window()
 
 
 def _filled(word: str, named: dict[str, str]) -> str:
@@ -239,6 +268,8 @@ def _all() -> Iterator[Target]:
         yield Target(f"gp-core {line.split()[0]} ({kind})", kind, _command(gp_core_main, *line.split()))
     mesh = "mesh {in} -o {dir}.ply --spacing 0.1 --threshold 100"
     yield Target("gp-labeler mesh", "scan", _command(gp_labeler_main, *mesh.split()))
+    for kind, table in STEPS:
+        yield Target(f"window {table['do']} ({kind})", kind, _in_window(table))
     offscreen = ("--offscreen", "{in}", "--output", "{dir}")
     yield Target("gp-labeler --offscreen", "script", _command(_offscreen, *offscreen))
 
