@@ -10,12 +10,15 @@ from pathlib import Path
 
 import numpy as np
 
+from gp_core.errors import GpError
+
 __all__ = ["Numbering", "SliceGroup", "group_slices", "number_slices"]
 
 _RUN = re.compile(r"(\d+)")
 _POSITION = re.compile(r"(\d+)\.(\d+)")
 _HEX_TAIL = re.compile(r"(.*?)([0-9a-fA-F]{2,8})")
 _FEWEST_HEX, _HOLES = 10, 0.1
+_SPARSEST = 100
 
 
 @dataclass(frozen=True)
@@ -159,7 +162,13 @@ def _group(members: list[tuple[int, Path]], counting: Sequence[int]) -> SliceGro
 
 
 def number_slices(group: SliceGroup) -> Numbering:
-    """Put the files of a group on a regular count: missing ones become None, doubled ones go aside."""
+    """Put the files of a group on a regular count: missing ones become None, doubled ones go aside.
+
+    Raises
+    ------
+    GpError
+        Nearly all would be missing.
+    """
     first: dict[int, Path] = {}
     doubled = []
     for number, file in zip(group.numbers, group.files, strict=True):
@@ -171,6 +180,13 @@ def number_slices(group: SliceGroup) -> Numbering:
     step = int(max(steps, key=lambda value: (steps[value], -value))) if steps else 1
     if any(value % step for value in steps):
         step = 1
+    n_slices = (numbers[-1] - numbers[0]) // step + 1
+    if n_slices > _SPARSEST * len(numbers) + _SPARSEST:
+        raise GpError(
+            f"the numbers of {len(numbers)} images named {group.pattern} run from {numbers[0]} "
+            f"to {numbers[-1]}, too far apart for slices",
+            remedy="Keep the slices of one stack alone in a folder.",
+        )
     every = range(numbers[0], numbers[-1] + 1, step)
     missing = tuple(number for number in every if number not in first)
     return Numbering(tuple(first.get(number) for number in every), step, missing, tuple(doubled))

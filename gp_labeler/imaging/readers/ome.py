@@ -11,6 +11,7 @@ from gp_labeler.imaging.readers.spacing import unit_in_mm
 __all__ = ["OmeImage", "ome_images"]
 
 _UNIT_BY_DEFAULT = "µm"
+_MOST_BYTES = 1 << 26
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,7 @@ def ome_images(text: str, folder: Path) -> tuple[tuple[OmeImage, ...], str]:
     companion = next((e.get("MetadataFile", "") for e in root if _is(e, "BinaryOnly")), "")
     if companion:
         file = folder / Path(companion).name
-        root = _parsed(file.read_bytes()) if file.is_file() else None
+        root = _parsed(_head(file)) if file.is_file() else None
         if root is None:
             return (), companion
     images = [
@@ -72,6 +73,11 @@ def ome_images(text: str, folder: Path) -> tuple[tuple[OmeImage, ...], str]:
         if _is(pixels, "Pixels")
     ]
     return tuple(images), companion
+
+
+def _head(file: Path) -> bytes:
+    with file.open("rb") as stream:
+        return stream.read(_MOST_BYTES)
 
 
 def _parsed(text: str | bytes) -> ElementTree.Element | None:

@@ -89,8 +89,9 @@ def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> Imp
     if not dicom and any(map(is_dicomdir, files)) and (disc := _dicom_below(folder)):
         return inspect_dicom(folder, disc, options, report)
     few = images if len(images) <= _FEW_IMAGES else []
-    volumes = [file for file in (*others, *few) if file not in set(dicom) and _is_volume(file)]
-    slices = [image for image in images if image not in set(volumes)]
+    known = set(dicom)
+    volumes = [file for file in (*others, *few) if file not in known and _is_volume(file)]
+    slices = sorted(set(images) - set(volumes))
     stack = max((len(group.files) for group in group_slices(slices)), default=0)
     if len(volumes) + bool(dicom) > 1:
         raise _several(folder, volumes, dicom, slices if stack > 1 else [])

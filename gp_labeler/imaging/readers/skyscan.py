@@ -17,6 +17,7 @@ __all__ = ["SkyScanLog", "find_log", "log_geometry", "read_log"]
 _ACQUISITION, _RECONSTRUCTION = "acquisition", "reconstruction"
 _PIXEL = re.compile(r"(?:image )?pixel size \((.+)\)")
 _SAME_FACTOR = 0.02
+_MOST_BYTES = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,8 @@ def read_log(path: Path) -> SkyScanLog | None:
     Only that section counts: ``[Acquisition]`` holds other pixel sizes (camera, projection, scaled) and
     another file name prefix.
     """
-    raw = path.read_bytes()
+    with path.open("rb") as file:
+        raw = file.read(_MOST_BYTES)
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -107,7 +109,9 @@ def _pixel_mm(fields: dict[str, str]) -> float | None:
 def find_log(folder: Path, prefix: str) -> SkyScanLog | None:
     """Return the log of the slices whose names begin with `prefix`; one that names others does not count."""
     logs = [
-        log for path in sorted(folder.glob("*")) if path.suffix.lower() == ".log" and (log := read_log(path))
+        log
+        for path in sorted(folder.glob("*"))
+        if path.suffix.lower() == ".log" and path.is_file() and (log := read_log(path))
     ]
     named = [log for log in logs if log.prefix and prefix.lower().startswith(log.prefix.lower())]
     if named:

@@ -28,6 +28,7 @@ __all__ = [
     "SliceSource",
     "assemble",
     "in_threads",
+    "nearest_there",
     "open_stream",
     "window",
 ]
@@ -154,8 +155,9 @@ class FileSource:
 
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
-        there = np.array([n for n, file in enumerate(self.files) if file is not None])
-        nearest = [self.files[there[np.abs(there - number).argmin()]] for number in wanted]
+        there = [file for file in self.files if file is not None]
+        stands_in = nearest_there([file is not None for file in self.files])
+        nearest = [there[stands_in[number]] for number in wanted]
         shape: tuple[int, ...] | None = None
         for file, plane in zip(nearest, in_threads(self._decode, nearest), strict=True):
             shape = shape or plane.shape
@@ -163,10 +165,19 @@ class FileSource:
                 raise VolumeError(f"it is {_times(plane.shape)}, the other slices {_times(shape)}", file=file)
             yield plane
 
-    def _decode(self, file: Path | None) -> Plane:
-        assert file is not None
+    def _decode(self, file: Path) -> Plane:
         with failing_as_volume_error(file):
             return self.decode(file)
+
+
+def nearest_there(there: Sequence[bool]) -> list[int]:
+    """Return for each slice the nearest of those that are there, counted among these; of two the lower."""
+    places = np.flatnonzero(there)
+    after = np.searchsorted(places, np.arange(len(there))).clip(0, len(places) - 1)
+    before = (after - 1).clip(0)
+    far = np.arange(len(there)) - places[before] > places[after] - np.arange(len(there))
+    nearer: list[int] = np.where(far | (places[after] == np.arange(len(there))), after, before).tolist()
+    return nearer
 
 
 def in_threads(make: Callable[[Any], Plane], things: Iterable[Any]) -> Iterator[Plane]:

@@ -17,7 +17,7 @@ from gp_labeler.imaging.readers.orientation import swaps_axes
 from gp_labeler.imaging.readers.pixel_size import stack_geometry, tiff_pixel_size
 from gp_labeler.imaging.readers.plan import ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
-from gp_labeler.imaging.readers.source import Plane, RawSource, SliceSource, in_threads
+from gp_labeler.imaging.readers.source import Plane, RawSource, SliceSource, in_threads, nearest_there
 from gp_labeler.imaging.readers.tiff_pages import (
     check_page,
     finishing,
@@ -125,11 +125,13 @@ def _source(stack: PageStack, path: Path, tif: tifffile.TiffFile, channel: int |
     if stack.deep:
         return _DeepPage(path, finish)
     if stack.offset is None:
-        return _PageSource(path, stack.series, _nearest(stack.pages), finish)
+        there = [page for page in stack.pages if page is not None]
+        numbers = tuple(there[n] for n in nearest_there([page is not None for page in stack.pages]))
+        return _PageSource(path, stack.series, numbers, finish)
     first = stack.first
     dtype = np.dtype(first.dtype).newbyteorder(tif.byteorder)
     page_bytes = int(np.prod(first.shape)) * dtype.itemsize
-    numbers = [page or 0 for page in stack.pages]
+    numbers = tuple(page or 0 for page in stack.pages)
     return RawSource(
         path=path,
         offset=stack.offset + numbers[0] * page_bytes,
@@ -139,12 +141,6 @@ def _source(stack: PageStack, path: Path, tif: tifffile.TiffFile, channel: int |
         plane_step=(numbers[1] - numbers[0]) * page_bytes,
         finish=finish,
     )
-
-
-def _nearest(pages: Sequence[int | None]) -> tuple[int, ...]:
-    """Return the pages of all slices, the nearest one for each that is missing."""
-    there = np.array([(n, page) for n, page in enumerate(pages) if page is not None])
-    return tuple(int(there[np.abs(there[:, 0] - n).argmin(), 1]) for n in range(len(pages)))
 
 
 @dataclass(frozen=True)

@@ -210,15 +210,15 @@ def _gathered(tif: tifffile.TiffFile, path: Path) -> list[PageStack]:
     stacks = [numbers for numbers in kinds.values() if len(numbers) > 1]
     found = []
     for n, numbers in enumerate(stacks):
-        strange = [m for m in pages if numbers[0] < m < numbers[-1] and m not in set(numbers)]
-        between = strange if len(strange) <= FEW * len(numbers) or len(strange) == 1 else []
+        strange = {m for m in pages if numbers[0] < m < numbers[-1]} - set(numbers)
+        between = sorted(strange) if len(strange) <= max(1, FEW * len(numbers)) else []
         slices = sorted({*numbers, *between})
         first = pages[numbers[0]]
         check_orientations([pages[m] for m in numbers], path)
         name = f"pages of {first.imagewidth} x {first.imagelength}"
         found.append(
             PageStack(
-                pages=tuple(None if m in between else m for m in slices),
+                pages=tuple(None if m in strange else m for m in slices),
                 first=first,
                 name=name if len(stacks) > 1 else f"stack {n + 1}",
                 text=f"{len(slices)} {name} pixels, {first.dtype}",

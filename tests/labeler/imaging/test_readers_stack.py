@@ -520,6 +520,15 @@ def test_a_counter_that_goes_on_does_not_join_two_stacks() -> None:
     assert [len(group.files) for group in group_slices(files)] == [20, 20]
 
 
+def test_numbers_too_far_apart_are_no_stack_and_cost_nothing(tmp_path: Path) -> None:
+    for number in (1, 2, 3, 10**13):
+        tifffile.imwrite(tmp_path / f"s{number}.tif", np.zeros((9, 9), np.uint8), photometric=1)
+    with pytest.raises(
+        VolumeError, match=r"4 images named s#.tif run from 1 to 10000000000000, too far apart"
+    ):
+        read_volume(tmp_path, spacing=SPACING)
+
+
 def test_a_hexadecimal_slice_that_is_missing_is_named() -> None:
     files = [Path(f"im_{k:03x}.tif") for k in range(40) if k != 27]
     (group,) = group_slices(files)
