@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from dataclasses import replace
 from os import PathLike, fspath
 from types import MappingProxyType
@@ -33,6 +34,8 @@ __all__ = [
     "sides_of",
     "specimen_of",
 ]
+
+_log = logging.getLogger(__name__)
 
 Unknown = Literal["error", "extra"]
 
@@ -213,6 +216,8 @@ def read_touches(
     seen = replace(points, points=tuple(_without_sentinel(point) for point in points.points))
     touches = _landmark_set(seen, wanted, "tracker", unknown)
     check_plausible_size(touches, path)
+    if touches.suggested:
+        _log.warning("%s: suggestions are no touches, left out: %s", path, " ".join(touches.suggested))
     return touches
 
 

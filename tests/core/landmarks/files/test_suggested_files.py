@@ -72,7 +72,7 @@ def _saved_by_slicer(file: Path, target: Path) -> Path:
     return target
 
 
-def test_the_description_alone_or_the_name_alone_marks_suggestions(tmp_path: Path) -> None:
+def test_the_description_alone_or_the_name_alone_marks_suggestions(tmp_path: Path, caplog) -> None:
     write_suggestions(tmp_path / "a_L_suggested.mrk.json", _side(), specimen="GP1")
     renamed = _saved_by_slicer(tmp_path / "a_L_suggested.mrk.json", tmp_path / "mine_L.mrk.json")
     assert dict(read_landmarks(renamed).suggested) == dict(_side().suggested)
@@ -82,6 +82,7 @@ def test_the_description_alone_or_the_name_alone_marks_suggestions(tmp_path: Pat
     assert set(read_landmarks(table).suggested) == {"CA", "OS"}
     assert all(point.position is None for point in read_points(table).points)
     assert not read_touches(table, "R").placed
+    assert "suggestions are no touches, left out: CA OS" in caplog.text
 
 
 def test_a_side_and_its_suggestions_are_one_animal(tmp_path: Path) -> None:
