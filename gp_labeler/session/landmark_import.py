@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError, blaming
 from gp_core.landmarks.features import Side, feature
-from gp_core.landmarks.files import PointList, landmarks_of, read_points
+from gp_core.landmarks.files import PointList, landmarks_of, read_points, sides_of
+from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session.document import provenance_of
 from gp_labeler.session.edits import as_position, point_text, require_free
@@ -39,6 +40,7 @@ def import_landmarks(
     paths: Iterable[str | PathLike[str]],
     *,
     side: Side | str | None = None,
+    names: Mapping[str, str] | None = None,
     near_bone: Predicate | None = None,
     accept_misfit: bool = False,
     replace_placed: bool = True,
@@ -55,7 +57,9 @@ def import_landmarks(
     paths : iterable of path
         Any landmark file that `gp_core.landmarks.files` reads.
     side : Side or str, optional
-        Where the files do not say it.
+        Where the files do not say it, or hold both and one is wanted.
+    names : mapping of str to str, optional
+        Our code by the lab's own name of a point; see `gp_core.landmarks.labels.LabelNames`.
     near_bone : callable, optional
         Tells which points are near bone.
     accept_misfit : bool
@@ -76,22 +80,28 @@ def import_landmarks(
         A file cannot be read, or a point that would change is locked.
     """
     paths = list(paths)
-    lists = [read_points(path) for path in paths]
+    lists = [read_points(path, names=LabelNames(names or {})) for path in paths]
     if not lists:
         raise GpError("no landmark file was given")
-    sets = tuple(landmarks_of(points, side=side) for points in lists)
+    read = [(points, one) for points in lists for one in _sides(points, side)]
+    sets = tuple(one for _, one in read)
     off_bone = _misfit(session, sets, near_bone, accept_misfit)
-    known = {key: found for p, s in zip(lists, sets, strict=True) for key, found in _known(p, s.side).items()}
+    known = {key: found for points, one in read for key, found in _known(points, one.side).items()}
     source = ", ".join(points.source.name for points in lists)
     asked = {
         "files": [str(Path(path).absolute()) for path in paths],
         "side": None if side is None else Side.parse(side).value,
+        "names": dict(names or {}),
         "accept_misfit": accept_misfit,
     }
     new = provenance(session, How.IMPORTED, source=source)
     with blaming(source):
         session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
     return (*_doubtful_origin(session, lists), *off_bone, *_suggested(sets))
+
+
+def _sides(points: PointList, side: Side | str | None) -> tuple[LandmarkSet, ...]:
+    return sides_of(points) if side is None else (landmarks_of(points, side=side),)
 
 
 def _suggested(sets: tuple[LandmarkSet, ...]) -> list[str]:

@@ -137,7 +137,8 @@ def _rename(edit: RenameSpecimen, *_: object) -> list[Table]:
 def _import(edit: ImportLandmarks, *_: object) -> list[Table] | None:
     if edit.asked is None:
         return None
-    return [step("import", **edit.asked, keep=not edit.replace_placed)]
+    asked = {key: value for key, value in edit.asked.items() if key != "names" or value}
+    return [step("import", **asked, keep=not edit.replace_placed)]
 
 
 def _touch(edit: RecordTouch, *_: object) -> list[Table]:

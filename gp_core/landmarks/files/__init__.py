@@ -17,6 +17,7 @@ from gp_core.landmarks.files.reading import (
     read_touches,
     sides_of,
     specimen_of,
+    unknown_labels,
 )
 from gp_core.landmarks.files.scale import check_plausible_size
 from gp_core.landmarks.files.specimens import landmark_files, load_specimens
@@ -42,6 +43,7 @@ __all__ = [
     "sides_of",
     "skull_feature_names",
     "specimen_of",
+    "unknown_labels",
     "write_csv",
     "write_fcsv",
     "write_markups",

@@ -33,6 +33,7 @@ __all__ = [
     "read_touches",
     "sides_of",
     "specimen_of",
+    "unknown_labels",
 ]
 
 _log = logging.getLogger(__name__)
@@ -327,6 +328,13 @@ def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:
             landmark="CA",
             remedy="Place one of them again.",
         )
+
+
+def unknown_labels(points: PointList) -> tuple[str, ...]:
+    """Return the labels of a file that name no feature and no skull feature, each once, in its order."""
+    known = set(points.header.extra) if points.header else set()
+    strange = (p.label for p in points.points if p.label not in CODES and not is_skull_feature(p.label))
+    return tuple(dict.fromkeys(label for label in strange if label not in known))
 
 
 def label_names(points: PointList, *, unknown: Unknown = "extra") -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from gp_core.errors import GpError
@@ -27,6 +28,9 @@ class Import(Step):
         Landmark files.
     side : L or R, optional
         Where the files do not say it.
+    names : table, optional
+        The feature's code by the lab's own name of a point, such as ``{"Apex" = "CA"}``; an empty code leaves
+        the point out.
     accept_misfit : bool
         Take them even where they cannot belong to this scan.
     keep : bool
@@ -36,6 +40,7 @@ class Import(Step):
     do: ClassVar[str] = "import"
     files: tuple[str, ...]
     side: Side | None = None
+    names: Mapping[str, str] = field(default_factory=dict)
     accept_misfit: bool = False
     keep: bool = False
 
@@ -45,6 +50,7 @@ class Import(Step):
             rig.desk.session,
             [rig.to_read(file) for file in self.files],
             side=self.side,
+            names=self.names,
             near_bone=rig.desk.near_bone,
             accept_misfit=self.accept_misfit,
             replace_placed=not self.keep,

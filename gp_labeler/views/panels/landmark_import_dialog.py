@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,8 +19,12 @@ from PySide6.QtWidgets import (
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import landmarks_of, read_points
+from gp_core.landmarks.files import landmarks_of, read_points, sides_of, unknown_labels
+from gp_core.landmarks.labels import LabelNames
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.session.lab_names import LabNamesMemory
 from gp_labeler.session.landmark_import import MisfitError, Predicate, import_landmarks
+from gp_labeler.views.panels.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.workbench import Workbench
 
@@ -51,6 +56,7 @@ class LandmarkImportDialog(QDialog):
         self._workbench, self._near_bone = workbench, near_bone
         self._files = [Path(file) for file in files]
         self._misfit = ""
+        self._memory = LabNamesMemory(workbench.directory)
         self.setWindowTitle("Import landmarks")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(True)
@@ -75,6 +81,8 @@ class LandmarkImportDialog(QDialog):
         self.take.setProperty("role", "primary")
         self.take.setDefault(True)
         self.take.clicked.connect(self._import)
+        self.names = LabNamesTable()
+        self.names.changed.connect(self._look)
         self._findings = QVBoxLayout()
         self._findings.setSpacing(8)
         self._title = ElidedLabel("", "title")
@@ -87,6 +95,7 @@ class LandmarkImportDialog(QDialog):
         column.setSpacing(10)
         column.addWidget(self._title)
         column.addLayout(self._findings)
+        column.addWidget(self.names)
         column.addWidget(self.anyway)
         self._choices = QWidget()
         choices = QVBoxLayout(self._choices)
@@ -113,6 +122,7 @@ class LandmarkImportDialog(QDialog):
         """Read the files, and say what is in them."""
         self._misfit = ""
         self.anyway.setChecked(False)
+        self.names.show_names(self._unknown())
         findings = [self._read(file) for file in self._files]
         self._n_wrong = sum(level == "error" for level, _ in findings)
         n = len(self._files)
@@ -121,16 +131,30 @@ class LandmarkImportDialog(QDialog):
 
     def _read(self, file: Path) -> tuple[str, str]:
         try:
-            landmarks = landmarks_of(read_points(file), side=self.side.currentData())
+            points = read_points(file, names=LabelNames(self._codes()))
+            if unknown := unknown_labels(points):
+                return (
+                    "error",
+                    f"{file.name}: {len(unknown)} names are not known. Choose what they stand for.",
+                )
+            side = self.side.currentData()
+            sets = sides_of(points) if side is None else (landmarks_of(points, side=side),)
         except GpError as error:
             return "error", str(error)
-        unseen = f", {len(landmarks.unseen)} not seen" if landmarks.unseen else ""
-        suggested = f", {len(landmarks.suggested)} only suggested" if landmarks.suggested else ""
-        return (
-            "info",
-            f"{file.name}: {len(landmarks.placed)} points of the {landmarks.side.word} side"
-            f"{suggested}{unseen}",
-        )
+        return "info", f"{file.name}: {' and '.join(_words(landmarks) for landmarks in sets)}"
+
+    def _codes(self) -> dict[str, str]:
+        """Return what names stand for: as remembered, and as chosen here."""
+        return {**self._memory.recall().codes, **self.names.codes}
+
+    def _unknown(self) -> list[str]:
+        """Return the names that neither the feature table nor the memory knows."""
+        found: dict[str, None] = {}
+        for file in self._files:
+            with contextlib.suppress(GpError):
+                points = read_points(file, names=self._memory.recall())
+                found |= dict.fromkeys(unknown_labels(points))
+        return list(found)
 
     def _show(self, findings: Sequence[tuple[str, str]]) -> None:
         emptied(self._findings)
@@ -149,6 +173,7 @@ class LandmarkImportDialog(QDialog):
                 session,
                 self._files,
                 side=self.side.currentData(),
+                names=self._codes(),
                 near_bone=self._near_bone,
                 accept_misfit=self.anyway.isChecked(),
                 replace_placed=not self.keep.isChecked(),
@@ -159,6 +184,7 @@ class LandmarkImportDialog(QDialog):
         except GpError as error:
             self._show([("error", str(error))])
         else:
+            self._memory.remember(self.names.codes)
             self._report(notes)
 
     def _report(self, notes: Sequence[str]) -> None:
@@ -174,6 +200,12 @@ class LandmarkImportDialog(QDialog):
         self._show([("good", f"Now placed: {done}"), *(("warning", _sentence(note)) for note in notes)])
         self.take.hide()
         self.cancel.setText("Close")
+
+
+def _words(landmarks: LandmarkSet) -> str:
+    unseen = f", {len(landmarks.unseen)} not seen" if landmarks.unseen else ""
+    suggested = f", {len(landmarks.suggested)} only suggested" if landmarks.suggested else ""
+    return f"{len(landmarks.placed)} points of the {landmarks.side.word} side{suggested}{unseen}"
 
 
 def _sentence(text: str) -> str:

@@ -1,0 +1,86 @@
+"""Landmark files under other names, in the import dialog: chosen once, remembered, recorded for a script."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from PySide6.QtCore import Qt
+from PySide6.QtWidgets import QWidget
+
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.labels import LabelNames
+from gp_labeler.session.lab_names import LabNamesMemory
+from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.workbench import Workbench
+
+_CLICK = Qt.MouseButton.LeftButton
+
+
+@pytest.fixture
+def desk(tmp_path):
+    desk = Workbench(tmp_path / "state")
+    yield desk
+    desk.close()
+
+
+@pytest.fixture
+def parent(qtbot):
+    widget = QWidget()
+    qtbot.addWidget(widget)
+    return widget
+
+
+@pytest.fixture
+def theirs(tmp_path):
+    file = tmp_path / "GP01.csv"
+    rows = "Apex,left,1,2,3\nBase,left,4,5,6\nApex R,,7,8,9\nBregma,,0,1,2\n"
+    file.write_text("name,side,x,y,z\n" + rows, encoding="utf-8")
+    return file
+
+
+def _choose(dialog: LandmarkImportDialog, name: str, code: str) -> None:
+    box = dialog.names.box(name)
+    box.setCurrentIndex(box.findData(code))
+
+
+def test_unknown_names_are_chosen_once_and_remembered(desk, parent, qtbot, theirs) -> None:
+    dialog = LandmarkImportDialog(desk, [theirs], parent=parent)
+    dialog.show()
+    assert dialog.names.isVisible()
+    assert not dialog.take.isEnabled()
+    _choose(dialog, "Apex", "CA")
+    _choose(dialog, "Base", "CB")
+    assert dialog.names.undecided == 2
+    qtbot.mouseClick(dialog.names.leave_rest, _CLICK)
+    assert dialog.take.isEnabled()
+    qtbot.mouseClick(dialog.take, _CLICK)
+    placed = desk.session.landmarks(Side.LEFT)
+    assert set(placed.placed) == {"CA", "CB"}
+    np.testing.assert_allclose(placed["CA"], [1, 2, 3])
+
+    again = LandmarkImportDialog(desk, [theirs], parent=parent)
+    again.show()
+    assert not again.names.isVisible()
+    assert again.take.isEnabled()
+    again.reject()
+
+
+def test_one_list_of_both_sides_is_taken_whole(desk, parent, qtbot, tmp_path) -> None:
+    file = tmp_path / "GP01.csv"
+    file.write_text("name,x,y,z\nCA_L,1,2,3\nCA_R,9,2,3\nIN,5,0,0\n", encoding="utf-8")
+    dialog = LandmarkImportDialog(desk, [file], parent=parent)
+    dialog.show()
+    qtbot.mouseClick(dialog.take, _CLICK)
+    for side, x in ((Side.LEFT, 1), (Side.RIGHT, 9)):
+        assert set(desk.session.landmarks(side).placed) == {"CA", "IN"}
+        assert desk.session.landmarks(side)["CA"][0] == x
+
+
+def test_a_memory_that_is_damaged_counts_as_empty(tmp_path) -> None:
+    memory = LabNamesMemory(tmp_path)
+    memory.remember({"Apex": "CA"})
+    memory.remember({"Base": "CB", "apex": "CA"})
+    assert memory.recall().codes == {"apex": "CA", "base": "CB"}
+    (tmp_path / "lab-names.json").write_text('{"Apex": "no feature"}', encoding="utf-8")
+    assert memory.recall() == LabelNames({})
+    assert LabNamesMemory(None).recall() == LabelNames({})
