@@ -63,11 +63,11 @@ def test_only_plain_files_of_bounded_size_are_read(name: str, read: object, tmp_
     (tmp_path / "folder").mkdir()
     with (tmp_path / "large").open("wb") as file:
         file.truncate(disk.MAX_BYTES + 1)
-    start = time.perf_counter()
+    start = time.process_time()  # not what else the machine does
     with pytest.raises(FileFormatError) as caught:
         read(tmp_path / name)  # type: ignore[operator]
     assert "\n" not in str(caught.value)
-    assert time.perf_counter() - start < 1
+    assert time.process_time() - start < 1
 
 
 @pytest.mark.parametrize("opening", ["[", '{"a":'])

@@ -173,9 +173,8 @@ def test_names_of_any_length_fit(desk, tmp_path, parent, qtbot):
     for k in range(3):
         tifffile.imwrite(folder / f"s{k}.tif", np.full((30, 30), k, np.uint8))
     dialog = opened(desk, folder, parent)
-    qtbot.wait(20)
     content = dialog.facts.parentWidget()
-    assert content.width() <= dialog.width()
+    qtbot.waitUntil(lambda: content.width() <= dialog.width())
     assert content.minimumSizeHint().width() < 560
     dialog.reject()
 

@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import QModelIndex, QPoint, QSize, Qt
+from PySide6.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
 from PySide6.QtGui import QFontMetrics, QGuiApplication
 from PySide6.QtWidgets import QMenu
+from shiboken6 import isValid
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
 from gp_labeler.session import labelling
@@ -337,7 +338,8 @@ def test_a_panel_that_is_gone_hears_nothing_more(desk, qtbot):
     panel.show()
     panel.close()
     panel.deleteLater()
-    qtbot.wait(20)
+    QCoreApplication.sendPostedEvents(panel, QEvent.Type.DeferredDelete)
+    assert not isValid(panel)
     place(desk, "CA")  # would raise in a slot of a deleted widget
 
 

@@ -164,7 +164,7 @@ def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, w
     drawn = scene.n_bone_frames
     for x in (0.0, 1.5, -1.5):
         QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, MIDDLE + np.array([x, -5.5, 0.3])))
-        qtbot.wait(30)
+        qtbot.waitUntil(lambda: not view.is_stale)
     assert len(scene.marks.marks) == 3
     assert view.grab() is not None
     assert scene.n_bone_frames == drawn
