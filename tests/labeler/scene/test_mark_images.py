@@ -38,3 +38,15 @@ def test_marks_are_lit_rimmed_and_faint_where_asked() -> None:
     outlines = [mark_image(shape, "#FFFFFF", 20.0)[..., 3] > 0.5 for shape in SHAPES]
     assert all((one != other).sum() > 60 for one, other in pairwise(outlines))
     assert mark_image("ball", "#FFFFFF", 1e6).shape[0] < 700  # a point does not fill memory
+
+
+@pytest.mark.parametrize("diameter", [10.0, 13.5, 40.0])
+def test_a_frame_shows_what_lies_beneath_it(diameter: float) -> None:
+    image = mark_image("frame", "#5CB8F5", diameter)[..., 3]
+    middle = image.shape[0] // 2
+    assert image[middle, middle] == 0  # what a person has to judge
+    assert image[[0, -1]].max() == image[:, [0, -1]].max() == 0  # nothing is cut off
+    columns = np.flatnonzero(image.max(axis=0) > 0.5)
+    assert np.ptp(columns) + 1 == pytest.approx(1.1 * diameter, abs=0.15 * diameter + 1)
+    corner = middle + int(0.45 * diameter)
+    assert image[corner, corner] > 0.5  # square: no ball reaches there

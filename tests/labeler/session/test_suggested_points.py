@@ -9,15 +9,19 @@ import numpy as np
 import pytest
 from session_cases import MARK, PLACEABLE, FakeVolume, predict, shape, text_of
 
+from gp_core import PROBE, Atlas
+from gp_core.atlas.draw import draw_animal
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import load_specimens, read_landmarks
-from gp_labeler.session import labelling
+from gp_labeler.session import labelling, touching
 from gp_labeler.session.document import document_of
 from gp_labeler.session.edits import CheckPoint, LockPoints, PlacePoint, SwapPoints
+from gp_labeler.session.estimating import Estimating
 from gp_labeler.session.landmark_export import export_landmarks
 from gp_labeler.session.landmark_import import import_landmarks
 from gp_labeler.session.opening import new_session, open_session, recover_session
+from gp_labeler.session.pose_report import PoseReport
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_file import read_specimen
@@ -237,3 +241,28 @@ def test_suggestions_outside_the_scan_are_refused_like_observations(tmp_path: Pa
     session = opened()
     with pytest.raises(GpError, match=r"ZL left.* lie outside the scan"):
         import_landmarks(session, files)
+
+
+def test_suggestions_register_no_touches_and_measure_no_error() -> None:
+    atlas, session = Atlas.published(), opened()
+    animal = draw_animal(atlas, rng=np.random.default_rng(3)).side(L)
+    for code in PLACEABLE:
+        labelling.clear(session, side=L, code=code)
+        labelling.suggest(session, animal[code], side=L, code=code)
+    for code in PROBE:
+        touching.record_touch(session, L, code, animal[code] + [5.0, 6.0, 7.0])
+    estimating = Estimating(session)
+    estimating.use_atlas(atlas)
+    found = estimating.current
+    assert found.pose is not None
+    assert (found.registered, found.truth) == (None, None)
+    for code in PLACEABLE:
+        labelling.confirm(session, side=L, code=code)
+    found = estimating.current
+    assert found.registered.way == "features"
+    np.testing.assert_allclose(found.truth.translation, animal["CO"], atol=1e-9)
+    page = PoseReport(session.state, found).html()
+    assert "only suggested" not in page
+    session.undo()
+    assert "1 label is only suggested and not used" in PoseReport(session.state, found).html()
+    estimating.close()
