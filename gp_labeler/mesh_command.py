@@ -101,7 +101,8 @@ def run_mesh(arguments: Sequence[str]) -> int:
     from gp_labeler.imaging.threshold import propose_threshold
 
     check_mesh_name(args.output)
-    with protected_inputs([args.volume]):
+    slices = args.volume.iterdir() if args.volume.is_dir() else ()
+    with protected_inputs([args.volume, *slices]):
         volume = read_volume(args.volume, **options)
         threshold = propose_threshold(volume) if args.threshold is None else args.threshold
         surface = extract_isosurface(volume, threshold, **surface_options)

@@ -108,7 +108,7 @@ def _converted(name: str, hint: Any, value: Any) -> Any:
     for kind in kinds:
         try:
             return _KINDS[kind][1](value)
-        except (TypeError, ValueError, AttributeError):
+        except (TypeError, ValueError, AttributeError, OverflowError):  # such as 10**400
             continue
         except GpError as error:
             raise GpError(f"{name}: {error.problem}", remedy=error.remedy) from None

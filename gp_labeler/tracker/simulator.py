@@ -20,7 +20,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.draw import draw_animal
 from gp_core.checks import FloatArray
-from gp_core.disk import read_bytes, write_text
+from gp_core.disk import protected_inputs, read_bytes, write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import EXTERNAL, PROBE, Side
@@ -75,7 +75,8 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
         points, truth = _points(args)
         simulator = _simulator(args, points)
         if args.truth is not None:
-            write_text(args.truth, json.dumps({**truth, "port": simulator.port}, indent=2))
+            with protected_inputs(file for file in (args.touches, args.script) if file is not None):
+                write_text(args.truth, json.dumps({**truth, "port": simulator.port}, indent=2))
         _say(f"listening on 127.0.0.1:{simulator.port}")
         return _serve(simulator, args, list(points))
     except (GpError, OSError) as error:

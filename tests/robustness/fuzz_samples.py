@@ -74,6 +74,9 @@ def _tables(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
     poses[:, :3, 3] = turns @ np.array([0.0, 0.0, 100.0])
     np.savetxt(folder / "poses.csv", poses.reshape(-1, 16), delimiter=",")
     np.savetxt(folder / "poses.txt", poses[:, :3].reshape(-1, 12))
+    _recordings(folder, poses)
+    (folder / "names.csv").write_text("their name,our code\nApex,CA\nBase,CB\n\nBolt,\n")
+    (folder / "names.json").write_text(json.dumps({"Apex": "CA", "Base": "CB"}))
     angle = np.linspace(0, 9, 60)
     spiral = np.stack([0.2 * angle, 1.5 * np.cos(angle), 1.5 * np.sin(angle)], axis=1)
     np.savetxt(folder / "path.csv", spiral, delimiter=",")
@@ -91,12 +94,37 @@ def _tables(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
     (folder / "checkpoint.json").write_text(json.dumps({"gpCheckpoint": 1, "key": "0" * 32, "results": {}}))
     return {
         "poses": [folder / "poses.csv", folder / "poses.txt"],
+        "recording": [folder / name for name in ("a.igs.mha", "a.igs.nrrd", "quaternions.csv")],
+        "names": [folder / "names.csv", folder / "names.json"],
         "path": [folder / "path.csv"],
         "mat": [folder / "sets.mat", folder / "plain.mat"],
         "stl": [folder / "bone.stl", folder / "words.stl"],
         "physical": [folder / "physical.json"],
         "checkpoint": [folder / "checkpoint.json"],
     }
+
+
+def _recordings(folder: Path, poses: np.ndarray) -> None:
+    """Write tracked poses as PLUS and 3D Slicer keep them, and as a table of quaternions."""
+    from scipy.spatial.transform import Rotation
+
+    for name, mark in (("a.igs.mha", " = "), ("a.igs.nrrd", ":=")):
+        lines = []
+        for k, pose in enumerate(poses):
+            frame = f"Seq_Frame{k:04d}_"
+            lines += [f"{frame}StylusToTrackerTransform{mark}{' '.join(f'{x:.6f}' for x in pose.ravel())}"]
+            lines += [f"{frame}StylusToTrackerTransformStatus{mark}OK", f"{frame}Timestamp{mark}{k / 20:.3f}"]
+        fields, n = "\n".join(lines) + "\n", len(poses)
+        head = f"ObjectType = Image\nNDims = 3\nDimSize = 4 4 {n}\nElementType = MET_UCHAR\n"
+        if mark == " = ":
+            text = f"{head}{fields}ElementDataFile = LOCAL\n"
+        else:
+            sizes = f"dimension: 3\nsizes: 4 4 {n}\nencoding: raw\n"
+            text = f"NRRD0004\ntype: unsigned char\n{sizes}{fields}\n"
+        (folder / name).write_bytes(text.encode() + bytes(16 * n))
+    turns = Rotation.from_matrix(poses[:, :3, :3]).as_quat()[:, [3, 0, 1, 2]]
+    rows = np.column_stack([np.arange(len(poses)) / 20, turns, poses[:, :3, 3]])
+    np.savetxt(folder / "quaternions.csv", rows, delimiter=",", header="t,qw,qx,qy,qz,tx,ty,tz", comments="")
 
 
 def _sessions(folder: Path) -> dict[str, list[Path]]:

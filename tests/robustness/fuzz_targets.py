@@ -18,8 +18,9 @@ from gp_core.atlas.insertion import read_path
 from gp_core.atlas.pose_files import read_pose
 from gp_core.cli import main as gp_core_main
 from gp_core.errors import GpError
-from gp_core.landmarks.files import import_mat, load_specimens, read_authors_mat, read_points
-from gp_core.registration.pivot import calibrate_pivot, read_marker_poses
+from gp_core.landmarks.files import import_mat, load_specimens, read_authors_mat, read_lab_names, read_points
+from gp_core.registration.pivot import calibrate_pivot
+from gp_core.registration.recordings import read_marker_poses, read_recording
 from gp_core.registration.stl import read_stl
 from gp_core.study.checkpoint import Checkpoint
 from gp_labeler.__main__ import main as gp_labeler_main
@@ -55,6 +56,9 @@ COMMANDS = (
         "--path-out {out}",
     ),
     ("poses", "pivot {in} --json {out}"),
+    ("recording", "pivot {in} --json {out}"),
+    ("recording", "touches {in} --tip 0,0,100 --order CL,MN -o {out}"),
+    ("names", f"check {MARKS}/one_L.csv --names {{in}} --json {{out}}"),
     ("animals", "fit {in} -o {out}"),
     ("animals", "check {in} --json {out}"),
     ("animals", "distances {in} --json {out} --figure {dir}.png"),
@@ -249,6 +253,8 @@ def _all() -> Iterator[Target]:
         ("atlas", Atlas.load),
         ("pose", read_pose),
         ("poses", _pivot),
+        ("recording", read_recording),
+        ("names", read_lab_names),
         ("path", lambda p: read_path(p, units="mm")),
         ("mat", lambda p: read_authors_mat(p, p)),
         ("mat", lambda p: import_mat(p, p, p.parent / "made")),
