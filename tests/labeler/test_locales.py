@@ -17,7 +17,8 @@ LOCALES = ["de_DE", "fr_FR", "tr_TR", "fa_IR"]
 SPACING, ORIGIN = 0.50075, (1.25, -2.75, 3.5)
 
 IN_THE_WINDOW = """
-import ctypes, json, sys
+import ctypes, json, locale, multiprocessing, sys
+from concurrent.futures import ProcessPoolExecutor
 from PySide6.QtCore import QLocale
 from PySide6.QtTest import QTest
 from gp_labeler.imaging.readers import read_volume
@@ -36,7 +37,10 @@ for typed in ("0.5", "1,25", "-3e2"):
     field.clear()
     QTest.keyClicks(field, typed)
     field.editingFinished.emit() if field.hasAcceptableInput() else chosen.append(None)
+with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as workers:
+    in_worker = workers.submit(locale.format_string, "%.1f", 0.5).result()
 said = {
+    "worker": in_worker,
     "strtod": strtod(b"0.50075", None),
     "float": QLocale().toString(1234.5, "g", 6),
     "typed": chosen,
@@ -88,6 +92,7 @@ def test_the_window_reads_and_takes_numbers_in_every_locale(
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     assert said["strtod"] == SPACING
+    assert said["worker"] == "0.5"
     assert said["float"] == "1234.5"
     assert said["typed"] == [0.5, 1.25, -300]
     expected = np.diag([SPACING, SPACING, SPACING, 1])

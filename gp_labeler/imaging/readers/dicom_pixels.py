@@ -2,29 +2,51 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from functools import lru_cache, partial
+from threading import Lock
+from typing import Any
 
+import imagecodecs
 import numpy as np
 import pydicom
-from pydicom.dataset import Dataset, FileMetaDataset
-from pydicom.uid import MultiFrameGrayscaleWordSecondaryCaptureImageStorage, SecondaryCaptureImageStorage
+from pydicom.encaps import generate_frames
+from pydicom.uid import (
+    HTJ2K,
+    JPEG2000,
+    HTJ2KLossless,
+    HTJ2KLosslessRPCL,
+    JPEG2000Lossless,
+    JPEGBaseline8Bit,
+    JPEGExtended12Bit,
+    JPEGLossless,
+    JPEGLosslessSV1,
+    JPEGLSLossless,
+    JPEGLSNearLossless,
+    RLELossless,
+)
 
 from gp_labeler.imaging.readers.dicom_tags import DicomFile, DicomSlice, Stored
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error
 from gp_labeler.imaging.readers.simpleitk import read_itk_planes
-from gp_labeler.imaging.readers.source import Plane
+from gp_labeler.imaging.readers.source import Plane, in_threads
 
 __all__ = ["DicomSource", "value_dtype", "value_notes"]
 
-_KEPT = (
-    "Rows", "Columns", "SamplesPerPixel", "BitsAllocated", "BitsStored", "HighBit", "PixelRepresentation",
-    "NumberOfFrames", "PixelData",
-)  # fmt: skip
+_DECODERS: dict[str, Callable[[bytes], Any]] = {
+    **dict.fromkeys(
+        (JPEG2000, JPEG2000Lossless, HTJ2K, HTJ2KLossless, HTJ2KLosslessRPCL), imagecodecs.jpeg2k_decode
+    ),
+    **dict.fromkeys((JPEGLSLossless, JPEGLSNearLossless), imagecodecs.jpegls_decode),
+    **dict.fromkeys(
+        (JPEGBaseline8Bit, JPEGExtended12Bit, JPEGLossless, JPEGLosslessSV1), imagecodecs.jpeg_decode
+    ),
+}
+
+_Frames = Plane | tuple[bytes, ...]
+"""The planes of a file, or its packed frames."""
 
 
 @dataclass(frozen=True)
@@ -53,20 +75,30 @@ class DicomSource:
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise."""
         there = np.array([n for n, one in enumerate(self.slices) if one is not None])
-        unpacked, fill = lru_cache(maxsize=2)(_unpacked), self.fill
-        for number in wanted:
-            nearest = self.slices[there[np.abs(there - number).argmin()]]
-            assert nearest is not None
-            file = nearest.file
-            with failing_as_volume_error(file.path):
-                if file.channels > 1:
-                    yield to_grey(unpacked(file)[nearest.frame], self.channel)
-                    continue
-                found = unpacked(file)[nearest.frame] if file.stored is None else _lying(nearest, file.stored)
-                plane = _values(found if file.stored is None else _used_bits(found, file.stored), nearest)
-                if file.padding is not None and fill is not None:
-                    plane = _filled(plane, found, file.padding, fill)
-                yield plane
+        nearest = [self.slices[there[np.abs(there - number).argmin()]] for number in wanted]
+        lock, cached = Lock(), lru_cache(maxsize=2)(_frames_of)
+
+        def frames_of(file: DicomFile) -> _Frames:
+            with lock:
+                return cached(file)
+
+        return in_threads(partial(self._plane, frames_of=frames_of, fill=self.fill), nearest)
+
+    def _plane(self, one: DicomSlice, frames_of: Callable[[DicomFile], _Frames], fill: float | None) -> Plane:
+        file = one.file
+        with failing_as_volume_error(file.path):
+            if file.channels > 1:
+                return to_grey(np.asarray(frames_of(file)[one.frame]), self.channel)
+            if file.stored is not None:
+                found = _lying(one, file.stored)
+                plane = _values(_used_bits(found, file.stored), one)
+            else:
+                frame = frames_of(file)[one.frame]
+                found = _unpacked(frame, file) if isinstance(frame, bytes) else frame
+                plane = _values(found, one)
+            if file.padding is None or fill is None:
+                return plane
+            return _filled(plane, found, file.padding, fill)
 
 
 def _lying(one: DicomSlice, stored: Stored) -> Plane:
@@ -99,41 +131,35 @@ def _filled(plane: Plane, stored: Plane, padding: tuple[float, float], fill: flo
     return np.where(padded, fill, plane) if padded.any() else plane
 
 
-def _unpacked(file: DicomFile) -> Plane:
-    """Return all (frame, y, x) stored numbers of a packed file, or its (frame, y, x, channel) colours.
-
-    Of grey pixels the library is given a copy without the tags that it would apply by its own lights: some
-    are scaled, inverted and sorted by it, some are not.
-    """
+def _frames_of(file: DicomFile) -> _Frames:
+    """Return the packed frames of a file, or its planes where it is in colour or deflated as a whole."""
     if file.channels > 1:
         return read_itk_planes(file.path)
     tags = pydicom.dcmread(file.path, force=True)
-    if not tags.file_meta.TransferSyntaxUID.is_compressed or "PixelData" not in tags:
-        return _deflated(tags, file)
-    bare = Dataset()
-    for name in _KEPT:
-        if name in tags:
-            bare[name] = tags[name]
-    bare.PhotometricInterpretation = "MONOCHROME2"
-    single = file.n_frames == 1
-    bare.SOPClassUID = (
-        SecondaryCaptureImageStorage if single else MultiFrameGrayscaleWordSecondaryCaptureImageStorage
-    )
-    bare.SOPInstanceUID = "1.2.3"
-    bare.file_meta = FileMetaDataset()
-    bare.file_meta.TransferSyntaxUID = tags.file_meta.TransferSyntaxUID
-    bare.file_meta.MediaStorageSOPClassUID = bare.SOPClassUID
-    bare.file_meta.MediaStorageSOPInstanceUID = bare.SOPInstanceUID
-    with TemporaryDirectory(prefix="gp-labeler-") as folder:
-        copy = Path(folder, "pixels.dcm")
-        pydicom.dcmwrite(copy, bare, enforce_file_format=True)
-        with failing_as_volume_error(file.path):
-            return read_itk_planes(copy)
+    if not tags.file_meta.TransferSyntaxUID.is_compressed:
+        planes: Plane = tags.pixel_array
+        return planes.reshape(file.n_frames, *file.shape)
+    frames = tuple(generate_frames(tags.PixelData, number_of_frames=file.n_frames))
+    if len(frames) != file.n_frames:
+        raise VolumeError(f"it holds {len(frames)} of {file.n_frames} frames", remedy="Copy it again.")
+    return frames
 
 
-def _deflated(tags: pydicom.FileDataset, file: DicomFile) -> Plane:
-    planes: Plane = tags.pixel_array
-    return planes.reshape(file.n_frames, *file.shape)
+def _unpacked(frame: bytes, file: DicomFile) -> Plane:
+    """Return the stored numbers of a packed frame, of as many bits and of the sign that the tags say."""
+    if file.syntax == RLELossless:
+        dtype = f"<u{int.from_bytes(frame[:4], 'little')}"  # a segment for each byte of a number
+        plane = np.frombuffer(imagecodecs.dicomrle_decode(frame, dtype), dtype)
+    elif file.syntax in _DECODERS:
+        plane = np.asarray(_DECODERS[file.syntax](frame))
+    else:
+        raise VolumeError(
+            f"its pixels are packed as {file.syntax or 'nobody knows what'}, which is not read",
+            remedy="Export it uncompressed.",
+        )
+    n, signed = 2**file.bits, file.stored_range[0] < 0
+    values: Plane = plane.reshape(file.shape).astype(np.int64) & (n - 1)
+    return np.where(values >= n // 2, values - n, values) if signed else values
 
 
 def _values(stored: Plane, one: DicomSlice) -> Plane:

@@ -78,6 +78,10 @@ class DicomFile:
         SpacingBetweenSlices, and SliceThickness, which is no distance.
     stored_range : (2,) float
         Lowest and highest number that a pixel can be stored as.
+    bits : int
+        Of a stored number.
+    syntax : str
+        How the pixels are packed: the transfer syntax.
     integral : bool
         Whether pixels are stored as whole numbers.
     inverted : bool
@@ -101,6 +105,8 @@ class DicomFile:
     between: float | None
     thickness: float | None
     stored_range: tuple[float, float]
+    bits: int
+    syntax: str
     integral: bool
     inverted: bool
     localizer: bool
@@ -228,6 +234,7 @@ def _file(path: Path, tags: Any, measures: Any, pixel_header: bytes, offset: int
     bits = _whole(tags, "BitsStored") or _whole(tags, "BitsAllocated") or 16
     signed = _whole(tags, "PixelRepresentation") == 1
     low, high = (-(2.0 ** (bits - 1)), 2.0 ** (bits - 1) - 1) if signed else (0.0, 2.0**bits - 1)
+    palette = str(tags.get("PhotometricInterpretation", "")).startswith("PALETTE")
     alone = n_frames > 1 and not tags.get("ConcatenationUID")
     return DicomFile(
         path=path,
@@ -237,10 +244,12 @@ def _file(path: Path, tags: Any, measures: Any, pixel_header: bytes, offset: int
         number=_whole(tags, "InstanceNumber"),
         shape=(_whole(tags, "Rows"), _whole(tags, "Columns")),
         n_frames=n_frames,
-        channels=max(1, _whole(tags, "SamplesPerPixel")),
+        channels=max(3 if palette else 1, _whole(tags, "SamplesPerPixel")),
         between=_length(measures, "SpacingBetweenSlices") or _length(tags, "SpacingBetweenSlices"),
         thickness=_length(measures, "SliceThickness"),
         stored_range=(low, high),
+        bits=bits,
+        syntax=str(_syntax(tags) or ""),
         integral=not _PIXEL_DATA.get(element, ""),
         inverted=str(tags.get("PhotometricInterpretation", "")).strip() == "MONOCHROME1",
         localizer="LOCALIZER" in [str(word).upper() for word in _listed(tags.get("ImageType"))],
@@ -357,9 +366,13 @@ def _encoding(tags: Any) -> tuple[bool, bool]:
     return bool(implicit), little is not False
 
 
+def _syntax(tags: Any) -> Any:
+    return tags.file_meta.get("TransferSyntaxUID") if "file_meta" in tags.__dict__ else None
+
+
 def _stored(tags: Any, element: int, header: bytes, offset: int) -> Stored | None:
     """Find the pixels behind their tag and its length, if they are plain numbers."""
-    syntax = tags.file_meta.get("TransferSyntaxUID") if "file_meta" in tags.__dict__ else None
+    syntax = _syntax(tags)
     packed = syntax is not None and (syntax.is_compressed or syntax == DeflatedExplicitVRLittleEndian)
     if packed or not element or _whole(tags, "SamplesPerPixel") > 1:
         return None

@@ -5,17 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import imagecodecs
 import numpy as np
 import pytest
 import SimpleITK
 from bodies import LEVEL, ORIGIN, SPACING, affine, off_by, voxels
 from dicom_makers import Change, dataset, decimal, enhanced, group, put_pixels, slices, write
 from pydicom.dataset import Dataset, FileDataset
+from pydicom.encaps import encapsulate
 from pydicom.fileset import FileSet
 from pydicom.uid import (
     DeflatedExplicitVRLittleEndian,
     ExplicitVRBigEndian,
     ImplicitVRLittleEndian,
+    JPEG2000Lossless,
+    JPEGLosslessSV1,
+    JPEGLSLossless,
     RLELossless,
 )
 from scipy.spatial.transform import Rotation
@@ -458,6 +463,46 @@ PADDED: dict[str, Change] = {
         data.compress(RLELossless, generate_instance_uid=False),
     ),
 }
+
+
+PACKINGS: dict[str, tuple[str, Callable[[np.ndarray], bytes]]] = {
+    "JPEG 2000": (JPEG2000Lossless, lambda plane: imagecodecs.jpeg2k_encode(plane, reversible=True, level=0)),
+    "JPEG-LS": (JPEGLSLossless, lambda plane: imagecodecs.jpegls_encode(plane.view("uint16"))),
+    "lossless JPEG": (JPEGLosslessSV1, lambda plane: imagecodecs.ljpeg_encode(plane.view("uint16"))),
+}
+
+
+def packed_as(name: str, folder: Path, *, signed: bool = False) -> Path:
+    syntax, encode = PACKINGS[name]
+
+    def change(data: FileDataset, n: int) -> None:
+        plane = RAW[n].astype("int16") - 1024 if signed else RAW[n]
+        put_pixels(data, plane)
+        data.RescaleSlope, data.RescaleIntercept = "1", "1024" if signed else "0"
+        data.file_meta.TransferSyntaxUID = syntax
+        data.PixelData = encapsulate([bytes(encode(plane))])
+        data["PixelData"].VR, data["PixelData"].is_undefined_length = "OB", True
+
+    return write(folder, slices(), change)
+
+
+@pytest.mark.parametrize("signed", [False, True])
+@pytest.mark.parametrize("name", PACKINGS)
+def test_packed_slices(name: str, signed: bool, tmp_path: Path) -> None:
+    assert off_by(packed_as(name, tmp_path, signed=signed)) < 0.1
+
+
+@pytest.mark.parametrize("name", PACKINGS)
+def test_a_damaged_packed_slice_is_named_in_one_line(
+    name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = packed_as(name, tmp_path) / "i009.dcm"
+    raw = file.read_bytes()
+    at = raw.index(b"\xe0\x7f\x10\x00") + 30
+    file.write_bytes(raw[:at] + b"\x07" * 40 + raw[at + 40 :])
+    with pytest.raises(VolumeError, match=r"i009\.dcm: it cannot be read"):
+        read_volume(tmp_path)
+    assert capfd.readouterr() == ("", "")
 
 
 def framed(plane: np.ndarray, value: int) -> np.ndarray:
