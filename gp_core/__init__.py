@@ -22,6 +22,7 @@ from gp_core.atlas.pose_files import read_pose
 from gp_core.atlas.pose_gate import GateReason, PoseGate
 from gp_core.atlas.pose_quality import PoseQuality, pose_quality
 from gp_core.atlas.reading_state import read_as
+from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -79,6 +80,7 @@ __all__ = [
     "PoseGate",
     "PoseQuality",
     "RigidTransform",
+    "ScanEvidence",
     "SearchReport",
     "Side",
     "SideCheck",

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.bone import Bone
 from gp_labeler.desk_signals import DeskSignals
+from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.near_bone import near_bone
 from gp_labeler.imaging.surface import Surface
 from gp_labeler.imaging.volume import Volume
@@ -86,6 +91,13 @@ class BoneDesk(DeskSignals):
         if self.volume is None or self.threshold is None:
             return np.ones(len(points), dtype=bool)
         return near_bone(self.volume, self.threshold, points)
+
+    @property
+    def scan_evidence(self) -> Callable[[LandmarkSet], ScanEvidence] | None:
+        """Tells how far the labels of a side are from the bone of this scan; None while there is none."""
+        if self.volume is None or self.threshold is None:
+            return None
+        return partial(scan_evidence, self.volume, self.threshold)
 
     def save_mesh(self, path: Path) -> None:
         """Write the whole bone surface at full resolution, in the background."""

@@ -109,6 +109,8 @@ class Workbench(AtlasDesk, BoneDesk):
         self._follow(self.session)
         self.jobs.failed.connect(self._on_failed)
         self.landmarks_changed.connect(self._on_landmarks)
+        self.volume_opened.connect(self._ask_scan)
+        self.threshold_changed.connect(self._ask_scan)
         for signal in (self.active_changed, self.session_replaced, self.landmarks_changed):
             signal.connect(self._disarm)
         self.pose = PoseDesk(self)
@@ -431,6 +433,11 @@ class Workbench(AtlasDesk, BoneDesk):
         self._last = touched[0] if len({code for _, code in touched}) == 1 else None
         self._judge({side for side, _ in changed})
         self._bone.mesh_ears()
+
+    def _ask_scan(self, *_: object) -> None:
+        """Judge the labels by this scan, and by its bone as it is now."""
+        self.session.set_measure(self.scan_evidence)
+        self._judge(Side, after=0.0)
 
     def _disarm(self, *_: object) -> None:
         self.arm_replacing(False)

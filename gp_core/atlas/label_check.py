@@ -23,6 +23,7 @@ from gp_core.atlas.label_likelihood import (
     Reading,
     best_reading,
 )
+from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import mirror_right
@@ -61,6 +62,9 @@ HEAD_MM = 40.0
 
 _LEAST_WIDTH = 0.1
 """Of the width that the atlas gives the placed features: narrower, they are a heap or a line."""
+
+NEAR_BONE_MM = 3.0
+"""A feature in the cochlea's spaces is nearer to some bone than this."""
 
 _HARMLESS = ("missing", "suggested", "unseen", "unchecked")
 
@@ -123,8 +127,8 @@ class Finding:
     specimen : str
     side : Side
     kind : str
-        ``other side``, ``swapped``, ``duplicate``, ``far``, ``shared point differs``, ``missing``,
-        ``suggested``, ``unseen`` or ``unchecked``.
+        ``other side``, ``swapped``, ``duplicate``, ``outside``, ``off bone``, ``far``,
+        ``shared point differs``, ``missing``, ``suggested``, ``unseen`` or ``unchecked``.
     landmarks : tuple of str
         Features concerned.
     text : str
@@ -182,7 +186,7 @@ class Finding:
         }
 
 
-_RANKS = {"other side": 3, "swapped": 2, "duplicate": 1}
+_RANKS = {"other side": 5, "swapped": 4, "duplicate": 3, "outside": 2, "off bone": 1}
 
 
 def _nothing() -> Mapping[str, Departure]:
@@ -220,7 +224,9 @@ class SideCheck:
         return found
 
 
-def check_specimen(specimen: Specimen, atlas: Atlas) -> list[Finding]:
+def check_specimen(
+    specimen: Specimen, atlas: Atlas, *, scan: Mapping[Side, ScanEvidence] | None = None
+) -> list[Finding]:
     """Return everything to look at in the labels of one animal, both sides.
 
     Parameters
@@ -228,10 +234,13 @@ def check_specimen(specimen: Specimen, atlas: Atlas) -> list[Finding]:
     specimen : Specimen
     atlas : Atlas
         What the labels are held against.
+    scan : mapping of Side to ScanEvidence, optional
+        What the scan says of each side.
     """
     found: list[Finding] = []
-    for landmarks in specimen.sides.values():
-        found += [replace(finding, specimen=specimen.name) for finding in check_landmarks(landmarks, atlas)]
+    for side, landmarks in specimen.sides.items():
+        of_side = check_side(landmarks, atlas, scan=(scan or {}).get(side)).findings
+        found += [replace(finding, specimen=specimen.name) for finding in of_side]
     return found + list(_shared_points(specimen))
 
 
@@ -240,7 +249,7 @@ def check_landmarks(landmarks: LandmarkSet, atlas: Atlas) -> list[Finding]:
     return list(check_side(landmarks, atlas).findings)
 
 
-def check_side(landmarks: LandmarkSet, atlas: Atlas) -> SideCheck:
+def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | None = None) -> SideCheck:
     """Check the labels of one side.
 
     Parameters
@@ -248,13 +257,15 @@ def check_side(landmarks: LandmarkSet, atlas: Atlas) -> SideCheck:
     landmarks : LandmarkSet
         In any frame, mm; from four placed features on they are held against the atlas.
     atlas : Atlas
+    scan : ScanEvidence, optional
+        What the scan says of the same labels: those off the bone are named, however few there are.
 
     Returns
     -------
     SideCheck
         It takes 1 ms for a side in order and 10 ms for one that is not.
     """
-    found = list(_duplicates(landmarks))
+    found = [*_duplicates(landmarks), *(() if scan is None else _against_scan(landmarks, scan))]
     departures: dict[str, Departure] = {}
     codes = tuple(code for code in landmarks.placed if code in atlas.codes)
     try:
@@ -307,6 +318,22 @@ def _duplicates(landmarks: LandmarkSet) -> Iterator[Finding]:
         if np.linalg.norm(landmarks[a] - landmarks[b]) < SAME_PLACE_MM:
             text, remedy = f"{a} and {b} are at the same place", "Place one of them again."
             yield _finding(landmarks, "duplicate", (a, b), text, remedy)
+
+
+def _against_scan(landmarks: LandmarkSet, scan: ScanEvidence) -> Iterator[Finding]:
+    for code, away in scan.bone_distances.items():
+        if code not in landmarks or feature(code).computed:
+            continue
+        distance = f"{away:.1f} mm" if np.isfinite(away) else "far"
+        if code in scan.outside:
+            text, remedy = f"{code} is outside the scan", f"Place {code} again, in the scan."
+            yield _finding(landmarks, "outside", (code,), text, remedy)
+        elif feature(code).on_bone and away > scan.tolerance:
+            text, remedy = f"{code} is {distance} from bone", f"Place {code} on bone, or mark it as checked."
+            yield _finding(landmarks, "off bone", (code,), text, remedy)
+        elif away > NEAR_BONE_MM:
+            text, remedy = f"{code} is {distance} from any bone: outside the head", f"Place {code} again."
+            yield _finding(landmarks, "outside", (code,), text, remedy)
 
 
 def _require_enough(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]) -> None:

@@ -62,7 +62,10 @@ class Side(str, Enum):
 
 @dataclass(frozen=True)
 class Feature:
-    """One anatomical feature: a row of the feature table."""
+    """One anatomical feature: a row of the feature table.
+
+    `on_bone` features lie on the surface of a bone or tooth; CA and CB lie in the cochlea's spaces.
+    """
 
     code: str
     name: str
@@ -70,6 +73,7 @@ class Feature:
     where: str
     view: str
     external: bool
+    on_bone: bool
     shared: bool
     computed: bool
 

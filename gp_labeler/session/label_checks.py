@@ -9,14 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.label_check import Finding, SideCheck, departure, far
+from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session.ghosts import fingerprint
 
-__all__ = ["Check", "CheckLabels", "LabelChecks"]
+__all__ = ["Check", "CheckLabels", "LabelChecks", "Measure"]
 
-Check = Callable[[LandmarkSet], SideCheck]
+Check = Callable[..., SideCheck]
 """Checks the labels of one side: `gp_core.atlas.label_check.check_side` with an atlas."""
+
+Measure = Callable[[LandmarkSet], ScanEvidence]
+"""Tells what the scan says of the labels of one side: `imaging.bone_distance.scan_evidence` with a scan."""
 
 N_REMEMBERED = 8
 
@@ -28,10 +32,12 @@ class LabelChecks:
     ----------
     check : callable, optional
         The checker; None doubts nothing.
+    measure : callable, optional
+        Asks the scan; None where there is none.
     """
 
-    def __init__(self, check: Check | None = None) -> None:
-        self._check = check
+    def __init__(self, check: Check | None = None, measure: Measure | None = None) -> None:
+        self.check, self.measure = check, measure
         self._known: dict[tuple[object, ...], SideCheck] = {}
         self._latest: dict[Side, tuple[LandmarkSet, SideCheck]] = {}
         self._lock = threading.Lock()
@@ -40,12 +46,19 @@ class LabelChecks:
         """Check a side, where that was not done before; this may take some 50 ms."""
         found = self.known(landmarks)
         if found is None:
-            found = SideCheck() if self._check is None else self._check(landmarks)
+            found = self._asked(landmarks)
             with self._lock:
                 self._known[fingerprint(landmarks)] = found
                 while len(self._known) > N_REMEMBERED:
                     del self._known[next(iter(self._known))]
         return found
+
+    def _asked(self, landmarks: LandmarkSet) -> SideCheck:
+        if self.check is None:
+            return SideCheck()
+        if self.measure is None:
+            return self.check(landmarks)
+        return self.check(landmarks, scan=self.measure(landmarks))
 
     def known(self, landmarks: LandmarkSet) -> SideCheck | None:
         """Return what was found before, else None; at once. It is then forgotten last."""

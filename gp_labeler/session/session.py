@@ -17,7 +17,7 @@ from gp_labeler.session.edits import as_position
 from gp_labeler.session.ghosts import Expectations, Ghost, Predict
 from gp_labeler.session.history import History
 from gp_labeler.session.keeper import Keeper
-from gp_labeler.session.label_checks import Check, CheckLabels, LabelChecks
+from gp_labeler.session.label_checks import Check, CheckLabels, LabelChecks, Measure
 from gp_labeler.session.state import SpecimenState, point_key
 from gp_labeler.session.view import View
 from gp_labeler.session.workflow import (
@@ -149,8 +149,12 @@ class Session(EditedSpecimen):
 
     def set_predict(self, predict: Predict | None, check: Check | None = None) -> None:
         """Take another atlas for ghosts and doubts, or none."""
-        self._expectations, self._checks = Expectations(predict), LabelChecks(check)
+        self._expectations, self._checks = Expectations(predict), LabelChecks(check, self._checks.measure)
         self.ghosts_changed.emit()
+
+    def set_measure(self, measure: Measure | None) -> None:
+        """Ask another scan whether labels lie on bone, or none."""
+        self._checks = LabelChecks(self._checks.check, measure)
 
     def _focus(self) -> object:
         return self._active

@@ -20,6 +20,7 @@ from gp_labeler.session.jobs import QueueDispatcher
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.session.state import How
 from gp_labeler.session.workflow import Active
+from gp_labeler.views.panels.card_content import content_of
 from gp_labeler.workbench import Workbench
 
 
@@ -361,3 +362,32 @@ def test_what_is_given_up_is_not_offered_again(on_ball, ball_file) -> None:
     on_ball.wait()
     assert not any("kept" in text for _, text in on_ball.said)
     assert find_recoveries(on_ball.directory) == ()
+
+
+def test_a_single_point_off_the_bone_is_doubted_by_the_scan(on_ball) -> None:
+    on_ball.use_atlas(Atlas.published())
+    out = np.array([0.0, 0.0, 1.0])
+    labelling.place(on_ball.session, MIDDLE + (BALL_MM + 1.0) * out, side=Side.LEFT, code="IN")
+    on_ball.wait()
+    doubt = on_ball.session.near_doubts(Side.LEFT)["IN"]
+    assert doubt.kind == "off bone"
+    distance = float(doubt.text.split()[2])
+    assert distance == pytest.approx(1.0, abs=VOXEL_MM)
+    on_ball.go_to(Side.LEFT, "IN")
+    assert "from bone" in content_of(on_ball.session, has_scan=True).status
+    labelling.place(on_ball.session, MIDDLE + BALL_MM * out, side=Side.LEFT, code="IN")
+    on_ball.wait()
+    assert not on_ball.session.near_doubts(Side.LEFT)
+    labelling.place(on_ball.session, MIDDLE + (BALL_MM - 2.0) * out, side=Side.LEFT, code="IN")
+    on_ball.wait()
+    assert not on_ball.session.near_doubts(Side.LEFT), "within bone it is not off it"
+
+
+def test_the_scan_is_asked_again_when_its_threshold_changes(on_ball) -> None:
+    on_ball.use_atlas(Atlas.published())
+    labelling.place(on_ball.session, MIDDLE + np.array([0, 0, BALL_MM]), side=Side.LEFT, code="IN")
+    on_ball.wait()
+    assert not on_ball.session.near_doubts(Side.LEFT)
+    on_ball.set_threshold(float(on_ball.volume.array.max()) + 1)
+    on_ball.wait()
+    assert on_ball.session.near_doubts(Side.LEFT)["IN"].text == "IN is far from bone"

@@ -99,7 +99,10 @@ class Check(Step):
     def run(self, rig: Rig) -> str:  # noqa: D102
         state = rig.desk.session.state
         sides = {side: state.side(side) for side in Side if state.side(side).placed}
-        findings = check_specimen(Specimen(state.specimen, sides), rig.desk.atlas or Atlas.published())
+        measure = rig.desk.scan_evidence
+        scan = None if measure is None else {side: measure(landmarks) for side, landmarks in sides.items()}
+        atlas = rig.desk.atlas or Atlas.published()
+        findings = check_specimen(Specimen(state.specimen, sides), atlas, scan=scan)
         doubtful = [finding for finding in findings if finding.is_doubt]
         if self.path is not None:
             file, rows = rig.to_write(self.path), [finding.as_dict() for finding in findings]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from atlas_cases import random_pose
 
-from gp_core import Atlas, LandmarkSet, Side, Specimen, check_side
+from gp_core import FEATURES, Atlas, LandmarkSet, ScanEvidence, Side, Specimen, check_side
 from gp_core.atlas.draw import draw_animal
 from gp_core.frames import mirror_x
 from gp_core.landmarks.suggestion import Suggestion
@@ -149,3 +149,27 @@ def test_suggestions_are_not_judged_and_judge_nothing(published: Atlas) -> None:
     assert [f.kind for f in found.findings if f.landmarks == (to_do,)] == ["suggested"]
     for code, away in check_side(ear, published).departures.items():
         assert found.departures[code].n_sd == away.n_sd
+
+
+def test_labels_off_the_bone_are_named_however_few_there_are(published: Atlas) -> None:
+    few = LandmarkSet.from_mapping({"IN": [0, 0, 0], "CA": [9, 0, 0], "ZL": [0, 20, 0]}, "L")
+    away = {"IN": 7.93, "CA": 0.8, "ZL": 0.29}
+    scan = ScanEvidence(away, tolerance=0.3)
+    found = {
+        f.landmarks: (f.kind, f.text) for f in check_side(few, published, scan=scan).findings if f.is_doubt
+    }
+    assert found[("IN",)] == ("off bone", "IN is 7.9 mm from bone")
+    assert ("CA",) not in found, "it lies in the cochlea, not on bone"
+    assert ("ZL",) not in found
+    one = LandmarkSet.from_mapping({"IN": [0, 0, 0]}, "L")
+    assert check_side(one, published, scan=scan).doubts["IN"].kind == "off bone"
+    lost = check_side(
+        LandmarkSet.from_mapping({"CB": [0, 0, 0]}, "L"), published, scan=ScanEvidence({"CB": 6}, 0.3)
+    )
+    assert lost.doubts["CB"].text == "CB is 6.0 mm from any bone: outside the head"
+    gone = ScanEvidence({"IN": np.inf}, 0.3, frozenset({"IN"}))
+    assert check_side(one, published, scan=gone).doubts["IN"].text == "IN is outside the scan"
+
+
+def test_which_features_lie_on_bone_is_a_fact_of_the_table() -> None:
+    assert {row.code for row in FEATURES if not row.on_bone} == {"CA", "CB", "CO"}
