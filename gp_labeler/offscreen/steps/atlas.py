@@ -43,8 +43,8 @@ class Fit(Step):
         atlas = fit_plain_atlas(specimens) if self.keep_doubtful else fit_screened_atlas(screened)
         atlas.save(file)
         kept = "believed" if self.keep_doubtful else "left out"
-        doubts = [f"{f.specimen} {f.side.word}: {f.text}, {kept}." for f in screened.left_out]
-        return " ".join((f"{rig.wrote(file)}, {len(specimens)} animals.", *doubts))
+        doubts = [f"{f.specimen} {f.side.word}: {f.text}, {kept}" for f in screened.left_out]
+        return ". ".join((f"{rig.wrote(file)}, {len(specimens)} animals", *doubts))
 
 
 @dataclass(frozen=True)
