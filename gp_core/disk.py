@@ -110,9 +110,10 @@ def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
 def read_head(path: AnyPath, n_bytes: int) -> bytes:
     """Return the first bytes of a plain file, to tell its kind; none where it is no such file."""
     with contextlib.suppress(OSError, ValueError):
-        if stat.S_ISREG(Path(path).stat().st_mode):
+        status = Path(path).stat()
+        if stat.S_ISREG(status.st_mode):
             with Path(path).open("rb") as file:
-                return file.read(n_bytes)
+                return file.read(min(n_bytes, status.st_size))
     return b""
 
 
@@ -126,9 +127,9 @@ def read_json(path: AnyPath, *, what: str = "file", remedy: str | None = None) -
 
 
 def _check_kind(status: os.stat_result, path: AnyPath, what: str, max_bytes: int) -> None:
-    remedy = f"Give a {what}."
+    remedy = f"Give {_a(what)}."
     if stat.S_ISDIR(status.st_mode):
-        raise FileFormatError(f"is a folder, not a {what}", file=path, remedy="Name a file in it.")
+        raise FileFormatError(f"is a folder, not {_a(what)}", file=path, remedy="Name a file in it.")
     if not stat.S_ISREG(status.st_mode):
         raise FileFormatError("is no plain file but a device or a pipe", file=path, remedy=remedy)
     if status.st_size > max_bytes:
@@ -137,7 +138,11 @@ def _check_kind(status: os.stat_result, path: AnyPath, what: str, max_bytes: int
 
 def _too_large(path: AnyPath, what: str, max_bytes: int) -> FileFormatError:
     limit = f"{max_bytes / 1e6:g} MB"
-    return FileFormatError(f"is too large for a {what}, above {limit}", file=path, remedy=f"Give a {what}.")
+    return FileFormatError(f"is too large for {_a(what)}, above {limit}", file=path, remedy="Check the name.")
+
+
+def _a(what: str) -> str:
+    return f"{'an' if what[0] in 'aeiou' else 'a'} {what}"
 
 
 def _unreadable(path: AnyPath, error: Exception) -> FileFormatError:
