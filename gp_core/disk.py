@@ -229,7 +229,8 @@ def _check_target(target: Path, path: AnyPath) -> None:
         raise GpError("is a folder, not a file", file=path, remedy="Name a file in it.")
     if target.exists() and not target.is_file():
         raise GpError("is neither a file nor a pipe", file=path, remedy="Name another file.")
-    if target.exists() and not os.access(target, os.W_OK):  # to replace it, the folder's permission would do
+    as_we_are = os.access in os.supports_effective_ids
+    if target.exists() and not os.access(target, os.W_OK, effective_ids=as_we_are):  # the folder's would do
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 

@@ -135,6 +135,8 @@ def _note(
     keep: Path | None,
 ) -> None:
     result.n += 1
+    if result.n % 1000 == 0:
+        sys.stdout.write(f"so far {result.text()}\n")
     result.statuses[f"status {status}"] += 1
     result.slowest = max(result.slowest, (float(seconds), f"{number} {target}"))
     result.peak_mb = max(result.peak_mb, float(megabytes))

@@ -71,7 +71,10 @@ def run(n: int, seed: int, *, kinds: tuple[str, ...] = ()) -> Result:
                 result.faults.append(f"{number} {name}: {type(error).__name__}: {error}")
                 sys.stdout.write(result.faults[-1] + "\n")
         result.counts[name] += 1
-    result.seconds = time.monotonic() - start
+        result.seconds = time.monotonic() - start
+        if number % 40 == 39:
+            sys.stdout.write(f"so far {result.text()}\n")
+            sys.stdout.flush()
     return result
 
 
