@@ -156,6 +156,11 @@ class Session(EditedSpecimen):
         """Ask another scan whether labels lie on bone, or none."""
         self._checks = LabelChecks(self._checks.check, measure)
 
+    def close(self, *, discard: bool = False) -> None:
+        """Let go of journal, locks and scan; see `EditedSpecimen.close`."""
+        super().close(discard=discard)
+        self.set_measure(None)  # it asks the scan, and holds it
+
     def _focus(self) -> object:
         return self._active
 
