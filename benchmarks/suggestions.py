@@ -18,14 +18,20 @@ import numpy as np
 _ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(_ROOT), str(_ROOT / "tests" / "labeler" / "session")]
 
-from suggestion_users import measured  # noqa: E402
+from suggestion_users import Coverage, measured, mirrored  # noqa: E402
 
 
 def main(n_animals: int) -> None:
     """Print the coverage as a whole, by number of observations and by feature."""
     found = measured(n_animals)
-    print(f"{n_animals} animals drawn from the published atlas, left side")
+    print(f"{n_animals} animals drawn from the published atlas, left side: what the atlas expects")
     print(f"{found.n_confirmed} ghosts were confirmed, {found.n_placed} features placed")
+    _print(found)
+    print("Right side, one or two features placed: what the left side, mirrored, expects")
+    _print(mirrored(n_animals))
+
+
+def _print(found: Coverage) -> None:
     print(f"the region held the feature in {found.whole:.1%} of all ghosts\n")
     for title, groups in (("observations", found.by_stage), ("feature", found.by_feature)):
         print(f"{title:>12}  ghosts  held")

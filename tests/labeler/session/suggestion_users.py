@@ -84,5 +84,22 @@ def measured(n_animals: int, seed: int = 0) -> Coverage:
     return found
 
 
+def mirrored(n_animals: int, seed: int = 0) -> Coverage:
+    """Return the same of ghosts mirrored from a labelled left side, with one or two features of the right."""
+    atlas, rng, found = Atlas.published(), np.random.default_rng(seed), Coverage()
+    for _ in range(n_animals):
+        animal, session = draw_animal(atlas, rng=rng, tilt_deg=5.0), Session()
+        left, right = animal.side("L"), animal.side("R")
+        for code in left.placed:
+            if code not in ("CO", "IN"):
+                labelling.place(session, _seen(left, code, rng), side="L", code=code)
+        for code in OPENING[:2]:
+            labelling.place(session, _seen(right, code, rng), side="R", code=code)
+            if session.ghosts(Side.RIGHT):
+                labelling.accept_all_ghosts(session, side="R")
+            found.note(session, Side.RIGHT, right)
+    return found
+
+
 def _seen(truth: LandmarkSet, code: str, rng: np.random.Generator) -> np.ndarray:
     return truth[code] + SEES_MM * rng.standard_normal(3)
