@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from PySide6.QtCore import Qt, QTimer
 from PySide6.QtTest import QTest
+from PySide6.QtWidgets import QMenu
 from window_cases import MIDDLE, Answers, ball_volume, close, settle
 
 from gp_core.landmarks.features import Side
@@ -385,10 +386,9 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
 
 
 def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
-    menus = {entry.text(): entry.menu() for entry in window.menuBar().actions()}
-    folded = [entry.menu() for menu in menus.values() for entry in menu.actions() if entry.menu() is not None]
-    assert max(menu.sizeHint().height() for menu in (*menus.values(), *folded)) < 480  # 1366 x 768 at 150 %
-    assert {"Look from", "Cut bone", "Text size"} <= {menu.title() for menu in folded}
+    menus = window.menuBar().findChildren(QMenu)  # PySide6 6.8 takes those of `QAction.menu` for gone
+    assert max(menu.sizeHint().height() for menu in menus) < 480  # 1366 x 768 at 150 %
+    assert {"&File", "Look from", "Cut bone", "Text size"} <= {menu.title() for menu in menus}
 
 
 def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:
