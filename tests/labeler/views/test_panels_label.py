@@ -14,7 +14,7 @@ from shiboken6 import isValid
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint
+from gp_labeler.session.edits import CheckPoint, SwapPoints
 from gp_labeler.session.workflow import Active
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
@@ -379,3 +379,16 @@ def test_an_index_outside_the_table_has_no_data(desk, qtbot):
     table = LandmarkTable(desk)
     qtbot.addWidget(table)
     assert table.model.data(QModelIndex()) is None
+
+
+def test_names_that_look_exchanged_are_exchanged_by_the_card(panel, desk, qtbot):
+    place(desk, "CA", "CB", "RWP", "OS", "MH", "LLI")
+    desk.session.do(SwapPoints(LEFT, "CA", "CB"))
+    deliver(desk)
+    desk.go_to(LEFT, "CB")
+    card = panel.card
+    qtbot.waitUntil(lambda: card.primary.text().startswith("Exchange CA and CB"))
+    qtbot.mouseClick(card.primary, CLICK)
+    deliver(desk)
+    assert not desk.session.near_doubts(LEFT)
+    np.testing.assert_allclose(desk.session.landmarks(LEFT)["CA"], in_scan("CA"))
