@@ -18,6 +18,7 @@ from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
+from gp_core.terminal import printable
 from gp_labeler.atlas_desk import AtlasDesk, expecting, is_atlas_file
 from gp_labeler.bone_desk import BoneDesk
 from gp_labeler.imaging.readers import ImportPlan
@@ -331,7 +332,7 @@ class Workbench(AtlasDesk, BoneDesk):
 
     def say(self, text: str, level: str = "info") -> None:
         """Tell the user something."""
-        self.message.emit(text, level)
+        self.message.emit(printable(text), level)
 
     def close(self, *, discard: bool = False) -> None:
         """Stop all work and let go of journal and locks; see `Session.close`."""

@@ -48,13 +48,14 @@ class Result:
     faults: list[str] = field(default_factory=list)
     slowest: tuple[float, str] = (0.0, "")
     peak_mb: float = 0.0
-    seconds: float = 0.0
+    begun: float = field(default_factory=time.monotonic)
 
     def text(self) -> str:
         """Return the figures."""
         statuses = ", ".join(f"{name} {count}" for name, count in sorted(self.statuses.items()))
         slow = f"slowest {self.slowest[0]:.1f} s ({self.slowest[1]})"
-        figures = f"{self.n} inputs over {len(TARGETS)} readers and commands in {self.seconds:.0f} s"
+        seconds = time.monotonic() - self.begun
+        figures = f"{self.n} inputs over {len(TARGETS)} readers and commands in {seconds:.0f} s"
         return f"{figures}; {statuses}; {slow}; peak {self.peak_mb:.0f} MB; {len(self.faults)} faults"
 
 
@@ -62,7 +63,7 @@ def run(
     n: int, seed: int, *, kinds: tuple[str, ...] = (), keep: Path | None = None, first: int = 0
 ) -> Result:
     """Try `n` inputs; those that fail are kept in a folder where one is given."""
-    result, start = Result(), time.monotonic()
+    result = Result()
     with tempfile.TemporaryDirectory(prefix="fuzz-") as name:
         folder = Path(name)
         samples = make_samples(folder / "good")
@@ -71,7 +72,6 @@ def run(
         done = first
         while done < first + n:
             done = _worker(range(done, first + n), seed, targets, samples, folder, result, keep)
-    result.seconds = time.monotonic() - start
     return result
 
 
