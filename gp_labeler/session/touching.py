@@ -97,7 +97,8 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
         taken = {name: Touch(as_position(p, name), source=source, **about) for name, p in points.items()}
     if not taken:
         raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
-    session.do(TakeTouches(Side.parse(side), taken))
+    with blaming(path):
+        session.do(TakeTouches(Side.parse(side), taken))
     named, unseen = named_side(source), " ".join(sorted(touched.unseen))
     doubts = [f"Not seen by the tracker: {unseen}"] if unseen else []
     if named not in (None, Side.parse(side)):
