@@ -31,8 +31,8 @@ def decide(pose: CochleaPose, better_exchanged: tuple[str, str] | None) -> dict[
     pose : CochleaPose
         With its hypotheses.
     better_exchanged : (str, str) or None
-        Two features whose touches fit much better with their names exchanged: that is told however little it
-        moves the pose, and however seldom names are exchanged.
+        Two features whose touches fit much better with their names exchanged: that is told however seldom
+        names are exchanged, and however little it moves the pose; it makes the names wrong if it moves it.
     """
     others = [h for h in pose.hypotheses if h.exchanged is None]
     exchanges = [h for h in pose.hypotheses if h.exchanged is not None]
@@ -42,7 +42,9 @@ def decide(pose: CochleaPose, better_exchanged: tuple[str, str] | None) -> dict[
     if sum(h.probability for h in exchanges) >= _WRONG:
         names, told = "wrong", exchanges
     if names != "wrong" and better_exchanged is not None:
-        return {"side_state": side, "names_state": "wrong", "swapped": better_exchanged}
+        if any(h.exchanged == better_exchanged for h in told):
+            names = "wrong"
+        return {"side_state": side, "names_state": names, "swapped": better_exchanged}
     heaviest = max(told, key=lambda h: h.probability, default=None)
     return {
         "side_state": side,
@@ -68,10 +70,10 @@ def reading_warnings(pose: CochleaPose) -> Iterator[str]:
     """Say so where the touches may be of the other ear, or two of them exchanged."""
     names = " and ".join(pose.swapped or ())
     this, other = pose.side.word, pose.side.other.word
-    if pose.names_state == "wrong":
-        yield f"{names} look swapped"
-    elif pose.names_state == "undecided":
+    if pose.names_state == "undecided":
         yield f"{names} may be exchanged: touch both again"
+    elif pose.swapped is not None:
+        yield f"{names} look swapped"
     if pose.side_state == "wrong":
         yield f"the {other} side fits these points better than the {this}: check the side"
     elif pose.side_state == "undecided":

@@ -36,9 +36,6 @@ _SUSPECT_WEIGHT = 0.2
 _SUSPECT_SQUARED = 20.0
 """Squared deviation from where the others put a touch, over its variance; 1 ordinary one of 6000 is above."""
 
-_ODD_SQUARED = 7.814727903251179
-"""The same, with 1 of 20 above: from there on a touch counts as uncertain as it looks."""
-
 _ENOUGH_TO_TELL = 5
 """Touches from which a mistouch can be told from an unusual animal."""
 
@@ -231,19 +228,21 @@ def pose_covariance(
     of_shape[:, atlas.coordinates(DEFINING)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
     covariance = of_shape @ atlas.scatter @ of_shape.T
-    variances = np.maximum(_touch_variances(fit), systematic.noise_floor(len(model.codes)) ** 2)
+    variances = np.maximum(
+        _touch_variances(fit, systematic.odd_squared), systematic.noise_floor(len(model.codes)) ** 2
+    )
     covariance += (of_touches * variances) @ of_touches.T
     covariance += systematic.covariance(atlas, fit, of_touches, of_shape)
     symmetric: FloatArray = (covariance + covariance.T) / 2
     return symmetric
 
 
-def _touch_variances(fit: NamedFit) -> FloatArray:
+def _touch_variances(fit: NamedFit, odd_squared: float) -> FloatArray:
     """Return (3 n,) variances of the touched coordinates; suspect and odd ones are as wrong as they look."""
     variances = fit.touch_variances
     odd = _suspicious(fit)
     if len(odd) >= _ENOUGH_TO_TELL:
-        odd |= fit.against_others.squared > _ODD_SQUARED
+        odd |= fit.against_others.squared > odd_squared
     if odd.any():
         variances = np.where(odd, np.maximum(fit.against_others.error_variance, variances), variances)
     return np.repeat(variances, 3)

@@ -8,7 +8,7 @@ is the same at every touch, part of its variance is taken as different from touc
 
 The same goes for an animal of unusual size: an atlas of some grown animals hardly says how much the size of
 guinea pigs differs. A factor of size with a wide prior is therefore weighed against the touches, and what
-they leave open or show of it widens the region. Where touches carry times, an offset that grows with time is
+they show of it beyond chance widens the region. Where touches carry times, an offset that grows with time is
 looked for alike.
 
 With a shared error of 0 none of this is added: then animals are like those behind the atlas, and touches err
@@ -35,11 +35,16 @@ DEFAULT_SHARED_ERROR_MM = 0.2
 
 _LARGEST_MM = 20.0
 
-_WITHIN = 0.25
-"""Part of the variance of the shared error that differs from touch to touch."""
+_WITHIN = 0.04
+"""Part of the variance of the shared error that differs from touch to touch and does not show as noise."""
 
 _SIZE_SCATTER = 0.06
 """Standard deviation of the size of animals beyond those of an atlas, as a factor."""
+
+_CHANCE = 3.0
+"""Squared deviations, over their variance, that ordinary animals of an atlas show in their size."""
+
+_ODD_SQUARED, _ODD_SQUARED_SHARED = 7.814727903251179, 5.0
 
 _FLOOR_MM = {3: 0.2, 4: 0.15}
 """Noise, mm a coordinate, that so few touches cannot show: their fit leaves too little over."""
@@ -76,6 +81,15 @@ class Systematic:
         """Return the least noise, mm a coordinate, that the region of so many touches is made with."""
         return _FLOOR_MM.get(n_touches, 0.0) if self.shared_error > 0 else 0.0
 
+    @property
+    def odd_squared(self) -> float:
+        """From where on a touch counts as uncertain as it looks: its squared deviation over its variance.
+
+        Of ordinary touches that is chi-square of 3 degrees: 1 of 20 is above the larger value, 1 of 6 above
+        the smaller one, which holds more of the mistouches that pull the pose after them.
+        """
+        return _ODD_SQUARED if self.shared_error == 0 else _ODD_SQUARED_SHARED
+
     def covariance(
         self, atlas: Atlas, fit: NamedFit, of_touches: FloatArray, of_shape: FloatArray
     ) -> FloatArray:
@@ -100,7 +114,7 @@ class Systematic:
     def _nuisances(
         self, atlas: Atlas, fit: NamedFit, of_touches: FloatArray, of_shape: FloatArray
     ) -> FloatArray:
-        """Return what the size of the animal, and a drift, may do: second moments, given the residuals."""
+        """Return what the size of the animal and a drift do to the pose, as far as the touches show them."""
         larger = fit.points.ravel() - fit.residual  # how the touched features move as the animal grows
         touched, moved = [larger], [of_shape @ atlas.mean.ravel()]
         prior = [_SIZE_SCATTER**2]
@@ -115,10 +129,14 @@ class Systematic:
         columns = columns - fit.jacobian @ np.linalg.solve(weighted.T @ fit.jacobian, weighted.T @ columns)
         spread = np.linalg.inv((fit.precision[:, None] * columns).T @ columns + np.diag(1 / np.array(prior)))
         mean = spread @ (columns.T @ (fit.precision * fit.residual))
-        squared = float(mean @ np.linalg.solve(spread, mean))  # of chance alone about one each
-        beyond_chance = max(0.0, 1 - len(mean) / squared) if squared > 0 else 0.0
-        second: FloatArray = effect @ (spread + beyond_chance * np.outer(mean, mean)) @ effect.T
-        return second
+        shown = np.zeros((6, 6))
+        for block, chance in ((slice(0, 1), _CHANCE), (slice(1, None), 1.0)):
+            part = mean[block]
+            squared = float(part @ np.linalg.solve(spread[block, block], part)) if part.size else 0.0
+            if squared > chance * part.size:  # beyond chance: James and Stein's estimate, positive part
+                moved_by = effect[:, block] @ part
+                shown += (1 - chance * part.size / squared) * np.outer(moved_by, moved_by)
+        return shown
 
     def _ramp(self) -> FloatArray | None:
         """Return how far along its way a drift is at each touch, about the mean; None without times."""
