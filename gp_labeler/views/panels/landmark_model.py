@@ -123,8 +123,9 @@ class LandmarkModel(QAbstractTableModel):
 
     def _heading(self, side: Side) -> str:
         progress = self._workbench.session.progress(side)
-        suggested = f"  {_SUGGESTED}{progress.n_suggested}" if progress.n_suggested else ""
-        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}{suggested}"
+        if progress.n_suggested:  # both counts and the total would not fit
+            return f"{side.word.capitalize()} {progress.n_placed} {_SUGGESTED}{progress.n_suggested}"
+        return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
 
     def _cell(self, code: str, side: Side, state: PointState) -> _Cell:
         session, row = self._workbench.session, feature(code)
