@@ -8,9 +8,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
-from PySide6.QtCore import QByteArray, QEvent, QSize
+from PySide6.QtCore import QByteArray, QSize
 from PySide6.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from PySide6.QtWidgets import (
+    QApplication,
     QBoxLayout,
     QHBoxLayout,
     QMainWindow,
@@ -107,6 +108,9 @@ class MainWindow(QMainWindow):
         self._listen()
         self._recall_place()
         self._show_title()
+        app = QApplication.instance()
+        if isinstance(app, QApplication):
+            app.fontChanged.connect(self._restyle)  # the desktop's text became larger or smaller
         self.welcome.open_scan.setFocus()  # else the first button there is, that of the theme
 
     def set_theme(self, name: str) -> None:
@@ -121,7 +125,7 @@ class MainWindow(QMainWindow):
         self.memory.set(text_size=self.text_size)
         self._restyle()
 
-    def _restyle(self) -> None:
+    def _restyle(self, *_: object) -> None:
         """Take the theme and the text size, the user's and the desktop's."""
         theme = THEMES.get(self.theme_name, THEMES["dark"])
         apply_theme(self, theme, text_scale=desktop_scale() * self.text_size / 100)
@@ -280,11 +284,6 @@ class MainWindow(QMainWindow):
         self.memory.save()
 
     # Qt's events
-
-    def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802
-        super().changeEvent(event)
-        if event.type() is QEvent.Type.ApplicationFontChange:  # the desktop's text became larger or smaller
-            self._restyle()
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if not self.ui.settle():

@@ -62,7 +62,7 @@ class SliceView(QWidget):
 
     def __init__(self, workbench: Workbench, plane: Plane, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self.setMinimumSize(140, 90)
+        self.setMinimumSize(120, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)

@@ -16,7 +16,7 @@ __all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "La
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of the columns after the first."""
 
-_SUGGESTED = "\N{WHITE SQUARE}"
+_SUGGESTED = "\N{BALLOT BOX}"
 """Before a number of suggestions in the header: it has the shape of their chips."""
 
 _USER = int(Qt.ItemDataRole.UserRole)

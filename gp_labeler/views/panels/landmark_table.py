@@ -17,6 +17,7 @@ from PySide6.QtWidgets import (
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.session.edits import ClearPoint
+from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
@@ -40,8 +41,7 @@ _ROOMY_ROW = 24
 _FEWEST_ROWS = 6
 """Shown in a low window, which scrolls the table."""
 
-_WIDEST_HEADING = "Right 20/20"
-_WIDEST_STATES = ("computed", "checked", "doubtful", "unseen", "0.99 mm")
+_WIDEST_STATES = (*(state.value for state in PointState), "by itself", "99.9 mm")
 _CHIP, _PAD = 12, 8
 
 
@@ -144,7 +144,7 @@ class _TableView(QTableView):
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
         header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
-        model.headings_changed.connect(header.viewport().update)
+        model.headings_changed.connect(self._on_headings)
         fit(self, self._fit)
 
     def height_of(self, rows: int, *, roomy: bool = False) -> int:
@@ -158,7 +158,7 @@ class _TableView(QTableView):
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         names = _PAD + _code_width(self) + text_width(self, *(row.name for row in FEATURES)) + _PAD
         bar = self.verticalScrollBar().sizeHint().width()
-        return QSize(names + 2 * _state_width(self) + bar + 4, self.height_of(_FEWEST_ROWS))
+        return QSize(names + sum(self._state_widths()) + bar + 4, self.height_of(_FEWEST_ROWS))
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802 - Qt's name
         self._share_height()
@@ -168,14 +168,25 @@ class _TableView(QTableView):
     def _lowest_row(self) -> int:
         return line_height(self)
 
+    def _on_headings(self) -> None:
+        """Show other counts; only where one takes more room than its column has are columns fitted anew."""
+        widths = [self.columnWidth(column) for column in (1, 2)]
+        if widths != self._state_widths():
+            self._fit()
+        self.horizontalHeader().viewport().update()
+
     def _fit(self) -> None:
         """Give columns and rows the room that their words take."""
         self.horizontalHeader().setFixedHeight(line_height(self) + 10)
         self.verticalHeader().setMinimumSectionSize(self._lowest_row)
-        for column in (1, 2):
-            self.setColumnWidth(column, _state_width(self))
+        for column, width in enumerate(self._state_widths(), 1):
+            self.setColumnWidth(column, width)
         self._share_height()
         self.updateGeometry()
+
+    def _state_widths(self) -> list[int]:
+        way, model = Qt.Orientation.Horizontal, self.model()
+        return [_state_width(self, str(model.headerData(column, way))) for column in (1, 2)]
 
     def _share_height(self) -> None:
         height = (self.viewport().height() - 2) // len(CODES)
@@ -208,11 +219,11 @@ def _code_width(view: QWidget) -> int:
     return text_width(view, *CODES, bold=True) + pixels(view, 6)
 
 
-def _state_width(view: QWidget) -> int:
-    """Return how much a column of states takes: chip, word and lock."""
+def _state_width(view: QWidget, heading: str) -> int:
+    """Return how much a column of states takes: chip, word and lock, or what stands above them."""
     chip = _PAD + pixels(view, _CHIP) + 4
     words = chip + text_width(view, *_WIDEST_STATES) + pixels(view, _CHIP) + 4
-    return max(words, heading_width(view, _WIDEST_HEADING))
+    return max(words, heading_width(view, heading))
 
 
 class _ChipDelegate(QStyledItemDelegate):

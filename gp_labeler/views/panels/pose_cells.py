@@ -50,9 +50,10 @@ def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) ->
         CLEAR: pixels(view, 16),
     }
     columns = {column: max(least, heads.get(column, 0)) for column, least in columns.items()}
-    spare = width - sum(columns.values()) - names_width(view)
-    if spare > pixels(view, _WIDE_BAR):
-        columns[MISFIT] += pixels(view, _WIDE_BAR)
+    free = width - sum(columns.values())
+    beside_names = free - names_width(view)
+    spare = beside_names if beside_names >= 0 else free  # where names have no room, bars may have it
+    columns[MISFIT] += min(max(spare, 0), pixels(view, _WIDE_BAR))
     return columns
 
 

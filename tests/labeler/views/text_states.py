@@ -142,6 +142,10 @@ def _label(window: MainWindow, look: Look) -> None:
     _settle(window)
     session.set_active(Active(LEFT, "OI"))
     look("label, doubtful", window)
+    labelling.suggest(session, in_scan("DTM"), radius_95=0.8, source="atlas", side=LEFT, code="DTM")
+    session.set_active(Active(LEFT, "DTM"))
+    _settle(window)
+    look("label, suggested", window)
     for code in ("RWA", "DTL", "IN", "ZL", "MN", "FPP"):
         session.set_active(Active(RIGHT, code))
         look(f"label, {code} right", window.steps["label"])
