@@ -15,7 +15,7 @@ from gp_core.landmarks.features import Side
 
 __all__ = ["UNDECIDED", "Hypothesis", "Part", "axis_part", "holding_radius", "origin_part"]
 
-UNDECIDED = 0.01
+UNDECIDED = 0.005
 """Probability of another reading from which it is not ruled out."""
 
 _SHARE = 0.95
