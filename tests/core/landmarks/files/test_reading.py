@@ -51,12 +51,14 @@ def test_a_contradicted_side_is_an_error(tmp_path):
 def test_what_is_no_file_to_read(tmp_path, reader):
     (tmp_path / "folder.mrk.json").mkdir()
     (tmp_path / "scan.nrrd").write_text("NRRD0004")
+    (tmp_path / "notes.doc").write_text("x")
     for name, message in [
         ("folder.mrk.json", "is a folder"),
         ("", "is a folder"),
         ("none_L.mrk.json", "does not exist"),
         ("none.xyz", "does not exist"),
-        ("scan.nrrd", r"no kind of landmark file.*\.mrk\.json, .*\.dat"),
+        ("scan.nrrd", r"an image, or a recording of a tracker.*gp-core touches"),
+        ("notes.doc", r"no kind of landmark file.*\.mrk\.json, .*\.dat"),
         ("x\0.dat", "does not exist|cannot be read"),
         ("x" * 5000 + ".dat", "does not exist|cannot be read"),
     ]:
