@@ -110,3 +110,16 @@ def test_names_stay_off_what_only_keeps_its_place_free() -> None:
     low, high = corners[0], corners[0] + sizes[0]
     covered = [(low < spot + 7).all() and (high > spot - 7).all() for spot in anchors[1:]]
     assert not any(covered)
+
+
+def test_another_reading_is_drawn_dotted_with_its_odds_and_its_own_region() -> None:
+    _, T_scan_touches, touched, atlas = estimated(Side.LEFT)
+    found = estimate_pose({**touched, "CL": touched["OS"], "OS": touched["CL"]}, "L", atlas)
+    reading = found.hypotheses[0]
+    drawn = DrawnPose.of_reading(reading, T_scan_touches)
+    np.testing.assert_allclose(drawn.origin, T_scan_touches.apply(reading.origin[None])[0])
+    assert (drawn.style, drawn.side) == ("dotted", Side.LEFT)
+    assert drawn.label == f"100% {reading.label}"
+    shown = DrawnPose.of(found, T_scan_touches)
+    assert (shown.cone, drawn.key != shown.key) == (found.plain_cone_95, True)
+    assert found.radius_95 > 1.5 * found.plain_radius_95
