@@ -1,6 +1,7 @@
 """Markups files as this program writes them: Slicer's form, and every bit back."""
 
 import json
+import math
 import os
 import stat
 from dataclasses import replace
@@ -9,7 +10,7 @@ from types import MappingProxyType
 import jsonschema
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from landmark_makers import SHARED, needs_shared_data, same_landmarks, some_landmarks
 from markups_schema import SCHEMA
@@ -39,6 +40,7 @@ def file(tmp_path):
 def test_what_is_written_is_read_back_to_the_last_bit(tmp_path_factory, writer, positions, unseen, side):
     if len({tuple(p) for p in positions.values()}) == 1:
         positions = dict(list(positions.items())[:2])  # three points at one place are refused
+    assume(not {"CA", "CB"} <= set(positions) or math.dist(positions["CA"], positions["CB"]) >= 1e-3)
     landmarks = replace(LandmarkSet.from_mapping(positions, side), unseen=frozenset(unseen))
     folder = tmp_path_factory.mktemp("bits")
     if writer == "markups":
