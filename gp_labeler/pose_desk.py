@@ -16,12 +16,13 @@ from psygnal import Signal
 from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.next_touch import TouchGain, gains
 from gp_core.atlas.pose import CochleaPose
+from gp_core.atlas.pose_gate import against_writing
 from gp_core.errors import GpError
 from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
 from gp_labeler.session import touching
-from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.estimate import Estimate, verdict_on
 from gp_labeler.session.estimating import Estimating
-from gp_labeler.session.pose_exports import InsertionPath, save_pose
+from gp_labeler.session.pose_exports import InsertionPath, save_pose, says_its_state
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.work import WarmFit, WarmJoint
 
@@ -279,9 +280,24 @@ class PoseDesk:
 
     # What leaves
 
-    def export(self, path: str | PathLike[str]) -> Path:
-        """Write the pose in the format that the file's name asks for; see `pose_exports.save_pose`."""
+    def export(self, path: str | PathLike[str], *, accept_warnings: bool = False) -> Path:
+        """Write the pose in the format that the file's name asks for; see `pose_exports.save_pose`.
+
+        Parameters
+        ----------
+        path : path
+        accept_warnings : bool
+            Write a file that a robot could run although side or names are in doubt, and nobody has accepted
+            the estimate. The pose's JSON, which says its state, is written in any case.
+
+        Raises
+        ------
+        GpError
+            It is in doubt, or as `save_pose`.
+        """
         pose = self._pose()
+        if not (accept_warnings or says_its_state(path)):
+            self._check_doubt(pose, path)
         file = save_pose(pose, path)
         self._desk.say(f"Wrote {file.name}, y to the {pose.round_window} round window")
         self._desk.wrote.emit("pose", file)
@@ -301,15 +317,33 @@ class PoseDesk:
         return self._path
 
     def save_path(self, path: str | PathLike[str]) -> Path:
-        """Write the carried insertion path in the frame of the touches; raises `GpError` without one."""
+        """Write the carried insertion path in the frame of the touches.
+
+        Raises
+        ------
+        GpError
+            There is none, the pose is in doubt as for `export`, or the file cannot be written.
+        """
         if self._path is None:
             raise GpError("there is no insertion path", remedy="Carry one to the estimate first.")
-        self._pose()
+        self._check_doubt(self._pose(), path)
         assert self.estimate is not None
         file = self._path.save_carried(self.estimate, path)
         self._desk.say(f"Wrote {file.name}")
         self._desk.wrote.emit("path", file)
         return file
+
+    def _check_doubt(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
+        """Refuse to write for a robot what is in doubt, unless a person has accepted this very estimate."""
+        reasons = against_writing(pose)
+        estimate = self.estimate
+        accepted = estimate is not None and verdict_on(estimate, self._desk.session.state) == "accept"
+        if reasons and not accepted:
+            raise GpError(
+                f"not written, as {' and '.join(reason.text for reason in reasons)}",
+                file=path,
+                remedy="Correct the touches, or accept the estimate (script: accept_warnings = true).",
+            )
 
     def _pose(self) -> CochleaPose:
         estimate = self.estimate

@@ -6,7 +6,7 @@ from psygnal import Signal
 
 from gp_core.atlas.pose import CochleaPose
 from gp_core.atlas.pose_gate import GateReason, PoseGate
-from gp_labeler.session.estimate import Estimate
+from gp_labeler.session.estimate import Estimate, verdict_on
 from gp_labeler.session.state import SpecimenState
 from gp_labeler.tracker import PoseMessage, PoseSender
 
@@ -86,11 +86,11 @@ class PoseSending:
             return
         reasons = (
             *self.gate.reasons(
-                pose, accepted=_verdict(estimate, state) == "accept", reference_age_s=reference_age_s
+                pose, accepted=verdict_on(estimate, state) == "accept", reference_age_s=reference_age_s
             ),
             *_reasons_of_touches(pose, doubtful),
         )
-        if _verdict(estimate, state) == "reject":
+        if verdict_on(estimate, state) == "reject":
             reasons = (
                 GateReason("rejected", "it was rejected"),
                 *(r for r in reasons if r.code != "not accepted"),
@@ -117,12 +117,6 @@ def _reasons_of_touches(pose: CochleaPose, doubtful: tuple[str, ...]) -> tuple[G
         text = f"{', '.join(doubtful)} may lie in another frame than what the tracker reads now"
         return (GateReason("frame", text),)
     return ()
-
-
-def _verdict(estimate: Estimate, state: SpecimenState) -> str:
-    """Return what was said last of this very estimate; empty where nothing was, or it has changed since."""
-    last = next((check for check in reversed(state.pose_checks) if check.side is estimate.side), None)
-    return "" if last is None or not estimate.is_that_of(last.pose) else last.verdict
 
 
 def _without_numbers(text: str) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from gp_core.atlas.pose import CochleaPose
 from gp_core.errors import GpError
 
-__all__ = ["GateReason", "PoseGate", "doubt_about"]
+__all__ = ["GateReason", "PoseGate", "against_writing", "doubt_about"]
 
 
 @dataclass(frozen=True)
@@ -125,6 +125,14 @@ def doubt_about(pose: CochleaPose) -> Iterator[GateReason]:
     }
     if pose.names_state in words:
         yield GateReason(*words[pose.names_state])
+
+
+def against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
+    """Return why a pose is not written for a robot: its side or names look wrong, or are undecided.
+
+    A method that checks neither finds nothing against it.
+    """
+    return tuple(reason for reason in doubt_about(pose) if not reason.code.endswith("unchecked"))
 
 
 def _pair(pose: CochleaPose) -> str:

@@ -14,7 +14,7 @@ from gp_core.atlas.insertion import UNITS, carry_path, read_path, rows_before_ce
 from gp_core.atlas.mixture import Hypothesis
 from gp_core.atlas.next_touch import MM_A_DEGREE, TouchGain, gains
 from gp_core.atlas.pose import METHODS, ROUND_WINDOWS, CochleaPose, estimate_pose
-from gp_core.atlas.pose_gate import doubt_about
+from gp_core.atlas.pose_gate import PoseGate, against_writing
 from gp_core.atlas.reading_state import read_as, with_names_exchanged
 from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.checks import FloatArray
@@ -40,6 +40,9 @@ HELD_BACK = 3
 
 _FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
 """Options whose files carry a pose without its doubts."""
+
+_TAKEN_FOR_SURE = 0.995
+"""Probability from which a reading that the program chose itself is beyond doubt."""
 
 _HARDLY = 0.03
 """Part of the present error region below which a gain is not worth a touch."""
@@ -163,16 +166,20 @@ def run(args: argparse.Namespace) -> int:
             if atlas is None
             else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
         )
-    held_back = _is_held_back(pose) and not args.accept_warnings
+    doubtful = bool(against_writing(pose)) or (taken is not None and taken.probability < _TAKEN_FOR_SURE)
+    held_back = doubtful and not args.accept_warnings
     _write(args, pose, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
     if taken is not None:
-        say(f"  ! taken as {taken.label}, which is likelier than what was given")
+        odds = f"{100 * taken.probability:.1f} %"
+        say(f"  ! taken as {taken.label}, which is likelier than what was given ({odds})")
     for line in _asides(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
     if held_back:
         say(f"  ! {_what_was_held_back(args, pose)}")
+    elif doubtful:
+        say("  ! written although side or names are in doubt: --accept-warnings was given")
     return HELD_BACK if held_back else 0
 
 
@@ -211,13 +218,11 @@ def _estimated(
     return touches, estimate(touches), best
 
 
-def _is_held_back(pose: CochleaPose) -> bool:
-    """Whether names or side look wrong, or are undecided; a method that does not look finds nothing wrong."""
-    return any(reason.code.split()[-1] != "unchecked" for reason in doubt_about(pose))
-
-
 def _what_was_held_back(args: argparse.Namespace, pose: CochleaPose) -> str:
-    why = " and ".join(reason.text for reason in doubt_about(pose))
+    why = (
+        " and ".join(reason.text for reason in against_writing(pose))
+        or "the reading taken is not beyond doubt"
+    )
     files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
     what = f"not written: {' '.join(files)}, as {why}" if files else why
     return f"{what}. Check side and names, or give --accept-warnings"
@@ -259,6 +264,9 @@ def _asides(
     centre = None if path is None else rows_before_centre(path)
     if centre is not None:
         yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
+    for reason in PoseGate().reasons(pose, accepted=True):
+        if reason.code in ("radius", "cone", "side unchecked", "names unchecked"):
+            yield f"! a robot link would hold this back: {reason.text}"
     if args.json or (not held_back and any((args.tfm, args.csv, args.path_out))):
         yield f"y of what was written points to the {pose.round_window} round window"
 

@@ -10,10 +10,10 @@ import numpy as np
 from gp_core.checks import FloatArray
 from gp_core.commands.options import Subparsers, add_command, say
 from gp_core.disk import read_json, write_text
-from gp_core.errors import FileFormatError, GpError, blaming
-from gp_core.landmarks.features import PROBE
+from gp_core.errors import FeatureError, FileFormatError, GpError, blaming
+from gp_core.landmarks.features import CODES, EXTERNAL, PROBE
 from gp_core.landmarks.files.text import as_csv_cell
-from gp_core.landmarks.labels import tidy_label
+from gp_core.landmarks.labels import is_skull_feature, tidy_label
 from gp_core.registration.recorded_touches import recorded_touches
 from gp_core.registration.recordings import read_recording
 
@@ -62,7 +62,7 @@ def add_transforms(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Find the touches, write them, and say where they are."""
     recording = read_recording(args.recording, transform=args.transform, reference=args.reference)
-    names = [tidy_label(name) for name in args.order.split(",") if name.strip()]
+    names = [_touched_name(name) for name in args.order.split(",") if name.strip()]
     with blaming(args.recording):
         touches = recorded_touches(recording, _tip(args.tip), names)
     lines = [",".join((as_csv_cell(name), *map(repr, place.tolist()))) for name, place in touches.items()]
@@ -71,6 +71,16 @@ def run(args: argparse.Namespace) -> int:
     for name, place in touches.items():
         say(f"  {name:<5} " + " ".join(f"{value:10.3f}" for value in place))
     return 0
+
+
+def _touched_name(word: str) -> str:
+    """Return the name of something that a probe can touch."""
+    name = tidy_label(word)
+    if name in EXTERNAL or is_skull_feature(name):
+        return name
+    problem = "is inside the bone and cannot be touched" if name in CODES else "is no feature"
+    remedy = f"Name any of {' '.join(EXTERNAL)}, or skull features S1, S2, ..."
+    raise FeatureError(problem, landmark=name[:40], remedy=remedy)
 
 
 def _tip(word: str) -> FloatArray:

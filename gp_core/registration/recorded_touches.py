@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
-from gp_core.errors import GeometryError, GpError
+from gp_core.errors import FeatureError, GeometryError, GpError
 from gp_core.registration.recordings import Recording
 
 __all__ = ["recorded_touches", "resting_places"]
@@ -21,7 +21,9 @@ _FEWEST = 8
 """The shortest rest that is a touch: seconds, and readings where the recording holds no times."""
 
 _AWAY_MM = 3.0
-"""Two rests nearer than this are one touch."""
+"""Two rests are one touch where the tip stayed within this between them."""
+
+_SHORTEST_TIP_MM = 1.0
 
 
 def recorded_touches(
@@ -47,13 +49,19 @@ def recorded_touches(
     ------
     GpError
         The tip offset is not three numbers.
+    FeatureError
+        A name stands twice.
     GeometryError
         The tip rested more or less often than there are names.
     """
+    double = next((name for name in names if list(names).count(name) > 1), None)
+    if double is not None:
+        raise FeatureError("is named twice", landmark=double, remedy="Name each touch once, in their order.")
     places = resting_places(recording, tip_offset)
     if len(places) != len(names):
+        where = "; ".join(f"{x:.1f} {y:.1f} {z:.1f}" for x, y, z in places[:12])
         raise GeometryError(
-            f"the tip rested {len(places)} times, but {len(names)} touches are named",
+            f"the tip rested {len(places)} times ({where} mm), but {len(names)} touches are named",
             remedy=f"A touch is {_REST_S:g} s within {_RADIUS_MM:g} mm; name as many, in their order.",
         )
     return dict(zip(names, places, strict=True))
@@ -69,16 +77,28 @@ def resting_places(recording: Recording, tip_offset: ArrayLike) -> FloatArray:
     """
     offset = np.asarray(tip_offset, dtype=np.float64)
     if offset.shape != (3,) or not np.isfinite(offset).all():
-        raise GpError(f"the tip offset must be three finite numbers in mm, got {tip_offset!r}")
+        raise GpError(f"the tip offset must be three finite numbers in mm, got {offset.tolist()}")
+    if 0 < np.linalg.norm(offset) < _SHORTEST_TIP_MM:
+        length = np.linalg.norm(offset)
+        raise GpError(
+            f"the tip lies only {length:.2g} mm from its marker", remedy="Give it in mm, not in metres."
+        )
     tips: FloatArray = recording.poses[:, :3, :3] @ offset + recording.poses[:, :3, 3]
     places: list[FloatArray] = []
+    left = 0
     for first, end in _rests(tips):
         if _is_long(recording, first, end):
             margin = (end - first) // 5  # the tip comes to rest, and leaves
             place = np.median(tips[first + margin : end - margin], axis=0)
-            if not places or np.linalg.norm(place - places[-1]) > _AWAY_MM:
+            if not places or _was_away(tips[left:end], places[-1]):
                 places.append(place)
+            left = end
     return np.array(places).reshape(-1, 3)
+
+
+def _was_away(tips: FloatArray, place: FloatArray) -> bool:
+    """Whether the tip left a place, or was not seen for a while."""
+    return bool((~(np.linalg.norm(tips - place, axis=1) <= _AWAY_MM)).any())
 
 
 def _rests(tips: FloatArray) -> Iterator[tuple[int, int]]:

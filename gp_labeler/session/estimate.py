@@ -27,7 +27,7 @@ from gp_core.registration.fiducials import FiducialRegistration, register_fiduci
 from gp_labeler.session.state import SpecimenState
 from gp_labeler.session.touches import TouchHow
 
-__all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", "make_estimate"]
+__all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", "make_estimate", "verdict_on"]
 
 _DEFINING = ("CA", "CB", "RWA", "RWP")
 REGISTRATIONS = ("auto", "features", "skull")
@@ -245,6 +245,12 @@ class Estimate:
         turn = (np.trace(then[:3, :3].T @ now[:3, :3]) - 1) / 2
         degrees = float(np.degrees(np.arccos(np.clip(turn, -1, 1))))
         return (mm, degrees) if mm > _SAME_MM or degrees > _SAME_DEG else None
+
+
+def verdict_on(estimate: Estimate, state: SpecimenState) -> str:
+    """Return what was said last of this very estimate; empty where nothing was, or it has changed since."""
+    last = next((check for check in reversed(state.pose_checks) if check.side is estimate.side), None)
+    return "" if last is None or not estimate.is_that_of(last.pose) else last.verdict
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -22,7 +22,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.session.estimate import Estimate
 
-__all__ = ["FORMATS", "InsertionPath", "save_pose"]
+__all__ = ["FORMATS", "InsertionPath", "save_pose", "says_its_state"]
 
 _WRITERS: Mapping[str, Callable[[CochleaPose, str | PathLike[str]], None]] = {
     ".mrk.json": CochleaPose.save_landmarks,
@@ -65,6 +65,12 @@ def save_pose(pose: CochleaPose, path: str | PathLike[str]) -> Path:
             write(pose, path)
             return Path(path)
     raise GpError("has no ending of a pose file", file=path, remedy=f"End it with {', '.join(FORMATS)}.")
+
+
+def says_its_state(path: str | PathLike[str]) -> bool:
+    """Whether a file's format carries the state of a pose beside it, for whoever reads it."""
+    name = Path(path).name.lower()
+    return name.endswith(".json") and not name.endswith(".mrk.json")
 
 
 @dataclass(frozen=True, eq=False)

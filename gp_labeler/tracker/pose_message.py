@@ -1,8 +1,8 @@
 """What a robot is told of the pose: the transform while it may be used, and always how it stands.
 
 Before the TRANSFORM go a STATUS message, whose code is 1 only while the pose may be used, and a STRING
-message with the same in JSON. These two have a device name of their own, for some clients keep one message a
-name. All have headers of version 1, which every OpenIGTLink client reads.
+message with the same in JSON. Each has a device name of its own, for some clients keep one message a name.
+All have headers of version 1, which every OpenIGTLink client reads.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from gp_core.checks import FloatArray
 from gp_core.frames import RigidTransform
 from gp_labeler.tracker.messages import pack_transform
 
-__all__ = ["HELD_BACK", "NO_POSE", "STATE_DEVICE", "PoseMessage"]
+__all__ = ["HELD_BACK", "NO_POSE", "STATE_DEVICE", "STATUS_DEVICE", "PoseMessage"]
 
-STATE_DEVICE = "CochleaPoseState"
-"""Device name of the messages that say how the pose stands."""
+STATE_DEVICE, STATUS_DEVICE = "CochleaPoseState", "CochleaPoseStatus"
+"""Device names of the STRING and of the STATUS message, which say how the pose stands."""
 
 HELD_BACK = "HELD_BACK"
 NO_POSE = "NO_POSE"
@@ -118,6 +118,6 @@ def _pack_status(message: PoseMessage, time: float) -> bytes:
     fraction = int((time - seconds) * 2**32)
     size_and_sum = (len(body), pyigtl.messages.CRC64(body))
     header = struct.pack(
-        "> H 12s 20s II QQ", 1, b"STATUS", STATE_DEVICE.encode(), seconds, fraction, *size_and_sum
+        "> H 12s 20s II QQ", 1, b"STATUS", STATUS_DEVICE.encode(), seconds, fraction, *size_and_sum
     )
     return header + body

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import json
 import logging
+import math
 import signal
 import sys
 import threading
@@ -67,7 +68,10 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
     int
         0; 2 where the input is wrong, said in one line.
     """
-    args = make_parser(prog).parse_args(arguments)
+    parser = make_parser(prog)
+    args = parser.parse_args(arguments)
+    if args.seed < 0:
+        parser.error(f"--seed must be 0 or more, got {args.seed}")
     logging.getLogger("pyigtl").setLevel(logging.ERROR)
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)  # it ends in good order
@@ -79,9 +83,14 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
                 write_text(args.truth, json.dumps({**truth, "port": simulator.port}, indent=2))
         _say(f"listening on 127.0.0.1:{simulator.port}")
         return _serve(simulator, args, list(points))
-    except (GpError, OSError) as error:
+    except GpError as error:
         sys.stderr.write(f"simulator: {error}\n")
-        return 2
+    except OSError as error:
+        why = error.strerror or error
+        sys.stderr.write(
+            f"simulator: cannot listen at port {args.port} ({why}). Choose another with --port.\n"
+        )
+    return 2
 
 
 def _serve(simulator: Simulator, args: argparse.Namespace, names: list[str]) -> int:
@@ -119,8 +128,15 @@ def _simulator(args: argparse.Namespace, points: dict[str, FloatArray]) -> Simul
         names["reference"] = args.reference
     for what, name in names.items():
         check_device(name, f"the {what}")
+    if len(set(names.values())) != len(names):
+        raise GpError("probe, reference and button must have different names")
     if not 1 <= args.rate <= 1000:
         raise GpError(f"--rate must be from 1 to 1000, got {args.rate:g}")
+    if not 0 <= args.port <= 65535:
+        raise GpError(f"--port must be from 0 to 65535, got {args.port}")
+    for name in ("noise", "noise_deg", "sway"):
+        if not 0 <= getattr(args, name) < math.inf:
+            raise GpError(f"--{name.replace('_', '-')} must be 0 or more, got {getattr(args, name):g}")
     probe = SimulatedProbe(
         points,
         args.tip,

@@ -101,6 +101,8 @@ class Estimate(Step):
         Ordinary error of a touch, mm a coordinate; by default found from the touches.
     shared_error : float
         RMS length of one offset that all touches share, mm; it widens the 95 % region.
+    accept_warnings : bool
+        Write files for a robot although side or names are in doubt.
     take_best : bool
         Where the other ear, or an exchange of two names, is likelier than what is given, take that; the pose
         is then of the side that was taken.
@@ -123,6 +125,7 @@ class Estimate(Step):
     probe_noise: float | None = None
     shared_error: float = DEFAULT_SHARED_ERROR_MM
     take_best: bool = False
+    accept_warnings: bool = False
     round_window: str = "touched"
     path: tuple[str, ...] = ("pose.json",)
 
@@ -153,7 +156,10 @@ class Estimate(Step):
                 rig.desk.say(f"{method}: {warning}", "warning")
         side = estimate.side
         rig.poses[side] = Estimated(estimate, pose, _truth(rig, side))
-        files = [rig.desk.pose.export(rig.to_write(path)) for path in self.path]
+        files = [
+            rig.desk.pose.export(rig.to_write(path), accept_warnings=self.accept_warnings)
+            for path in self.path
+        ]
         return _told(rig.poses[side], rig.wrote(*files))
 
     def _take_atlas(self, rig: Rig) -> None:

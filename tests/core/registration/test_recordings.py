@@ -192,8 +192,40 @@ def test_the_places_where_the_tip_rested_are_found_in_their_order(timed) -> None
 
 
 def test_more_or_fewer_rests_than_names_are_said() -> None:
-    with pytest.raises(GeometryError, match="rested 5 times, but 6 touches are named"):
+    with pytest.raises(
+        GeometryError, match=r"rested 5 times \(.*10\.0 12\.\d .*mm\), but 6 touches are named"
+    ):
         recorded_touches(_touching(_PLACES), _TIP, list("ABCDEF"))
+
+
+def test_two_features_that_lie_close_are_two_touches_where_the_tip_was_away_between() -> None:
+    away = np.array([0.0, 0.0, 30.0])
+    places = np.array([[0.0, 0, 0], [1.4, 0, 0], [1.4, 0.5, 0]])
+    way = [places[0], places[0] + away, places[1], places[1] + away, places[2]]
+    found = resting_places(_touching(np.array(way)), _TIP)
+    assert found[::2] == pytest.approx(places, abs=0.1)
+    assert len(found) == 5
+
+
+def test_a_tip_that_slips_a_little_is_one_touch() -> None:
+    assert len(resting_places(_touching(np.array([[0.0, 0, 0], [1.5, 0, 0]])), _TIP)) == 1
+
+
+@pytest.mark.parametrize(
+    ("order", "tip", "said"),
+    [
+        ("RWA,CL,RWA", "0,0,0", "RWA: is named twice"),
+        ("RWA,CA", "0,0,0", "CA: is inside the bone"),
+        ("RWA,FOO", "0,0,0", "FOO: is no feature"),
+        ("RWA,CL", "0.001,0,0.16", "only 0.16 mm from its marker. Give it in mm"),
+        ("RWA,CL", "1,2", "three finite numbers in mm, got [1.0, 2.0]"),
+    ],
+)
+def test_what_is_named_wrongly_is_said_before_anything_is_written(tmp_path, capsys, order, tip, said) -> None:
+    file, csv = _mha(tmp_path / "a.mha", _touching(_PLACES).poses), tmp_path / "t.csv"
+    assert main(["touches", str(file), "--order", order, "--tip", tip, "-o", str(csv)]) == 2
+    assert said in capsys.readouterr().err
+    assert not csv.exists()
 
 
 def test_from_the_shell_a_pivot_and_touches_of_sequences(tmp_path, capsys) -> None:

@@ -15,7 +15,7 @@ from tracker_cases import pose, until
 from gp_core.atlas.pose_gate import GateReason
 from gp_labeler.tracker import LinkPhase, PoseMessage, PoseSender, TrackerAddress, TrackerLink
 from gp_labeler.tracker.messages import MessageDecoder, TrackerMessage
-from gp_labeler.tracker.pose_message import STATE_DEVICE
+from gp_labeler.tracker.pose_message import STATUS_DEVICE
 
 _NAME = "T_tracker_cochlea"
 _WRONG_SIDE = GateReason("wrong side", "the touches look like those of the right ear")
@@ -88,7 +88,7 @@ def test_a_pose_reaches_every_client_and_stops_where_it_no_longer_holds() -> Non
         until(lambda: sender.peers == 1, links[0].poll, "one client")
         sender.send(_usable(1, 2, 3).held_back_for(_WRONG_SIDE))
         until(lambda: links[0].state.phase is LinkPhase.SILENT, links[0].poll, "no transform any more")
-        assert links[0].devices[STATE_DEVICE] in ("STATUS", "STRING")  # which is said, not left to silence
+        assert links[0].devices[STATUS_DEVICE] == "STATUS"  # which is said, not left to silence
         sender.send(_usable(4, 5, 6), renew_s=0.3)
         until(lambda: links[0].state.phase is LinkPhase.CONNECTED, links[0].poll, "the next pose")
         until(lambda: links[0].state.phase is LinkPhase.SILENT, links[0].poll, "one that nobody renewed")
