@@ -103,6 +103,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.replacing = False  # whether the next click moves the chosen point
         self._author = author
         self._last: tuple[Side, str] | None = None
+        self._choices_since_edit = 0
         self._abandoned: SpecimenState | None = None
         self._copied: str | None = None  # of what this is a copy
         super().__init__(atlas)
@@ -112,6 +113,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.landmarks_changed.connect(self._on_landmarks)
         self.volume_opened.connect(self._ask_scan)
         self.threshold_changed.connect(self._ask_scan)
+        self.active_changed.connect(self._on_chosen)
         for signal in (self.active_changed, self.session_replaced, self.landmarks_changed):
             signal.connect(self._disarm)
         self.pose = PoseDesk(self)
@@ -293,13 +295,46 @@ class Workbench(AtlasDesk, BoneDesk):
             self.point_shown.emit(self.session.crosshair)
 
     def nudged_point(self) -> tuple[Side, str] | None:
-        """Return the point that arrow keys move: the chosen one where it has a place, else the last."""
+        """Return the point that arrow keys move: the chosen one where it has a place, else the last.
+
+        A suggestion that became the chosen one by itself, after an edit of another, is not what the user
+        means: the point of that edit is.
+        """
         active, last = self.session.active, self._last
-        if active.code is not None and self.session.state.landmark(active.side, active.code).shown_position:
+        mark = None if active.code is None else self.session.state.landmark(active.side, active.code)
+        is_last_placed = last is not None and self.session.state.landmark(*last).position is not None
+        came_by_itself = mark is not None and mark.suggestion is not None and self._choices_since_edit <= 1
+        has_place = mark is not None and mark.shown_position is not None
+        if active.code is not None and has_place and not (came_by_itself and is_last_placed):
             return active.side, active.code
-        if last is not None and self.session.state.landmark(*last).position is not None:
-            return last
-        return None
+        return last if is_last_placed else None
+
+    def nudge(self, offset: FloatArray) -> tuple[Side, str] | None:
+        """Move that point by a (3,) offset, mm, scan frame; a suggestion only where it can be judged.
+
+        Returns
+        -------
+        (Side, str) or None
+            What was moved. None where nothing was: there is no such point, or it was brought into sight.
+
+        Raises
+        ------
+        GpError
+            The point is locked.
+        """
+        target = self.nudged_point()
+        if target is None:
+            return None
+        mark = self.session.state.landmark(*target)
+        if mark.suggestion is not None and self.sight is not None:
+            where = np.array(mark.suggestion.position)
+            if not self.sight.can_judge(where):
+                labelling.go_to(self.session, *target)
+                self.sight.bring_close(where)
+                self.say(f"Is {point_text(*target)} right here? Confirm it, or move it to where it belongs")
+                return None
+        labelling.nudge(self.session, offset, side=target[0], code=target[1])
+        return target
 
     def begin_drag(self, side: Side, code: str) -> bool:
         """Take up a placed or suggested point; False where it cannot be moved."""
@@ -432,6 +467,7 @@ class Workbench(AtlasDesk, BoneDesk):
     def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
         touched = [point for point in changed if not feature(point[1]).computed]
         self._last = touched[0] if len({code for _, code in touched}) == 1 else None
+        self._choices_since_edit = 0
         self._judge({side for side, _ in changed})
         self._bone.mesh_ears()
 
@@ -439,6 +475,9 @@ class Workbench(AtlasDesk, BoneDesk):
         """Judge the labels by this scan, and by its bone as it is now."""
         self.session.set_measure(self.scan_evidence)
         self._judge(Side, after=0.0)
+
+    def _on_chosen(self, _: object) -> None:
+        self._choices_since_edit += 1
 
     def _disarm(self, *_: object) -> None:
         self.arm_replacing(False)

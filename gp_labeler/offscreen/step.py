@@ -15,12 +15,13 @@ from gp_core.landmarks.features import Side
 if TYPE_CHECKING:
     from gp_labeler.offscreen.rig import Rig
 
-__all__ = ["Lengths", "Pair", "Positions", "Ranges", "Step", "Triple", "make_step"]
+__all__ = ["Lengths", "Pair", "Positions", "Ranges", "Step", "Texts", "Triple", "make_step"]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Positions = dict[str, Triple]
 Lengths = dict[str, float]
+Texts = dict[str, str]
 Ranges = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 S = TypeVar("S", bound="Step")
 
@@ -173,6 +174,10 @@ def _lengths(value: Any) -> dict[str, float]:
     return {_text(name): _number(length) for name, length in value.items()}
 
 
+def _table_of_texts(value: Any) -> dict[str, str]:
+    return {_text(key): _text(text) for key, text in value.items()}
+
+
 _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     str: ("text", _text),
     float: ("a number", _number),
@@ -185,4 +190,5 @@ _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     tuple[str, ...]: ("texts", _texts),
     Positions: ("a table of positions", _positions),
     Lengths: ("a table of numbers", _lengths),
+    Texts: ("a table of texts", _table_of_texts),
 }

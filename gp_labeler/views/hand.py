@@ -161,14 +161,15 @@ class Hand:
 
 def nudge(workbench: Workbench, offset: FloatArray) -> None:
     """Move the chosen point, or the one placed last, by a (3,) offset, mm; without one, the crosshair."""
-    target, session = workbench.nudged_point(), workbench.session
-    if target is None:
+    session = workbench.session
+    if workbench.nudged_point() is None:
         session.set_crosshair(session.crosshair + offset)
         return
-    side, code = target
     try:
-        labelling.nudge(session, offset, side=side, code=code)
+        moved = workbench.nudge(offset)
     except GpError as error:
         workbench.say(str(error), "warning")
         return
-    session.set_crosshair(session.landmarks(side)[code])
+    if moved is not None:
+        side, code = moved
+        session.set_crosshair(session.landmarks(side)[code])

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.offscreen.rig import Rig
-from gp_labeler.offscreen.step import Step
+from gp_labeler.offscreen.step import Step, Texts
 from gp_labeler.session.landmark_export import export_landmarks
 from gp_labeler.session.landmark_import import import_landmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
@@ -40,7 +39,7 @@ class Import(Step):
     do: ClassVar[str] = "import"
     files: tuple[str, ...]
     side: Side | None = None
-    names: Mapping[str, str] = field(default_factory=dict)
+    names: Texts = field(default_factory=dict)
     accept_misfit: bool = False
     keep: bool = False
 

@@ -130,3 +130,10 @@ def test_every_step_explains_its_keys(kind) -> None:
     manual = kind.__doc__ or ""
     assert "Parameters" in manual
     assert all(field.name in manual for field in fields(kind))
+
+
+def test_a_table_of_texts_is_read(tmp_path):
+    file = tmp_path / "s.toml"
+    file.write_text('[[step]]\ndo = "import"\nfiles = ["a.csv"]\nnames = { "Apex of cochlea" = "CA" }\n')
+    (step,) = read_script(file).steps
+    assert step.names == {"Apex of cochlea": "CA"}

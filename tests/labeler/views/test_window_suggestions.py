@@ -164,6 +164,29 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(sugg
     np.testing.assert_allclose(desk.session.landmarks(L)["MN"], elsewhere, atol=0.1)
 
 
+def test_from_afar_an_arrow_key_brings_a_suggestion_close_and_moves_nothing(suggested) -> None:
+    axial = axial_of(suggested)
+    axial.setFocus()
+    QTest.keyClick(axial, Qt.Key.Key_Up)
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    QTest.keyClick(axial, Qt.Key.Key_Up)
+    assert status_of(suggested, "MN") is PointState.PLACED
+
+
+def test_an_arrow_key_after_a_correction_moves_the_point_that_was_corrected(suggested) -> None:
+    desk, axial = suggested.workbench, axial_of(suggested)
+    labelling.suggest(desk.session, AWAY, radius_95=5.0, source="atlas", side=L, code="IN")
+    desk.go_to(L, "MN")
+    axial.zoom_to(INSIDE, 10.0)
+    QTest.keyClick(suggested, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
+    click(axial, INSIDE + np.array([1.0, 1.0, 0.0]))
+    before = desk.session.landmarks(L)["MN"]
+    axial.setFocus()
+    QTest.keyClick(axial, Qt.Key.Key_Up)
+    assert status_of(suggested, "IN") is PointState.SUGGESTED
+    assert np.linalg.norm(desk.session.landmarks(L)["MN"] - before) > 0
+
+
 # Files of earlier versions
 
 
