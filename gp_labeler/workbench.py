@@ -279,10 +279,7 @@ class Workbench(AtlasDesk, BoneDesk):
         if where is None or session.state.landmark(side, code).settled:
             point = point_text(side, code)
             raise GpError(f"{point} is not suggested, so there is nothing to confirm", landmark=code)
-        if self.sight is not None and not self.sight.can_judge(where):
-            labelling.go_to(session, side, code)
-            self.sight.bring_close(where)
-            self.say(f"Is {point_text(side, code)} right here? Confirm it, or drag it to where it belongs")
+        if self._had_to_come_close(side, code, where):
             return False
         if is_ghost:
             labelling.accept_ghost(session, side=side, code=code)
@@ -295,10 +292,9 @@ class Workbench(AtlasDesk, BoneDesk):
             self.point_shown.emit(self.session.crosshair)
 
     def nudged_point(self) -> tuple[Side, str] | None:
-        """Return the point that arrow keys move: the chosen one where it has a place, else the last.
+        """Return the point that arrow keys move: the chosen one, or the one of the last edit.
 
-        A suggestion that became the chosen one by itself, after an edit of another, is not what the user
-        means: the point of that edit is.
+        That one is meant where the chosen one has no place, or is a suggestion that came up by itself.
         """
         active, last = self.session.active, self._last
         mark = None if active.code is None else self.session.state.landmark(active.side, active.code)
@@ -312,29 +308,25 @@ class Workbench(AtlasDesk, BoneDesk):
     def nudge(self, offset: FloatArray) -> tuple[Side, str] | None:
         """Move that point by a (3,) offset, mm, scan frame; a suggestion only where it can be judged.
 
-        Returns
-        -------
-        (Side, str) or None
-            What was moved. None where nothing was: there is no such point, or it was brought into sight.
-
-        Raises
-        ------
-        GpError
-            The point is locked.
+        Returns what was moved, None where nothing was; raises `GpError` where the point is locked.
         """
         target = self.nudged_point()
         if target is None:
             return None
         mark = self.session.state.landmark(*target)
-        if mark.suggestion is not None and self.sight is not None:
-            where = np.array(mark.suggestion.position)
-            if not self.sight.can_judge(where):
-                labelling.go_to(self.session, *target)
-                self.sight.bring_close(where)
-                self.say(f"Is {point_text(*target)} right here? Confirm it, or move it to where it belongs")
-                return None
+        if mark.suggestion and self._had_to_come_close(*target, np.array(mark.suggestion.position)):
+            return None
         labelling.nudge(self.session, offset, side=target[0], code=target[1])
         return target
+
+    def _had_to_come_close(self, side: Side, code: str, where: FloatArray) -> bool:
+        """Whether a suggestion could not be judged where it was seen, and so is shown from close by now."""
+        if self.sight is None or self.sight.can_judge(where):
+            return False
+        labelling.go_to(self.session, side, code)
+        self.sight.bring_close(where)
+        self.say(f"Is {point_text(side, code)} right here? Confirm it, or drag it to where it belongs")
+        return True
 
     def begin_drag(self, side: Side, code: str) -> bool:
         """Take up a placed or suggested point; False where it cannot be moved."""

@@ -92,7 +92,9 @@ def run_fit(args: argparse.Namespace) -> int:
     save_json(args.json, _fit_report(atlas, screened, kept=args.keep_doubtful))
     _say_screened(screened, kept=args.keep_doubtful)
     spread = np.sqrt(atlas.variances(atlas.codes))
-    say(f"Atlas of {len(specimens)} animals, {atlas.n_samples} sides: {args.output}")
+    say(f"Atlas of {len(atlas.specimens)} animals, {atlas.n_samples} sides: {args.output}")
+    if skipped := [s.name for s in specimens if s.name not in atlas.specimens]:
+        say(f"  Skipped: {', '.join(skipped)}, of which no side could be used")
     say("  feature   SD between animals, mm a coordinate")
     for code, sd in zip(atlas.codes, spread, strict=True):
         say(f"  {code:<9} {sd:5.2f}")

@@ -20,8 +20,8 @@ __all__ = ["Commands"]
 _VIEW_KEYS = {"Return", "Enter", "Space", "Delete", "Backspace"}
 """Keys that buttons, tables and text fields need themselves: they act while the pointer is in a view."""
 
-_ONCE = ("point.accept_ghost", "point.confirm")
-"""A key that is held down must not run through suggestions that nobody has looked at."""
+_ONCE = ("point.accept_ghost", "point.confirm", "point.unseen", "point.clear", "point.replace")
+"""A key that is held down must not run through points that nobody has looked at."""
 
 _FOLDED = {
     "layout": "Views",

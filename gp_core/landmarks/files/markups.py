@@ -102,6 +102,12 @@ def _load(path: str | PathLike[str]) -> dict[str, Any]:
         raise FileFormatError(
             f"is not JSON: damaged or cut off{line}", file=path, remedy="Export the landmarks again."
         ) from None
+    if isinstance(content, dict) and str(content.get("format", "")).startswith("gp-labeler specimen"):
+        raise FileFormatError(
+            "is a specimen of gp-labeler, not a landmark file",
+            file=path,
+            remedy=f"Export its landmarks: gp-labeler export {Path(path).name} -o labelled",
+        )
     if not isinstance(content, dict) or not isinstance(content.get("markups"), list):
         raise FileFormatError(
             "is not a markups file: no list 'markups' in it",

@@ -369,5 +369,5 @@ def _unknown(label: str, points: PointList) -> FeatureError:
         f"unknown feature {shown(label)}{near_matches(label[:40], CODES)}",
         file=points.source,
         landmark=label[:40],
-        remedy=f"The features are {' '.join(CODES)}.",
+        remedy=f"The features are {' '.join(CODES)}. Or give a table of your own names (--names FILE).",
     )

@@ -36,6 +36,13 @@ def test_a_file_without_a_side_needs_the_argument(tmp_path, stem):
     assert read_landmarks(file, side="R").side.value == "R"
 
 
+def test_a_specimen_file_is_told_from_a_landmark_file(tmp_path):
+    file = tmp_path / "GP01.gpspecimen.json"
+    file.write_text('{"format": "gp-labeler specimen", "version": 3}')
+    with pytest.raises(FileFormatError, match=r"gp-labeler export GP01\.gpspecimen\.json -o labelled"):
+        read_points(file)
+
+
 def test_the_header_counts_more_than_the_name(tmp_path):
     file = write_json(tmp_path / "GP01_L.mrk.json", markup(control_point("CA")), gpLabeler={"side": "right"})
     assert read_landmarks(file).side.value == "R"
