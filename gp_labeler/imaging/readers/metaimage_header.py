@@ -61,6 +61,11 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
     fields = text_fields(decoded(head[: end.end() if end else len(head)]), "=:")
     if end is None or not {"ndims", "dimsize", "elementtype", "elementdatafile"} <= fields.keys():
         raise not_a("MetaImage", path)
+    if "list" in fields.get("kinds", "").lower().split() or b"Seq_Frame0" in head[: end.start()]:
+        raise VolumeError(
+            "it is a sequence of 2-D images, as tracking software records them, and no volume",
+            remedy="Give a CT. The poses in it are for gp-core pivot and gp-core touches.",
+        )
     layout = _layout(fields)
     said = fields["elementdatafile"]
     local = said.upper() == "LOCAL"

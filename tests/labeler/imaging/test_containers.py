@@ -350,6 +350,8 @@ def test_metaimage(name: str, tmp_path: Path) -> None:
         (meta(ElementNumberOfChannels=0), "DimSize|Channels"),
         (meta(ElementNumberOfChannels=-2), "DimSize|Channels"),
         (meta(HeaderSize=-7), "HeaderSize is -7"),
+        (meta(Kinds="domain domain list"), "sequence of 2-D images"),
+        (meta(Seq_Frame0000_Timestamp="0.0"), "sequence of 2-D images"),
         (meta(local=False, ElementDataFile="../nothing.raw"), "nothing.raw, which is not there"),
         (meta(local=False, ElementDataFile="s%03d.raw 1 100000000 1"), "names 100000000 files"),
         (meta(DimSize="46000 40000 34000", CompressedData="True"), "incomplete"),
