@@ -20,7 +20,7 @@ from gp_core.landmarks.features import Side
 from gp_core.registration.pivot import PivotCalibration
 from gp_labeler.pose_sending import PoseSending
 from gp_labeler.session.session import Session
-from gp_labeler.session.touches import Touch, TouchHow, TouchKey
+from gp_labeler.session.touches import Touch, TouchHow
 from gp_labeler.tracker import (
     FrameCheck,
     Limits,
@@ -265,8 +265,8 @@ class TrackerDesk:
         """Tracked touches of the side in work that may lie in another frame than what is read now."""
         if not self.on:
             return ()
-        side = self._desk.pose.side
-        return tuple(name for name in self._tracked() if self._frame.is_doubtful((side, name)))
+        touches = self._tracked().items()
+        return tuple(name for name, touch in touches if self._frame.is_doubtful(touch.position))
 
     @property
     def frame_words(self) -> str:
@@ -282,7 +282,7 @@ class TrackerDesk:
             return (
                 f"Reference not verified since {_clock_time(begun)}: touch a feature again." if begun else ""
             )
-        apart = f"{last.key[1]} touched again {last.distance_mm:.1f} mm from before"
+        apart = f"{last.name} touched again {last.distance_mm:.1f} mm from before"
         if last.agrees:
             return f"Reference verified at {_clock_time(last.time)}: {apart}."
         return f"The reference moved, or a touch was wrong, at {_clock_time(last.time)}: {apart}."
@@ -370,18 +370,18 @@ class TrackerDesk:
         except GpError as error:
             self.refused.emit(f"{str(error)[:1].upper()}{str(error)[1:]}")
             return
-        self._compare(key, outcome, before)
+        self._compare(key[1], outcome, before)
         self.touched.emit(outcome)
 
-    def _compare(self, key: TouchKey, outcome: RecordedTouch, before: Touch | None) -> None:
+    def _compare(self, name: str, outcome: RecordedTouch, before: Touch | None) -> None:
         """Compare a touch with the one that it replaces, and say so where something has moved."""
         was = before.position if before is not None and before.how is TouchHow.TRACKED else None
         repeated = self._frame.record(
-            key, outcome.position, self._segment(outcome.segment), was, outcome.time
+            name, outcome.position, self._segment(outcome.segment), was, outcome.time
         )
         if repeated is not None and not repeated.agrees:
             self._desk.say(
-                f"{key[1]} is {repeated.distance_mm:.1f} mm from where it was touched before: "
+                f"{name} is {repeated.distance_mm:.1f} mm from where it was touched before: "
                 "the reference moved, or one of the two touches was wrong",
                 "warning",
             )

@@ -225,6 +225,8 @@ def _what_was_held_back(args: argparse.Namespace, pose: CochleaPose) -> str:
     )
     files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
     what = f"not written: {' '.join(files)}, as {why}" if files else why
+    if old := [file for file in files if Path(file).exists()]:
+        what += f". Still there from before, and of another estimate: {' '.join(old)}"
     return f"{what}. Check side and names, or give --accept-warnings"
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.landmarks.features import Side
-
 __all__ = ["FrameCheck", "RepeatedTouch"]
 
-Key = tuple[Side, str]
+Place = tuple[float, float, float]
+"""Position of a touch, mm: it stays the same where the touch is given another name or side."""
+
 Segment = tuple[int, int]
 """A connection, and a segment of its samples (`Sample.segment`)."""
 
@@ -25,8 +25,8 @@ class RepeatedTouch:
 
     Parameters
     ----------
-    key : (Side, str)
-        Side and name of the touch.
+    name : str
+        What was touched.
     distance_mm : float
         How far from where it was touched before.
     agrees : bool
@@ -35,7 +35,7 @@ class RepeatedTouch:
         When it was touched again.
     """
 
-    key: Key
+    name: str
     distance_mm: float
     agrees: bool
     time: str
@@ -57,7 +57,7 @@ class FrameCheck:
         self.limit_mm = limit_mm
         self.last: RepeatedTouch | None = None
         """The last repeated touch, for telling since when the reference is verified."""
-        self._segments: dict[Key, Segment] = {}
+        self._segments: dict[Place, Segment] = {}
         self._joined: dict[Segment, Segment] = {}
         self._broken = 0
         self._now: Segment | None = None
@@ -67,13 +67,13 @@ class FrameCheck:
         self._now = self._with_break(segment)
 
     def record(
-        self, key: Key, position: ArrayLike, segment: Segment, before: ArrayLike | None, time: str
+        self, name: str, position: ArrayLike, segment: Segment, before: ArrayLike | None, time: str
     ) -> RepeatedTouch | None:
         """Take a touch, and compare it with the one that it replaces.
 
         Parameters
         ----------
-        key : (Side, str)
+        name : str
         position, before : (3,) array_like, mm
             This touch, and the one before; None where there was none.
         segment : Segment
@@ -83,21 +83,21 @@ class FrameCheck:
         repeated = None
         if before is not None:
             mm = float(np.linalg.norm(np.asarray(position, float) - np.asarray(before, float)))
-            repeated = self.last = RepeatedTouch(key, mm, mm <= self.limit_mm, time)
-            earlier = self._segments.get(key)
+            repeated = self.last = RepeatedTouch(name, mm, mm <= self.limit_mm, time)
+            earlier = self._segments.get(_place(before))
             if repeated.agrees and earlier is not None:
                 self._joined[self._root(earlier)] = self._root(mine)
             elif not repeated.agrees and (earlier is None or self._root(earlier) == self._root(mine)):
                 self._broken += 1  # in one frame, and yet elsewhere: something moved that no jump told of
                 mine = self._with_break(segment)
-        self._segments[key] = self._now = mine
+        self._segments[_place(position)] = self._now = mine
         return repeated
 
-    def is_doubtful(self, key: Key) -> bool:
+    def is_doubtful(self, position: ArrayLike) -> bool:
         """Whether a touch may lie in another frame than the newest sample."""
         if self._now is None:
             return False
-        segment = self._segments.get(key)
+        segment = self._segments.get(_place(position))
         return segment is None or self._root(segment) != self._root(self._now)
 
     def forget(self) -> None:
@@ -114,3 +114,8 @@ class FrameCheck:
         while (parent := self._joined.get(segment, segment)) != segment:
             segment = parent
         return segment
+
+
+def _place(position: ArrayLike) -> Place:
+    x, y, z = np.asarray(position, dtype=np.float64).tolist()
+    return x, y, z

@@ -21,6 +21,7 @@ _MOST_WAITING = 1_000_000
 
 
 _SILENT = GateReason("stale", "gp-labeler does not answer")
+_STOPPED = GateReason("stopped", "sending was stopped")
 
 
 class PoseSender:
@@ -126,6 +127,16 @@ class PoseSender:
                 self._peers = self._server.serve(data)
             else:
                 self._send_as_client(data)
+
+        self._withdraw()
+
+    def _withdraw(self) -> None:
+        """Say a last time that no pose may be used, before the connections end."""
+        data = self._message.held_back_for(_STOPPED).pack(self.device, time.time())
+        if self._server is not None:
+            self._server.serve(data)
+        else:
+            self._send_as_client(data)
 
     def _send_as_client(self, data: bytes) -> None:
         assert self._connection is not None

@@ -2,79 +2,90 @@
 
 from __future__ import annotations
 
-from gp_core.landmarks.features import Side
-from gp_labeler.tracker import FrameCheck
+from gp_labeler.tracker import FrameCheck, RepeatedTouch
 
-_HERE, _THERE = (0.0, 0.0, 0.0), (4.0, 0.0, 0.0)
-
-
-def _doubtful(check: FrameCheck, names: list[str]) -> tuple[str, ...]:
-    return tuple(name for name in names if check.is_doubtful((Side.LEFT, name)))
+_PLACES = {"CL": (0.0, 0.0, 0.0), "OS": (10.0, 0.0, 0.0), "MN": (0.0, 20.0, 0.0)}
+_Place = tuple[float, float, float]
 
 
-def _touched(*names: str, segment: tuple[int, int] = (1, 0)) -> FrameCheck:
-    check = FrameCheck()
-    for name in names:
-        check.follow(segment)
-        assert check.record((Side.LEFT, name), _HERE, segment, None, "t") is None
-    return check
+class _Touches:
+    """Touches by name, and what is known of their frame."""
+
+    def __init__(self, *names: str, segment: tuple[int, int] = (1, 0)) -> None:
+        self.check = FrameCheck()
+        self.places: dict[str, _Place] = {}
+        for name in names:
+            self.check.follow(segment)
+            assert self.touch(name, segment) is None
+
+    def touch(self, name: str, segment: tuple[int, int], off: float = 0.0) -> RepeatedTouch | None:
+        """Touch a feature, that many mm beside its place, in the place of the touch before."""
+        x, y, z = _PLACES[name]
+        before, self.places[name] = self.places.get(name), (x + off, y, z)
+        return self.check.record(name, self.places[name], segment, before, "later")
+
+    @property
+    def doubtful(self) -> list[str]:
+        return [name for name, place in self.places.items() if self.check.is_doubtful(place)]
 
 
 def test_touches_without_a_jump_between_them_are_in_one_frame() -> None:
-    assert _doubtful(_touched("CL", "OS", "MN"), ["CL", "OS", "MN"]) == ()
+    assert _Touches("CL", "OS", "MN").doubtful == []
 
 
 def test_after_a_jump_earlier_touches_are_in_doubt_until_it_is_taken_back() -> None:
-    check = _touched("CL", "OS")
-    check.follow((1, 1))
-    assert _doubtful(check, ["CL", "OS"]) == ("CL", "OS")
-    check.follow((1, 0))
-    assert _doubtful(check, ["CL", "OS"]) == ()
+    touches = _Touches("CL", "OS")
+    touches.check.follow((1, 1))
+    assert touches.doubtful == ["CL", "OS"]
+    touches.check.follow((1, 0))
+    assert touches.doubtful == []
 
 
 def test_a_touch_made_during_a_jump_is_in_doubt_once_it_is_taken_back() -> None:
-    check = _touched("CL")
-    check.record((Side.LEFT, "OS"), _HERE, (1, 1), None, "t")
-    assert _doubtful(check, ["CL", "OS"]) == ("CL",)
-    check.follow((1, 0))
-    assert _doubtful(check, ["CL", "OS"]) == ("OS",)
+    touches = _Touches("CL")
+    touches.touch("OS", (1, 1))
+    assert touches.doubtful == ["CL"]
+    touches.check.follow((1, 0))
+    assert touches.doubtful == ["OS"]
 
 
 def test_a_feature_touched_again_at_its_place_joins_what_a_jump_parted() -> None:
-    check = _touched("CL", "OS")
-    repeated = check.record((Side.LEFT, "CL"), (0.4, 0, 0), (1, 1), _HERE, "later")
+    touches = _Touches("CL", "OS")
+    repeated = touches.touch("CL", (1, 1), off=0.4)
     assert repeated is not None
     assert (repeated.agrees, repeated.distance_mm, repeated.time) == (True, 0.4, "later")
-    assert _doubtful(check, ["CL", "OS"]) == ()
-    check.follow((1, 0))
-    assert _doubtful(check, ["CL", "OS"]) == ()
+    assert touches.doubtful == []
+    touches.check.follow((1, 0))
+    assert touches.doubtful == []
 
 
 def test_a_feature_touched_again_elsewhere_puts_all_others_in_doubt() -> None:
-    check = _touched("CL", "OS", "MN")
-    repeated = check.record((Side.LEFT, "CL"), _THERE, (1, 0), _HERE, "later")
+    touches = _Touches("CL", "OS", "MN")
+    repeated = touches.touch("CL", (1, 0), off=4.0)
     assert repeated is not None
     assert not repeated.agrees
-    assert _doubtful(check, ["CL", "OS", "MN"]) == ("OS", "MN")
-    check.follow((1, 0))
-    check.record(
-        (Side.LEFT, "OS"), _THERE, (1, 0), _HERE, "later"
-    )  # it moved as well: not the touch, the reference
-    assert _doubtful(check, ["CL", "OS", "MN"]) == ("MN",)
+    assert touches.doubtful == ["OS", "MN"]
+    touches.check.follow((1, 0))
+    touches.touch("OS", (1, 0), off=4.0)  # so the reference moved, not one touch
+    assert touches.doubtful == ["MN"]
 
 
 def test_a_repeat_that_differs_across_a_jump_joins_nothing() -> None:
-    check = _touched("CL", "OS")
-    check.record((Side.LEFT, "CL"), _THERE, (1, 1), _HERE, "later")
-    assert _doubtful(check, ["CL", "OS"]) == ("OS",)
-    check.record((Side.LEFT, "OS"), _THERE, (1, 1), _HERE, "later")
-    assert _doubtful(check, ["CL", "OS"]) == ()
+    touches = _Touches("CL", "OS")
+    touches.touch("CL", (1, 1), off=4.0)
+    assert touches.doubtful == ["OS"]
+    touches.touch("OS", (1, 1), off=4.0)
+    assert touches.doubtful == []
 
 
 def test_another_connection_is_another_segment_and_touches_of_before_are_unknown() -> None:
-    check = _touched("CL")
-    check.follow((2, 0))
-    assert _doubtful(check, ["CL", "OS"]) == ("CL", "OS")
-    check.forget()
-    check.follow((2, 0))
-    assert _doubtful(check, []) == ()
+    touches = _Touches("CL")
+    touches.places["OS"] = _PLACES["OS"]  # of a file
+    touches.check.follow((2, 0))
+    assert touches.doubtful == ["CL", "OS"]
+
+
+def test_a_touch_under_another_name_is_the_same_touch() -> None:
+    touches = _Touches("CL", "OS")
+    touches.places = {"OS": touches.places["CL"], "CL": touches.places["OS"]}
+    assert touches.doubtful == []
