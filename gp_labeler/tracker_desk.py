@@ -83,6 +83,7 @@ class TrackerDesk:
         self._sending.held_back.connect(self._say_held)
         desk.pose.changed.connect(self._on_pose_changed)
         desk.details_changed.connect(self._on_pose_changed)
+        desk.session_replaced.connect(self._on_session_replaced)
 
     # The link
 
@@ -332,6 +333,7 @@ class TrackerDesk:
         """End everything."""
         self._desk.pose.changed.disconnect(self._on_pose_changed)
         self._desk.details_changed.disconnect(self._on_pose_changed)
+        self._desk.session_replaced.disconnect(self._on_session_replaced)
         self.stop_sending()
         self.disconnect()
 
@@ -430,6 +432,10 @@ class TrackerDesk:
     def _forget_tip(self) -> None:
         self._latest = self._tip = None
         self._trail.clear()
+
+    def _on_session_replaced(self, _: object) -> None:
+        self._frame.forget()
+        self._update_sending()
 
     def _on_pose_changed(self, *_: object) -> None:
         self._update_sending()
