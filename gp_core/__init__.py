@@ -22,7 +22,6 @@ from gp_core.atlas.pose_files import read_pose
 from gp_core.atlas.pose_gate import GateReason, PoseGate
 from gp_core.atlas.pose_quality import PoseQuality, pose_quality
 from gp_core.atlas.reading_state import read_as
-from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.atlas.shape import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -35,6 +34,7 @@ from gp_core.landmarks.files import (
     write_markups,
     write_suggestions,
 )
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials

@@ -23,11 +23,11 @@ from gp_core.atlas.label_likelihood import (
     Reading,
     best_reading,
 )
-from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 
 __all__ = [
@@ -235,7 +235,7 @@ def check_specimen(
     atlas : Atlas
         What the labels are held against.
     scan : mapping of Side to ScanEvidence, optional
-        What the scan says of each side.
+        What the scan says of each side; by default what was kept with its labels.
     """
     found: list[Finding] = []
     for side, landmarks in specimen.sides.items():
@@ -258,13 +258,15 @@ def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | Non
         In any frame, mm; from four placed features on they are held against the atlas.
     atlas : Atlas
     scan : ScanEvidence, optional
-        What the scan says of the same labels: those off the bone are named, however few there are.
+        What the scan says of the same labels: those off the bone are named, however few there are. By
+        default what was kept with the labels.
 
     Returns
     -------
     SideCheck
         It takes 1 ms for a side in order and 10 ms for one that is not.
     """
+    scan = scan or landmarks.scan_evidence
     found = [*_duplicates(landmarks), *(() if scan is None else _against_scan(landmarks, scan))]
     departures: dict[str, Departure] = {}
     codes = tuple(code for code in landmarks.placed if code in atlas.codes)

@@ -15,6 +15,7 @@ from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import CODES, Side, feature, index_of
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 
 __all__ = ["LandmarkSet", "Specimen", "Status"]
@@ -58,6 +59,8 @@ class LandmarkSet:
     suggested : mapping of str to Suggestion
         Where features that are to do are suggested, in the same frame, in the table's order. Once a feature
         is placed or unseen, a person has decided, and its suggestion is dropped.
+    scan_evidence : ScanEvidence, optional
+        How far the points are from bone, as measured in the scan; dropped for a point that is moved.
 
     Examples
     --------
@@ -72,6 +75,7 @@ class LandmarkSet:
     unseen: frozenset[str] = frozenset()
     extra: Mapping[str, FloatArray] = field(default_factory=_nothing)
     suggested: Mapping[str, Suggestion] = field(default_factory=_nothing)
+    scan_evidence: ScanEvidence | None = None
 
     def __post_init__(self) -> None:
         points = as_points(self.points, "points", missing_allowed=True).copy()
@@ -83,6 +87,8 @@ class LandmarkSet:
         object.__setattr__(self, "side", Side.parse(self.side))
         object.__setattr__(self, "unseen", frozenset(feature(c).code for c in self.unseen) - set(self.placed))
         object.__setattr__(self, "suggested", self._undecided(self.suggested))
+        if self.scan_evidence is not None:
+            object.__setattr__(self, "scan_evidence", self.scan_evidence.of(self.as_mapping()))
 
     def _undecided(self, suggested: Mapping[str, Suggestion]) -> Mapping[str, Suggestion]:
         """Return the suggestions of the features that are to do."""
@@ -119,8 +125,8 @@ class LandmarkSet:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Let pickle carry the set to other processes, though it cannot carry a read-only mapping."""
-        content = (self.points, self.side, self.frame, self.unseen, dict(self.extra), dict(self.suggested))
-        return LandmarkSet, content
+        mappings = (dict(self.extra), dict(self.suggested))
+        return LandmarkSet, (self.points, self.side, self.frame, self.unseen, *mappings, self.scan_evidence)
 
     def __getitem__(self, code: str) -> FloatArray:
         """Return the (3,) position of a feature, NaN where it is not placed."""
@@ -231,12 +237,14 @@ class LandmarkSet:
         if T_dst_src.src != self.frame:
             raise FrameError(f"T_{T_dst_src.dst}_{T_dst_src.src} cannot move points of frame {self.frame!r}")
         extra = {name: T_dst_src.apply(point[None])[0] for name, point in self.extra.items()}
+        evidence = self.scan_evidence
         return replace(
             self,
             points=T_dst_src.apply(self.points),
             frame=T_dst_src.dst,
             extra=MappingProxyType(extra),
             suggested={code: suggestion.moved(T_dst_src) for code, suggestion in self.suggested.items()},
+            scan_evidence=None if evidence is None else evidence.moved(T_dst_src),
         )
 
 

@@ -8,8 +8,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.checks import FloatArray
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.imaging.volume import Volume
 
@@ -44,7 +44,9 @@ def scan_evidence(volume: Volume, threshold: float, landmarks: LandmarkSet) -> S
     points = landmarks.as_mapping()
     distances = bone_distances(volume, threshold, points)
     outside = frozenset(code for code, point in points.items() if not volume.contains(point[None])[0])
-    return ScanEvidence(distances, max(*volume.spacing, _LEAST_TOLERANCE_MM), outside)
+    positions = {code: (float(x), float(y), float(z)) for code, (x, y, z) in points.items()}
+    tolerance = max(*volume.spacing, _LEAST_TOLERANCE_MM)
+    return ScanEvidence(distances, tolerance, outside, positions, float(threshold))
 
 
 def bone_distances(volume: Volume, threshold: float, points: Mapping[str, FloatArray]) -> dict[str, float]:

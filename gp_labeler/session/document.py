@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.session.frozen_json import thaw
 from gp_labeler.session.state import (
@@ -58,6 +59,10 @@ def document_of(state: SpecimenState) -> Document:
         document["volume"] = volume_document(state.volume)
     if state.threshold is not None:
         document["threshold"] = state.threshold
+    if evidence := {
+        side.value: found.as_json() for side in Side if (found := state.side(side).scan_evidence)
+    }:
+        document["bone_distance_mm"] = evidence
     return document
 
 
@@ -83,6 +88,9 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
             pose_checks=tuple(_pose_check_in(c, f"pose_checks[{i}]") for i, c in enumerate(checks)),
             touches=_touches_in(_typed(document.get("touches", {}), dict, "touches")),
             skull=_skull_in(_typed(document.get("skull", {}), dict, "skull")),
+            scan_evidence=_scan_evidence_in(
+                _typed(document.get("bone_distance_mm", {}), dict, "bone_distance_mm")
+            ),
         )
     except FileFormatError:
         raise
@@ -261,6 +269,13 @@ def _touch_in(document: Mapping[str, Any], where: str) -> Touch:
 
 def _skull_in(document: Mapping[str, Any]) -> dict[str, Position]:
     return {name: _triple(position, f"skull.{name}") for name, position in document.items()}
+
+
+def _scan_evidence_in(document: Mapping[str, Any]) -> dict[Side, ScanEvidence]:
+    return {
+        Side.parse(owner): _parsed(ScanEvidence.from_json, content, f"bone_distance_mm.{owner}")
+        for owner, content in document.items()
+    }
 
 
 def _typed(value: Any, kind: type[T], where: str) -> T:

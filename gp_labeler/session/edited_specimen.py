@@ -301,10 +301,15 @@ class EditedSpecimen:
 
     # Files
 
+    @property
+    def measured_state(self) -> SpecimenState:
+        """The state as it is saved and exported."""
+        return self.state
+
     def save(self, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> Path:
         """Save the specimen; see `Keeper.save` for arguments and errors."""
         self._check_thread()
-        file = self._keeper.save(self.state, path, overwrite=overwrite)
+        file = self._keeper.save(self.measured_state, path, overwrite=overwrite)
         self._clean = self.state
         self.saved.emit(file)
         self._tell_dirty()

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.label_check import Finding, SideCheck, departure, far
-from gp_core.atlas.scan_evidence import ScanEvidence
 from gp_core.landmarks.features import FEATURES, Side
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session.ghosts import fingerprint
 

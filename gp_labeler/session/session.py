@@ -18,7 +18,7 @@ from gp_labeler.session.ghosts import Expectations, Ghost, Predict
 from gp_labeler.session.history import History
 from gp_labeler.session.keeper import Keeper
 from gp_labeler.session.label_checks import Check, CheckLabels, LabelChecks, Measure
-from gp_labeler.session.state import SpecimenState, point_key
+from gp_labeler.session.state import SpecimenState, measured, point_key
 from gp_labeler.session.view import View
 from gp_labeler.session.workflow import (
     Active,
@@ -155,6 +155,11 @@ class Session(EditedSpecimen):
     def set_measure(self, measure: Measure | None) -> None:
         """Ask another scan whether labels lie on bone, or none."""
         self._checks = LabelChecks(self._checks.check, measure)
+
+    @property
+    def measured_state(self) -> SpecimenState:
+        """The state as it is saved and exported: with distances from bone, where there is a scan."""
+        return measured(self.state, self._checks.measure)
 
     def close(self, *, discard: bool = False) -> None:
         """Let go of journal, locks and scan; see `EditedSpecimen.close`."""

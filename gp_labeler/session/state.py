@@ -7,7 +7,7 @@ change.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cache
@@ -20,6 +20,7 @@ from gp_core.checks import check_option
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.session.frozen_json import freeze
@@ -34,6 +35,7 @@ __all__ = [
     "Provenance",
     "SpecimenState",
     "changed_points",
+    "measured",
     "point_key",
 ]
 
@@ -201,6 +203,8 @@ class SpecimenState:
         What was touched with the probe; all touches of a side are in one frame.
     skull : mapping of str to (3,) tuple
         Skull features on the scan by which touches are registered to it, scan frame, mm.
+    scan_evidence : mapping of Side to ScanEvidence
+        How far the points were from bone when that was last measured in the scan; see `measured`.
 
     Raises
     ------
@@ -218,6 +222,7 @@ class SpecimenState:
     pose_checks: tuple[PoseCheck, ...] = ()
     touches: Mapping[TouchKey, Touch] = field(default_factory=dict)
     skull: Mapping[str, Position] = field(default_factory=dict)
+    scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
     sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -227,7 +232,10 @@ class SpecimenState:
                 f"a specimen's name must do as a file name, got {self.specimen!r}", remedy="Such as GP-014."
             )
         kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
-        sets = {side: _landmark_set(kept, side) for side in Side}
+        sets = {
+            side: replace(_landmark_set(kept, side), scan_evidence=self.scan_evidence.get(side))
+            for side in Side
+        }
         if self.threshold is not None:
             object.__setattr__(self, "threshold", freeze(float(self.threshold), "threshold"))
         object.__setattr__(self, "specimen", name)
@@ -257,7 +265,21 @@ class SpecimenState:
 
     def on_volume(self, volume: VolumeReference | None, import_choices: Mapping[str, Any]) -> SpecimenState:
         """Return a copy that belongs to another volume, or to the same one elsewhere."""
-        return replace(self, volume=volume, import_choices=import_choices)
+        return replace(self, volume=volume, import_choices=import_choices, scan_evidence={})
+
+
+def measured(state: SpecimenState, measure: Callable[[LandmarkSet], ScanEvidence] | None) -> SpecimenState:
+    """Return a state with the distances of its points from bone, to be saved or exported.
+
+    Parameters
+    ----------
+    state : SpecimenState
+    measure : callable, optional
+        Asks the scan; None where there is none, and what was measured before is kept.
+    """
+    if measure is None:
+        return state
+    return replace(state, scan_evidence={side: measure(state.side(side)) for side in Side})
 
 
 def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Side, str]]:

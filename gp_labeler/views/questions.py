@@ -70,7 +70,7 @@ def import_asking(workbench: Workbench, files: Sequence[Path], prompts: Prompts,
 
 def export_asking(workbench: Workbench, folder: Path, prompts: Prompts) -> None:
     """Write the landmarks of both sides into a folder; asks before files are replaced."""
-    state = workbench.session.state
+    state = workbench.session.measured_state
     try:
         report = export_landmarks(state, folder)
     except GpError as error:

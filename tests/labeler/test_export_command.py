@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+from functools import partial
+
+import numpy as np
+
+from gp_core.cli import main as core
 from gp_core.landmarks.files import load_specimens
 from gp_labeler.__main__ import main
+from gp_labeler.imaging.bone_distance import scan_evidence
+from gp_labeler.imaging.volume import Volume
 from gp_labeler.session import labelling
 from gp_labeler.session.session import Session
-from gp_labeler.session.specimen_file import write_specimen
+from gp_labeler.session.specimen_file import read_specimen, write_specimen
 
 
 def _specimen(folder):
@@ -35,3 +42,27 @@ def test_nothing_is_replaced_unasked(tmp_path, capsys) -> None:
     assert "exists already" in capsys.readouterr().err
     assert main(["export", file, "-o", out, "--replace"]) == 0
     assert main(["export", file, "-o", out, "--format", ".xyz"]) == 2
+
+
+def test_distances_from_bone_reach_check_by_way_of_the_specimen_file(tmp_path, capsys) -> None:
+    bone = np.zeros((40, 40, 40), np.int16)
+    bone[:, :, :10] = 1000
+    volume = Volume(bone, np.diag([0.5, 0.5, 0.5, 1.0]), name="block")
+    session = Session()
+    session.set_measure(partial(scan_evidence, volume, 500.0))
+    labelling.place(session, (12.65, 10, 10), side="L", code="IN")
+    labelling.place(session, (4.5, 10, 10), side="L", code="ZL")
+    file = session.save(tmp_path / "GP1.gpspecimen.json")
+    assert main(["export", str(file), "-o", str(tmp_path / "out")]) == 0
+    assert core(["check", str(tmp_path / "out")]) == 1
+    told = capsys.readouterr().out
+    assert "IN is 7.9 mm from bone" in told
+    assert "ZL is" not in told
+
+    again = Session(read_specimen(file))  # without the scan
+    labelling.place(again, (12.65, 10, 11), side="L", code="IN")
+    file = again.save(tmp_path / "GP2.gpspecimen.json")
+    assert main(["export", str(file), "-o", str(tmp_path / "moved")]) == 0
+    (animal,) = load_specimens(tmp_path / "moved")
+    assert set(animal.side("L").scan_evidence.bone_distances) == {"ZL"}
+    assert core(["check", str(tmp_path / "moved")]) == 0

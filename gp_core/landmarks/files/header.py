@@ -11,6 +11,7 @@ from gp_core.errors import FeatureError, FileFormatError
 from gp_core.frames import FRAMES
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.text import shown
+from gp_core.landmarks.scan_evidence import ScanEvidence
 
 __all__ = ["SCHEMA_VERSION", "FileHeader"]
 
@@ -35,6 +36,8 @@ class FileHeader:
         By label: how the point came to be, in plain JSON values.
     extra : tuple of str
         Labels beside the feature table that belong in the file.
+    scan_evidence : ScanEvidence, optional
+        How far the points are from bone, as measured in the scan.
     """
 
     specimen: str | None = None
@@ -43,10 +46,11 @@ class FileHeader:
     volume: Mapping[str, Any] | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extra: tuple[str, ...] = ()
+    scan_evidence: ScanEvidence | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return the object as it stands in the file."""
-        return {
+        content = {
             "schemaVersion": SCHEMA_VERSION,
             "specimen": self.specimen,
             "side": None if self.side is None else self.side.value,
@@ -55,6 +59,9 @@ class FileHeader:
             "provenance": dict(self.provenance),
             "extra": list(self.extra),
         }
+        if self.scan_evidence is not None:
+            content["boneDistanceMm"] = self.scan_evidence.as_json()
+        return content
 
     @classmethod
     def from_json(cls, value: object, file: str | PathLike[str]) -> FileHeader:
@@ -80,6 +87,7 @@ class FileHeader:
             volume=got.get("volume"),
             provenance=got.get("provenance", {}),
             extra=tuple(got["extra"]) if isinstance(got.get("extra"), list) else (),
+            scan_evidence=_scan_evidence(got.get("boneDistanceMm"), file),
         )
         wrong = header._wrong_field()
         if wrong:
@@ -108,4 +116,15 @@ def _side(value: object, file: str | PathLike[str]) -> Side | None:
     except FeatureError:
         raise FileFormatError(
             f"its gpLabeler object has a wrong side, {shown(value)}", file=file, remedy="Write L or R."
+        ) from None
+
+
+def _scan_evidence(value: object, file: str | PathLike[str]) -> ScanEvidence | None:
+    try:
+        return None if value is None else ScanEvidence.from_json(value)
+    except ValueError as error:
+        raise FileFormatError(
+            f"its gpLabeler object has a wrong boneDistanceMm ({error})",
+            file=file,
+            remedy="Export the landmarks again, or remove the entry.",
         ) from None

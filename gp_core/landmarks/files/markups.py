@@ -219,6 +219,7 @@ def write_markups(
         volume=volume,
         provenance=provenance or {},
         extra=tuple(landmarks.extra),
+        scan_evidence=landmarks.scan_evidence,
     )
     write_point_lists(path, {"Fiducial": points_of(landmarks)}, header)
 

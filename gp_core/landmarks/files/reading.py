@@ -314,7 +314,10 @@ def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -
         if point.suggestion is not None and name in CODES and not feature(name).computed
     }
     _check_axis(positions, points)
-    found = LandmarkSet(rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra))
+    evidence = points.header.scan_evidence if points.header else None
+    found = LandmarkSet(
+        rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra), scan_evidence=evidence
+    )
     return found.with_suggestions(suggested)
 
 

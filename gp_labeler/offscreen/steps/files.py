@@ -82,7 +82,7 @@ class Export(Step):
     suggested: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        state, folder = rig.desk.session.state, rig.to_write(self.folder)
+        state, folder = rig.desk.session.measured_state, rig.to_write(self.folder)
         report = export_landmarks(
             state, folder, formats=self.formats, overwrite=True, suggested=self.suggested
         )

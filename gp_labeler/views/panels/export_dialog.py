@@ -221,7 +221,7 @@ class ExportDialog(QDialog):
 
     def _export(self) -> None:
         """Write the files; on failure say why and stay."""
-        state, folder = self._workbench.session.state, self.folder.text()
+        state, folder = self._workbench.session.measured_state, self.folder.text()
         try:
             report = export_landmarks(
                 state,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 from PySide6.QtCore import QPoint, Qt
@@ -11,7 +13,9 @@ from window_cases import settle
 
 from gp_core.landmarks.features import Side, index_of
 from gp_core.landmarks.files import read_landmarks
+from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.readers import read_volume
+from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling
 from gp_labeler.session.landmark_export import export_landmarks
@@ -50,12 +54,14 @@ def texts(folder) -> list[str]:
 
 def test_python_calls_leave_the_same_files(folder) -> None:
     session = new_session(specimen="ball")
-    session.attach_volume(read_volume(folder / "ball.nrrd"))
+    volume = read_volume(folder / "ball.nrrd")
+    session.attach_volume(volume)
+    session.set_measure(partial(scan_evidence, volume, propose_threshold(volume)))
     sets = {side: read_landmarks(folder / "out" / f"ball_{side.value}.mrk.json") for side in Side}
     for side, code, view, _ in CLICKS:
         how = How.MESH if view == "3d" else How.SLICE
         labelling.place(session, sets[Side(side)][code], how, side=side, code=code)
-    export_landmarks(session.state, folder / "python")
+    export_landmarks(session.measured_state, folder / "python")
     assert texts(folder / "python") == texts(folder / "out")
 
 

@@ -134,7 +134,7 @@ class Recording:
     def check(self, *files: str) -> list[str]:
         """Save, end the recording, run the script, compare what both leave; return its steps."""
         self.session.save(self.folder / "first" / SAVED, overwrite=True)
-        export_landmarks(self.session.state, self.folder / "first", overwrite=True)
+        export_landmarks(self.session.measured_state, self.folder / "first", overwrite=True)
         self.window.ui.prompts.files = [self.script]
         self.window.commands.run("help.record")
         assert self.recorder is None
