@@ -270,7 +270,11 @@ class AtlasDesk(DeskSignals):
         self._take(fitted.atlas, fitted.animals, source)
         n = len(fitted.animals.skipped)
         text = f"The atlas was fitted to {fitted.animals.text}" + (f"; {n} skipped" if n else "")
-        self.message.emit(text, "warning" if n else "info")
+        doubted = list(dict.fromkeys(finding.specimen for finding in fitted.animals.doubts))
+        if doubted:
+            many = "animal" if len(doubted) == 1 else "animals"
+            text += f"; {len(doubted)} {many} in doubt: {', '.join(doubted)}"
+        self.message.emit(text, "warning" if n or doubted else "info")
 
     def _take_trial(self, trial: Trial) -> None:
         self.trial = trial

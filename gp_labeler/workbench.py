@@ -27,7 +27,7 @@ from gp_labeler.pose_desk import PoseDesk
 from gp_labeler.session import labelling
 from gp_labeler.session.atlas_memory import AtlasMemory
 from gp_labeler.session.edited_specimen import VolumeChangedError
-from gp_labeler.session.edits import point_text, require_free
+from gp_labeler.session.edits import SwapPoints, point_text, require_free
 from gp_labeler.session.jobs import Dispatcher, Jobs, Task
 from gp_labeler.session.opening import new_session, open_session, recover_session, tidy_name
 from gp_labeler.session.recent import RecentFiles
@@ -49,12 +49,10 @@ class Sight(Protocol):
     """What a window knows of what the user sees."""
 
     def can_judge(self, position: FloatArray) -> bool:
-        """Whether a view shows a (3,) scan position with voxels at least two screen pixels wide."""
-        ...
+        """Whether a painted view shows a (3,) scan position with voxels at least two screen pixels wide."""
 
     def bring_close(self, position: FloatArray) -> None:
         """Show a (3,) scan position so closely that it can be judged."""
-        ...
 
 
 class Drag:
@@ -261,7 +259,7 @@ class Workbench(AtlasDesk, BoneDesk):
             self.replacing_changed.emit(on)
 
     def confirm(self, side: Side, code: str) -> bool:
-        """Confirm a suggestion, or a ghost, where it can be judged; else bring it there first.
+        """Confirm a suggestion, or a ghost, that was drawn where it can be judged; else bring it there first.
 
         Returns
         -------
@@ -284,6 +282,13 @@ class Workbench(AtlasDesk, BoneDesk):
         if is_ghost:
             labelling.accept_ghost(session, side=side, code=code)
         return labelling.confirm(session, side=side, code=code)
+
+    def swap(self, side: Side, code: str, other: str) -> None:
+        """Exchange two points of a side, and say which suggestions that drops."""
+        swap = SwapPoints(side, code, other)
+        told = swap.dropped_text(self.session.state)
+        if self.session.do(swap) and told:
+            self.say(told, "warning")
 
     def go_to(self, side: Side, code: str) -> None:
         """Choose a point, and bring it, or where it is suggested or expected, into sight in every view."""
@@ -321,10 +326,11 @@ class Workbench(AtlasDesk, BoneDesk):
 
     def _had_to_come_close(self, side: Side, code: str, where: FloatArray) -> bool:
         """Whether a suggestion could not be judged where it was seen, and so is shown from close by now."""
-        if self.sight is None or self.sight.can_judge(where):
+        active, sight = self.session.active, self.sight
+        if sight is None or ((active.side, active.code) == (side, code) and sight.can_judge(where)):
             return False
         labelling.go_to(self.session, side, code)
-        self.sight.bring_close(where)
+        sight.bring_close(where)
         self.say(f"Is {point_text(side, code)} right here? Confirm it, or drag it to where it belongs")
         return True
 

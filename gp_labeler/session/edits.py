@@ -297,6 +297,16 @@ class SwapPoints:
         """Such as ``swap RWA and RWP left``."""
         return f"swap {self.code} and {self.other} {Side.parse(self.side).word}"
 
+    def dropped_text(self, state: SpecimenState) -> str:
+        """Say which suggestions it drops; empty where it drops none."""
+        codes = (self.code, self.other)
+        dropped = [code for code in codes if state.landmark(self.side, code).suggestion is not None]
+        if not dropped:
+            return ""
+        if len(dropped) == 1:
+            return f"The suggestion of {dropped[0]} was dropped; undo brings it back"
+        return f"The suggestions of {' and '.join(dropped)} were dropped; undo brings them back"
+
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the two exchanged; raises `GpError` where one is locked."""
         a, b = point_key(self.side, self.code), point_key(self.side, self.other)

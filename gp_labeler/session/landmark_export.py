@@ -52,6 +52,10 @@ _WRITERS: Mapping[str, Writer] = {
 FORMATS = tuple(_WRITERS)
 
 
+CO_IS_COMPUTED = "CO is computed from CA, CB, RWA and RWP"
+"""Said where CO is missing: nobody is to place it."""
+
+
 @dataclass(frozen=True)
 class ExportReport:
     """What was written, and what was not there to write.
@@ -83,15 +87,20 @@ class ExportReport:
         lines = [f"Wrote {', '.join(path.name for path in self.files)}."]
         for side in Side:
             if side not in self.to_do:
-                lines.append(f"The {side.word} side is not labelled and was not written.")
+                name = landmark_file_name("", side, suggested=True)
+                is_suggested = any(path.name.endswith(name) for path in self.files)
+                but = "; only its suggestions were written" if is_suggested else " and was not written"
+                lines.append(f"The {side.word} side is not labelled{but}.")
                 continue
             for what, codes in (
-                ("to do", self.to_do[side]),
+                ("to do", tuple(code for code in self.to_do[side] if not feature(code).computed)),
                 ("suggested, not confirmed", self.suggested.get(side, ())),
                 ("not seen", self.unseen[side]),
             ):
                 if codes:
                     lines.append(f"Missing on the {side.word} side, {what}: {' '.join(codes)}.")
+            if "CO" in self.to_do[side]:
+                lines.append(f"Missing on the {side.word} side: {CO_IS_COMPUTED}.")
         return "\n".join(lines)
 
 
@@ -160,8 +169,7 @@ def _files(
     sides = [side for side in Side if _is_labelled(state, side)]
     files = {f"{state.specimen}_{side.value}{s}": (_WRITERS[s], side) for side in sides for s in suffixes}
     for side in Side if suggested else ():
-        codes = state.side(side).suggested
-        if codes and (side in sides or any(not feature(code).shared for code in codes)):
+        if state.side(side).suggested:  # IN, which both sides share, is in both files
             name = landmark_file_name(state.specimen, side, suggested=True)
             files[name] = (_write_suggestions, side)
     return files

@@ -152,12 +152,14 @@ def click_text(state: SpecimenState, active: Active) -> str:
         return "Choose a feature to place" if left else "Everything is placed · drag a point to move it"
     point, landmark = point_text(active.side, active.code), state.landmark(active.side, active.code)
     if feature(active.code).shared:
-        point += ", for both sides"
+        point += " (both sides)"
     if landmark.locked:
         return f"{point} is locked"
     if landmark.suggestion is not None:
         return f"{point} is suggested · confirm it (Enter), or drag or re-place it to correct it"
     if landmark.position is not None:
-        return f"{point} is placed · drag, nudge or re-place it to move it"
+        return (
+            f"{point} is placed; a click does not move it. Drag it, use the arrow keys, or Shift+P and click"
+        )
     after_all = " after all" if landmark.unseen else ""
     return f"Click on bone or a slice to place {point}{after_all}"

@@ -94,6 +94,7 @@ class SceneView(QWidget):
         self._source: SliceSource | None = None
         self._slices_old = False
         self._hover: FloatArray | None = None
+        self._painted: QImage | None = None
         self._pointer: tuple[float, float] | None = None
         self._dragging = self._on_target = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
@@ -169,6 +170,11 @@ class SceneView(QWidget):
             return 0.0
         pixel_mm = float(self.scene.camera.viewpoint().pixel_sizes(position[None])[0])
         return voxel_mm / (pixel_mm * self.devicePixelRatioF())
+
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether the scene as it is now has been painted."""
+        return not self._stale and self._frame is not None and self._painted is self._frame
 
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
         """Return the logical pixel at which a (3,) scan position is seen, for tests and scripts."""
@@ -290,6 +296,7 @@ class SceneView(QWidget):
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._frame is not None:
             painter.drawImage(QPointF(0, 0), self._frame)
+            self._painted = self._frame
         if self._desk.volume is not None:
             paint_crosshair(painter, self, self.scene, self._desk.session.crosshair)
         paint_cut(painter, self, self._desk.session.view.state.cut)

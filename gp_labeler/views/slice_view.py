@@ -71,6 +71,7 @@ class SliceView(QWidget):
         self.source: SliceSource | None = None
         self.shown: Shown | None = None
         self._whole: Shown | None = None
+        self._painted: Shown | None = None  # what is on the screen, if all of it is up to date
         self.layers: list[SliceLayer] = []
         self._control, self._hand = SliceControl(), Hand(workbench)
         self._painter = SlicePainter(workbench, self)
@@ -115,6 +116,11 @@ class SliceView(QWidget):
             return 0.0
         return voxel_mm / (self.shown.mm_per_pixel * self.devicePixelRatioF())
 
+    @property
+    def is_up_to_date(self) -> bool:
+        """Whether what it shows now, with the points as they are now, has been painted."""
+        return self.shown is not None and self._painted is self.shown
+
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
         """Return the logical pixel over which a (3,) scan position lies, for tests and scripts."""
         if self.shown is None:
@@ -157,6 +163,7 @@ class SliceView(QWidget):
 
     def _repaint(self, *_: object) -> None:
         self._painter.forget_points()
+        self._painted = None
         self.update()
 
     def _on_volume(self, volume: Volume) -> None:
@@ -206,6 +213,7 @@ class SliceView(QWidget):
         painter = QPainter(self)
         self._painter.paint(painter)
         painter.end()
+        self._painted = self.shown
 
     # Mouse and keys
 

@@ -189,12 +189,11 @@ class ViewGrid(QWidget):
             view.reset()
 
     def can_judge(self, position: FloatArray) -> bool:
-        """Whether a view shows a (3,) scan position with voxels at least two logical pixels wide."""
-        volume = self._desk.volume
-        return volume is not None and any(
-            view.isVisible() and view.voxel_pixels(position, min(volume.spacing)) >= JUDGED_PIXELS
-            for view in self.views
-        )
+        """Whether a painted view shows a (3,) scan position with voxels at least two logical pixels wide.
+
+        A view that is still to be painted does not count: nobody has seen the position in it.
+        """
+        return any(view.is_up_to_date for view in self._close_views(position))
 
     def bring_close(self, position: FloatArray) -> None:
         """Show a (3,) scan position in every view so closely that it can be judged."""
@@ -204,13 +203,21 @@ class ViewGrid(QWidget):
         for view in self.views:
             side = min(view.width(), view.height())
             view.zoom_to(position, min(CLOSE_MM, side * min(volume.spacing) / (2 * JUDGED_PIXELS)))
-        if not self.can_judge(position):  # such as what bone hides in the 3D view, shown alone
+        if not self._close_views(position):  # such as what bone hides in the 3D view, shown alone
             self._desk.session.view.update(layout="four-up")
 
     def release(self) -> None:
         """Let go of scene and voxels."""
         for view in self.views:
             view.release()
+
+    def _close_views(self, position: FloatArray) -> list[SceneView | SliceView]:
+        """Return the visible views that show a position closely enough to judge it, once they are painted."""
+        volume = self._desk.volume
+        if volume is None:
+            return []
+        voxel = min(volume.spacing)
+        return [v for v in self.views if v.isVisible() and v.voxel_pixels(position, voxel) >= JUDGED_PIXELS]
 
     def _row(self, left: str, right: str) -> QSplitter:
         row = QSplitter(Qt.Orientation.Horizontal)

@@ -11,7 +11,6 @@ from gp_labeler.atlas_desk import is_atlas_file
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session.edited_specimen import VolumeChangedError
-from gp_labeler.session.edits import SwapPoints
 from gp_labeler.session.lock import InUseError
 from gp_labeler.session.opening import UnsavedEditsError
 from gp_labeler.session.recovery import Recovery
@@ -222,7 +221,7 @@ class WindowUi(AtlasUi, PoseUi):
 
     def ask_swap(self) -> None:
         """Ask with which other point of the side the active one shall be exchanged."""
-        session, active = self._desk.session, self._desk.session.active
+        active = self._desk.session.active
         if active.code is None:
             return
         others = [f for f in FEATURES if not (f.computed or f.shared or f.code == active.code)]
@@ -231,7 +230,7 @@ class WindowUi(AtlasUi, PoseUi):
         text = f"Exchange {active.code} {active.side.word} with"
         chosen = self.prompts.item("Swap", text, [f"{f.code}  {f.name}" for f in others])
         if chosen:
-            session.do(SwapPoints(active.side, active.code, chosen.split()[0]))
+            self._desk.swap(active.side, active.code, chosen.split()[0])
 
     # The screen
 

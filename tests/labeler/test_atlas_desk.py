@@ -15,6 +15,7 @@ from gp_core.atlas.label_check import Finding, SideCheck
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files import load_specimens
+from gp_core.landmarks.sets import Specimen
 from gp_core.study.leave_one_out import leave_one_out
 from gp_labeler.atlas_desk import is_atlas_file
 from gp_labeler.session.landmark_import import ImportLandmarks
@@ -60,6 +61,18 @@ def test_an_atlas_fitted_here_is_saved_and_opened_again(desk, folder, tmp_path) 
     np.testing.assert_array_equal(desk.atlas.mean, fitted.mean)
     assert desk.atlas_file == file
     assert desk.atlas_specimens == ()
+
+
+def test_a_fit_to_an_animal_in_doubt_warns_and_names_it(desk, tmp_path) -> None:
+    animals = drawn_animals(5, seed=5)
+    right = animals[2].side("R")
+    wrong = right.with_point("CA", right["CB"]).with_point("CB", right["CA"])
+    animals[2] = Specimen("GP03", {L: animals[2].side(L), Side.RIGHT: wrong})
+    desk.fit_atlas([write_animals(tmp_path / "animals", animals)])
+    desk.wait()
+    level, text = desk.said[-1]
+    assert level == "warning"
+    assert text == "The atlas was fitted to 5 animals, 10 sides; 1 animal in doubt: GP03"
 
 
 def test_leave_one_out_of_the_animals_by_both_methods(desk, folder) -> None:

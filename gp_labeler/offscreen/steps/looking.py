@@ -99,6 +99,17 @@ class Look(Step):
     advance: bool | None = None
     follow: bool | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse words and sizes that there are not, before any step runs."""
+        if self.theme is not None:
+            _check(self.theme, "theme", tuple(THEMES))
+        if self.text_size is not None:
+            _check(str(self.text_size), "text_size", tuple(map(str, TEXT_SIZES)))
+        if isinstance(self.greys, str):
+            _check(self.greys, "greys", ("auto",))
+        if isinstance(self.glyphs, str):
+            _check(self.glyphs, "glyphs", ("screen",))
+
     def run(self, rig: Rig) -> None:  # noqa: D102
         self._set_window(rig)
         rig.desk.session.view.update(**self._shown())
@@ -121,12 +132,10 @@ class Look(Step):
         given = {name: getattr(self, key) for key, name in _FIELDS.items()}
         shown = {name: value for name, value in given.items() if value is not None}
         if isinstance(self.greys, str):
-            _check(self.greys, "greys", ("auto",))
             shown |= {"level": None, "width": None}
         elif self.greys is not None:
             shown |= {"level": self.greys[0], "width": self.greys[1]}
         if isinstance(self.glyphs, str):
-            _check(self.glyphs, "glyphs", ("screen",))
             shown |= {"glyph_mm": None}
         elif self.glyphs is not None:
             shown |= {"glyph_mm": self.glyphs}
@@ -136,10 +145,8 @@ class Look(Step):
         if self.size is not None:
             rig.window.resize(*_pixels(self.size))
         if self.theme is not None:
-            _check(self.theme, "theme", tuple(THEMES))
             rig.window.set_theme(self.theme)
         if self.text_size is not None:
-            _check(str(self.text_size), "text_size", tuple(map(str, TEXT_SIZES)))
             rig.window.set_text_size(self.text_size)
         if self.panel is not None:
             _check(self.panel, "panel", tuple(rig.window.steps))

@@ -300,6 +300,7 @@ class LabelsCard(Card):
         for signal in (
             workbench.atlas_changed,
             workbench.judged,
+            workbench.doubts_changed,
             workbench.landmarks_changed,
             workbench.session_replaced,
         ):
@@ -315,6 +316,10 @@ class LabelsCard(Card):
             words = f"{rows.n_doubtful} of {rows.n_judged} labels should be looked at again."
         else:
             words = f"All {rows.n_judged} labels that can be checked fit the atlas."
+        others = rows.others_doubted
+        if rows.n_judged and others:
+            have = "has" if len(others) == 1 else "have"
+            words = f"{words.removesuffix('.')}; {len(others)} {have} other doubts: {', '.join(others)}."
         self.verdict.setText(words)
 
 

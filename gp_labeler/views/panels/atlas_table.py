@@ -20,6 +20,8 @@ from PySide6.QtWidgets import (
 
 from gp_core.atlas.label_check import Departure
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
+from gp_labeler.session.edits import point_text
+from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
@@ -85,6 +87,19 @@ class AtlasModel(QAbstractTableModel):
     def n_doubtful(self) -> int:
         """Those of them that should be looked at again."""
         return sum(found.is_doubtful for away in self._away.values() for found in away.values())
+
+    @property
+    def others_doubted(self) -> tuple[str, ...]:
+        """Points that are doubted for another reason than their distance, such as ``IN`` or ``MN left``."""
+        session = self._desk.session
+        found = {
+            code if feature(code).shared else point_text(side, code): None
+            for side in _SIDES
+            for code, state in session.point_states(side, wait=False).items()
+            if state is PointState.DOUBTFUL
+            and not (code in self._away[side] and self._away[side][code].is_doubtful)
+        }
+        return tuple(found)
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's
         return 0 if parent.isValid() else len(self.codes)

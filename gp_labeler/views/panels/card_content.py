@@ -169,7 +169,7 @@ def _settled_words(session: Session, side: Side, code: str) -> str:
         "mesh": "Placed on bone.",
         "slice": "Placed on a slice.",
         "confirmed suggestion": "Suggested and confirmed.",
-        "nudged suggestion": "Suggested and corrected.",
+        "nudged suggestion": "Suggested, then corrected by you: it counts.",
     }
     return words.get(how, f"{how.capitalize()}." if how else "Placed.")
 

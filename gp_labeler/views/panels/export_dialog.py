@@ -21,7 +21,7 @@ from PySide6.QtWidgets import (
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
-from gp_labeler.session.landmark_export import FORMATS, export_landmarks, export_names
+from gp_labeler.session.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
 from gp_labeler.session.workflow import PointState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import (
@@ -160,10 +160,12 @@ class ExportDialog(QDialog):
         for side in Side:
             landmarks = session.landmarks(side)
             if not landmarks.placed:
-                found.append(("warning", f"The {side.word} side is not labelled and will not be written."))
+                writes = bool(landmarks.suggested) and self.suggested.isChecked()
+                but = "; only its suggestions will be written" if writes else " and will not be written"
+                found.append(("warning", f"The {side.word} side is not labelled{but}."))
                 continue
             statuses = {code: landmarks.status(code) for code in session.point_states(side, wait=False)}
-            to_do = [code for code, status in statuses.items() if status is Status.TO_DO]
+            to_do = [code for code, status in statuses.items() if status is Status.TO_DO and code != "CO"]
             unseen = [code for code, status in statuses.items() if status is Status.UNSEEN]
             suggested = list(landmarks.suggested)
             parts = [
@@ -175,10 +177,14 @@ class ExportDialog(QDialog):
                 )
                 if codes
             ]
+            lacks_co = statuses.get("CO") is Status.TO_DO
+            parts += [CO_IS_COMPUTED] if lacks_co else []
             words = f"The {side.word} side has {session.progress(side).text}" + "".join(
                 f"; {p}" for p in parts
             )
-            found.append(("warning" if to_do or suggested else "info" if unseen else "good", f"{words}."))
+            found.append(
+                ("warning" if to_do or suggested or lacks_co else "info" if unseen else "good", f"{words}.")
+            )
             found += self._doubts(side)
         return found
 

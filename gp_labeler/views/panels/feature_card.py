@@ -20,7 +20,7 @@ from PySide6.QtWidgets import (
 from gp_core.landmarks.features import Side
 from gp_labeler.actions import ACTIONS
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, SwapPoints, SwapSides
+from gp_labeler.session.edits import CheckPoint, SwapSides
 from gp_labeler.session.state import How
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
@@ -250,7 +250,7 @@ def _swap_names(workbench: Workbench) -> None:
     side, code = session.active.side, session.active.code
     doubt = session.near_doubts(side).get(code or "")
     if doubt is not None and doubt.kind == "swapped":
-        session.do(SwapPoints(side, *doubt.landmarks))
+        workbench.swap(side, *doubt.landmarks)
 
 
 def _place_at_crosshair(workbench: Workbench) -> None:

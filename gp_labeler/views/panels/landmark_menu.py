@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from PySide6.QtGui import QGuiApplication
 from PySide6.QtWidgets import QMenu, QWidget
 
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, ClearPoint, MarkUnseen, SwapPoints, point_text
+from gp_labeler.session.edits import CheckPoint, ClearPoint, MarkUnseen, point_text
 from gp_labeler.session.state import How, Landmark
 from gp_labeler.views.bind import attempt
 from gp_labeler.workbench import Workbench
@@ -82,6 +83,6 @@ def _add_swaps(add: Callable[..., None], menu: QMenu, workbench: Workbench, side
             continue
         other = session.state.landmark(side, row.code)
         if other.settled and not other.locked:
-            swap = SwapPoints(side, code, row.code)
-            add(f"{row.code}  {row.name}", lambda swap=swap: session.do(swap), to=others)
+            swap = partial(workbench.swap, side, code, row.code)
+            add(f"{row.code}  {row.name}", swap, to=others)
     others.setEnabled(not others.isEmpty() and not session.state.landmark(side, code).locked)

@@ -17,6 +17,7 @@ from gp_labeler.workbench import Workbench
 __all__ = ["HeadCard"]
 
 _METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmpc")}
+_SHARED = "Error common to all touches, mm"
 _HINTS = {
     "robust": "Uses the names of the touched points, and sets a wrong touch aside",
     "jrmpc": "The published method; needs the labelled animals of an atlas fitted here",
@@ -45,14 +46,14 @@ class HeadCard(Card):
         self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
         self.method = Segments({"robust": "Robust", "jrmpc": "JRMPC", "both": "Both"}, _HINTS)
-        self.noise = NumberField("Probe noise", widest="found")
+        self.noise = NumberField("Probe noise", widest="automatic")
         self.noise.step = 0.05
-        self.noise.setPlaceholderText("found")
+        self.noise.setPlaceholderText("automatic")
         self.noise.setToolTip(
             "Ordinary error of a touch in mm a coordinate; empty: found from the touches themselves"
         )
         self.found = text_label("", "hint")
-        self.shared = NumberField("Shared error", widest="0.25")
+        self.shared = NumberField(_SHARED, widest="0.25")
         self.shared.step = 0.05
         self.shared.setToolTip(
             "RMS length of one offset that all touches of the session share: of the tip, the reference "
@@ -108,18 +109,18 @@ class HeadCard(Card):
         for row, caption in (
             (name, "Specimen"),
             (noise, "Probe noise"),
-            (shared, "Shared error"),
             (atlas, "Atlas"),
         ):
             row.setSpacing(6)
             row.addWidget(_caption(caption))
+        shared.setSpacing(6)
+        shared.addWidget(text_label(_SHARED, "hint"))
         name.addWidget(self.specimen, 1)
         name.addWidget(self.new)
         noise.addWidget(self.noise)
         noise.addWidget(self.found)
         noise.addStretch(1)
         shared.addWidget(self.shared)
-        shared.addWidget(text_label("mm, of all touches alike", "hint"))
         shared.addStretch(1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
@@ -145,5 +146,5 @@ class HeadCard(Card):
 def _caption(name: str) -> QLabel:
     """Return what stands before a field: all as wide as the longest."""
     words = text_label(name, "hint")
-    fit(words, lambda: words.setFixedWidth(text_width(words, "Shared error")))
+    fit(words, lambda: words.setFixedWidth(text_width(words, "Probe noise")))
     return words

@@ -55,7 +55,7 @@ class InScanCard(Card):
         self.notices, self.waiting = Notices(), text_label("", "hint", wrap=True)
         self.skull = text_label("", "hint", wrap=True)
         self.file = link("Load…", "Where the skull features are on the scan: a landmark file that names them")
-        self.mark = link("Mark S1 here", "Say that this skull feature is at the crosshair")
+        self.mark = link("Mark skull point S1 at the crosshair", "Say that this skull feature is there")
         self._lay_out()
         self.way.chosen.connect(self._choose)
         self.file.clicked.connect(self.skull_file_asked)
@@ -118,7 +118,7 @@ class InScanCard(Card):
     def _show_skull(self) -> None:
         n = len(self._desk.session.state.skull)
         self.skull.setText(f"Skull features on the scan: {n or 'none'}")
-        self.mark.setText(f"Mark {self.unmarked} here")
+        self.mark.setText(f"Mark skull point {self.unmarked} at the crosshair")
         self.mark.setEnabled(self._desk.volume is not None)
 
     def _frame(self) -> str:

@@ -55,7 +55,9 @@ class TouchesCard(Card):
         self.table = TouchTable(self.model)
         self.notices, self.change = Notices(), ElidedLabel("", "hint")
         self.change.setAccessibleName("What leaving a point out changes")
-        self.skull = link("+ S1", "Touch a feature of the skull that serves the registration to the scan")
+        self.skull = link(
+            "+ skull point S1", "Touch a skull feature that serves the registration to the scan"
+        )
         self.more = link("", "Rows of the skull's registration features; those that do not fit always show")
         self.guide = link("Guide…", "One feature after the other in large type, with its picture")
         self.clear = link("Clear all", "Forget all touches of this side; undo brings them back")
@@ -79,7 +81,7 @@ class TouchesCard(Card):
         self.more.setAccessibleName(f"{'Hide' if shown else 'Show'} {n} skull features")
         self.more.setVisible(n > 0)
         self._timer.start()
-        self.skull.setText(f"+ {self._desk.pose.next_skull}")
+        self.skull.setText(f"+ skull point {self._desk.pose.next_skull}")
 
     def tell(self, error: GpError | None) -> None:
         """Say what could not be done, until something can; None takes it away."""

@@ -170,7 +170,6 @@ IMPOSSIBLE = (
     ({"do": "put", "feature": "CO", "side": "L", "at": [0, 0, 0]}, "CO left cannot be chosen"),
     ({"do": "specimen"}, "needs name or notes"),
     ({"do": "specimen", "name": "a/b"}, "a/b"),
-    ({"do": "view", "greys": "dark"}, "greys must be one of auto"),
     ({"do": "action", "id": "edit.swap"}, "Exchange CA left with"),
     ({"do": "fit", "specimens": "none"}, "none"),
     ({"do": "export"}, "nothing is placed"),

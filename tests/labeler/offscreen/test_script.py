@@ -102,6 +102,12 @@ def test_a_file_that_is_no_script_is_named(tmp_path, name, text, problem) -> Non
     assert name in str(caught.value)
 
 
+@pytest.mark.parametrize("table", [{"text_size": 18}, {"theme": "blue"}, {"greys": "x"}, {"glyphs": "x"}])
+def test_a_view_that_there_is_not_is_refused_before_the_script_runs(table) -> None:
+    with pytest.raises(StepError, match=f"{next(iter(table))} must be one of"):
+        make_script([{"do": "view", **table}])
+
+
 def test_a_script_that_cannot_be_read_is_named(tmp_path) -> None:
     with pytest.raises(GpError, match="does not exist"):
         read_script(tmp_path / "none.toml")

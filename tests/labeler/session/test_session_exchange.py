@@ -63,7 +63,8 @@ def test_what_is_missing_is_said(session, tmp_path):
     assert export_landmarks(session.state, tmp_path).text.splitlines()[1:] == [
         "Missing on the left side, to do: ZL.",
         "Missing on the left side, not seen: MN.",
-        "Missing on the right side, to do: CA CO.",
+        "Missing on the right side, to do: CA.",
+        "Missing on the right side: CO is computed from CA, CB, RWA and RWP.",
     ]
     one = Session(ImportLandmarks((shape(L),), MARK).apply(SpecimenState("B")))
     report = export_landmarks(one.state, tmp_path)

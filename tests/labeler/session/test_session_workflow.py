@@ -123,13 +123,15 @@ def test_the_next_click_is_told():
     session = Session()
     assert session.click_text == "Click on bone or a slice to place CA left"
     labelling.go_to(session, R, "IN")
-    assert session.click_text == "Click on bone or a slice to place IN, for both sides"
+    assert session.click_text == "Click on bone or a slice to place IN (both sides)"
     labelling.mark_unseen(session, side=R, code="IN")
     labelling.go_to(session, L, "IN")
-    assert session.click_text == "Click on bone or a slice to place IN, for both sides after all"
+    assert session.click_text == "Click on bone or a slice to place IN (both sides) after all"
     session.do(PlacePoint(L, "ZL", (1, 2, 3), MARK))
     labelling.go_to(session, L, "ZL")
-    assert session.click_text == "ZL left is placed · drag, nudge or re-place it to move it"
+    assert session.click_text == (
+        "ZL left is placed; a click does not move it. Drag it, use the arrow keys, or Shift+P and click"
+    )
     labelling.lock(session)
     assert session.click_text == "ZL left is locked"
     with pytest.raises(GpError, match="ZL left is locked"):

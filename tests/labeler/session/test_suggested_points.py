@@ -202,7 +202,9 @@ def test_suggestions_are_exported_only_on_request_and_apart(tmp_path: Path) -> N
     assert not report.is_complete
     assert "suggested, not confirmed: CB CC CL" in report.text
     report = export_landmarks(session.state, tmp_path / "both", suggested=True)
-    plain, apart = report.files
+    plain, apart, right = report.files
+    assert set(read_landmarks(right).suggested) == {"IN"}  # both sides share it
+    assert "The right side is not labelled; only its suggestions were written." in report.text
     assert apart.name == plain.name.replace("_L.", "_L_suggested.")
     assert not read_landmarks(apart).placed
     (animal,) = load_specimens(tmp_path / "both")

@@ -530,7 +530,7 @@ def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
     for n, corner in enumerate(np.eye(3) * 9, 1):
         touching.record_touch(desk.session, LEFT, f"S{n}", corner + THERE)
         desk.session.set_crosshair(corner + shift)
-        assert panel.in_scan.mark.text() == f"Mark S{n} here"
+        assert panel.in_scan.mark.text() == f"Mark skull point S{n} at the crosshair"
         qtbot.mouseClick(panel.in_scan.mark, CLICK)
     assert desk.pose.estimate.registered.way == "skull"
     qtbot.mouseClick(panel.touches.more, CLICK)

@@ -59,7 +59,7 @@ def axial_of(window):
 # Confirming
 
 
-def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(suggested) -> None:
+def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(qtbot, suggested) -> None:
     axial, voxel = axial_of(suggested), 0.25
     axial.setFocus()
     assert axial.voxel_pixels(INSIDE, voxel) < 2.0
@@ -67,10 +67,48 @@ def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(suggested)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
     assert "Is MN left right here?" in suggested.status.next_click.text()
     assert axial.voxel_pixels(INSIDE, voxel) >= 2.0
+    settle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.PLACED
     assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.CONFIRMED
     np.testing.assert_array_equal(suggested.workbench.session.landmarks(L)["MN"], INSIDE)
+
+
+def test_enters_without_a_picture_in_between_confirm_nothing(qtbot, suggested) -> None:
+    desk, axial = suggested.workbench, axial_of(suggested)
+    labelling.suggest(desk.session, AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
+    desk.go_to(L, "MN")
+    axial.setFocus()
+    for _ in range(4):
+        QTest.keyClick(axial, Qt.Key.Key_Return)
+    assert {status_of(suggested, code) for code in ("MN", "ZL")} == {PointState.SUGGESTED}
+    settle(qtbot, suggested)
+    for _ in range(4):
+        QTest.keyClick(axial, Qt.Key.Key_Return)
+    assert status_of(suggested, "MN") is PointState.PLACED
+    assert status_of(suggested, "ZL") is PointState.SUGGESTED
+
+
+def test_another_point_than_the_one_that_is_chosen_is_shown_first(qtbot, suggested) -> None:
+    desk = suggested.workbench
+    labelling.suggest(desk.session, INSIDE, radius_95=0.8, source="atlas", side=L, code="ZL")
+    desk.go_to(L, "MN")
+    suggested.grid.bring_close(INSIDE)
+    settle(qtbot, suggested)
+    assert not desk.confirm(L, "ZL")  # of the menu
+    settle(qtbot, suggested)
+    assert desk.confirm(L, "ZL")
+
+
+def test_a_swap_says_which_suggestions_it_drops(suggested) -> None:
+    desk = suggested.workbench
+    labelling.suggest(desk.session, AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
+    desk.swap(L, "MN", "ZL")
+    assert suggested.status.next_click.text() == (
+        "The suggestions of MN and ZL were dropped; undo brings them back"
+    )
+    desk.session.undo()
+    assert status_of(suggested, "ZL") is PointState.SUGGESTED
 
 
 def test_a_key_that_is_held_down_confirms_nothing(suggested) -> None:
@@ -86,7 +124,7 @@ def test_a_key_that_is_held_down_confirms_nothing(suggested) -> None:
     assert status_of(suggested, "MN") is PointState.SUGGESTED
 
 
-def test_a_slice_elsewhere_does_not_show_the_point(suggested) -> None:
+def test_a_slice_elsewhere_does_not_show_the_point(qtbot, suggested) -> None:
     desk, axial = suggested.workbench, axial_of(suggested)
     desk.confirm(L, "MN")  # brings it close
     desk.session.set_crosshair(INSIDE + np.array([3.0, 3.0, 2.0]))
@@ -95,6 +133,8 @@ def test_a_slice_elsewhere_does_not_show_the_point(suggested) -> None:
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
+    assert not suggested.grid.can_judge(INSIDE)  # not before it is painted
+    settle(qtbot, suggested)
     assert suggested.grid.can_judge(INSIDE)
 
 
@@ -120,6 +160,7 @@ def test_the_button_of_the_card_confirms_as_enter_does(qtbot, suggested) -> None
     assert "atlas, 95 % within 0.80 mm" in card.content.status
     qtbot.mouseClick(card.primary, Qt.MouseButton.LeftButton)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
+    settle(qtbot, suggested)
     qtbot.mouseClick(card.primary, Qt.MouseButton.LeftButton)
     assert status_of(suggested, "MN") is PointState.PLACED
 
@@ -145,11 +186,12 @@ def test_a_dragged_suggestion_is_placed_and_escape_leaves_it_suggested(suggested
     assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.SLICE
 
 
-def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(suggested) -> None:
+def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(qtbot, suggested) -> None:
     desk, axial = suggested.workbench, axial_of(suggested)
     axial.zoom_to(INSIDE, 10.0)
     click(axial, INSIDE)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
+    settle(qtbot, suggested)
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.PLACED
@@ -164,11 +206,12 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(sugg
     np.testing.assert_allclose(desk.session.landmarks(L)["MN"], elsewhere, atol=0.1)
 
 
-def test_from_afar_an_arrow_key_brings_a_suggestion_close_and_moves_nothing(suggested) -> None:
+def test_from_afar_an_arrow_key_brings_a_suggestion_close_and_moves_nothing(qtbot, suggested) -> None:
     axial = axial_of(suggested)
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
+    settle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.PLACED
 
