@@ -237,6 +237,11 @@ def file_rows() -> Iterator[Action]:
     yield row("save_mesh", "Save bone surface…", (), lambda d, ui: ui.ask_save_mesh(),
               lambda d: bool(d.surfaces), group="exchange")
     yield row("screenshot", "Save picture…", (), lambda d, ui: ui.ask_screenshot(), group="exchange")
+    yield row("show_references", "Show reference points…", (), lambda d, ui: ui.ask_references(), _has_scan,
+              hint="Points of any landmark list, grey, to compare with: no part of the specimen",
+              group="references")
+    yield row("clear_references", "Clear reference points", (), lambda d, ui: d.references.clear(),
+              lambda d: bool(d.references.points), group="references")
     yield row("close", "Close", ("Ctrl+Q",), lambda d, ui: ui.close_window(), group="close")
 
 

@@ -24,6 +24,7 @@ from gp_labeler.bone_desk import BoneDesk
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import PoseDesk
+from gp_labeler.reference_points import ReferencePoints
 from gp_labeler.session import labelling
 from gp_labeler.session.atlas_memory import AtlasMemory
 from gp_labeler.session.edited_specimen import VolumeChangedError
@@ -65,14 +66,12 @@ class Drag:
 class Workbench(AtlasDesk, BoneDesk):
     """What one window works on; see the module.
 
-    Its signals of the session's names repeat those of whatever session is open, so a listener connects once;
-    `session_replaced` tells it to look at everything anew.
+    Its signals repeat those of whatever session is open; `session_replaced` says to look at everything anew.
 
     Parameters
     ----------
     directory : Path, optional
-        State directory (`session.places.default_directory()` in the window); None keeps no journal, no list
-        of recent files, and does not remember the atlas.
+        State directory; None keeps no journal, no list of recent files, and does not remember the atlas.
     dispatcher : callable, optional
         Brings results of jobs to this thread.
     atlas : Atlas, optional
@@ -116,6 +115,7 @@ class Workbench(AtlasDesk, BoneDesk):
             signal.connect(self._disarm)
         self.pose = PoseDesk(self)
         self.tracker = TrackerDesk(self)
+        self.references = ReferencePoints(self)
 
     @property
     def _session_options(self) -> dict[str, Any]:

@@ -37,6 +37,7 @@ _STATES = MappingProxyType(
         "truth": "#009E73",
         "touch": "#C8619F",
         "unseen": "#8A929B",
+        "reference": "#B4BCC4",
         "path": "#F0E442",
     }
 )
@@ -119,6 +120,7 @@ LIGHT = SceneColours(
             "truth": "#0A7F5D",
             "touch": "#A8397F",
             "unseen": "#6B747E",
+            "reference": "#5B646D",
             "path": "#F0E442",
         }
     ),

@@ -31,7 +31,7 @@ def mark_image(shape: str, colour: str, diameter: float, opacity: float = 1.0) -
     Parameters
     ----------
     shape : str
-        ``ball``, ``diamond``, ``triangle`` or ``frame``.
+        ``ball``, ``diamond``, ``triangle``, ``frame`` or ``inverted``: a hollow triangle on its tip.
     colour : str
         ``#RRGGBB``.
     diameter : float
@@ -94,4 +94,17 @@ def _frame(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return inside, np.broadcast_to([0.0, 0.0, 1.0], (*x.shape, 3))
 
 
-_SOLIDS = {"ball": _ball, "diamond": _diamond, "triangle": _triangle, "frame": _frame}
+def _inverted(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the same of a triangle on its tip, with a hole."""
+    within, _ = _triangle(x, -y)
+    inside = np.minimum(within, 0.42 - within)
+    return inside, np.broadcast_to([0.0, 0.0, 1.0], (*x.shape, 3))
+
+
+_SOLIDS = {
+    "ball": _ball,
+    "diamond": _diamond,
+    "triangle": _triangle,
+    "frame": _frame,
+    "inverted": _inverted,
+}

@@ -16,13 +16,17 @@ from gp_labeler.scene.mark_images import mark_image
 from gp_labeler.scene.sprites import SpriteSheet, Text
 from gp_labeler.scene.stage import Stage
 
-__all__ = ["GlyphSize", "Mark", "MarkActor"]
+__all__ = ["REFERENCE", "GlyphSize", "Mark", "MarkActor"]
 
-_SHAPES = {"computed": "diamond", "doubtful": "triangle", "suggested": "frame"}
+REFERENCE = "reference"
+"""The state of a mark that is only looked at: smaller, hollow, and never picked."""
+
+_SHAPES = {"computed": "diamond", "doubtful": "triangle", "suggested": "frame", REFERENCE: "inverted"}
 """A state shows by shape as well as by colour; others are balls."""
 
 _FAINT = 0.30
 _ACTIVE_GROWS = 1.35
+_REFERENCE_SHRINKS = 0.8
 _RING_PIXELS = 5.0
 
 
@@ -55,8 +59,8 @@ class Mark:
     label : str
         What stands beside it; empty for none.
     state : str
-        ``placed``, ``suggested``, ``computed``, ``doubtful``, ``other`` (the other side) or any
-        other state of the theme.
+        ``placed``, ``suggested``, ``computed``, ``doubtful``, ``other`` (the other side), `REFERENCE` or
+        any other state of the theme.
     active : bool
         Whether it is the one being worked on: larger, and its label is never left out.
     """
@@ -108,7 +112,7 @@ class MarkActor:
             sizes = np.full(len(self._marks), self.size.diameter)
         else:
             sizes = self.size.diameter * self._stage.scale * view.pixel_sizes(self.positions)
-        grown: FloatArray = sizes * [_ACTIVE_GROWS if mark.active else 1.0 for mark in self._marks]
+        grown: FloatArray = sizes * [_growth(mark) for mark in self._marks]
         return grown
 
     def refresh(
@@ -171,7 +175,7 @@ class MarkActor:
             + 2.0 * self._stage.scale
             + (_RING_PIXELS * self._stage.scale if mark.active else 0.0)
         )
-        rank = 2.0 if mark.active else -float(hidden)
+        rank = 2.0 if mark.active else -float(hidden) - 2.0 * (mark.state == REFERENCE)
         return Label(
             Text(mark.label, self._stage.colours.word(mark.state)),
             pixel,
@@ -197,3 +201,9 @@ class MarkActor:
         self._marks = ()
         self._sheet.close()
         self._rings.close()
+
+
+def _growth(mark: Mark) -> float:
+    if mark.state == REFERENCE:
+        return _REFERENCE_SHRINKS
+    return _ACTIVE_GROWS if mark.active else 1.0

@@ -20,7 +20,7 @@ from gp_labeler.scene.gestures import CameraControl
 from gp_labeler.scene.ghosts import GhostActor
 from gp_labeler.scene.hover import HoverActor
 from gp_labeler.scene.labels import LabelActor
-from gp_labeler.scene.marks import MarkActor
+from gp_labeler.scene.marks import REFERENCE, MarkActor
 from gp_labeler.scene.pose import PoseActor
 from gp_labeler.scene.segments import CrosshairActor, SegmentActor
 from gp_labeler.scene.slice_planes import SlicePlaneActor
@@ -257,12 +257,13 @@ class Scene3D:
         ]
 
     def mark_at(self, x: float, y: float, within: float = 10.0) -> str | None:
-        """Return the key of the mark nearest to a pixel, seen before hidden, within logical pixels."""
+        """Return the key of the landmark nearest to a pixel, seen before hidden, within logical pixels."""
         marks = self.marks.marks
         if not marks:
             return None
         away = np.linalg.norm(self.display_of(self.marks.positions) - [x, y], axis=1)
-        near = away <= within * self.scale
+        pickable = np.array([mark.state != REFERENCE for mark in marks])
+        near = pickable & (away <= within * self.scale)
         if not near.any():
             return None
         rank = away + np.where(self.hidden(self.marks.positions), within * self.scale, 0.0)

@@ -71,6 +71,7 @@ class Commands(QObject):
             workbench.pose.target_changed,
             workbench.pose.overlay_changed,
             workbench.tracker.changed,
+            workbench.references.changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()

@@ -13,13 +13,13 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import Ghost
-from gp_labeler.scene.marks import Mark
+from gp_labeler.scene.marks import REFERENCE, Mark
 from gp_labeler.scene.segments import Segment
 from gp_labeler.session.ghosts import CHI2_95
 from gp_labeler.session.workflow import PointState
 from gp_labeler.workbench import Workbench
 
-__all__ = ["drawn_ghosts", "drawn_marks", "drawn_segments", "key_of", "point_of"]
+__all__ = ["drawn_ghosts", "drawn_marks", "drawn_references", "drawn_segments", "key_of", "point_of"]
 
 _BEYOND_MM = 1.0
 """The modiolar axis is drawn this much longer at each end."""
@@ -63,6 +63,19 @@ def drawn_marks(workbench: Workbench) -> list[Mark]:
             name = code if named or is_active else ""
             marks.append(Mark(key_of(side, code), position, name, state, is_active))
     return marks
+
+
+def drawn_references(workbench: Workbench) -> list[Mark]:
+    """Return the reference points inside the scan: no landmarks, so they are never picked."""
+    points, volume = workbench.references.points, workbench.volume
+    if not points or volume is None:
+        return []
+    inside = volume.contains(np.array([point.position for point in points]))
+    return [
+        Mark(f"reference:{n}", point.position, point.name, REFERENCE)
+        for n, point in enumerate(points)
+        if inside[n]
+    ]
 
 
 def _shown_at(landmarks: LandmarkSet, code: str) -> FloatArray | None:

@@ -36,6 +36,7 @@ from gp_labeler.views.panels.tracker_card import TrackerCard
 from gp_labeler.views.panels.welcome import Welcome
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.reference_layer import ReferenceLayer
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.top_bar import TopBar
@@ -97,6 +98,8 @@ class MainWindow(QMainWindow):
         self._restyle()
         self.grid = ViewGrid(workbench)
         self.pose_display = PoseDisplay(workbench, self.grid)
+        for view in self.grid.slice_views.values():
+            ReferenceLayer(workbench, view)
         self.tracker_display = TrackerDisplay(workbench, self.pose_display)
         self.tracker_display.audible = self.memory.get("audible", bool, False)
         self.commands = Commands(workbench, self.ui, self, self.grid)

@@ -20,6 +20,7 @@ _CORNERS = {
     "square": ((-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)),
     "tall": ((0.0, -1.7), (1.0, 0.0), (0.0, 1.7), (-1.0, 0.0)),
     "triangle": ((0.0, -1.3), (1.17, 0.91), (-1.17, 0.91)),
+    "inverted": ((0.0, 1.3), (1.17, -0.91), (-1.17, -0.91)),
 }
 
 
@@ -43,7 +44,7 @@ def marker_picture(
     Parameters
     ----------
     shape : str
-        ``ball``, ``diamond``, ``rhomb``, ``square``, ``tall`` or ``triangle``.
+        ``ball``, ``diamond``, ``rhomb``, ``square``, ``tall``, ``triangle`` or ``inverted``.
     radius : float
         Device pixels.
     colour : str

@@ -89,6 +89,7 @@ class Recorder(QObject):
             (desk.jobs.done, self._on_job),
             (desk.atlas_changed, self._on_atlas),
             (desk.pose.path_changed, self._on_path),
+            (desk.references.changed, self._on_references),
             (desk.view_changed, self._on_view_changed),
             (desk.tool_changed, self._on_tool),
             (desk.pose.overlay_changed, self._on_overlay),
@@ -144,6 +145,8 @@ class Recorder(QObject):
         if desk.atlas is not None and not desk.is_published_atlas:
             self._on_atlas()
         self._on_path(desk.pose.path)
+        if desk.references.points:
+            self._on_references()
 
     def _on_volume(self, _: Volume) -> None:
         self._begin()
@@ -280,6 +283,10 @@ class Recorder(QObject):
         if path is not None:
             about = {"units": path.units, "side": path.side.value, "axes": path.axes, "rows": path.rows}
             self.tables.append(step("path", path=str(path.source.absolute()), **about))
+
+    def _on_references(self) -> None:
+        files = self._window.workbench.references.files
+        self.tables.append({"do": "reference", "files": [str(file.absolute()) for file in files]})
 
     def _on_job(self, task: Task[Any]) -> None:
         if isinstance(task.job, SaveMesh):

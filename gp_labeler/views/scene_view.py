@@ -1,9 +1,8 @@
 """The 3D view as a widget: the scene is drawn in memory and painted, so it needs no OpenGL of the display.
 
 What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over
-the last frame; points are drawn over a picture of the bone that is kept. When the bone must be drawn anew, a
-coarse stand-in is shown at once, and the bone is drawn finely behind it, a little at a time: the window
-answers meanwhile. A picture of the widget (`grab`) always shows the finished frame.
+the last frame; points are drawn over a kept picture of the bone. While the bone is drawn anew, a little at a
+time, a coarse stand-in is shown. A picture of the widget (`grab`) always shows the finished frame.
 """
 
 from __future__ import annotations
@@ -34,7 +33,7 @@ from gp_labeler.scene.target import RenderTarget
 from gp_labeler.session.state import How
 from gp_labeler.session.view import Cut
 from gp_labeler.views.bind import follow
-from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments, key_of
+from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.fonts import text_scale
 from gp_labeler.views.greys import greys_of
 from gp_labeler.views.hand import Hand
@@ -190,7 +189,8 @@ class SceneView(QWidget):
             follow(self, signal, self._show_points)
         for signal in (desk.replacing_changed, desk.tool_changed, desk.active_changed):
             follow(self, signal, self._show_cursor)
-        follow(self, desk.pose.overlay_changed, self._show_points)
+        for signal in (desk.pose.overlay_changed, desk.references.changed):
+            follow(self, signal, self._show_points)
         follow(self, desk.crosshair_changed, self._on_crosshair)
         follow(self, desk.point_shown, self.go_to)
         follow(self, desk.dragged, self._on_dragged)
@@ -257,7 +257,8 @@ class SceneView(QWidget):
         self._points_old = False
         drag = self._desk.drag
         dragged = "" if drag is None else key_of(drag.side, drag.code)
-        self.scene.marks.show([mark for mark in drawn_marks(self._desk) if mark.key != dragged])
+        marks = drawn_references(self._desk) + drawn_marks(self._desk)
+        self.scene.marks.show([mark for mark in marks if mark.key != dragged])
         self.scene.ghosts.show(drawn_ghosts(self._desk))
         self.scene.lines.show(drawn_segments(self._desk, theme_of(self).scene))
 

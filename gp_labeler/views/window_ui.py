@@ -152,6 +152,13 @@ class WindowUi(AtlasUi, PoseUi):
             else:
                 import_asking(self._desk, files, self.prompts)
 
+    def ask_references(self) -> None:
+        """Ask for landmark lists, and show their points as reference points."""
+        files = self.prompts.open_files("Show reference points", self._folder, _POINTS, many=True)
+        if files:
+            self._remember_folder(files[0])
+            self._desk.references.show(*files)
+
     def ask_export(self) -> None:
         """Ask for a folder, and write the landmarks of both sides into it."""
         if self._has_dialogs:

@@ -14,7 +14,7 @@ from gp_labeler.session.landmark_import import import_landmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
 from gp_labeler.session.specimen_file import SUFFIX
 
-__all__ = ["Details", "Export", "Import", "Save"]
+__all__ = ["Details", "Export", "Import", "Reference", "Save"]
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,28 @@ class Import(Step):
         )
         for note in notes:
             rig.desk.say(note, "warning")
+        rig.settle(in_passing=False)
+
+
+@dataclass(frozen=True)
+class Reference(Step):
+    """Show the points of landmark files as grey reference points, in place of those shown before.
+
+    Parameters
+    ----------
+    files : text or texts
+        Landmark files, under any names; none clears them.
+    """
+
+    do: ClassVar[str] = "reference"
+    files: tuple[str, ...] = ()
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        if self.files:
+            _ = rig.voxel  # a scan must be there
+            rig.desk.references.show(*[rig.to_read(file) for file in self.files])
+        else:
+            rig.desk.references.clear()
         rig.settle(in_passing=False)
 
 

@@ -75,6 +75,9 @@ class LandmarkImportDialog(QDialog):
         self.keep = QCheckBox("Keep points that are placed already; fill only what is to do")
         self.anyway = QCheckBox("Import nevertheless")
         self.anyway.toggled.connect(self._refresh)
+        self.show_only = QPushButton("Show as grey reference points instead")
+        self.show_only.setAutoDefault(False)
+        self.show_only.clicked.connect(self._show_references)
         self.cancel = QPushButton("Cancel")
         self.cancel.clicked.connect(self.reject)
         self.take = QPushButton("Import")
@@ -95,6 +98,7 @@ class LandmarkImportDialog(QDialog):
         column.setSpacing(10)
         column.addWidget(self._title)
         column.addLayout(self._findings)
+        column.addWidget(self.show_only, 0, Qt.AlignmentFlag.AlignLeft)
         column.addWidget(self.names)
         column.addWidget(self.anyway)
         self._choices = QWidget()
@@ -122,7 +126,9 @@ class LandmarkImportDialog(QDialog):
         """Read the files, and say what is in them."""
         self._misfit = ""
         self.anyway.setChecked(False)
-        self.names.show_names(self._unknown())
+        unknown = self._unknown()
+        self.names.show_names(unknown)
+        self.show_only.setVisible(bool(unknown))
         findings = [self._read(file) for file in self._files]
         self._n_wrong = sum(level == "error" for level, _ in findings)
         n = len(self._files)
@@ -166,6 +172,15 @@ class LandmarkImportDialog(QDialog):
         self.anyway.setVisible(bool(self._misfit))
         self.take.setEnabled(not self._n_wrong and (not self._misfit or self.anyway.isChecked()))
 
+    def _show_references(self) -> None:
+        """Leave the specimen as it is, and only show where their points are."""
+        try:
+            self._workbench.references.show(*self._files)
+        except GpError as error:
+            self._show([("error", str(error))])
+        else:
+            self.accept()
+
     def _import(self) -> None:
         session = self._workbench.session
         try:
@@ -197,6 +212,7 @@ class LandmarkImportDialog(QDialog):
         self._misfit = ""
         self._title.set_words("Imported, but look at this")
         self._choices.hide()
+        self.show_only.hide()
         self._show([("good", f"Now placed: {done}"), *(("warning", _sentence(note)) for note in notes)])
         self.take.hide()
         self.cancel.setText("Close")

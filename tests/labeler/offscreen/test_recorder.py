@@ -43,6 +43,7 @@ ACTION_STEPS = {
     **dict.fromkeys(("file.open", "file.open_folder", "file.demo", "file.find_scan", "file.new"), "open"),
     **dict.fromkeys(("file.save", "file.save_as"), "save"),
     "file.import": "import",
+    **dict.fromkeys(("file.show_references", "file.clear_references"), "reference"),
     "file.export": "export",
     "file.save_mesh": "mesh",
     "file.screenshot": "screenshot",
@@ -519,3 +520,16 @@ def test_a_recorder_lets_go_of_its_window(make_window) -> None:
     recorder.deleteLater()
     QCoreApplication.sendPostedEvents(recorder, QEvent.Type.DeferredDelete)
     assert len(desk.saved) == listening - 1
+
+
+def test_reference_points_are_written_and_cleared(recording) -> None:
+    file = recording.folder / "theirs.csv"
+    file.write_text("name,x,y,z\nApex,10,-20,30\n", encoding="utf-8")
+    recording.begin()
+    recording.window.ui.prompts.files = [file]
+    assert recording.run("file.show_references") == ["reference"]
+    assert recording.recorder.tables[-1]["files"] == [str(file)]
+    assert recording.run("file.clear_references") == ["reference"]
+    assert not recording.desk.references.points
+    place_three(recording)
+    recording.check()

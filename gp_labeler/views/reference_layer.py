@@ -1,0 +1,80 @@
+"""Reference points over a slice: grey, small and hollow, with their names."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from PySide6.QtCore import QObject
+from PySide6.QtGui import QPainter
+
+from gp_core.checks import FloatArray
+from gp_labeler.scene.colours import DARK
+from gp_labeler.scene.marks import Mark
+from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.views.bind import follow
+from gp_labeler.views.drawn import drawn_references
+from gp_labeler.views.marker_pictures import marker_picture
+from gp_labeler.views.slice_layers import SliceName
+from gp_labeler.views.slice_painter import reach_of
+from gp_labeler.workbench import Workbench
+
+if TYPE_CHECKING:
+    from gp_labeler.views.slice_view import SliceView
+
+__all__ = ["ReferenceLayer"]
+
+_RADIUS = 3.5
+_FADE = 0.65
+
+
+class ReferenceLayer(QObject):
+    """A layer of a slice view, beneath the landmarks.
+
+    Parameters
+    ----------
+    workbench : Workbench
+        Whose reference points.
+    view : SliceView
+        The view, which owns it.
+    """
+
+    def __init__(self, workbench: Workbench, view: SliceView) -> None:
+        super().__init__(view)
+        self._desk, self._view = workbench, view
+        view.layers.append(self)
+        follow(self, workbench.references.changed, self._repaint)
+
+    def _repaint(self) -> None:
+        self._view.update()
+
+    def paint(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+        """Paint those near the slice, in device pixels; `ratio` of them are a logical one."""
+        picture = marker_picture(
+            "inverted",
+            _RADIUS * ratio,
+            DARK.states["reference"],
+            full=False,
+            line=1.5 * ratio,
+            halo=3 * ratio,
+        )
+        painter.save()
+        for _, pixel, share in self._near(shown):
+            painter.setOpacity(1.0 - _FADE * share)
+            picture.draw(painter, pixel)
+        painter.restore()
+
+    def names(self, shown: Shown, ratio: float) -> list[SliceName]:
+        """Return their names, which give way to those of landmarks."""
+        colour = DARK.word("reference")
+        return [SliceName(mark.label, pixel, colour, 7.0, -1.0) for mark, pixel, _ in self._near(shown)]
+
+    def _near(self, shown: Shown) -> list[tuple[Mark, FloatArray, float]]:
+        """Return the points near the slice, their pixels, and how far off it they are: 0 on it, 1 at most."""
+        marks = drawn_references(self._desk)
+        if not marks or self._view.source is None:
+            return []
+        positions = np.array([mark.position for mark in marks])
+        pixels = shown.scan_to_pixel(positions) + 0.5
+        shares = np.abs(shown.off_slice(positions)) / reach_of(self._view.source, shown.plane)
+        return [(marks[n], pixels[n], float(shares[n])) for n in np.flatnonzero(shares <= 1.0)]
