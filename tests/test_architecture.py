@@ -13,7 +13,7 @@ import pytest
 
 _ROOT = Path(__file__).resolve().parents[1]
 _SOURCES = sorted(p for package in ("gp_core", "gp_labeler") for p in (_ROOT / package).rglob("*.py"))
-_LONGEST_FILE = 500
+_LONGEST_FILE = 700
 _LONGEST_FUNCTION = 60
 _INNER_ROOMS = ("files", "commands")
 """The map names them as a whole."""
