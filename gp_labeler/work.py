@@ -257,8 +257,8 @@ class MakeDemo:
 
     def run(self, progress: Progress) -> Demo:
         """Draw the animal and scan it."""
-        load_modules("scipy.ndimage", "scipy.interpolate", "gp_labeler.imaging.phantom")
-        from gp_labeler.imaging.phantom import make_phantom
+        load_modules("scipy.ndimage", "scipy.interpolate", "gp_labeler.phantom")
+        from gp_labeler.phantom import make_phantom
 
         told: Told = lambda fraction: progress(0.98 * fraction)  # noqa: E731
         phantom = make_phantom(self.seed, spacing=self.spacing, progress=told, cancel=progress.cancelled)

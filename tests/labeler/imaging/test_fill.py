@@ -15,11 +15,11 @@ from scipy.spatial.transform import Rotation
 from gp_core.errors import GpError
 from gp_labeler.imaging.fill import find_fill, replace_fill
 from gp_labeler.imaging.histogram import histogram_of, window_presets
-from gp_labeler.imaging.phantom import make_phantom
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.phantom import make_phantom
 
 SPACING = 0.5
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.phantom import grey
-from gp_labeler.imaging.phantom.canvas import Canvas
-from gp_labeler.imaging.phantom.cochlea import Cochlea
-from gp_labeler.imaging.phantom.layout import Ear, unit
-from gp_labeler.imaging.phantom.rim import Rim
-from gp_labeler.imaging.phantom.solids import (
+from gp_labeler.phantom import grey
+from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.cochlea import Cochlea
+from gp_labeler.phantom.layout import Ear, unit
+from gp_labeler.phantom.rim import Rim
+from gp_labeler.phantom.solids import (
     Solid,
     blend,
     cone,

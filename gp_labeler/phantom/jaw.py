@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from gp_labeler.imaging.phantom import grey
-from gp_labeler.imaging.phantom.canvas import Canvas
-from gp_labeler.imaging.phantom.layout import Ear, HeadLayout
-from gp_labeler.imaging.phantom.solids import Solid, sheet, tip_centre, tube, union
+from gp_labeler.phantom import grey
+from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.layout import Ear, HeadLayout
+from gp_labeler.phantom.solids import Solid, sheet, tip_centre, tube, union
 
 __all__ = ["paint_jaw"]
 

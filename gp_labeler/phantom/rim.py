@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.phantom.layout import unit
-from gp_labeler.imaging.phantom.solids import Grid, Solid, Values, component, moved, tube
+from gp_labeler.phantom.layout import unit
+from gp_labeler.phantom.solids import Grid, Solid, Values, component, moved, tube
 
 __all__ = ["Rim"]
 

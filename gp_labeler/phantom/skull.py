@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.phantom import grey
-from gp_labeler.imaging.phantom.canvas import Canvas
-from gp_labeler.imaging.phantom.layout import Ear, HeadLayout, unit
-from gp_labeler.imaging.phantom.loft import roof_heights, skin, skull_body
-from gp_labeler.imaging.phantom.solids import (
+from gp_labeler.phantom import grey
+from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.layout import Ear, HeadLayout, unit
+from gp_labeler.phantom.loft import roof_heights, skin, skull_body
+from gp_labeler.phantom.solids import (
     Grid,
     Solid,
     Values,

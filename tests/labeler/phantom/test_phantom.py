@@ -11,9 +11,9 @@ from gp_core.atlas.draw import draw_animal, mean_animal
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.files.markups import read_markups
-from gp_labeler.imaging.phantom import make_phantom, write_phantom
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.threshold import propose_threshold
+from gp_labeler.phantom import make_phantom, write_phantom
 
 BONE = 21_000.0
 PLACED = [code for code in CODES if code != "CO"]

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.phantom.solids import Grid, Solid, Values
 from gp_labeler.imaging.progress import Report
+from gp_labeler.phantom.solids import Grid, Solid, Values
 
 __all__ = ["Canvas"]
 

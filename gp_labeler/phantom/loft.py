@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.checks import FloatArray
-from gp_labeler.imaging.phantom.layout import HeadLayout
-from gp_labeler.imaging.phantom.solids import Grid, Solid, Values, component, implicit, moved
+from gp_labeler.phantom.layout import HeadLayout
+from gp_labeler.phantom.solids import Grid, Solid, Values, component, implicit, moved
 
 __all__ = ["roof_heights", "skin", "skull_body"]
 

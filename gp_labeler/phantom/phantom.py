@@ -18,20 +18,20 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.files.markups import write_markups
 from gp_core.landmarks.sets import Specimen
-from gp_labeler.imaging.phantom import grey
-from gp_labeler.imaging.phantom.canvas import Canvas
-from gp_labeler.imaging.phantom.ear import paint_ear, pinna
-from gp_labeler.imaging.phantom.jaw import paint_jaw
-from gp_labeler.imaging.phantom.layout import HeadLayout
-from gp_labeler.imaging.phantom.loft import skin
-from gp_labeler.imaging.phantom.skull import (
+from gp_labeler.imaging.progress import Progress, Report
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.phantom import grey
+from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.ear import paint_ear, pinna
+from gp_labeler.phantom.jaw import paint_jaw
+from gp_labeler.phantom.layout import HeadLayout
+from gp_labeler.phantom.loft import skin
+from gp_labeler.phantom.skull import (
     paint_arches,
     paint_skin,
     paint_skull,
     paint_upper_teeth,
 )
-from gp_labeler.imaging.progress import Progress, Report
-from gp_labeler.imaging.volume import Volume
 
 __all__ = ["Phantom", "make_phantom", "write_phantom"]
 
