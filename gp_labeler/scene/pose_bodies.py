@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from vtkmodules.vtkCommonDataModel import vtkPolyData
-from vtkmodules.vtkFiltersCore import vtkPolyDataNormals
-from vtkmodules.vtkFiltersSources import vtkConeSource, vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor
 
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
-from gp_labeler.imaging.vtk_arrays import cells_of, matrix_of, points_of
-from gp_labeler.scene.coil import Tube, cochlea_tubes
+from gp_labeler.imaging.mean_cochlea import cochlea_tubes
+from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.ghosts import RADIUS_95
 from gp_labeler.scene.pose_data import AXIS_MM, DrawnPose, PoseScene
 from gp_labeler.scene.stage import Stage, release, solid_actor
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 __all__ = ["PoseBodies"]
 
@@ -33,9 +35,15 @@ class PoseBodies:
     """
 
     def __init__(self, stage: Stage) -> None:
+        import pyvista as pv  # takes 0.6 s: not before there is an estimate to draw
+
         self._stage = stage
-        self._meshes = {side: [_mesh(tube) for tube in cochlea_tubes(side)] for side in Side}
-        shapes = {"region": _ball(), "cone": _cone(), "duct": vtkPolyData(), "core": vtkPolyData()}
+        duct, core = cochlea_tubes(Side.LEFT)
+        ball = pv.Sphere(radius=1.0, theta_resolution=40, phi_resolution=24)
+        cone = pv.Cone(  # from its apex in the origin to a rim of radius 1 about x = 1
+            center=(0.5, 0.0, 0.0), direction=(-1.0, 0.0, 0.0), radius=1.0, resolution=48, capping=False
+        )
+        shapes = {"region": ball, "cone": cone, "duct": duct, "core": core}
         self._actors = {name: self._add(shape) for name, shape in shapes.items()}
 
     def show(self, pose: DrawnPose | None, scene: PoseScene) -> None:
@@ -44,7 +52,7 @@ class PoseBodies:
             actor.SetVisibility(pose is not None and scene.shows(_PARTS[name]) and scene.opacity > 0)
         if pose is None:
             return
-        duct, core = self._meshes[pose.side]
+        duct, core = cochlea_tubes(pose.side)
         self._actors["duct"].GetMapper().SetInputDataObject(duct)
         self._actors["core"].GetMapper().SetInputDataObject(core)
         radius = pose.cone_radius
@@ -64,7 +72,7 @@ class PoseBodies:
             release(self._stage.overlay, actor)
         self._actors = {}
 
-    def _add(self, shape: vtkPolyData) -> vtkActor:
+    def _add(self, shape: pv.PolyData) -> vtkActor:
         actor = solid_actor(shape, self._stage.colours.states["pose"])
         actor.VisibilityOff()
         actor.GetProperty().SetAmbient(0.3)
@@ -72,41 +80,6 @@ class PoseBodies:
         actor.GetProperty().BackfaceCullingOn()
         self._stage.overlay.AddActor(actor)
         return actor
-
-
-def _mesh(tube: Tube) -> vtkPolyData:
-    data = vtkPolyData()
-    data.SetPoints(points_of(tube.points.copy()))
-    data.SetPolys(cells_of(tube.triangles.copy()))
-    normals = vtkPolyDataNormals()
-    normals.SetInputData(data)
-    normals.SplittingOff()
-    normals.Update()
-    mesh: vtkPolyData = normals.GetOutput()
-    return mesh
-
-
-def _ball() -> vtkPolyData:
-    source = vtkSphereSource()
-    source.SetRadius(1.0)
-    source.SetThetaResolution(40)
-    source.SetPhiResolution(24)
-    source.Update()
-    solid: vtkPolyData = source.GetOutput()
-    return solid
-
-
-def _cone() -> vtkPolyData:
-    """Return the cone from its apex in the origin to a rim of radius 1 about x = 1."""
-    source = vtkConeSource()
-    source.SetResolution(48)
-    source.SetCapping(False)
-    source.SetCenter(0.5, 0.0, 0.0)
-    source.SetDirection(-1.0, 0.0, 0.0)
-    source.SetRadius(1.0)
-    source.Update()
-    solid: vtkPolyData = source.GetOutput()
-    return solid
 
 
 def _ellipsoid(pose: DrawnPose) -> FloatArray:

@@ -11,7 +11,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from gp_core.checks import FloatArray
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_vtk
-from gp_labeler.scene.pose_solids import SHAPES
+from gp_labeler.scene.pose_solids import solid_mesh
 from gp_labeler.scene.stage import Stage, release
 
 __all__ = ["SolidActor"]
@@ -20,8 +20,8 @@ __all__ = ["SolidActor"]
 class SolidActor:
     """Draws solids: full where they are seen, fainter where bone hides them.
 
-    They are laid out anew as one mesh whenever they change: for a hundred solids of a few corners that is
-    several times faster than VTK's own glyphs.
+    They are laid out anew as one mesh whenever they change. The glyph filter of VTK and pyvista scales a
+    glyph by one number, while a rod that grows longer keeps its thickness.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class SolidActor:
         colours : (N, 3) uint8 array
             Red, green, blue.
         shapes : (N,) int array
-            Which of `SHAPES`.
+            Which solid, see `pose_solids`.
         opacity : float
             From 0 to 1.
         """
@@ -95,13 +95,13 @@ class SolidActor:
         colours: NDArray[np.uint8],
     ) -> tuple[Any, Any, Any, Any]:
         """Return points, normals, colours and triangles of all solids of one shape."""
-        solid, size, turn = SHAPES[shape], sizes[chosen][:, None], turns[chosen].transpose(0, 2, 1)
+        solid, size, turn = solid_mesh(shape), sizes[chosen][:, None], turns[chosen].transpose(0, 2, 1)
         points = (solid.points * size) @ turn + places[chosen][:, None]
-        normals = solid.normals / size
+        normals = solid.point_normals / size
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
         normals = normals @ turn
         n, k = points.shape[:2]
-        triangles = solid.triangles[None] + k * np.arange(n)[:, None, None]
+        triangles = solid.regular_faces[None] + k * np.arange(n)[:, None, None]
         paint = np.repeat(colours[chosen], k, axis=0)
         return points.reshape(-1, 3), normals.reshape(-1, 3), paint, triangles.reshape(-1, 3)
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
+from gp_labeler.imaging.mean_cochlea import duct_curve
 from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.coil import duct_curve
 from gp_labeler.scene.ghosts import ellipse
 from gp_labeler.scene.pose_data import DrawnPose
 

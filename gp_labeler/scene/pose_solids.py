@@ -2,99 +2,43 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from functools import cache
+from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
+if TYPE_CHECKING:
+    import pyvista as pv
 
-from gp_core.checks import FloatArray
-
-__all__ = ["BALL", "CUBE", "DIAMOND", "HEAD", "ROD", "SHAPES", "Shape"]
+__all__ = ["BALL", "CUBE", "DIAMOND", "HEAD", "ROD", "solid_mesh"]
 
 ROD, HEAD, BALL, DIAMOND, CUBE = range(5)
-"""Numbers of `SHAPES`: a rod begins at its place and a head ends there; the others lie about theirs."""
+"""A rod begins at its place and a head ends there; the others lie about theirs."""
 
-_SIDES = 12
+_SHARP_DEG = 45.0
+"""Edges sharper than this are drawn as edges, others smoothly."""
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
-    """A solid.
+@cache
+def solid_mesh(shape: int) -> pv.PolyData:
+    """Return triangles with outward normals, a corner repeated for each flat face that meets there.
 
     Parameters
     ----------
-    points, normals : (N, 3) float array
-        Corners, once for each face that is flat.
-    triangles : (T, 3) int array
-        Numbers of corners.
+    shape : int
+        ``ROD``, ``HEAD``, ``BALL``, ``DIAMOND`` or ``CUBE``.
     """
+    import pyvista as pv  # takes 0.6 s: not before the window shows
 
-    points: FloatArray
-    normals: FloatArray
-    triangles: NDArray[np.int64]
-
-
-def _lathe(profile: FloatArray, sides: int = _SIDES) -> Shape:
-    """Turn the outline (P, 2), along and across, about x; a point that comes twice makes an edge."""
-    turn = np.linspace(0, 2 * np.pi, sides + 1)
-    round_x = np.stack([np.zeros(sides + 1), np.cos(turn), np.sin(turn)], axis=1)
-    points = profile[:, None, :1] * np.eye(3)[0] + profile[:, None, 1:] * round_x
-    steps = np.diff(profile, axis=0)
-    out = np.stack([-steps[:, 1], steps[:, 0]], axis=1)
-    flat = np.linalg.norm(steps, axis=1) < 1e-9
-    before = np.concatenate([out[:1], out])
-    after = np.concatenate([out, out[-1:]])
-    start, end = np.append(flat, False), np.insert(flat, 0, False)
-    slope = np.where(start[:, None], before, np.where(end[:, None], after, before + after))
-    slope /= np.linalg.norm(slope, axis=1, keepdims=True)
-    normals = slope[:, None, :1] * np.eye(3)[0] + slope[:, None, 1:] * round_x
-    rows = (sides + 1) * np.flatnonzero(~flat)[:, None] + np.arange(sides)
-    a, b, c, d = rows, rows + 1, rows + sides + 2, rows + sides + 1
-    triangles = np.concatenate([np.stack([a, b, c], -1), np.stack([a, c, d], -1)]).reshape(-1, 3)
-    return _outward(points.reshape(-1, 3), normals.reshape(-1, 3), triangles.astype(np.int64))
-
-
-def _faceted(corners: FloatArray, faces: NDArray[np.int64]) -> Shape:
-    points = corners[faces]
-    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
-    normals *= np.sign((normals * points.mean(axis=1)).sum(axis=1))[:, None]
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    numbers = np.arange(points.size // 3, dtype=np.int64).reshape(-1, 3)
-    return _outward(points.reshape(-1, 3), np.repeat(normals, 3, axis=0), numbers)
-
-
-def _outward(points: FloatArray, normals: FloatArray, triangles: NDArray[np.int64]) -> Shape:
-    """Turn every triangle so that it faces outward, and drop those without area."""
-    a, b, c = points[triangles.T]
-    facing = np.cross(b - a, c - a)
-    whole = np.linalg.norm(facing, axis=1) > 1e-9
-    inward = (facing * normals[triangles].sum(axis=1)).sum(axis=1) < 0
-    turned = np.where(inward[:, None], triangles[:, ::-1], triangles)[whole]
-    return Shape(points, normals, turned)
-
-
-def _ball() -> Shape:
-    turn = np.linspace(np.pi, 0, 11)
-    return _lathe(0.5 * np.stack([np.cos(turn), np.sin(turn)], axis=1), 16)
-
-
-def _diamond() -> Shape:
-    corners = 0.5 * np.concatenate([np.eye(3), -np.eye(3)])
-    faces = np.array([[x, y, z] for x in (0, 3) for y in (1, 4) for z in (2, 5)], dtype=np.int64)
-    return _faceted(corners, faces)
-
-
-def _cube() -> Shape:
-    corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    squares = ((0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3))
-    faces = np.array([[a, b, c] for a, b, c, d in squares] + [[a, c, d] for a, b, c, d in squares])
-    return _faceted(corners, faces.astype(np.int64))
-
-
-SHAPES = (
-    _lathe(np.array([[0, 0], [0, 0.5], [0, 0.5], [1, 0.5], [1, 0.5], [1, 0]])),
-    _lathe(np.array([[-1, 0], [-1, 0.5], [-1, 0.5], [0, 0]]), 20),
-    _ball(),
-    _diamond(),
-    _cube(),
-)
+    x, middle, back = (1.0, 0.0, 0.0), (0.5, 0.0, 0.0), (-0.5, 0.0, 0.0)
+    make: dict[int, Callable[[], pv.PolyData]] = {
+        ROD: lambda: pv.Cylinder(center=middle, direction=x, radius=0.5, height=1.0, resolution=12),
+        HEAD: lambda: pv.Cone(center=back, direction=x, radius=0.5, height=1.0, resolution=20),
+        BALL: lambda: pv.Sphere(radius=0.5, theta_resolution=16, phi_resolution=12, direction=x),
+        DIAMOND: lambda: pv.Octahedron(radius=0.5).rotate_z(45.0),
+        CUBE: lambda: pv.Cube(),
+    }
+    mesh: pv.PolyData = make[shape]().triangulate()
+    smooth: pv.PolyData = mesh.compute_normals(
+        cell_normals=False, split_vertices=True, feature_angle=_SHARP_DEG, auto_orient_normals=True
+    )
+    return smooth

@@ -8,7 +8,8 @@ from pose_cases import pose
 
 from gp_core import Atlas, Side
 from gp_labeler.imaging.coil import _monotone
-from gp_labeler.scene.coil import BASE_MM, COIL, cochlea_tubes, duct_curve, section
+from gp_labeler.imaging.mean_cochlea import BASE_MM, COIL, cochlea_tubes, duct_curve
+from gp_labeler.scene.coil import section
 
 
 def test_it_winds_three_and_a_half_times_about_the_axis_and_narrows() -> None:
@@ -40,10 +41,11 @@ def test_a_right_ear_is_the_mirror_image() -> None:
 @pytest.mark.parametrize("side", list(Side))
 def test_tubes_are_closed_and_face_outward(side) -> None:
     for tube in cochlea_tubes(side):
-        corners = tube.points[tube.triangles]
+        triangles = tube.regular_faces
+        corners = tube.points[triangles].astype(float)
         volume = np.einsum("ij,ij->", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6
         assert volume > 1.0
-        edges = np.sort(np.concatenate([tube.triangles[:, k] for k in ([0, 1], [1, 2], [2, 0])]), axis=1)
+        edges = np.sort(np.concatenate([triangles[:, k] for k in ([0, 1], [1, 2], [2, 0])]), axis=1)
         assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
 
 

@@ -28,7 +28,7 @@ from pose_cases import (
 from PySide6.QtGui import QImage, QPainter
 
 from gp_core.landmarks.features import Side
-from gp_labeler.scene.coil import duct_curve
+from gp_labeler.imaging.mean_cochlea import duct_curve
 from gp_labeler.scene.colours import DARK, rgb
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import PARTS, PoseScene
