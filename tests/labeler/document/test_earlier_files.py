@@ -1,0 +1,68 @@
+"""Specimen files, journals and recorded scripts that earlier versions wrote still open, with all they hold.
+
+The files under ``earlier`` were written by those versions themselves, on phantom data; ``expected.json`` is
+what they hold, as it is saved today.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gp_labeler.offscreen.runner import run_script
+from gp_labeler.offscreen.script import read_script
+from gp_labeler.session.document import document_of
+from gp_labeler.session.opening import open_session, recover_session
+from gp_labeler.session.places import journal_folder
+from gp_labeler.session.recovery import find_recoveries
+
+EARLIER = Path(__file__).parent / "earlier"
+EXPECTED = json.loads((EARLIER / "expected.json").read_text())
+
+
+def plain(document: dict[str, Any]) -> dict[str, Any]:
+    return json.loads(json.dumps(document))
+
+
+def untimed(value: Any) -> Any:
+    """Without when it was done, and without what is computed: how far from bone, and the estimate itself."""
+    if isinstance(value, dict):
+        left_out = ("time", "pose", "bone_distance_mm", "checksum")
+        return {key: untimed(each) for key, each in value.items() if key not in left_out}
+    return [untimed(each) for each in value] if isinstance(value, list) else value
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_specimen_files_open(version):
+    session = open_session(EARLIER / f"specimen_{version}.gpspecimen.json")
+    assert plain(document_of(session.state)) == EXPECTED[f"specimen_{version}"]
+    assert bool(session.notices) == (version < 3)  # an accepted ghost is a suggestion now, and that is said
+
+
+@pytest.mark.parametrize("version", [1, 2, 3])
+def test_journals_are_recovered_and_undo_works_back_to_what_was_saved(version, tmp_path):
+    folder = journal_folder(tmp_path)
+    folder.mkdir(parents=True)
+    shutil.copy(EARLIER / f"journal_{version}.jsonl", folder)
+    (recovery,) = find_recoveries(tmp_path)
+    assert not recovery.content.damage
+    session = recover_session(recovery, tmp_path)
+    assert plain(document_of(session.state)) == EXPECTED[f"journal_{version}"]
+    texts = []
+    while (text := session.undo_text) is not None:
+        texts.append(text)
+        assert session.undo()
+    assert texts == EXPECTED[f"undo_{version}"]
+    assert plain(document_of(session.state)) == EXPECTED[f"specimen_{version}"]
+    session.close(discard=True)
+
+
+def test_recorded_scripts_run(tmp_path, qapp):
+    report = run_script(read_script(EARLIER / "recorded.toml"), tmp_path)
+    assert report.ok, report.error
+    found = json.loads((tmp_path / "recorded.gpspecimen.json").read_text())
+    assert untimed(found) == EXPECTED["recorded"]
