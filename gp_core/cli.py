@@ -8,6 +8,7 @@ import sys
 from collections.abc import Sequence
 
 from gp_core import __version__
+from gp_core.command_line import CommandParser
 from gp_core.commands import (
     conditions,
     estimate,
@@ -40,7 +41,7 @@ _COMMANDS = (
 
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser with all commands."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="gp-core",
         description="Atlas of guinea-pig ear landmarks, and cochlea poses from touched points.",
     )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from gp_core import __version__
+from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
 from gp_core.terminal import leave_output, plain_terminal
 from gp_labeler.export_command import run_export
@@ -32,7 +33,7 @@ _EXAMPLE = """examples:
 
 def make_parser() -> argparse.ArgumentParser:
     """Return the parser of the window's command line."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="gp-labeler",
         description="Label guinea-pig heads in micro-CT.",
         epilog=_EXAMPLE,
@@ -111,6 +112,7 @@ def _refuse(error: GpError) -> int:
 
 
 def _window(args: argparse.Namespace) -> int:
+    _check_together(args)
     if args.offscreen is not None:
         from gp_labeler.offscreen.command import run_offscreen
 
@@ -122,6 +124,20 @@ def _window(args: argparse.Namespace) -> int:
     from gp_labeler.views.application import run_window  # here: `--help` need not wait for Qt and VTK
 
     return run_window(args.path, demo=args.demo, directory=args.state)
+
+
+def _check_together(args: argparse.Namespace) -> None:
+    """Refuse words that would be ignored."""
+    if args.offscreen is None:
+        for option, value in (("--output", args.output), ("--specimens", args.specimens)):
+            if value:
+                raise GpError(f"{option} is for a script", remedy="Give --offscreen SCRIPT, or leave it out.")
+        if args.demo and args.path is not None:
+            raise GpError("--demo opens the synthetic head, and a path was given too", remedy="Give one.")
+        return
+    for option, value in (("--demo", args.demo), ("--state", args.state), (f"{args.path}", args.path)):
+        if value:
+            raise GpError(f"{option} is for the window, not for --offscreen", remedy="Leave it out.")
 
 
 if __name__ == "__main__":

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import json
 import os
 import platform
@@ -17,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from gp_core import __version__
+from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
 from gp_labeler.installation import INSTALL, check_display, explain_import
 from gp_labeler.system_libraries import advice, missing
@@ -58,7 +58,7 @@ def run_doctor(arguments: Sequence[str]) -> int:
     int
         0; 2 where something is wrong.
     """
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="gp-labeler doctor",
         description="Print what this machine has: versions, system libraries, display, OpenGL, fonts, state "
         "folder; and what is wrong. Ends with 0, or with 2 where something is wrong.",

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
 
 __all__ = ["make_export_parser", "run_export"]
@@ -22,7 +23,7 @@ out. --suggested writes them too, into <specimen>_L_suggested.mrk.json and _R_.
 
 def make_export_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler export``."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="gp-labeler export",
         description="Write the landmarks of specimens as files for 3D Slicer and gp-core.",
         epilog=_EXAMPLE,

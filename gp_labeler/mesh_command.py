@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
 
@@ -24,7 +25,7 @@ Where a scan does not say all that is needed, the error names the option that se
 
 def make_mesh_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler mesh``."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="gp-labeler mesh",
         description="Write the bone surface of a scan, LPS mm.",
         epilog=_EXAMPLE,

@@ -41,6 +41,9 @@ HELD_BACK = 3
 _FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
 """Options whose files carry a pose without its doubts."""
 
+_OF_A_PATH = ("path_units", "path_side", "path_axes", "path_rows", "path_out")
+_AXES = "x,y,z"
+
 _TAKEN_FOR_SURE = 0.995
 """Probability from which a reading that the program chose itself is beyond doubt."""
 
@@ -135,7 +138,6 @@ def _add_path(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--path-side", choices=("L", "R"), help="the ear it was drawn for; must be said")
     group.add_argument(
         "--path-axes",
-        default="x,y,z",
         metavar="AXES",
         help="which of its axes are x, y and z of the cochlea frame, such as z,-y,x; default: x,y,z",
     )
@@ -276,8 +278,11 @@ def _asides(
 def _path_of(args: argparse.Namespace) -> FloatArray | None:
     """Return the insertion path that was given, once all is said that must be."""
     if args.path is None:
-        if args.path_out or args.path_side or args.path_units:
-            raise GpError("--path-out, --path-side and --path-units need a path", remedy="Give --path CSV.")
+        given = [name for name in _OF_A_PATH if getattr(args, name) is not None]
+        if given:
+            options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
+            verb = "needs" if len(given) == 1 else "need"
+            raise GpError(f"{options} {verb} a path", remedy="Give --path CSV.")
         return None
     missing = [
         option
@@ -290,7 +295,7 @@ def _path_of(args: argparse.Namespace) -> FloatArray | None:
     ]
     if missing:
         raise GpError(f"an insertion path needs {' and '.join(missing)} too", file=args.path)
-    return read_path(args.path, units=args.path_units, axes=args.path_axes, rows=args.path_rows)
+    return read_path(args.path, units=args.path_units, axes=args.path_axes or _AXES, rows=args.path_rows)
 
 
 def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain] = ()) -> Iterator[str]:

@@ -16,6 +16,7 @@ from gp_core.commands.options import (
     add_command,
     add_json,
     add_specimens,
+    check_ending,
     lab_names,
     labelled_specimens,
     read_atlas,
@@ -65,6 +66,7 @@ def add(commands: Subparsers) -> None:
     mat.add_argument("left", metavar="CC_L.mat", help="sets of the left side, variable cc_L")
     mat.add_argument("right", metavar="CC_R.mat", help="sets of the right side, variable cc_R")
     mat.add_argument("-o", "--output", required=True, metavar="DIR", help="folder to write to")
+    mat.add_argument("--replace", action="store_true", help="replace files of the same names")
     check = add_command(
         commands,
         "check",
@@ -82,6 +84,7 @@ def add(commands: Subparsers) -> None:
 
 def run_fit(args: argparse.Namespace) -> int:
     """Fit, write, and say what the atlas holds."""
+    check_ending(args.output, (".json",), "--output")
     specimens = labelled_specimens(args)
     screened = screen_labels(specimens)
     if args.keep_doubtful:
@@ -132,7 +135,7 @@ def _fit_report(atlas: Atlas, screened: Screened, *, kept: bool) -> dict[str, An
 
 def run_import_mat(args: argparse.Namespace) -> int:
     """Convert and say what was written."""
-    written = import_mat(args.left, args.right, args.output)
+    written = import_mat(args.left, args.right, args.output, overwrite=args.replace)
     say(f"{len(written)} landmark files in {args.output}")
     return 0
 

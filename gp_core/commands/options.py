@@ -25,6 +25,7 @@ __all__ = [
     "add_json",
     "add_names",
     "add_specimens",
+    "check_ending",
     "keeping_inputs",
     "lab_names",
     "labelled_specimens",
@@ -38,6 +39,15 @@ Subparsers = Any
 
 _WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output", "checkpoint")
 """Names of the options whose files are written; every other word that is a file is read."""
+
+_ENDINGS = {
+    "json": (".json",),
+    "tfm": (".tfm", ".txt"),
+    "csv": (".csv", ".txt"),
+    "landmarks": (".mrk.json", ".json"),
+    "path_out": (".csv", ".txt"),
+}
+"""How the names of these files may end, so that whatever reads them knows what they are."""
 
 _ANOTHER = "Name another file."
 
@@ -115,8 +125,23 @@ def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
             if path in written and not is_stream(word):
                 problem = f"would be written by {written[path]} and {option}"
                 raise GpError(problem, file=word, remedy=_ANOTHER)
+            check_ending(word, _ENDINGS.get(name, ()), option)
             written[path] = option
         yield
+
+
+def check_ending(word: str, endings: tuple[str, ...], option: str) -> None:
+    """Refuse the name of a file to write that ends as another kind of file does.
+
+    Raises
+    ------
+    GpError
+        It ends, but in none of `endings`, if there are any; a name without an ending is taken, and a stream.
+    """
+    wrong = Path(word).suffix and not word.lower().endswith(endings)
+    if endings and wrong and not is_stream(word):
+        problem = f"{option} writes a {endings[0]} file, and this name ends in {Path(word).suffix}"
+        raise GpError(problem, file=word, remedy=f"Let it end in {' or '.join(endings)}.")
 
 
 def _files_read(args: argparse.Namespace) -> Iterator[str | Path]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from gp_core.checks import FloatArray
-from gp_core.commands.options import Subparsers, add_command, say
+from gp_core.commands.options import Subparsers, add_command, check_ending, say
 from gp_core.disk import read_json, write_text
 from gp_core.errors import FeatureError, FileFormatError, GpError, blaming
 from gp_core.landmarks.features import CODES, EXTERNAL, PROBE
@@ -61,6 +61,7 @@ def add_transforms(parser: argparse.ArgumentParser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Find the touches, write them, and say where they are."""
+    check_ending(args.output, (".csv",), "--output")
     recording = read_recording(args.recording, transform=args.transform, reference=args.reference)
     names = [_touched_name(name) for name in args.order.split(",") if name.strip()]
     with blaming(args.recording):

@@ -21,6 +21,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.draw import draw_animal
 from gp_core.checks import FloatArray
+from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, read_bytes, write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -179,7 +180,7 @@ def _listed(points: dict[str, FloatArray]) -> dict[str, list[float]]:
 
 def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
     """Return the parser of the simulator's command line."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog=prog,
         description="Serve a simulated tracked probe over OpenIGTLink, on this computer only.",
         epilog=_COMMANDS,

@@ -181,3 +181,55 @@ def test_check_takes_the_side_of_one_odd_file(tmp_path: Path, capsys: pytest.Cap
     assert "--side is for one file, got 2" in _error(["check", str(odd), str(odd), "--side", "R"], capsys)
     write_csv(tmp_path / "A_L.csv", animal.side("L"))
     assert "is the left side" in _error(["check", str(tmp_path / "A_L.csv"), "--side", "R"], capsys)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ([], "gp-core: the following arguments are required: COMMAND. See gp-core --help."),
+        (
+            ["estimate", "a.csv"],
+            "gp-core: the following arguments are required: --side. See gp-core estimate --help.",
+        ),
+        (["estimate", "a.csv", "--side", "X"], "gp-core: argument --side: invalid choice: 'X'"),
+        (
+            ["check", "a.csv", "--colour\n\x1b[31m"],
+            "gp-core: unrecognized arguments: --colour \\x1b[31m. See",
+        ),
+    ],
+    ids=str,
+)
+def test_a_wrong_command_line_is_refused_in_one_line(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(words)
+    error = capsys.readouterr().err
+    assert ended.value.code == 2
+    assert error.startswith(said)
+    assert error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "option",
+    [["--path-rows", "3"], ["--path-axes", "z,y,x"], ["--path-units", "mm"], ["--path-out", "a.csv"]],
+    ids=str,
+)
+def test_no_option_of_a_path_is_passed_over(
+    option: list[str], touches: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    error = _error(["estimate", str(touches), "--side", "L", *option], capsys)
+    assert error == f"gp-core: {option[0]} needs a path. Give --path CSV.\n"
+
+
+@pytest.mark.parametrize(
+    ("option", "name"),
+    [("--json", "pose.tfm"), ("--tfm", "pose.json"), ("--csv", "pose.JSON"), ("--landmarks", "a.fcsv")],
+)
+def test_no_result_takes_the_name_of_another_kind(
+    option: str, name: str, touches: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / name
+    error = _error(["estimate", str(touches), "--side", "L", option, str(file)], capsys)
+    assert error.startswith(f"gp-core: {file}: {option} writes a ")
+    assert not file.exists()

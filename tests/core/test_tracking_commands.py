@@ -89,7 +89,7 @@ def test_estimate_says_when_nothing_is_left_to_gain(
     [
         (["--path", "PATH"], "needs --path-units m|cm|mm|um and --path-side L|R and --path-out FILE too"),
         (["--path", "PATH", "--path-units", "mm", "--path-side", "L"], "needs --path-out FILE too"),
-        (["--path-side", "L"], "need a path. Give --path CSV."),
+        (["--path-side", "L"], "needs a path. Give --path CSV."),
         (
             ["--path", "PATH", "--path-units", "m", "--path-side", "L", "--path-out", "o.csv"],
             "Its numbers look like mm",

@@ -123,3 +123,21 @@ def test_a_simulated_tracker_is_one_command_away(capsys) -> None:
         main(["simulate-tracker", "--help"])
     assert ended.value.code == 0
     assert "gp-labeler simulate-tracker" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--output", "out"],
+        ["--specimens", "a"],
+        ["head.nrrd", "--demo"],
+        ["--offscreen", "demo", "--output", "out", "--demo"],
+        ["head.nrrd", "--offscreen", "demo", "--output", "out"],
+    ],
+    ids=" ".join,
+)
+def test_no_word_is_passed_over(words, capsys) -> None:
+    assert main(words) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("gp-labeler: ")
+    assert error.count("\n") == 1

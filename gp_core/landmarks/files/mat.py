@@ -52,16 +52,29 @@ def read_authors_mat(path_left: str | PathLike[str], path_right: str | PathLike[
 
 
 def import_mat(
-    path_left: str | PathLike[str], path_right: str | PathLike[str], directory: str | PathLike[str]
+    path_left: str | PathLike[str],
+    path_right: str | PathLike[str],
+    directory: str | PathLike[str],
+    *,
+    overwrite: bool = False,
 ) -> list[Path]:
     """Write the authors' sets as landmark JSON, a file a side, and return the files.
+
+    Parameters
+    ----------
+    path_left, path_right : path
+        The authors' sets of each side.
+    directory : path
+        Where to write; made if it is missing.
+    overwrite : bool
+        Replace files of the same names, which may be somebody's corrected labels.
 
     Raises
     ------
     FileFormatError
         See `read_authors_mat`.
     GpError
-        The folder cannot be made or written.
+        The folder cannot be made or written, or a file is there already.
     """
     specimens = read_authors_mat(path_left, path_right)
     folder = Path(directory)
@@ -69,19 +82,19 @@ def import_mat(
         folder.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:
         raise GpError(f"cannot be made a folder ({error})", file=folder, remedy="Name another.") from None
-    written = []
-    for specimen in specimens:
-        for side, landmarks in specimen.sides.items():
-            file = folder / landmark_file_name(specimen.name, side)
-            source = Path(path_left if side is Side.LEFT else path_right).name
-            write_markups(
-                file,
-                landmarks,
-                specimen=specimen.name,
-                provenance={code: {"method": "imported", "source": source} for code in landmarks.placed},
-            )
-            written.append(file)
-    return written
+    files = {
+        folder / landmark_file_name(specimen.name, side): (specimen.name, landmarks)
+        for specimen in specimens
+        for side, landmarks in specimen.sides.items()
+    }
+    if not overwrite and (there := next((file for file in files if file.exists()), None)):
+        remedy = "Name an empty folder, or replace what is there (--replace)."
+        raise GpError("is there already", file=there, remedy=remedy)
+    for file, (name, landmarks) in files.items():
+        source = Path(path_left if landmarks.side is Side.LEFT else path_right).name
+        provenance = {code: {"method": "imported", "source": source} for code in landmarks.placed}
+        write_markups(file, landmarks, specimen=name, provenance=provenance)
+    return list(files)
 
 
 def _read_sets(path: str | PathLike[str], side: Side) -> list[LandmarkSet]:

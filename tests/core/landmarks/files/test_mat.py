@@ -138,3 +138,16 @@ def test_a_folder_that_cannot_be_made_is_named(made_up, tmp_path):
     (tmp_path / "taken").write_text("a file")
     with pytest.raises(GpError, match="cannot be made a folder"):
         import_mat(made_up[0], made_up[1], tmp_path / "taken")
+
+
+def test_labels_that_are_there_already_are_not_replaced_unasked(made_up, tmp_path):
+    left, right, *_ = made_up
+    first, *_ = written = import_mat(left, right, tmp_path)
+    first.write_text("corrected by hand")
+    written[-1].unlink()
+    with pytest.raises(GpError, match=r"_L\.mrk\.json: is there already.*--replace"):
+        import_mat(left, right, tmp_path)
+    assert first.read_text() == "corrected by hand"
+    assert not written[-1].exists()  # nothing was written before it was refused
+    assert import_mat(left, right, tmp_path, overwrite=True) == written
+    assert first.read_text() != "corrected by hand"
