@@ -32,8 +32,8 @@ from gp_core import (  # noqa: E402
     gains,
     load_specimens,
 )
-from gp_core.atlas.draw import draw_animal  # noqa: E402
-from gp_core.commands.conditions import condition_lines  # noqa: E402
+from gp_core.atlas.sampling import draw_animal  # noqa: E402
+from gp_core.cli.conditions import condition_lines  # noqa: E402
 from gp_core.frames import angle_between_deg  # noqa: E402
 from gp_core.landmarks.anatomy import with_cochlea_origin  # noqa: E402
 from gp_core.study.trials import make_trial  # noqa: E402

@@ -24,7 +24,7 @@ from atlas_cases import draw_side, draw_specimens  # noqa: E402
 from reference_jrmpc import reference_jrmpc  # noqa: E402
 
 import gp_core  # noqa: E402
-from gp_core.atlas.jrmpc_pose import training_sides  # noqa: E402
+from gp_core.pose.jrmpc_estimator import training_sides  # noqa: E402
 
 _FIRST = """
 import time, numpy, gp_core

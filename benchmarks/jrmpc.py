@@ -19,8 +19,8 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "core" / "registration")]
 
 from reference_jrmpc import reference_jrmpc  # noqa: E402
 
-from gp_core.checks import FloatArray  # noqa: E402
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings, jrmpc, jrmpc_batch  # noqa: E402
+from gp_core.validation import FloatArray  # noqa: E402
 
 SIZES = [16] * 10 + [6]
 N_PROBLEMS = 22

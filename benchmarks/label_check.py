@@ -22,7 +22,7 @@ from pathlib import Path
 import numpy as np
 
 from gp_core import Atlas, LandmarkSet, Side
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 
 N_LABELS = (4, 5, 6, 8, 12, 19)
 NOISE_MM = 0.1
@@ -66,7 +66,7 @@ def old_window(atlas: Atlas) -> Check:
     """Return what the labelling window asked."""
     from functools import partial
 
-    from gp_core.atlas.shape import predict
+    from gp_core.atlas.prediction import predict
     from gp_labeler.session.ghosts import Expectations, Judging  # type: ignore[attr-defined]
 
     def check(landmarks: LandmarkSet) -> tuple[bool, set[frozenset[str]], set[str]]:

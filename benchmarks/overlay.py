@@ -21,7 +21,7 @@ from PySide6.QtGui import QImage, QPainter  # noqa: E402
 from PySide6.QtWidgets import QApplication  # noqa: E402
 
 from gp_core import PROBE, Atlas, RigidTransform, Side, estimate_pose  # noqa: E402
-from gp_core.atlas.expected import expected_features  # noqa: E402
+from gp_core.pose.expected_landmarks import expected_features  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scene.pose import PoseActor  # noqa: E402
 from gp_labeler.scene.pose_data import (  # noqa: E402

@@ -14,9 +14,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from gp_core import Atlas, LandmarkSet, Side, Specimen, fit_atlas
-from gp_core.atlas.draw import draw_animal
-from gp_core.checks import FloatArray
+from gp_core.atlas.sampling import draw_animal
 from gp_core.frames import mirror_x
+from gp_core.validation import FloatArray
 
 CODES = Atlas.published().codes
 NOISE_MM = 0.1

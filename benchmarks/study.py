@@ -22,17 +22,17 @@ sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "core" / "registration")]
 from reference_jrmpc import reference_jrmpc  # type: ignore[import-not-found]  # noqa: E402
 
 from gp_core import EXTERNAL, PROBE, TRAINING, Atlas, Side, Specimen  # noqa: E402
-from gp_core.atlas.draw import draw_animal  # noqa: E402
-from gp_core.atlas.jrmpc_pose import training_sides  # noqa: E402
-from gp_core.checks import FloatArray  # noqa: E402
+from gp_core.atlas.sampling import draw_animal  # noqa: E402
 from gp_core.landmarks.features import index_of  # noqa: E402
+from gp_core.pose.jrmpc_estimator import training_sides  # noqa: E402
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings  # noqa: E402
-from gp_core.study.elimination import Codes, Problem  # noqa: E402
+from gp_core.study.backward_elimination import Codes, Problem  # noqa: E402
 from gp_core.study.leave_one_out import Folds, folds_of  # noqa: E402
 from gp_core.study.scoring import PoseErrors, angle_between_deg, jrmpc_errors  # noqa: E402
 from gp_core.study.simulation import simulate_sides  # noqa: E402
 from gp_core.study.subset_search import problem_of  # noqa: E402
 from gp_core.study.trials import make_trial, window_arrays  # noqa: E402
+from gp_core.validation import FloatArray  # noqa: E402
 
 N_ANIMALS = 11
 FULL_SEARCH = 168_652

@@ -24,8 +24,8 @@ from PySide6.QtTest import QTest  # noqa: E402
 from PySide6.QtWidgets import QApplication, QWidget  # noqa: E402
 
 from gp_core import PROBE, RigidTransform, Side  # noqa: E402
-from gp_core.checks import FloatArray  # noqa: E402
 from gp_core.landmarks.features import FEATURES  # noqa: E402
+from gp_core.validation import FloatArray  # noqa: E402
 from gp_labeler.session import touching  # noqa: E402
 from gp_labeler.session.edits import PlacePoint  # noqa: E402
 from gp_labeler.session.state import How, Provenance  # noqa: E402

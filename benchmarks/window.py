@@ -24,7 +24,7 @@ import numpy as np  # noqa: E402
 from PySide6.QtCore import QPoint, QPointF, Qt, QTimer  # noqa: E402
 from PySide6.QtTest import QTest  # noqa: E402
 
-from gp_core.checks import FloatArray  # noqa: E402
+from gp_core.validation import FloatArray  # noqa: E402
 from gp_labeler.imaging.volume import Volume  # noqa: E402
 from gp_labeler.session.jobs import Job  # noqa: E402
 from gp_labeler.views.application import make_window  # noqa: E402

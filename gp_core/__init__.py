@@ -13,20 +13,11 @@ Examples
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
-from gp_core.atlas.insertion import carry_path, read_path
 from gp_core.atlas.label_check import Departure, Finding, SideCheck, check_side, check_specimen
-from gp_core.atlas.mixture import Hypothesis
-from gp_core.atlas.next_touch import TouchGain, gains
-from gp_core.atlas.pose import CochleaPose, estimate_pose
-from gp_core.atlas.pose_files import read_pose
-from gp_core.atlas.pose_gate import GateReason, PoseGate
-from gp_core.atlas.pose_quality import PoseQuality, pose_quality
-from gp_core.atlas.reading_state import read_as
-from gp_core.atlas.shape import predict
+from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
-from gp_core.landmarks.features import CODES, EXTERNAL, FEATURES, PROBE, RECOMMENDED, TRAINING, Feature, Side
-from gp_core.landmarks.files import (
+from gp_core.io import (
     import_mat,
     load_specimens,
     read_landmarks,
@@ -34,9 +25,19 @@ from gp_core.landmarks.files import (
     write_markups,
     write_suggestions,
 )
+from gp_core.io.pose_json import read_pose
+from gp_core.landmarks.features import CODES, EXTERNAL, FEATURES, PROBE, RECOMMENDED, TRAINING, Feature, Side
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.gate import GateReason, PoseGate
+from gp_core.pose.hypothesis_check import read_as
+from gp_core.pose.insertion_path import carry_path, read_path
+from gp_core.pose.mixture import Hypothesis
+from gp_core.pose.next_touch import TouchGain, gains
+from gp_core.pose.quality import PoseQuality, pose_quality
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
@@ -44,7 +45,7 @@ from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.conditions import ConditionsReport, conditions, touch_conditions
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
-from gp_core.study.nested import NestedReport, nested_search
+from gp_core.study.nested_search import NestedReport, nested_search
 from gp_core.study.physical import PhysicalReport, physical_test
 from gp_core.study.simulation import SimulationReport, simulate
 from gp_core.study.subset_search import SearchReport, search_features

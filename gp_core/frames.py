@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FrameError
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["FRAMES", "RigidTransform", "angle_between_deg", "cross_matrix", "mirror_x"]
 

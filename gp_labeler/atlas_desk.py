@@ -11,7 +11,7 @@ from typing import Any
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import Departure, SideCheck, check_side
-from gp_core.atlas.shape import predict
+from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Specimen

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_plain_atlas, fit_screened_atlas
+from gp_core.atlas.fitting import fit_screened_atlas
+from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.atlas.screening import screen_labels
 from gp_core.errors import GpError
 from gp_core.landmarks.features import PROBE, TRAINING, Side
@@ -85,7 +86,7 @@ class FitAtlas:
         GpError
             Too little of it can be used; says what was skipped, and why.
         """
-        load_modules("gp_core.atlas.fitting", "gp_core.atlas.shape")
+        load_modules("gp_core.atlas.fitting", "gp_core.atlas.prediction")
         animals = read_animals(self.paths, lambda fraction: progress(0.9 * fraction))
         progress(0.9)
         try:
@@ -204,7 +205,7 @@ class TryAtlas:
         GpError
             Fewer than three animals have the features that it takes.
         """
-        load_modules("gp_core.registration.kernels", "gp_core.registration.turning_compiled")
+        load_modules("gp_core.registration.jrmpc_kernels", "gp_core.registration.rotation_compiled")
         animals, skipped = _complete(self.specimens)
         training = tuple(code for code in TRAINING if code == "CO" or _all_have(animals, code))
         robust: list[Row] = []

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import SMALLEST_PART_MM, box_around
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session import labelling

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
 from gp_labeler.bone import Bone
 from gp_labeler.desk_signals import DeskSignals
 from gp_labeler.imaging.bone_distance import scan_evidence

@@ -81,7 +81,7 @@ class PhysicalTest:
         GpError
             As `gp_core.study.physical.physical_test`.
         """
-        load_modules("gp_core.study.physical", "gp_core.study.figures", "gp_core.registration.kernels")
+        load_modules("gp_core.study.physical", "gp_core.study.figures", "gp_core.registration.jrmpc_kernels")
         from gp_core.study.figures import draw_physical
         from gp_core.study.physical import physical_simulations, physical_test
 

@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
-from gp_core.atlas.mixture import Hypothesis
-from gp_core.atlas.next_touch import TouchGain, gains
-from gp_core.atlas.pose import CochleaPose
-from gp_core.atlas.pose_gate import against_writing
 from gp_core.errors import GpError
 from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.gate import against_writing
+from gp_core.pose.mixture import Hypothesis
+from gp_core.pose.next_touch import TouchGain, gains
 from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate, verdict_on
 from gp_labeler.session.estimating import Estimating

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from psygnal import Signal
 
-from gp_core.atlas.pose import CochleaPose
-from gp_core.atlas.pose_gate import GateReason, PoseGate
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.gate import GateReason, PoseGate
 from gp_labeler.session.estimate import Estimate, verdict_on
 from gp_labeler.session.state import SpecimenState
 from gp_labeler.tracker import PoseMessage, PoseSender

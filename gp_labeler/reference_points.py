@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from psygnal import Signal
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
-from gp_core.landmarks.files import LabelledPoint, read_points
+from gp_core.io import LabelledPoint, read_points
+from gp_core.validation import FloatArray
 
 if TYPE_CHECKING:
     from gp_labeler.workbench import Workbench

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
-from gp_core.atlas.pose_gate import PoseGate
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.pose.gate import PoseGate
 from gp_core.registration.pivot import PivotCalibration
+from gp_core.validation import FloatArray
 from gp_labeler.pose_sending import PoseSending
 from gp_labeler.session.session import Session
 from gp_labeler.session.touches import Touch, TouchHow

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Progress as Told
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
 from gp_labeler.imaging.stand_in import coarse_surface
@@ -196,7 +196,7 @@ class LoadAtlas:
 
     def run(self, progress: Progress) -> Atlas:
         """Build it from the published table."""
-        load_modules("gp_core.atlas.shape", "gp_core.atlas.published")
+        load_modules("gp_core.atlas.prediction", "gp_core.atlas.published")
         progress(0.0)
         return Atlas.published()
 
@@ -210,7 +210,7 @@ class WarmFit:
     def run(self, progress: Progress) -> None:
         """Import them; estimates go on meanwhile, a little slower."""
         progress(0.0)
-        load_modules("gp_core.atlas.settling_compiled")
+        load_modules("gp_core.registration.student_t_fit_compiled")
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ class WarmJoint:
     def run(self, progress: Progress) -> None:
         """Register three points with themselves."""
         progress(0.0)
-        load_modules("gp_core.registration.kernels", "gp_core.atlas.jrmpc_pose")
+        load_modules("gp_core.registration.jrmpc_kernels", "gp_core.pose.jrmpc_estimator")
         from gp_core.registration.jrmpc import ESTIMATION, jrmpc
 
         points = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0]]

@@ -14,11 +14,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
 from gp_core.terminal import printable
+from gp_core.validation import FloatArray
 from gp_labeler.atlas_desk import AtlasDesk, expecting, is_atlas_file
 from gp_labeler.bone_desk import BoneDesk
 from gp_labeler.imaging.readers import ImportPlan

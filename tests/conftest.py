@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gp_core import Specimen
-from gp_core.landmarks.files import read_authors_mat
+from gp_core.io import read_authors_mat
 
 _ROOT = Path(__file__).resolve().parents[1]
 

@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -15,7 +16,7 @@ _ROOT = Path(__file__).resolve().parents[1]
 _SOURCES = sorted(p for package in ("gp_core", "gp_labeler") for p in (_ROOT / package).rglob("*.py"))
 _LONGEST_FILE = 700
 _LONGEST_FUNCTION = 60
-_INNER_ROOMS = ("files", "commands")
+_INNER_ROOMS = ("cli",)
 """The map names them as a whole."""
 
 
@@ -45,6 +46,36 @@ def test_the_map_of_the_house_names_every_module() -> None:
     rooms += [path for path in _SOURCES if path.parent.name == "gp_labeler"]
     stems = {re.sub("^action_rows_.*", "action_rows", path.stem) for path in rooms} - {"__init__"}
     assert sorted(stems - named) == []
+
+
+def _imports(path: Path, modules: set[str]) -> set[str]:
+    """Return the modules that a file imports anywhere in it, but for types alone."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            node.body = [ast.Pass()]
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            for name in node.names:
+                inner = f"{node.module}.{name.name}"
+                found.add(inner if inner in modules else node.module)
+        elif isinstance(node, ast.Import):
+            found |= {name.name for name in node.names}
+    return found & modules
+
+
+def test_the_core_has_no_import_cycles() -> None:
+    files = {
+        ".".join(path.relative_to(_ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in _SOURCES
+        if "gp_core" in path.parts
+    }
+    graph = {name: _imports(path, set(files)) - {"gp_core"} for name, path in files.items()}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(f"import cycle: {' <- '.join(error.args[1])}")
 
 
 def test_the_core_brings_no_window_with_it() -> None:

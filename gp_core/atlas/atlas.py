@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray
+from gp_core.atlas.published import published_shape
 from gp_core.disk import read_json, write_text
 from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.landmarks.anatomy import cochlea_frame, cochlea_origin
 from gp_core.landmarks.features import CODES, FEATURES, check_codes, index_of
-from gp_core.landmarks.files import check_plausible_size
+from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
 
 __all__ = ["DEFINING", "SCHEMA_VERSION", "Atlas"]
 
@@ -229,6 +230,13 @@ _building = threading.Lock()
 
 @cache
 def _published() -> Atlas:
-    from gp_core.atlas.published import build_published_atlas  # it builds on this module
-
-    return build_published_atlas()
+    shape = published_shape()
+    independent = np.diag(np.repeat(shape.variances, 3))
+    return Atlas(
+        name="published",
+        codes=shape.codes,
+        mean=shape.mean,
+        covariance=independent,
+        scatter=independent,
+        n_samples=shape.n_sides,
+    )

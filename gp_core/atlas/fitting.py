@@ -1,24 +1,15 @@
-"""Fit an atlas to labelled specimens: generalised Procrustes, then a shrunk covariance."""
+"""Fit an atlas to labelled specimens, without the labels that are known to be wrong."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
 
-import numpy as np
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.plain_fit import fit_plain_atlas, fit_weighted_atlas
+from gp_core.atlas.screening import Screened, screen_labels
+from gp_core.landmarks.sets import Specimen
 
-from gp_core.atlas.atlas import DEFINING, PLACED, Atlas
-from gp_core.atlas.generalised_procrustes import align_shapes, covariances, label_weights
-from gp_core.checks import FloatArray
-from gp_core.errors import FeatureError, GpError
-from gp_core.landmarks.anatomy import mirror_right
-from gp_core.landmarks.features import CODES, check_codes
-from gp_core.landmarks.sets import LandmarkSet, Specimen
-
-if TYPE_CHECKING:
-    from gp_core.atlas.screening import Screened
-
-__all__ = ["as_left", "fit_atlas", "fit_consensus", "fit_plain_atlas", "fit_screened_atlas", "left_shapes"]
+__all__ = ["fit_atlas", "fit_screened_atlas"]
 
 
 def fit_atlas(
@@ -55,8 +46,6 @@ def fit_atlas(
     """
     if keep_doubtful:
         return fit_plain_atlas(specimens, features=features, name=name)
-    from gp_core.atlas.screening import screen_labels  # it fits atlases
-
     return fit_screened_atlas(screen_labels(specimens), features=features, name=name)
 
 
@@ -64,125 +53,4 @@ def fit_screened_atlas(
     screened: Screened, *, features: Iterable[str] | None = None, name: str | None = None
 ) -> Atlas:
     """Fit an atlas to what `screen_labels` left, each animal with its weight; see `fit_atlas`."""
-    return _fit(screened.specimens, screened.weights, features, name)
-
-
-def fit_plain_atlas(
-    specimens: Sequence[Specimen], *, features: Iterable[str] | None = None, name: str | None = None
-) -> Atlas:
-    """Fit an atlas in which every label of every animal counts alike: what the study of the paper needs.
-
-    Parameters
-    ----------
-    specimens, features, name
-        As for `fit_atlas`.
-
-    Returns
-    -------
-    Atlas
-        Mean of a generalised Procrustes alignment in which each feature weighs by its scatter, and the
-        covariance of the deviations, shrunk towards independent features.
-
-    Raises
-    ------
-    GpError
-        Fewer than three sides, CA, CB, RWA or RWP on fewer than two of them, or sides that share too few
-        features to be put together.
-
-    References
-    ----------
-    Gower, "Generalized Procrustes analysis", Psychometrika 40, 1975. https://doi.org/10.1007/BF02291478
-    Schäfer and Strimmer, "A shrinkage approach to large-scale covariance matrix estimation", 2005
-    (target D). https://doi.org/10.2202/1544-6115.1175
-    """
-    return _fit(specimens, np.ones(len(specimens)), features, name)
-
-
-def fit_consensus(specimens: Sequence[Specimen], *, name: str = "these animals") -> Atlas:
-    """Fit an atlas to what most animals agree on, wrong labels among them: not to keep, but to judge them by.
-
-    Raises
-    ------
-    GpError
-        As `fit_plain_atlas`.
-    """
-    owners, shapes, codes = _shapes_of(specimens, None)
-    weights = label_weights(shapes, codes, owners)
-    return _fit_shapes(specimens, shapes, codes, owners, weights, name)
-
-
-def _fit(
-    specimens: Sequence[Specimen], of_animals: FloatArray, features: Iterable[str] | None, name: str | None
-) -> Atlas:
-    owners, shapes, codes = _shapes_of(specimens, features)
-    weights = None
-    if not (of_animals == 1).all():
-        of_sides = np.repeat(of_animals, [len(specimen.sides) for specimen in specimens])
-        weights = np.repeat(of_sides[:, None], len(codes), axis=1)
-    return _fit_shapes(specimens, shapes, codes, owners, weights, name or f"{len(specimens)} specimens")
-
-
-def _shapes_of(
-    specimens: Sequence[Specimen], features: Iterable[str] | None
-) -> tuple[list[str], FloatArray, tuple[str, ...]]:
-    owners, shapes = left_shapes(specimens)
-    if len(shapes) < 3:
-        raise GpError(f"an atlas needs at least three labelled sides, got {len(shapes)}")
-    codes = _choose(shapes, features)
-    return owners, shapes[:, [CODES.index(code) for code in codes]], codes
-
-
-def _fit_shapes(
-    specimens: Sequence[Specimen],
-    shapes: FloatArray,
-    codes: tuple[str, ...],
-    owners: list[str],
-    weights: FloatArray | None,
-    name: str,
-) -> Atlas:
-    mean, aligned = align_shapes(shapes, codes, owners, weights)
-    animals = [i for i, specimen in enumerate(specimens) for _ in specimen.sides]
-    scatter, covariance = covariances(aligned - mean, animals, weights)
-    return Atlas(
-        name=name,
-        codes=codes,
-        mean=mean,
-        covariance=covariance,
-        scatter=scatter,
-        n_samples=len(shapes),
-        specimens=tuple(specimen.name for specimen in specimens),
-    )
-
-
-def left_shapes(specimens: Sequence[Specimen]) -> tuple[list[str], FloatArray]:
-    """Return every labelled side as a left side.
-
-    Returns
-    -------
-    owners : list of str
-        Whose side it is, for messages.
-    shapes : (S, 20, 3) array, mm
-        Points in the table's order, right sides mirrored in x, NaN where missing.
-    """
-    sides = [(s.name, landmarks) for s in specimens for landmarks in s.sides.values()]
-    owners = [f"{name} {landmarks.side.word}" for name, landmarks in sides]
-    shapes = [as_left(landmarks) for _, landmarks in sides]
-    return owners, np.array(shapes).reshape(-1, len(CODES), 3)
-
-
-def as_left(landmarks: LandmarkSet) -> FloatArray:
-    """Return the points (20, 3) of a set, mirrored in x if they are of a right side."""
-    return mirror_right(landmarks.points, landmarks.side)
-
-
-def _choose(shapes: FloatArray, features: Iterable[str] | None) -> tuple[str, ...]:
-    counts = np.isfinite(shapes).all(axis=2).sum(axis=0)
-    common = tuple(code for code in PLACED if counts[CODES.index(code)] >= 2)
-    wanted = common if features is None else check_codes(features, "the features of an atlas", allowed=CODES)
-    chosen = tuple(code for code in CODES if code in wanted and code != "CO")
-    for code in (*DEFINING, *chosen):
-        if code not in common:
-            raise FeatureError(
-                f"fewer than two sides have {code}", landmark=code, remedy="Label it in more specimens."
-            )
-    return tuple(code for code in PLACED if code in {*chosen, *DEFINING})
+    return fit_weighted_atlas(screened.specimens, screened.weights, features, name)

@@ -11,12 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
 from gp_core.landmarks.anatomy import cochlea_frame
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.procrustes import weighted_procrustes
+from gp_core.validation import FloatArray
 
 __all__ = ["align_shapes", "covariances", "label_weights", "per_feature_covariance"]
 

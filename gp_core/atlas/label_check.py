@@ -16,19 +16,13 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.label_likelihood import (
-    LABELLING_NOISE_MM,
-    WRONG_MM,
-    LabelModel,
-    Reading,
-    best_reading,
-)
-from gp_core.checks import FloatArray
+from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM, WRONG_MM, LabelModel, Reading, best_reading
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
+from gp_core.validation import FloatArray
 
 __all__ = [
     "DOUBTFUL_SD",

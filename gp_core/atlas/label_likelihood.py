@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.named_fit import motion_jacobian
-from gp_core.checks import FloatArray
+from gp_core.registration.named_points import motion_jacobian
+from gp_core.validation import FloatArray
 
 __all__ = ["LABELLING_NOISE_MM", "LabelModel", "LeaveOneOut", "Reading", "best_reading"]
 

@@ -3,21 +3,42 @@
 from __future__ import annotations
 
 import csv
+from typing import NamedTuple
 
 import numpy as np
 
-from gp_core.atlas.atlas import Atlas
-from gp_core.checks import FloatArray
 from gp_core.landmarks.anatomy import cochlea_frame
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.resources import resource_path
+from gp_core.validation import FloatArray
 
-__all__ = ["build_published_atlas", "published_distances"]
+__all__ = ["PublishedShape", "published_distances", "published_shape"]
 
 _N_SIDES = 22
 _ROUNDING_MM = 0.1 / 12**0.5
 """Standard deviation of what rounding the table's means to 0.1 mm adds."""
+
+
+class PublishedShape(NamedTuple):
+    """Mean and variances of the placed features, rebuilt from the published table.
+
+    Attributes
+    ----------
+    codes : tuple of str
+        Features, in the table's order, without CO.
+    mean : (n, 3) array, mm
+        Positions of a left side, in its CO frame.
+    variances : (n,) array, mm^2
+        Of each coordinate of a feature between animals.
+    n_sides : int
+        Number of labelled sides behind the table.
+    """
+
+    codes: tuple[str, ...]
+    mean: FloatArray
+    variances: FloatArray
+    n_sides: int
 
 
 def published_distances() -> tuple[FloatArray, FloatArray]:
@@ -37,7 +58,7 @@ def published_distances() -> tuple[FloatArray, FloatArray]:
     return mean, sd
 
 
-def build_published_atlas() -> Atlas:
+def published_shape() -> PublishedShape:
     """Rebuild mean positions and variances of the features from the published table alone.
 
     Positions come from multidimensional scaling: classical (Torgerson 1952, doi:10.1007/BF02288916), then
@@ -50,15 +71,7 @@ def build_published_atlas() -> Atlas:
     positions = _refine(_classical_scaling(mean), mean, sd, variances)
     positions = _left_cochlea_frame(positions)
     placed = [i for i, code in enumerate(CODES) if code != "CO"]
-    independent = np.diag(np.repeat(variances[placed], 3))
-    return Atlas(
-        name="published",
-        codes=tuple(CODES[i] for i in placed),
-        mean=positions[placed],
-        covariance=independent,
-        scatter=independent,
-        n_samples=_N_SIDES,
-    )
+    return PublishedShape(tuple(CODES[i] for i in placed), positions[placed], variances[placed], _N_SIDES)
 
 
 def _classical_scaling(distances: FloatArray) -> FloatArray:

@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_consensus
 from gp_core.atlas.label_check import FEWEST, Finding, check_specimen
-from gp_core.checks import FloatArray
+from gp_core.atlas.plain_fit import fit_consensus
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.validation import FloatArray
 
 __all__ = ["Screened", "mean_shared_points", "screen_labels"]
 

@@ -9,11 +9,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray
 from gp_core.errors import FeatureError, GeometryError
 from gp_core.frames import RigidTransform, mirror_x
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
 
 __all__ = [
     "axis_frame",

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 
-from gp_core.checks import near_matches
 from gp_core.errors import FeatureError
 from gp_core.resources import resource_path
+from gp_core.validation import near_matches
 
 __all__ = [
     "CODES",

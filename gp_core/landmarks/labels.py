@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from gp_core.checks import near_matches
 from gp_core.errors import FeatureError
 from gp_core.landmarks.features import CODES, Side
+from gp_core.validation import near_matches
 
 __all__ = ["LabelNames", "ParsedLabel", "is_skull_feature", "parse_label", "same_label", "tidy_label"]
 

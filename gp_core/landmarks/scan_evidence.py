@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.frames import RigidTransform
+from gp_core.validation import FloatArray
 
 __all__ = ["ScanEvidence"]
 

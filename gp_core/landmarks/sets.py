@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import CODES, Side, feature, index_of
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["LandmarkSet", "Specimen", "Status"]
 

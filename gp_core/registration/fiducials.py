@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import feature
 from gp_core.landmarks.sets import LandmarkSet
-from gp_core.quantiles import NORMAL_95, chi_square_share
 from gp_core.registration.procrustes import RigidFit, fit_rigid, rms_without_each
+from gp_core.stats import NORMAL_95, chi_square_share
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["FiducialRegistration", "named_points", "register_fiducials"]
 

@@ -9,11 +9,11 @@ from itertools import permutations, product
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import FrameError, GeometryError
 from gp_core.frames import RigidTransform
+from gp_core.registration.icp_targets import Cloud, Surface, Target
 from gp_core.registration.procrustes import weighted_procrustes
-from gp_core.registration.targets import Cloud, Surface, Target
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["Cloud", "IcpResult", "Surface", "icp"]
 

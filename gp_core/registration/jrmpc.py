@@ -2,7 +2,7 @@
 
 The points of every set are taken as samples of one mixture of K isotropic Gaussians and a uniform class of
 outliers; expectation conditional maximisation finds the pose of each set, the centres and their variances.
-The inner loops are compiled (`gp_core.registration.kernels`) and loaded on first use.
+The inner loops are compiled (`gp_core.registration.jrmpc_kernels`) and loaded on first use.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["DEFAULTS", "ESTIMATION", "JrmpcBatch", "JrmpcResult", "JrmpcSettings", "jrmpc", "jrmpc_batch"]
 
@@ -433,6 +433,6 @@ def _n_cores() -> int:
 
 
 def _kernels() -> Any:
-    from gp_core.registration import kernels
+    from gp_core.registration import jrmpc_kernels
 
-    return kernels
+    return jrmpc_kernels

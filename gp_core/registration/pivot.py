@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
+from gp_core.validation import FloatArray
 
 __all__ = ["PivotCalibration", "calibrate_pivot"]
 

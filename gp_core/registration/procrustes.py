@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["RigidFit", "align", "fit_rigid", "rms_without_each", "surely_no_line", "weighted_procrustes"]
 

@@ -17,16 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal, perturbed_atlas
-from gp_core.atlas.pose import estimate_pose
-from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
-from gp_core.checks import FloatArray
+from gp_core.atlas.sampling import draw_animal, perturbed_atlas
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import angle_between_deg
 from gp_core.landmarks.features import EXTERNAL, PROBE, RECOMMENDED
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.study.leave_one_out import held_out_sides
-from gp_core.study.mapping import run_map
+from gp_core.study.parallel import run_map
 from gp_core.study.sessions import (
     Disturbance,
     anisotropic,
@@ -41,6 +40,7 @@ from gp_core.study.sessions import (
     wrong_side,
 )
 from gp_core.study.subsets import check_labels
+from gp_core.validation import FloatArray
 
 __all__ = ["GROUPS", "ConditionRow", "ConditionsReport", "TouchCondition", "conditions", "touch_conditions"]
 

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
 from gp_core.landmarks.sets import Specimen
+from gp_core.validation import FloatArray
 
 __all__ = ["DistanceTable", "distances"]
 

@@ -14,17 +14,17 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
-from gp_core.checks import FloatArray
 from gp_core.disk import write_bytes
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, PROBE
 from gp_core.study.compare import PROBES, ComparisonReport, ComparisonRow
 from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
-from gp_core.study.nested import NestedReport
+from gp_core.study.nested_search import NestedReport
 from gp_core.study.physical import PhysicalReport
 from gp_core.study.simulation import SimulationReport
 from gp_core.study.subset_search import SearchReport
+from gp_core.validation import FloatArray
 
 __all__ = [
     "comparison",

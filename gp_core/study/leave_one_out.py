@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_plain_atlas
-from gp_core.atlas.jrmpc_pose import training_sides
-from gp_core.atlas.pose import METHODS
-from gp_core.checks import FloatArray, check_option
+from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import round_window_frame, with_cochlea_origin
 from gp_core.landmarks.features import PROBE, TRAINING, index_of
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.cochlea_pose import METHODS
+from gp_core.pose.jrmpc_estimator import training_sides
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
 from gp_core.study.scoring import PoseErrors, jrmpc_errors, robust_errors, touched
 from gp_core.study.subsets import check_labels, check_subsets, sides_of
+from gp_core.validation import FloatArray, check_option
 
 __all__ = [
     "Folds",

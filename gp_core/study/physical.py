@@ -10,21 +10,22 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal
-from gp_core.atlas.pose import METHODS, CochleaPose, estimate_pose
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import modiolar_axis, with_cochlea_origin
 from gp_core.landmarks.features import CODES, EXTERNAL, TRAINING
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.registration.targets import Surface
-from gp_core.study.scoring import angle_between_deg
-from gp_core.study.simulation import SimulationReport, simulate
-from gp_core.study.skull_registration import (
+from gp_core.pose.cochlea_pose import METHODS, CochleaPose
+from gp_core.pose.estimate import estimate_pose
+from gp_core.registration.icp_targets import Surface
+from gp_core.registration.skull import (
     SkullRegistration,
     register_by_icp,
     register_by_names,
     register_to_surface,
 )
+from gp_core.study.scoring import angle_between_deg
+from gp_core.study.simulation import SimulationReport, simulate
 
 __all__ = ["PhysicalReport", "PhysicalRow", "physical_simulations", "physical_test"]
 

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.robust_pose import locate_robust
-from gp_core.checks import FloatArray
 from gp_core.frames import angle_between_deg
 from gp_core.landmarks.features import index_of
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.pose.robust import locate_robust
 from gp_core.registration.jrmpc import JrmpcSettings, jrmpc_batch
+from gp_core.validation import FloatArray
 
 __all__ = ["AXIS_WEIGHT", "PoseErrors", "angle_between_deg", "jrmpc_errors", "robust_errors", "touched"]
 

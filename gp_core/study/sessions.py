@@ -12,10 +12,10 @@ from functools import partial
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
 
 __all__ = [
     "Disturbance",

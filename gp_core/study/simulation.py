@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.fitting import fit_plain_atlas
-from gp_core.atlas.jrmpc_pose import training_sides
-from gp_core.atlas.pose import METHODS
-from gp_core.checks import FloatArray, check_option
+from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import CODES, PROBE, TRAINING, Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.cochlea_pose import METHODS
+from gp_core.pose.jrmpc_estimator import training_sides
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings, jrmpc
 from gp_core.study.leave_one_out import describe
-from gp_core.study.mapping import run_map
+from gp_core.study.parallel import run_map
 from gp_core.study.scoring import PoseErrors, jrmpc_errors, robust_errors
 from gp_core.study.subsets import check_labels, check_subsets, sides_of
 from gp_core.study.trials import Trial, check_noise, make_trial, window_arrays
+from gp_core.validation import FloatArray, check_option
 
 __all__ = ["LIMITS", "SimulationReport", "simulate", "simulate_sides"]
 

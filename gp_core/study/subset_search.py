@@ -8,14 +8,12 @@ from dataclasses import asdict, dataclass
 from os import PathLike
 from typing import Any
 
-from gp_core.atlas.pose import METHODS
-from gp_core.checks import check_option
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.features import CODES, check_codes
 from gp_core.landmarks.sets import Specimen
+from gp_core.pose.cochlea_pose import METHODS
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
-from gp_core.study.checkpoint import Checkpoint, fingerprint
-from gp_core.study.elimination import (
+from gp_core.study.backward_elimination import (
     FEWEST,
     Codes,
     Elimination,
@@ -25,9 +23,11 @@ from gp_core.study.elimination import (
     TrainingStep,
     external,
 )
+from gp_core.study.checkpoint import Checkpoint, fingerprint
 from gp_core.study.leave_one_out import Folds, folds_of, held_out_sides
 from gp_core.study.scoring import PoseErrors, robust_errors, touched
 from gp_core.study.subsets import check_labels
+from gp_core.validation import check_option
 
 __all__ = ["SearchReport", "check_start", "problem_of", "search_features"]
 
@@ -125,7 +125,7 @@ def search_features(
     From the best training features of one number, each is left out in turn; each of these candidates is
     scored by the least E_T of a backward elimination over its own external features, and the best is the next
     step. Features are chosen on the animals that they are scored on, so the errors are optimistic: see
-    `gp_core.study.nested`.
+    `gp_core.study.nested_search`.
 
     Parameters
     ----------

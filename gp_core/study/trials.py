@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import round_window_frame
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.study.scoring import touched
 from gp_core.study.subsets import WINDOW_FEATURES
+from gp_core.validation import FloatArray
 
 __all__ = ["Trial", "check_noise", "make_trial", "window_arrays"]
 

@@ -8,9 +8,9 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["bone_distances", "scan_evidence"]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 
 __all__ = ["CAP_MM", "RISE", "TURNS", "Coil"]
 

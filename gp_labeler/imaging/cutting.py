@@ -8,7 +8,7 @@ from vtkmodules.vtkCommonDataModel import vtkBox, vtkPolyData
 from vtkmodules.vtkCommonTransforms import vtkTransform
 from vtkmodules.vtkFiltersCore import vtkClipPolyData, vtkTriangleFilter
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import cells_of, matrix_of, points_of, to_numpy, to_vtk, triangles_of
 
 __all__ = ["crossing", "joined", "part_outside"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["Histogram", "histogram_of", "window_presets"]

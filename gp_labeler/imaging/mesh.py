@@ -16,8 +16,8 @@ from vtkmodules.vtkCommonCore import mutable, vtkIdList
 from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkStaticCellLocator
 from vtkmodules.vtkFiltersCore import vtkProbeFilter
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.cutting import crossing, joined, part_outside
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_numpy, to_vtk, triangles_of, triple
 

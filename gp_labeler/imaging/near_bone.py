@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["near_bone"]

@@ -14,8 +14,8 @@ from vtkmodules.vtkCommonCore import vtkSMPTools
 from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray, as_points
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import surface_level

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["holds_integers", "propose_threshold", "surface_level"]

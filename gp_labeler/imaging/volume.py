@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.checks import FloatArray, as_points
 from gp_core.errors import GeometryError
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["GreyArray", "Volume"]
 

@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.offscreen.events import turn_wheel
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.scene.planes import Plane

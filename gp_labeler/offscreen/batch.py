@@ -10,7 +10,7 @@ from typing import Any
 
 from gp_core.disk import write_text
 from gp_core.errors import GpError
-from gp_core.landmarks.files.text import as_csv_cell
+from gp_core.io.text import as_csv_cell
 from gp_labeler.offscreen.report import Report
 from gp_labeler.offscreen.runner import Tell, run_script
 from gp_labeler.offscreen.script import Script

@@ -15,10 +15,10 @@ import numpy as np
 from PySide6.QtCore import QCoreApplication, QEvent
 from PySide6.QtTest import QTest
 
-from gp_core.checks import FloatArray
 from gp_core.disk import protect
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature, index_of
+from gp_core.validation import FloatArray
 from gp_labeler.offscreen.events import click
 from gp_labeler.offscreen.prompts import ScriptPrompts
 from gp_labeler.scene.planes import Plane

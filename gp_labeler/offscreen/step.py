@@ -8,9 +8,9 @@ from dataclasses import MISSING, dataclass, fields
 from types import UnionType
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from gp_core.checks import near_matches
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.validation import near_matches
 
 if TYPE_CHECKING:
     from gp_labeler.offscreen.rig import Rig

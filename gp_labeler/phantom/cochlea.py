@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.coil import CAP_MM, RISE, TURNS, Coil
 from gp_labeler.phantom import grey
 from gp_labeler.phantom.canvas import Canvas

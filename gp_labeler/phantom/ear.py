@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
 from gp_labeler.phantom.canvas import Canvas
 from gp_labeler.phantom.cochlea import Cochlea

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import mean_animal
-from gp_core.checks import FloatArray
+from gp_core.atlas.sampling import mean_animal
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import Specimen
 from gp_core.registration.procrustes import fit_rigid
+from gp_core.validation import FloatArray
 
 __all__ = ["Ear", "HeadLayout", "unit"]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.phantom.layout import HeadLayout
 from gp_labeler.phantom.solids import Grid, Solid, Values, component, implicit, moved
 

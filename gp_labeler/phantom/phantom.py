@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal
-from gp_core.checks import FloatArray
+from gp_core.atlas.sampling import draw_animal
 from gp_core.disk import atomic_file
 from gp_core.errors import GpError
+from gp_core.io.markups import write_markups
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files.markups import write_markups
 from gp_core.landmarks.sets import Specimen
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.phantom import grey

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.phantom.layout import unit
 from gp_labeler.phantom.solids import Grid, Solid, Values, component, moved, tube
 

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
 from gp_labeler.phantom.canvas import Canvas
 from gp_labeler.phantom.layout import Ear, HeadLayout, unit

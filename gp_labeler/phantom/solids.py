@@ -13,7 +13,7 @@ from functools import reduce
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 
 __all__ = [
     "Grid",

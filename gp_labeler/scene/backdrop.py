@@ -14,7 +14,7 @@ import numpy as np
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkRenderer
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.bone import BoneActor
 from gp_labeler.scene.furniture import OrientationCube
 from gp_labeler.scene.pieces import Piece

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from vtkmodules.vtkCommonDataModel import vtkPlane
 from vtkmodules.vtkRenderingCore import vtkActor, vtkProperty
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import Surface, SurfaceHit
 from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.cut import CutPlane

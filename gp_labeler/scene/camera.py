@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from vtkmodules.vtkRenderingCore import vtkCamera
 
-from gp_core.checks import FloatArray, as_points, check_option
 from gp_core.errors import GeometryError
+from gp_core.validation import FloatArray, as_points, check_option
 from gp_labeler.imaging.vtk_arrays import triple
 
 __all__ = ["VIEWPOINTS", "SceneCamera", "Viewpoint"]

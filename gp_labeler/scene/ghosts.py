@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.labels import Label

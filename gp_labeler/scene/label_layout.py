@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 
 __all__ = ["lines_within", "place_labels"]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.label_layout import lines_within, place_labels
 from gp_labeler.scene.sprites import SpriteSheet, Text

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.labels import Label
 from gp_labeler.scene.lines2d import PixelLines

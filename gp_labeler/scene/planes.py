@@ -14,7 +14,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray, as_points
+from gp_core.validation import FloatArray, as_points
 
 __all__ = ["LETTERS", "Plane", "letter_of", "position_text"]
 

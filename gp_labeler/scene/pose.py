@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.labels import Label

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from vtkmodules.vtkRenderingCore import vtkActor
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.mean_cochlea import cochlea_tubes
 from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.colours import rgb

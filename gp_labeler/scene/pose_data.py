@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core import CochleaPose, Hypothesis, RigidTransform
-from gp_core.atlas.uncertainty import cone_95
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
+from gp_core.pose.covariance import cone_95
+from gp_core.validation import FloatArray
 
 __all__ = [
     "AXIS_MM",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.labels import Label
 from gp_labeler.scene.pose_data import PoseScene

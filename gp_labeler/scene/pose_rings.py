@@ -7,8 +7,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.mean_cochlea import duct_curve
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.ghosts import ellipse

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.pose_data import (
     AXIS_MM,
     BEHIND_MM,

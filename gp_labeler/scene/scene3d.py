@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import SurfaceHit
 from gp_labeler.scene.backdrop import Backdrop, Sight
 from gp_labeler.scene.bone import BoneActor

@@ -9,8 +9,8 @@ from functools import cache
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side, feature
+from gp_core.validation import FloatArray
 
 __all__ = ["FAR", "Schematic", "schematic_of"]
 

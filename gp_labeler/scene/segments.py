@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from vtkmodules.vtkFiltersSources import vtkLineSource
 from vtkmodules.vtkRenderingCore import vtkActor
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import triple
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.stage import Stage, release, solid_actor

@@ -11,7 +11,7 @@ from vtkmodules.vtkFiltersCore import vtkFeatureEdges
 from vtkmodules.vtkFiltersSources import vtkPlaneSource
 from vtkmodules.vtkRenderingCore import vtkActor, vtkTexture
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import to_vtk, triple
 from gp_labeler.scene.slices import SliceImage
 from gp_labeler.scene.stage import Stage, release, solid_actor

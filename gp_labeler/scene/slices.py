@@ -11,7 +11,7 @@ from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
 from vtkmodules.vtkImagingCore import vtkImageReslice
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready

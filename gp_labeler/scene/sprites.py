@@ -21,7 +21,7 @@ from vtkmodules.vtkRenderingCore import (
     vtkTexturedActor2D,
 )
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_numpy, to_vtk
 from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.typeface import font_file

@@ -12,9 +12,9 @@ import numpy as np
 from gp_core.atlas.label_check import Finding
 from gp_core.atlas.screening import Screened, screen_labels
 from gp_core.errors import GpError
+from gp_core.io import load_specimens
+from gp_core.io.file_names import natural_key
 from gp_core.landmarks.features import Side, feature
-from gp_core.landmarks.files import load_specimens
-from gp_core.landmarks.files.naming import natural_key
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.session.specimen_file import SUFFIX, read_specimen
 

@@ -14,10 +14,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import as_points
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import as_points
 from gp_labeler.session.state import (
     TO_DO,
     Landmark,

@@ -14,16 +14,17 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.expected import expected_features
-from gp_core.atlas.pose import CochleaPose, estimate_pose
-from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform, angle_between_deg
 from gp_core.landmarks.anatomy import axis_frame
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.expected_landmarks import expected_features
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
+from gp_core.validation import FloatArray
 from gp_labeler.session.state import SpecimenState
 from gp_labeler.session.touches import TouchHow
 

@@ -9,13 +9,13 @@ from typing import Any
 from psygnal import Signal
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.pose import METHODS, ROUND_WINDOWS
-from gp_core.atlas.systematic import Systematic
-from gp_core.checks import check_option
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Specimen
+from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS
+from gp_core.pose.systematic_error import Systematic
+from gp_core.validation import check_option
 from gp_labeler.session.estimate import REGISTRATIONS, Estimate, EstimateSettings, apart, make_estimate
 from gp_labeler.session.session import Session
 from gp_labeler.session.specimen_edits import RecordPoseCheck

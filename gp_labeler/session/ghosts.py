@@ -10,16 +10,16 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
 from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray
 
 __all__ = ["Expectations", "Ghost", "Predict", "fingerprint", "mirror_ghosts"]
 
 Predict = Callable[[LandmarkSet], Mapping[str, tuple[FloatArray, FloatArray]]]
-"""Mean (3,) and covariance (3, 3) of every feature, given some: `gp_core.atlas.shape.predict`."""
+"""Mean (3,) and covariance (3, 3) of every feature, given some: `gp_core.atlas.prediction.predict`."""
 
 N_FOR_GHOSTS = 3
 

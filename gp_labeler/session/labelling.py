@@ -11,10 +11,10 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray
 from gp_labeler.session.edits import (
     ClearPoint,
     ConfirmPoint,

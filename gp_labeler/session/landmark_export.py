@@ -7,17 +7,11 @@ from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
-from gp_core.checks import check_option
 from gp_core.errors import GpError
+from gp_core.io import landmark_file_name, write_csv, write_fcsv, write_markups, write_suggestions
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
-from gp_core.landmarks.files import (
-    landmark_file_name,
-    write_csv,
-    write_fcsv,
-    write_markups,
-    write_suggestions,
-)
 from gp_core.landmarks.sets import LandmarkSet, Status
+from gp_core.validation import check_option
 from gp_labeler.session.document import provenance_document, volume_document
 from gp_labeler.session.state import SpecimenState
 

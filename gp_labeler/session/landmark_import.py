@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError, blaming
+from gp_core.io import PointList, landmarks_of, read_points, sides_of
 from gp_core.landmarks.features import Side, feature
-from gp_core.landmarks.files import PointList, landmarks_of, read_points, sides_of
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
 from gp_labeler.session.document import provenance_of
 from gp_labeler.session.edits import as_position, point_text, require_free
 from gp_labeler.session.labelling import provenance
@@ -55,7 +55,7 @@ def import_landmarks(
     session : Session
         Where to.
     paths : iterable of path
-        Any landmark file that `gp_core.landmarks.files` reads.
+        Any landmark file that `gp_core.io` reads.
     side : Side or str, optional
         Where the files do not say it, or hold both and one is wanted.
     names : mapping of str to str, optional

@@ -8,9 +8,9 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gp_core.checks import check_option
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
+from gp_core.validation import check_option
 from gp_labeler.session.document import accepted_ghosts, state_of
 from gp_labeler.session.keeper import Keeper
 from gp_labeler.session.places import absolute_path

@@ -8,7 +8,10 @@ from itertools import permutations, product
 from os import PathLike
 from pathlib import Path
 
-from gp_core.atlas.insertion import (
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.insertion_path import (
     carry_path,
     read_path,
     rows_before_centre,
@@ -16,10 +19,7 @@ from gp_core.atlas.insertion import (
     winding_side,
     write_path,
 )
-from gp_core.atlas.pose import CochleaPose
-from gp_core.checks import FloatArray
-from gp_core.errors import GpError
-from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
 from gp_labeler.session.estimate import Estimate
 
 __all__ = ["FORMATS", "InsertionPath", "save_pose", "says_its_state"]
@@ -86,7 +86,7 @@ class InsertionPath:
     source : Path
         Its file.
     units, axes : str
-        How the file was read; see `gp_core.atlas.insertion.read_path`.
+        How the file was read; see `gp_core.pose.insertion_path.read_path`.
     rows : int, optional
         Of how many rows of it these are; None for all.
     """
@@ -102,7 +102,7 @@ class InsertionPath:
     def read(
         cls, path: str | PathLike[str], side: Side | str, *, units: str, axes: str = "x,y,z"
     ) -> InsertionPath:
-        """Read a path; see `gp_core.atlas.insertion.read_path` for what is asked and raised."""
+        """Read a path; see `gp_core.pose.insertion_path.read_path` for what is asked and raised."""
         return cls(read_path(path, units=units, axes=axes), Side.parse(side), Path(path), units, axes)
 
     @classmethod
@@ -113,7 +113,7 @@ class InsertionPath:
         -------
         dict of str to InsertionPath
             ``"x,y,z"`` alone where the file is in the cochlea frame as it is. Otherwise by axes, such as
-            ``"z,-y,x"``, which `gp_core.atlas.insertion.read_path` explains; what begins nearest to the
+            ``"z,-y,x"``, which `gp_core.pose.insertion_path.read_path` explains; what begins nearest to the
             round window comes first.
 
         Raises

@@ -14,8 +14,8 @@ from html import escape
 
 import numpy as np
 
-from gp_core.atlas.pose import CochleaPose
 from gp_core.landmarks.features import CODES
+from gp_core.pose.cochlea_pose import CochleaPose
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.specimen_file import application
 from gp_labeler.session.state import PoseCheck, SpecimenState

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from psygnal import Signal
 
 from gp_core.atlas.label_check import Finding
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side
+from gp_core.validation import FloatArray
 from gp_labeler.session.edited_specimen import EditedSpecimen, utc_now
 from gp_labeler.session.edits import as_position
 from gp_labeler.session.ghosts import Expectations, Ghost, Predict

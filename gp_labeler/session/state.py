@@ -16,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.checks import check_option
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import check_option
 from gp_labeler.session.frozen_json import freeze
 from gp_labeler.session.touches import Touch, TouchKey, touched_set
 from gp_labeler.session.volume_reference import VolumeReference

@@ -9,9 +9,9 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from gp_core.errors import GpError, blaming
+from gp_core.io import label_names, read_points, read_touches
+from gp_core.io.file_names import named_side
 from gp_core.landmarks.features import CODES, Side
-from gp_core.landmarks.files import label_names, read_points, read_touches
-from gp_core.landmarks.files.naming import named_side
 from gp_core.landmarks.labels import same_label, tidy_label
 from gp_labeler.session.edits import as_position
 from gp_labeler.session.session import Session

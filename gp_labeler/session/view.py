@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
-from gp_core.checks import check_option
 from gp_core.errors import GpError
+from gp_core.validation import check_option
 
 __all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "View", "ViewState"]
 

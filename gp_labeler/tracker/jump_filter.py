@@ -12,7 +12,7 @@ from itertools import count
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.rigid import step_between, turn_deg
 from gp_labeler.tracker.samples import Fault, Limits, Sample
 

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 import pyigtl
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray
 
 __all__ = ["MessageDecoder", "TrackerMessage", "hello", "pack_transform"]
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 import pyigtl
 
-from gp_core.atlas.pose import CochleaPose
-from gp_core.atlas.pose_gate import GateReason
-from gp_core.checks import FloatArray
 from gp_core.frames import RigidTransform
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.gate import GateReason
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.messages import pack_transform
 
 __all__ = ["HELD_BACK", "NO_POSE", "STATE_DEVICE", "STATUS_DEVICE", "PoseMessage"]

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.rigid import turn_deg
 from gp_labeler.tracker.samples import Fault, Sample
 

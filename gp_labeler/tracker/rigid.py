@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.frames import cross_matrix
+from gp_core.validation import FloatArray
 
 __all__ = ["Step", "nearest_rigid", "rotation_of", "step_between", "turn_deg", "why_not_rigid"]
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.device_clock import DeviceClock
 from gp_labeler.tracker.jump_filter import JumpFilter
 from gp_labeler.tracker.messages import TrackerMessage

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import Enum
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 
 __all__ = ["UNTIMELY", "Fault", "Limits", "Sample"]
 

@@ -8,8 +8,8 @@ import socket
 import threading
 import time
 
-from gp_core.atlas.pose_gate import GateReason
 from gp_core.errors import GpError
+from gp_core.pose.gate import GateReason
 from gp_labeler.tracker.address import check_device, check_host
 from gp_labeler.tracker.connection import Connection, Lost, Opened, keep_alive
 from gp_labeler.tracker.pose_message import PoseMessage

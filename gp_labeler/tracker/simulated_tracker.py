@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pyigtl
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.tracker.simulated_probe import Reading, SimulatedProbe
 

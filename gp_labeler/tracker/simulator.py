@@ -19,14 +19,14 @@ from queue import SimpleQueue
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal
-from gp_core.checks import FloatArray
+from gp_core.atlas.sampling import draw_animal
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, read_bytes, write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
+from gp_core.io import read_touches
 from gp_core.landmarks.features import EXTERNAL, PROBE, Side
-from gp_core.landmarks.files import read_touches
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.address import DEFAULT_PORT, check_device
 from gp_labeler.tracker.rigid import rotation_of
 from gp_labeler.tracker.simulated_probe import SimulatedProbe

@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray
 from gp_labeler.tracker.probe import Probe
 from gp_labeler.tracker.samples import Fault, Sample
 

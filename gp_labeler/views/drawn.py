@@ -7,10 +7,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from gp_core.atlas.label_check import HEAD_MM
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import Ghost
 from gp_labeler.scene.marks import REFERENCE, Mark

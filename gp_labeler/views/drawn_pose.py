@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from gp_core.atlas.mixture import UNDECIDED
-from gp_core.checks import FloatArray
+from gp_core.pose.mixture import UNDECIDED
+from gp_core.validation import FloatArray
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import (
     METHOD_ROLES,

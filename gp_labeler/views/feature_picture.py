@@ -20,8 +20,8 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import CODES, Side
+from gp_core.validation import FloatArray
 from gp_labeler.scene.schematic import FAR, Schematic, schematic_of
 from gp_labeler.views.fonts import CAPTION, HEADING, base_font, family, text_scale
 from gp_labeler.views.strokes import beside, round_pen, smooth

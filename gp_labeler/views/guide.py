@@ -15,8 +15,8 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_core.atlas.pose_quality import pose_quality
 from gp_core.landmarks.features import CODES, RECOMMENDED, Side, feature
+from gp_core.pose.quality import pose_quality
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture

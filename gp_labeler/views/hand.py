@@ -5,9 +5,9 @@ from __future__ import annotations
 from PySide6.QtCore import QPoint, Qt
 from PySide6.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainTextEdit, QTextEdit, QWidget
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
+from gp_core.validation import FloatArray
 from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.session import labelling
 from gp_labeler.session.state import How, Landmark

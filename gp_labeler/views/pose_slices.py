@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from PySide6.QtGui import QPainter
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.mean_cochlea import cochlea_tubes
 from gp_labeler.scene.coil import section
 from gp_labeler.scene.ghosts import RADIUS_95, ellipse

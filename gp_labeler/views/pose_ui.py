@@ -8,9 +8,9 @@ from pathlib import Path
 from PySide6.QtCore import Qt
 from PySide6.QtGui import QGuiApplication
 
-from gp_core.atlas.insertion import UNITS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.pose.insertion_path import UNITS
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
 from gp_labeler.session import touching

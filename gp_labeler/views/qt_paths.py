@@ -6,7 +6,7 @@ import numpy as np
 from PySide6.QtCore import QByteArray, QDataStream, QIODevice
 from PySide6.QtGui import QPainterPath
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 
 __all__ = ["segments_path"]
 

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 from PySide6.QtCore import QObject
 
-from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
 from gp_core.disk import write_text
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import PARTS

@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtCore import QObject
 from PySide6.QtGui import QPainter
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.slice_view import SliceView as Shown

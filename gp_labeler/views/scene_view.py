@@ -22,7 +22,7 @@ from PySide6.QtGui import (
 )
 from PySide6.QtWidgets import QWidget
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.cut import CutPlane
 from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize

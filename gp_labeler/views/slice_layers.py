@@ -7,7 +7,7 @@ from typing import Protocol
 
 from PySide6.QtGui import QPainter
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.slice_view import SliceView as Shown
 
 __all__ = ["SliceLayer", "SliceName"]

@@ -8,7 +8,7 @@ import numpy as np
 from PySide6.QtCore import QPointF, Qt
 from PySide6.QtGui import QColor, QPainter, QPen
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.segments import Segment
 from gp_labeler.scene.slice_view import SliceView as Shown
 

@@ -9,7 +9,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, QTimer, Signal
 from PySide6.QtGui import QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.planes import LETTERS
 from gp_labeler.session.edits import point_text
 from gp_labeler.session.jobs import Task

@@ -6,7 +6,7 @@ from PySide6.QtCore import QEvent, QSize, Qt, Signal
 from PySide6.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels

@@ -17,10 +17,10 @@ import pytest
 
 import gp_core
 from gp_core import disk
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.cli import main
 from gp_core.errors import FileFormatError, GpError
-from gp_core.landmarks.files import write_markups
+from gp_core.io import write_markups
 
 OLD = b"what was there before\n"
 

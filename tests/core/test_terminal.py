@@ -13,8 +13,8 @@ import pytest
 
 from gp_core.cli import main
 from gp_core.errors import FeatureError, GeometryError, GpError
+from gp_core.io import read_landmarks, read_points, read_touches, write_csv
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import read_landmarks, read_points, read_touches, write_csv
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.terminal import printable
 

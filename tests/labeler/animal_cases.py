@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal
-from gp_core.landmarks.files import write_markups
+from gp_core.atlas.sampling import draw_animal
+from gp_core.io import write_markups
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
 from gp_labeler.scene.pose_data import (
     DrawnFeature,
     DrawnPose,

@@ -13,8 +13,8 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.label_check import Finding, SideCheck
 from gp_core.errors import GpError
+from gp_core.io import load_specimens
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import load_specimens
 from gp_core.landmarks.sets import Specimen
 from gp_core.study.leave_one_out import leave_one_out
 from gp_labeler.atlas_desk import is_atlas_file

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from gp_core.cli import main as core
-from gp_core.landmarks.files import load_specimens
+from gp_core.io import load_specimens
 from gp_labeler.__main__ import main
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.volume import Volume

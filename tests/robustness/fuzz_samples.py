@@ -11,8 +11,8 @@ from types import MappingProxyType
 import numpy as np
 
 from gp_core import CODES, PROBE, Atlas, estimate_pose, read_touches
-from gp_core.atlas.draw import draw_animal
-from gp_core.landmarks.files import write_csv, write_fcsv, write_markups
+from gp_core.atlas.sampling import draw_animal
+from gp_core.io import write_csv, write_fcsv, write_markups
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["make_samples"]

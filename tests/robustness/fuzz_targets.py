@@ -14,14 +14,14 @@ from fuzz_window import Window
 
 import gp_core
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.insertion import read_path
-from gp_core.atlas.pose_files import read_pose
 from gp_core.cli import main as gp_core_main
 from gp_core.errors import GpError
-from gp_core.landmarks.files import import_mat, load_specimens, read_authors_mat, read_lab_names, read_points
+from gp_core.io import import_mat, load_specimens, read_authors_mat, read_lab_names, read_points
+from gp_core.io.pose_json import read_pose
+from gp_core.io.stl import read_stl
+from gp_core.io.tracker_recordings import read_marker_poses, read_recording
+from gp_core.pose.insertion_path import read_path
 from gp_core.registration.pivot import calibrate_pivot
-from gp_core.registration.recordings import read_marker_poses, read_recording
-from gp_core.registration.stl import read_stl
 from gp_core.study.checkpoint import Checkpoint
 from gp_labeler.__main__ import main as gp_labeler_main
 from gp_labeler.imaging.readers import inspect_volume, read_volume

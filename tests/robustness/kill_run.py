@@ -25,9 +25,9 @@ from pathlib import Path
 import numpy as np
 
 from gp_core import Atlas, load_specimens
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
-from gp_core.landmarks.files import read_landmarks, write_csv, write_markups
+from gp_core.io import read_landmarks, write_csv, write_markups
 from gp_labeler.session.opening import new_session, open_session, recover_session
 from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.session.specimen_edits import SetNotes

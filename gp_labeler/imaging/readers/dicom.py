@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.choosing import Choice, choose
 from gp_labeler.imaging.readers.dicom_grid import Grid, on_grid

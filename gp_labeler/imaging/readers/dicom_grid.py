@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.readers.dicom_tags import DicomSlice
 from gp_labeler.imaging.readers.problems import Problem, names, warning
 

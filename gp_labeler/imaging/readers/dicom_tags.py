@@ -14,7 +14,7 @@ import pydicom
 from pydicom.errors import InvalidDicomError
 from pydicom.uid import DeflatedExplicitVRLittleEndian
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Report
 
 __all__ = ["DicomFile", "DicomSlice", "Stored", "is_dicom", "is_dicomdir", "scan_dicom"]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.readers.headers import (
     HEADER_BYTES,
     Header,

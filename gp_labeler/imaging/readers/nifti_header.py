@@ -16,7 +16,7 @@ from nibabel.nifti2 import Nifti2Header, Nifti2PairHeader
 from nibabel.spatialimages import HeaderDataError
 from nibabel.spm99analyze import Spm99AnalyzeHeader
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.headers import Header, Layout, not_a
 from gp_labeler.imaging.readers.options import Spacing

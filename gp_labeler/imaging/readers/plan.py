@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.grey import loaded_dtype, narrowing
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import SimpleITK
 
-from gp_core.checks import FloatArray
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.headers import Header
 from gp_labeler.imaging.readers.options import Spacing

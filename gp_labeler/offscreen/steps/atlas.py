@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from gp_core import Atlas, Specimen, check_specimen, load_specimens
-from gp_core.atlas.fitting import fit_plain_atlas, fit_screened_atlas
+from gp_core.atlas.fitting import fit_screened_atlas
+from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.atlas.screening import screen_labels
 from gp_core.disk import write_text
 from gp_core.errors import GpError

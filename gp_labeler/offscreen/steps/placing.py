@@ -8,10 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray
 from gp_labeler.offscreen.aiming import aim_at_bone, scroll_to
 from gp_labeler.offscreen.events import click, drag, press_keys
 from gp_labeler.offscreen.rig import VIEWS, Rig

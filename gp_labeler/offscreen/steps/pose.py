@@ -8,11 +8,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gp_core import PROBE, Atlas, CochleaPose, fit_atlas, load_specimens
-from gp_core.atlas.systematic import DEFAULT_SHARED_ERROR_MM
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import modiolar_axis
 from gp_core.landmarks.features import Side
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
+from gp_core.validation import FloatArray
 from gp_labeler.offscreen.events import leave
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step

@@ -10,10 +10,10 @@ from typing import ClassVar
 import numpy as np
 
 from gp_core import PROBE, RigidTransform
-from gp_core.checks import FloatArray
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, Side
+from gp_core.validation import FloatArray
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step, Triple
 from gp_labeler.session import touching

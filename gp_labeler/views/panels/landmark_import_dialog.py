@@ -18,8 +18,8 @@ from PySide6.QtWidgets import (
 )
 
 from gp_core.errors import GpError
+from gp_core.io import landmarks_of, read_points, sides_of, unknown_labels
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import landmarks_of, read_points, sides_of, unknown_labels
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session.lab_names import LabNamesMemory

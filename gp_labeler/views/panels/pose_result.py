@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QGridLayout, QWidget
 
-from gp_core.atlas.pose import CochleaPose
-from gp_core.atlas.pose_quality import pose_quality
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.quality import pose_quality
 from gp_labeler.session import touching
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.touches import TouchHow

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from gp_core.atlas.next_touch import TouchGain
-from gp_core.atlas.pose import CochleaPose
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, feature
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.next_touch import TouchGain
 from gp_labeler.session.estimate import Estimate
 from gp_labeler.session.touches import Touch, TouchHow
 from gp_labeler.views.bind import NONE, degrees_text

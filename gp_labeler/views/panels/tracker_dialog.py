@@ -20,9 +20,9 @@ from PySide6.QtWidgets import (
     QWidget,
 )
 
-from gp_core.atlas.pose_gate import PoseGate
-from gp_core.checks import FloatArray
 from gp_core.errors import GpError
+from gp_core.pose.gate import PoseGate
+from gp_core.validation import FloatArray
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.bind import follow, set_role

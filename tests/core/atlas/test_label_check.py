@@ -9,7 +9,7 @@ import pytest
 from atlas_cases import random_pose
 
 from gp_core import FEATURES, Atlas, LandmarkSet, ScanEvidence, Side, Specimen, check_side
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.frames import mirror_x
 from gp_core.landmarks.suggestion import Suggestion
 

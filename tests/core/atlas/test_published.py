@@ -9,7 +9,7 @@ import numpy as np
 
 from gp_core import Atlas, Specimen, fit_atlas
 from gp_core.atlas.atlas import _published
-from gp_core.atlas.published import published_distances
+from gp_core.atlas.published import published_distances, published_shape
 from gp_core.landmarks.features import CODES, FEATURES
 
 
@@ -37,9 +37,9 @@ def test_all_who_ask_at_once_get_the_same(monkeypatch) -> None:
         built.append(1)
         with suppress(threading.BrokenBarrierError):
             both.wait()  # passes only if a second one is let in
-        return object()
+        return published_shape()
 
-    monkeypatch.setattr("gp_core.atlas.published.build_published_atlas", build)
+    monkeypatch.setattr("gp_core.atlas.atlas.published_shape", build)
     monkeypatch.setattr("gp_core.atlas.atlas._published", cache(_published.__wrapped__))
     with ThreadPoolExecutor(2) as pool:
         first, second = (future.result() for future in [pool.submit(Atlas.published) for _ in range(2)])

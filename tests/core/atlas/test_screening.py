@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from gp_core import PROBE, TRAINING, Atlas, LandmarkSet, Side, Specimen, fit_atlas, leave_one_out
-from gp_core.atlas.draw import draw_animal
-from gp_core.atlas.fitting import fit_plain_atlas, left_shapes
+from gp_core.atlas.plain_fit import fit_plain_atlas, left_shapes
+from gp_core.atlas.sampling import draw_animal
 from gp_core.atlas.screening import mean_shared_points, screen_labels
 from gp_core.frames import mirror_x
 from gp_core.landmarks.anatomy import cochlea_frame, with_cochlea_origin

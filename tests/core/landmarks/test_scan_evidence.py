@@ -12,7 +12,7 @@ import pytest
 from gp_core.cli import main
 from gp_core.errors import FileFormatError
 from gp_core.frames import RigidTransform
-from gp_core.landmarks.files import read_landmarks, write_csv, write_markups
+from gp_core.io import read_landmarks, write_csv, write_markups
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 

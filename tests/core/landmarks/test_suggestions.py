@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.shape import predict
+from gp_core.atlas.prediction import predict
 from gp_core.errors import FeatureError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.anatomy import with_cochlea_origin

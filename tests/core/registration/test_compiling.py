@@ -9,8 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gp_core.atlas import settling_compiled
-from gp_core.registration import compiling, kernels
+from gp_core.registration import compiling, jrmpc_kernels, student_t_fit_compiled
 
 _RUN = """
 from gp_core.registration.outer import outer
@@ -52,11 +51,12 @@ def test_a_kernel_is_compiled_anew_when_the_file_of_one_it_calls_changes(package
 
 
 @pytest.mark.parametrize(
-    ("kernel", "own"), [(kernels.maximise, "kernels.py"), (settling_compiled.settle, "settling.py")]
+    ("kernel", "own"),
+    [(jrmpc_kernels.maximise, "jrmpc_kernels.py"), (student_t_fit_compiled.settle, "student_t_fit.py")],
 )
 def test_both_fits_are_made_of_the_one_solver(kernel: object, own: str) -> None:
     files = {Path(file).name for file in compiling._files(kernel.py_func)}
-    assert {own, "turning.py", "compiling.py"} <= files
+    assert {own, "rotation.py", "compiling.py"} <= files
 
 
 def test_plain_functions_stay_as_they_are() -> None:

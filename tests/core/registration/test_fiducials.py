@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
 from gp_core.registration.procrustes import fit_rigid, rms_without_each
+from gp_core.validation import FloatArray
 
 TARGETS = np.array([[3.0, -25.0, 8.0], [0.0, 0.0, 0.0], [40.0, 5.0, -3.0]])
 

@@ -11,9 +11,9 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from gp_core import GpError, RigidTransform
+from gp_core.io.stl import read_stl
 from gp_core.registration.icp import icp
-from gp_core.registration.stl import read_stl
-from gp_core.registration.targets import Cloud, Surface
+from gp_core.registration.icp_targets import Cloud, Surface
 
 Points = NDArray[np.float64]
 

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 from reference_jrmpc import reference_jrmpc
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.registration import jrmpc as module
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcResult, JrmpcSettings, jrmpc, jrmpc_batch
+from gp_core.validation import FloatArray
 
 
 def turn(rng: np.random.Generator, largest_angle: float = np.pi) -> FloatArray:

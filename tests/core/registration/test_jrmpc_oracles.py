@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
-from gp_core.checks import FloatArray
 from gp_core.landmarks.anatomy import round_window_frame
 from gp_core.landmarks.features import PROBE, TRAINING
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.jrmpc import ESTIMATION, jrmpc, jrmpc_batch
+from gp_core.validation import FloatArray
 
 DATA = Path(__file__).parents[3] / ".." / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="../shared/data is not here")

@@ -12,10 +12,10 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from gp_core.checks import FloatArray
 from gp_core.errors import FileFormatError, GeometryError, GpError
+from gp_core.io.tracker_recordings import read_marker_poses
 from gp_core.registration.pivot import calibrate_pivot
-from gp_core.registration.recordings import read_marker_poses
+from gp_core.validation import FloatArray
 
 TIP = np.array([12.0, -4.0, 163.0])
 PIVOT = np.array([-80.0, 240.0, -900.0])

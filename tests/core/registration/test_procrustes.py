@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gp_core.checks import FloatArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import mirror_x
 from gp_core.registration.procrustes import fit_rigid, rms_without_each, surely_no_line, weighted_procrustes
+from gp_core.validation import FloatArray
 
 seeds = st.integers(0, 2**32 - 1)
 

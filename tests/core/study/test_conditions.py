@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gp_core import PROBE, Atlas, GpError, Side
-from gp_core.atlas.draw import draw_animal, perturbed_atlas
+from gp_core.atlas.sampling import draw_animal, perturbed_atlas
 from gp_core.cli import main
 from gp_core.study.conditions import GROUPS, TouchCondition, conditions, touch_conditions
 from gp_core.study.sessions import (

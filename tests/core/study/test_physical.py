@@ -13,10 +13,10 @@ from study_cases import herd
 
 from gp_core import PROBE, GpError, RigidTransform
 from gp_core.landmarks.sets import LandmarkSet
-from gp_core.registration.targets import Surface
+from gp_core.registration.icp_targets import Surface
+from gp_core.registration.skull import register_by_icp, register_by_names
 from gp_core.study import figures
 from gp_core.study.physical import PhysicalReport, PhysicalRow, physical_simulations, physical_test
-from gp_core.study.skull_registration import register_by_icp, register_by_names
 
 HERD = herd(6, seed=3)
 SKULL_MM = np.array([18.0, 25.0, 14.0])

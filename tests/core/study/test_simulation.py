@@ -11,9 +11,9 @@ import pytest
 from study_cases import herd
 
 from gp_core import TRAINING, GpError, Side, Specimen, jrmpc
-from gp_core.atlas.jrmpc_pose import training_sides
 from gp_core.landmarks.anatomy import cochlea_origin
 from gp_core.landmarks.features import index_of
+from gp_core.pose.jrmpc_estimator import training_sides
 from gp_core.registration.jrmpc import ESTIMATION
 from gp_core.study.simulation import simulate, simulate_sides
 

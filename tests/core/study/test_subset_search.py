@@ -15,10 +15,10 @@ from study_cases import herd
 
 from gp_core import CODES, EXTERNAL, PROBE, TRAINING, GpError, Specimen
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
+from gp_core.study.backward_elimination import Codes, Elimination, Progress, Ticker, probe_curve
 from gp_core.study.checkpoint import Checkpoint
-from gp_core.study.elimination import Codes, Elimination, Progress, Ticker, probe_curve
 from gp_core.study.leave_one_out import leave_one_out
-from gp_core.study.mapping import open_executor
+from gp_core.study.parallel import open_executor
 from gp_core.study.subset_search import SearchReport, problem_of, search_features
 
 SMALL = ("CA", "CB", "CL", "LLI", "MN", "OS", "RWA", "RWP")

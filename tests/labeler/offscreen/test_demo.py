@@ -6,7 +6,7 @@ import pytest
 from PySide6.QtGui import QImage
 from script_cases import content
 
-from gp_core.landmarks.files import read_landmarks
+from gp_core.io import read_landmarks
 from gp_labeler.offscreen.demo import demo_script
 from gp_labeler.offscreen.runner import run_script
 

@@ -11,8 +11,8 @@ from PySide6.QtTest import QTest
 from script_cases import run, untimed
 from window_cases import settle
 
+from gp_core.io import read_landmarks
 from gp_core.landmarks.features import Side, index_of
-from gp_core.landmarks.files import read_landmarks
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.threshold import propose_threshold

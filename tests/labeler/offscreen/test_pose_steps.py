@@ -200,7 +200,7 @@ def test_an_insertion_path_that_cannot_be_carried_is_refused(tmp_path, step, com
 @pytest.mark.slow
 def test_both_methods_side_by_side(tmp_path) -> None:
     from gp_core import write_markups
-    from gp_core.atlas.draw import draw_animal
+    from gp_core.atlas.sampling import draw_animal
 
     rng, animals = np.random.default_rng(5), tmp_path / "animals"
     animals.mkdir()

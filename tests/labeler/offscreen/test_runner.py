@@ -216,7 +216,7 @@ def test_a_scan_without_a_voxel_size_stops_unless_the_script_gives_it(tmp_path) 
 
 def test_an_atlas_is_fitted_to_labelled_animals(tmp_path) -> None:
     from gp_core import Atlas, Side, write_markups
-    from gp_core.atlas.draw import draw_animal
+    from gp_core.atlas.sampling import draw_animal
 
     rng, animals = np.random.default_rng(5), tmp_path / "animals"
     animals.mkdir()

@@ -7,10 +7,10 @@ from scipy.spatial import cKDTree
 from skimage.measure import label, marching_cubes
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal, mean_animal
+from gp_core.atlas.sampling import draw_animal, mean_animal
 from gp_core.errors import GpError
+from gp_core.io.markups import read_markups
 from gp_core.landmarks.features import CODES, Side
-from gp_core.landmarks.files.markups import read_markups
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.phantom import make_phantom, write_phantom

@@ -9,8 +9,8 @@ from functools import partial
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.draw import draw_animal
-from gp_core.atlas.shape import predict
+from gp_core.atlas.prediction import predict
+from gp_core.atlas.sampling import draw_animal
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.session import labelling

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
-from gp_core.landmarks.files import write_markups
+from gp_core.io import write_markups
 from gp_labeler.session import touching
 from gp_labeler.session.edits import PlacePoint
 from gp_labeler.session.estimating import Estimating

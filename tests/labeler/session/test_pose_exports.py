@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gp_core import PROBE, Atlas, Side
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_labeler.session import touching
 from gp_labeler.session.estimating import Estimating

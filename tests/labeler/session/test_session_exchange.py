@@ -9,8 +9,8 @@ import pytest
 from session_cases import MARK, FakeVolume, shape
 
 from gp_core.errors import FeatureError, GpError
+from gp_core.io import load_specimens, read_landmarks, write_csv
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import load_specimens, read_landmarks, write_csv
 from gp_core.landmarks.sets import Status
 from gp_labeler.session import labelling
 from gp_labeler.session.landmark_export import FORMATS, export_landmarks

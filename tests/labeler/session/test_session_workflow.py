@@ -11,7 +11,7 @@ from session_cases import MARK, PLACEABLE, FakeVolume, check, predict, shape
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
-from gp_core.atlas.shape import predict as shape_predict
+from gp_core.atlas.prediction import predict as shape_predict
 from gp_core.errors import FeatureError, GeometryError, GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import LandmarkSet

@@ -10,10 +10,10 @@ import pytest
 from session_cases import MARK, PLACEABLE, FakeVolume, predict, shape, text_of
 
 from gp_core import PROBE, Atlas
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
+from gp_core.io import load_specimens, read_landmarks
 from gp_core.landmarks.features import Side
-from gp_core.landmarks.files import load_specimens, read_landmarks
 from gp_labeler.session import labelling, touching
 from gp_labeler.session.document import document_of
 from gp_labeler.session.edits import CheckPoint, LockPoints, PlacePoint, SwapPoints

@@ -12,7 +12,7 @@ import pyigtl
 import pytest
 from tracker_cases import pose, until
 
-from gp_core.atlas.pose_gate import GateReason
+from gp_core.pose.gate import GateReason
 from gp_labeler.tracker import LinkPhase, PoseMessage, PoseSender, TrackerAddress, TrackerLink
 from gp_labeler.tracker.messages import MessageDecoder, TrackerMessage
 from gp_labeler.tracker.pose_message import STATUS_DEVICE

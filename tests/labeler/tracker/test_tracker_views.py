@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QWidget
 from tracker_cases import POINTS, TIP, SimulatorProcess
 
 from gp_core import PROBE, Atlas, Side
-from gp_core.atlas.pose_quality import pose_quality
+from gp_core.pose.quality import pose_quality
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import TrackerAddress

@@ -13,7 +13,7 @@ from PySide6.QtGui import QColor, QImage, QPixmap, QRegion
 from PySide6.QtWidgets import QApplication, QDialog, QWidget
 
 from gp_core import PROBE
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.landmarks.features import CODES, Side, index_of
 from gp_labeler.session import labelling
 from gp_labeler.session.edits import MarkUnseen, PlacePoint, SwapSides

@@ -10,7 +10,7 @@ from PySide6.QtCore import Qt
 from PySide6.QtWidgets import QWidget
 
 from gp_core import PROBE, Atlas
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.frames import RigidTransform
 from gp_labeler.physical_work import PhysicalTest
 from gp_labeler.session import touching

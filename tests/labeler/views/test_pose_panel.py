@@ -15,7 +15,7 @@ from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
 from window_cases import drop_file
 
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.session import labelling, touching

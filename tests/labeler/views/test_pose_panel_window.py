@@ -9,7 +9,7 @@ from PySide6.QtWidgets import QApplication
 from window_cases import BALL_MM, MIDDLE, ball_volume, close, drop_file, settle
 
 from gp_core import PROBE, Atlas, Side
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_labeler.pose_desk import ORDER
 from gp_labeler.scene.planes import Plane
 from gp_labeler.session import labelling

@@ -15,7 +15,7 @@ from PySide6.QtCore import QTimer
 from PySide6.QtWidgets import QApplication, QWidget
 
 from gp_core import PROBE, Side
-from gp_core.atlas.draw import draw_animal
+from gp_core.atlas.sampling import draw_animal
 from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.session import labelling, touching
 from gp_labeler.session.landmark_export import export_landmarks

@@ -1,0 +1,121 @@
+"""Where an atlas expects the features of a labelled side that are not placed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
+from gp_core.errors import FeatureError, GeometryError
+from gp_core.landmarks.anatomy import cochlea_origin, mirror_right
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.registration.named_points import NamedFit, TouchModel, fit_named_points, motion_jacobian
+from gp_core.validation import FloatArray
+
+__all__ = ["predict"]
+
+UNKNOWN_ANGLE_SD = np.pi / np.sqrt(3)
+"""Standard deviation of an angle of which nothing is known, rad."""
+
+
+def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Predict every feature that is not placed from those that are.
+
+    Parameters
+    ----------
+    atlas : Atlas
+    landmarks : LandmarkSet
+        At least three placed features that the atlas holds, not on one line, in any frame, mm.
+
+    Returns
+    -------
+    dict of str to (mean (3,), covariance (3, 3))
+        In the frame of the landmarks, mm and mm^2; CO among them where it is not placed.
+
+    Raises
+    ------
+    FeatureError
+        Fewer than three usable features.
+    GeometryError
+        They lie on one line.
+    """
+    known = _known(atlas, landmarks)
+    fit = _fit(atlas, landmarks, known)
+    wanted = tuple(code for code in atlas.codes if code not in known)
+    mean, covariance = _given(atlas, known, fit, wanted)
+    mean, covariance = _to_frame(mean, covariance, fit, landmarks.side)
+    found = {
+        code: (mean[i], covariance[3 * i : 3 * i + 3, 3 * i : 3 * i + 3]) for i, code in enumerate(wanted)
+    }
+    if "CO" not in landmarks:
+        found["CO"] = _predict_origin(landmarks, found)
+    return found
+
+
+def _known(atlas: Atlas, landmarks: LandmarkSet) -> tuple[str, ...]:
+    known = tuple(code for code in landmarks.placed if code in atlas.codes)
+    if len(known) < 3:
+        raise FeatureError(
+            f"at least three placed features are needed, got {len(known)}", remedy="Place more of them."
+        )
+    return known
+
+
+def _fit(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...]) -> NamedFit:
+    points = landmarks.array(known)
+    model = TouchModel(known, atlas.rows(known), atlas.variances(known), LABELLING_NOISE_MM)
+    return fit_named_points(model, mirror_right(points, landmarks.side))
+
+
+def _given(
+    atlas: Atlas, known: tuple[str, ...], fit: NamedFit, wanted: tuple[str, ...]
+) -> tuple[FloatArray, FloatArray]:
+    """Return mean (m, 3) and covariance (3 m, 3 m) of other features, given the fitted ones; atlas frame."""
+    noise = np.repeat(fit.noise**2 / fit.weights, 3)
+    precision = np.linalg.inv(atlas.cross_covariance(known, known) + np.diag(noise))
+    jacobian = fit.jacobian
+    information = jacobian.T @ precision @ jacobian
+    _check_turn(information)
+    shift = np.linalg.solve(information, jacobian.T @ precision @ fit.residual)
+    cross = atlas.cross_covariance(wanted, known) @ precision
+    prior = atlas.rows(wanted)
+    motion = motion_jacobian(prior)
+    mean = prior + (cross @ (fit.residual - jacobian @ shift) + motion @ shift).reshape(-1, 3)
+    lever = motion - cross @ jacobian
+    covariance = atlas.cross_covariance(wanted, wanted) - cross @ atlas.cross_covariance(known, wanted)
+    return mean, covariance + lever @ np.linalg.solve(information, lever.T)
+
+
+def _check_turn(information: FloatArray) -> None:
+    """Refuse points that tell no more of the turn of the head than no points would.
+
+    `information` (6, 6): of the translation, 1/mm^2, and the rotation, 1/rad^2.
+    """
+    about_middle = information[3:, 3:] - information[3:, :3] @ np.linalg.solve(
+        information[:3, :3], information[:3, 3:]
+    )
+    if not np.linalg.eigvalsh(about_middle)[0] > UNKNOWN_ANGLE_SD**-2:
+        raise GeometryError(
+            "the placed features lie at one place or on one line, and do not tell how the head is turned",
+            remedy="Place one that lies apart, and check that the labels are in mm.",
+        )
+
+
+def _to_frame(
+    mean: FloatArray, covariance: FloatArray, fit: NamedFit, side: Side
+) -> tuple[FloatArray, FloatArray]:
+    points = mirror_right(mean @ fit.rotation.T + fit.translation, side)
+    turn = np.kron(np.eye(len(mean)), fit.rotation)
+    if side is Side.RIGHT:
+        turn = np.kron(np.eye(len(mean)), np.diag([-1.0, 1.0, 1.0])) @ turn
+    return points, turn @ covariance @ turn.T
+
+
+def _predict_origin(
+    landmarks: LandmarkSet, found: dict[str, tuple[FloatArray, FloatArray]]
+) -> tuple[FloatArray, FloatArray]:
+    """Return CO of the placed or predicted points that define it, and the spread of the least certain one."""
+    points = [landmarks[code] if code in landmarks else found[code][0] for code in DEFINING]
+    spreads = [found[code][1] for code in DEFINING if code in found] or [np.zeros((3, 3))]
+    return cochlea_origin(*points), max(spreads, key=np.trace)

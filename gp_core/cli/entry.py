@@ -1,0 +1,95 @@
+"""The command line ``gp-core``: thin over the functions at the top of `gp_core`."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+
+from gp_core import __version__
+from gp_core.cli import (
+    conditions,
+    estimate,
+    labels,
+    study,
+    study_errors,
+    study_physical,
+    study_search,
+    touches,
+    tracking,
+)
+from gp_core.cli.options import keeping_inputs
+from gp_core.command_line import CommandParser
+from gp_core.errors import GpError
+from gp_core.terminal import leave_output, plain_terminal
+
+__all__ = ["main", "make_parser"]
+
+_COMMANDS = (
+    estimate,
+    tracking,
+    touches,
+    labels,
+    study,
+    study_search,
+    study_errors,
+    study_physical,
+    conditions,
+)
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser with all commands."""
+    parser = CommandParser(
+        prog="gp-core",
+        description="Atlas of guinea-pig ear landmarks, and cochlea poses from touched points.",
+    )
+    parser.add_argument("--version", action="version", version=f"gp-core {__version__}")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    for module in _COMMANDS:
+        module.add(commands)
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Returns
+    -------
+    int
+        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line; 3 where a
+        pose was not written, since names or side look wrong; 130 where it was stopped and 141 where nobody
+        reads on, as shells have it.
+    """
+    with plain_terminal():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
+    args = make_parser().parse_args(arguments)
+    try:
+        with keeping_inputs(args):
+            status: int = args.run(args)
+        sys.stdout.flush()
+    except GpError as error:
+        sys.stderr.write(f"gp-core: {error}\n")
+        return 2
+    except BrokenPipeError:  # who reads has read enough, such as `head`
+        leave_output()
+        return 141
+    except MemoryError:
+        sys.stderr.write("gp-core: there is not enough memory for this; close other programs\n")
+        return 2
+    except OSError as error:
+        sys.stderr.write(f"gp-core: {error.filename or 'file'}: {error.strerror or error}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("gp-core: stopped\n")
+        return 130
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,343 @@
+"""``gp-core estimate``: touched points in, the pose of the cochlea out."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.fitting import fit_atlas
+from gp_core.cli.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_names,
+    lab_names,
+    read_atlas,
+    save_json,
+    say,
+)
+from gp_core.errors import GpError, blaming
+from gp_core.io import read_touches
+from gp_core.io.file_names import named_side
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS, CochleaPose
+from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.gate import PoseGate, against_writing
+from gp_core.pose.hypothesis_check import read_as, with_names_exchanged
+from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_before_centre, write_path
+from gp_core.pose.mixture import Hypothesis
+from gp_core.pose.next_touch import MM_A_DEGREE, TouchGain, gains
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
+from gp_core.validation import FloatArray
+
+__all__ = ["HELD_BACK", "add", "pose_table"]
+
+HELD_BACK = 3
+"""Status of a command that wrote no pose, since names or side look wrong."""
+
+_FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
+"""Options whose files carry a pose without its doubts."""
+
+_OF_A_PATH = ("path_units", "path_side", "path_axes", "path_rows", "path_out")
+_AXES = "x,y,z"
+
+_TAKEN_FOR_SURE = 0.995
+"""Probability from which a reading that the program chose itself is beyond doubt."""
+
+_HARDLY = 0.03
+"""Part of the present error region below which a gain is not worth a touch."""
+
+
+def add(commands: Subparsers) -> None:
+    """Add the command."""
+    parser = add_command(
+        commands,
+        "estimate",
+        run,
+        summary="estimate the pose of a cochlea from a few touched points",
+        example="gp-core estimate touches.dat --side R --json pose.json",
+    )
+    parser.add_argument(
+        "touches", metavar="TOUCHES", help=".dat, .csv, .mrk.json or .fcsv with three or more touches"
+    )
+    add_names(parser)
+    parser.add_argument("--side", required=True, choices=("L", "R"), help="side of the head")
+    parser.add_argument(
+        "--atlas",
+        nargs="+",
+        default=["published"],
+        metavar="ATLAS",
+        help="published (default), an atlas file, or landmark files of labelled animals",
+    )
+    parser.add_argument("--method", choices=METHODS, default="robust", help="default: robust")
+    parser.add_argument(
+        "--probe-noise",
+        type=float,
+        metavar="MM",
+        help="error of an ordinary touch; default: found from the touches",
+    )
+    _add_doubts(parser)
+    parser.add_argument(
+        "--round-window",
+        choices=ROUND_WINDOWS,
+        default="touched",
+        help="what y of the written frame points to: the middle of the touched RWA and RWP, where both fit "
+        "(default), or of the fitted atlas",
+    )
+    add_json(parser)
+    parser.add_argument("--tfm", metavar="FILE", help="write the pose as an ITK / Slicer transform here")
+    parser.add_argument(
+        "--csv", metavar="FILE", help="write the 4x4 matrix here: four rows of four numbers, mm"
+    )
+    parser.add_argument(
+        "--landmarks",
+        metavar="FILE",
+        help="write CO and a point of the axis here, as Slicer markups (.mrk.json)",
+    )
+    _add_path(parser)
+
+
+def _add_doubts(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("what may be wrong")
+    group.add_argument(
+        "--shared-error",
+        type=float,
+        default=DEFAULT_SHARED_ERROR_MM,
+        metavar="MM",
+        help="RMS length of one offset that all touches share: tip calibration, tracker, soft tissue; it "
+        f"widens the region; default: {DEFAULT_SHARED_ERROR_MM:g}",
+    )
+    group.add_argument(
+        "--exchange",
+        type=_two_names,
+        metavar="A,B",
+        help="give each of two touches the other's name before the estimate, such as RWA,RWP",
+    )
+    group.add_argument(
+        "--take-best",
+        action="store_true",
+        help="where the other side, or an exchange of two names, is likelier than what is given, take that",
+    )
+    group.add_argument(
+        "--accept-warnings",
+        action="store_true",
+        help="write all files even where names or side look wrong or are undecided; without it, only --json "
+        "is written then, and the status is 3",
+    )
+
+
+def _add_path(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("insertion path, carried to where the cochlea is")
+    group.add_argument(
+        "--path", metavar="CSV", help="three columns, in the cochlea frame: origin CO, x towards CA"
+    )
+    group.add_argument("--path-units", choices=tuple(UNITS), help="what its numbers are in; must be said")
+    group.add_argument("--path-side", choices=("L", "R"), help="the ear it was drawn for; must be said")
+    group.add_argument(
+        "--path-axes",
+        metavar="AXES",
+        help="which of its axes are x, y and z of the cochlea frame, such as z,-y,x; default: x,y,z",
+    )
+    group.add_argument("--path-rows", type=int, metavar="N", help="only its first rows; default: all")
+    group.add_argument(
+        "--path-out",
+        metavar="FILE",
+        help="write it here in the frame of the touches: rows of three numbers, mm",
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Estimate, print, and write what was asked for."""
+    path = _path_of(args)
+    touches = read_touches(args.touches, args.side, names=lab_names(args))
+    if args.exchange is not None:
+        with blaming(args.touches):
+            touches = with_names_exchanged(touches, args.exchange)
+    atlas, specimens = read_atlas(args.atlas)
+    if atlas is None and args.method == "robust":
+        with blaming(" ".join(args.atlas)):
+            atlas = fit_atlas(specimens or [])
+    own_atlas = "" if args.atlas == ["published"] else f" with atlas {' '.join(args.atlas)}"
+    with blaming(args.touches + own_atlas):
+        touches, pose, taken = _estimated(args, touches, atlas, specimens)
+        next_touches = (
+            ()
+            if atlas is None
+            else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
+        )
+    doubtful = bool(against_writing(pose)) or (taken is not None and taken.probability < _TAKEN_FOR_SURE)
+    held_back = doubtful and not args.accept_warnings
+    _write(args, pose, path, held_back=held_back)
+    for line in pose_table(pose, Path(args.touches).name, next_touches):
+        say(line)
+    if taken is not None:
+        odds = f"{100 * taken.probability:.1f} %"
+        say(f"  ! taken as {taken.label}, which is likelier than what was given ({odds})")
+    for line in _asides(args, touches, pose, path, held_back=held_back):
+        say(f"  {line}")
+    if held_back:
+        say(f"  ! {_what_was_held_back(args, pose)}")
+    elif doubtful:
+        say("  ! written although side or names are in doubt: --accept-warnings was given")
+    return HELD_BACK if held_back else 0
+
+
+def _two_names(text: str) -> tuple[str, str]:
+    names = [name.strip().upper() for name in text.split(",")]
+    if len(names) != 2 or names[0] == names[1]:
+        raise argparse.ArgumentTypeError(f"expected two different features such as RWA,RWP, got {text!r}")
+    return names[0], names[1]
+
+
+def _estimated(
+    args: argparse.Namespace,
+    touches: LandmarkSet,
+    atlas: Atlas | None,
+    specimens: list[Specimen] | None,
+) -> tuple[LandmarkSet, CochleaPose, Hypothesis | None]:
+    """Estimate the touches as they are named; with ``--take-best``, as they are likeliest to be meant."""
+
+    def estimate(read: LandmarkSet) -> CochleaPose:
+        return estimate_pose(
+            read,
+            read.side,
+            atlas,
+            method=args.method,
+            specimens=specimens,
+            probe_noise=args.probe_noise,
+            round_window=args.round_window,
+            shared_error=args.shared_error,
+        )
+
+    pose = estimate(touches)
+    best = pose.likelier_reading
+    if best is None or not args.take_best:
+        return touches, pose, None
+    touches = read_as(touches, best)
+    return touches, estimate(touches), best
+
+
+def _what_was_held_back(args: argparse.Namespace, pose: CochleaPose) -> str:
+    why = (
+        " and ".join(reason.text for reason in against_writing(pose))
+        or "the reading taken is not beyond doubt"
+    )
+    files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
+    what = f"not written: {' '.join(files)}, as {why}" if files else why
+    if old := [file for file in files if Path(file).exists()]:
+        what += f". Still there from before, and of another estimate: {' '.join(old)}"
+    return f"{what}. Check side and names, or give --accept-warnings"
+
+
+def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None, *, held_back: bool) -> None:
+    """Write what was asked for; of a pose that is held back only the JSON, which carries its state."""
+    if path is not None:
+        with blaming(args.path):
+            carried = carry_path(path, pose, path_side=args.path_side)
+    save_json(args.json, pose.as_dict())
+    if held_back:
+        return
+    if path is not None:
+        write_path(args.path_out, carried)
+    for save, file in (
+        (pose.save_tfm, args.tfm),
+        (pose.save_csv, args.csv),
+        (pose.save_landmarks, args.landmarks),
+    ):
+        if file:
+            save(file)
+
+
+def _asides(
+    args: argparse.Namespace,
+    touches: LandmarkSet,
+    pose: CochleaPose,
+    path: FloatArray | None,
+    *,
+    held_back: bool,
+) -> Iterator[str]:
+    """Yield what the files say beside the pose, and what the written frame is."""
+    if touches.unseen:
+        yield f"not seen by the tracker: {' '.join(sorted(touches.unseen))}"
+    named = named_side(args.touches)
+    if named not in (None, pose.side):
+        yield f"! by its name the file is of the {named.word} side: check the side"
+    centre = None if path is None else rows_before_centre(path)
+    if centre is not None:
+        yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
+    for reason in PoseGate().reasons(pose, accepted=True):
+        if reason.code in ("radius", "cone", "side unchecked", "names unchecked"):
+            yield f"! a robot link would hold this back: {reason.text}"
+    if args.json or (not held_back and any((args.tfm, args.csv, args.path_out))):
+        yield f"y of what was written points to the {pose.round_window} round window"
+
+
+def _path_of(args: argparse.Namespace) -> FloatArray | None:
+    """Return the insertion path that was given, once all is said that must be."""
+    if args.path is None:
+        given = [name for name in _OF_A_PATH if getattr(args, name) is not None]
+        if given:
+            options = " and ".join(f"--{name.replace('_', '-')}" for name in given)
+            verb = "needs" if len(given) == 1 else "need"
+            raise GpError(f"{options} {verb} a path", remedy="Give --path CSV.")
+        return None
+    missing = [
+        option
+        for option, value in (
+            (f"--path-units {'|'.join(UNITS)}", args.path_units),
+            ("--path-side L|R", args.path_side),
+            ("--path-out FILE", args.path_out),
+        )
+        if value is None
+    ]
+    if missing:
+        raise GpError(f"an insertion path needs {' and '.join(missing)} too", file=args.path)
+    return read_path(args.path, units=args.path_units, axes=args.path_axes or _AXES, rows=args.path_rows)
+
+
+def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain] = ()) -> Iterator[str]:
+    """Yield the lines of a short readable table, and what of `next_touches`, best first, gains most."""
+    yield f"Cochlea from {source}, {pose.side.word} side, method {pose.method}, atlas {pose.atlas}"
+    yield ""
+    yield from _position_lines(pose)
+    yield ""
+    yield "  touch   from the mean, mm"
+    for code, distance in pose.residuals.items():
+        yield f"  {code:<7} {distance:6.2f}{'   doubtful' if code in pose.suspects else ''}"
+    for warning in pose.warnings:
+        yield f"  ! {warning}"
+    if next_touches:
+        yield f"  {_advice(next_touches[0])}"
+
+
+def _position_lines(pose: CochleaPose) -> Iterator[str]:
+    """Yield origin and axis with their regions, the state of side and names, and the other readings."""
+    x, y, z = pose.origin
+    within = "95 % within" if pose.method == "robust" else "animals scatter by"
+    yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
+    x, y, z = pose.axis
+    yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"
+    yield f"  state         {pose.state}"
+    if pose.shared_error is not None:
+        yield f"  shared error  {pose.shared_error:g} mm, which the regions allow for"
+    if pose.has_parts:
+        plain = f"{pose.plain_radius_95:.2f} mm and {np.degrees(pose.plain_cone_95):.1f} deg"
+        yield f"  as named      95 % within {plain}; the region above is of several parts:"
+        yield f"    {pose.probability:6.1%}  as named"
+        for other in pose.hypotheses:
+            x, y, z = other.origin
+            yield f"    {other.probability:6.1%}  {other.label}: CO {x:.3f} {y:.3f} {z:.3f}"
+
+
+def _advice(best: TouchGain) -> str:
+    """Say what the best next touch gains, if anything to speak of."""
+    if best.worth < _HARDLY * (best.radius_95_now + MM_A_DEGREE * np.degrees(best.cone_95_now)):
+        return "no other touch would gain much"
+    return (
+        f"touching {best.code} too would gain most: 95 % within about {best.radius_95:.2f} mm "
+        f"and {np.degrees(best.cone_95):.1f} deg"
+    )

@@ -1,0 +1,196 @@
+"""Options that several commands share, and how commands speak."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.disk import is_protected, is_stream, protected_inputs, read_head, write_text
+from gp_core.errors import GpError
+from gp_core.io import landmark_files, load_specimens, read_lab_names
+from gp_core.landmarks.labels import LabelNames
+from gp_core.landmarks.sets import Specimen
+
+__all__ = [
+    "AtlasSource",
+    "Subparsers",
+    "add_command",
+    "add_json",
+    "add_names",
+    "add_specimens",
+    "check_ending",
+    "keeping_inputs",
+    "lab_names",
+    "labelled_specimens",
+    "read_atlas",
+    "save_json",
+    "say",
+]
+
+Subparsers = Any
+"""What `argparse.ArgumentParser.add_subparsers` returns; its class is private."""
+
+_WRITTEN = ("json", "tfm", "csv", "landmarks", "path_out", "figure", "output", "checkpoint")
+"""Names of the options whose files are written; every other word that is a file is read."""
+
+_ENDINGS = {
+    "json": (".json",),
+    "tfm": (".tfm", ".txt"),
+    "csv": (".csv", ".txt"),
+    "landmarks": (".mrk.json", ".json"),
+    "path_out": (".csv", ".txt"),
+}
+"""How the names of these files may end, so that whatever reads them knows what they are."""
+
+_ANOTHER = "Name another file."
+
+AtlasSource = tuple[Atlas | None, list[Specimen] | None]
+
+
+def add_command(
+    commands: Subparsers, name: str, run: Callable[[argparse.Namespace], int], *, summary: str, example: str
+) -> argparse.ArgumentParser:
+    """Add a command with its one-line summary and an example to the help."""
+    parser: argparse.ArgumentParser = commands.add_parser(
+        name,
+        help=summary.replace("%", "%%"),
+        description=f"{summary[0].upper()}{summary[1:]}.",
+        epilog=f"example:\n  {example}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def add_specimens(parser: argparse.ArgumentParser) -> None:
+    """Add the labelled animals, one or more paths."""
+    parser.add_argument(
+        "specimens",
+        nargs="+",
+        metavar="SPECIMENS",
+        help="landmark files of labelled animals, or folders of them",
+    )
+    add_names(parser)
+
+
+def add_names(parser: argparse.ArgumentParser) -> None:
+    """Add ``--names FILE``."""
+    parser.add_argument(
+        "--names",
+        metavar="FILE",
+        help="a table of two columns, your own name of a point and the feature's code (CA, or CA_L)",
+    )
+
+
+def lab_names(args: argparse.Namespace) -> LabelNames | None:
+    """Return the names that ``--names`` gives; None without it."""
+    return None if args.names is None else read_lab_names(args.names)
+
+
+def labelled_specimens(args: argparse.Namespace) -> list[Specimen]:
+    """Return the animals of the command line, under the names that ``--names`` gives."""
+    return load_specimens(args.specimens, names=lab_names(args))
+
+
+def add_json(parser: argparse.ArgumentParser) -> None:
+    """Add ``--json FILE``."""
+    parser.add_argument("--json", metavar="FILE", help="write the full result here")
+
+
+@contextmanager
+def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
+    """Refuse to write over what is read, under any name, or two results to one file, while a command runs.
+
+    Raises
+    ------
+    GpError
+        An output is an input, also one in a folder of landmark files, or two outputs are one file.
+    """
+    with protected_inputs(_files_read(args)):
+        written: dict[str, str] = {}
+        for name in _WRITTEN:
+            word = getattr(args, name, None)
+            if word is None:
+                continue
+            path, option = os.path.realpath(word), f"--{name.replace('_', '-')}"
+            if is_protected(word):
+                raise GpError(f"is read, and {option} would write over it", file=word, remedy=_ANOTHER)
+            if path in written and not is_stream(word):
+                problem = f"would be written by {written[path]} and {option}"
+                raise GpError(problem, file=word, remedy=_ANOTHER)
+            check_ending(word, _ENDINGS.get(name, ()), option)
+            written[path] = option
+        yield
+
+
+def check_ending(word: str, endings: tuple[str, ...], option: str) -> None:
+    """Refuse the name of a file to write that ends as another kind of file does.
+
+    Raises
+    ------
+    GpError
+        It ends, but in none of `endings`, if there are any; a name without an ending is taken, and a stream.
+    """
+    wrong = Path(word).suffix and not word.lower().endswith(endings)
+    if endings and wrong and not is_stream(word):
+        problem = f"{option} writes a {endings[0]} file, and this name ends in {Path(word).suffix}"
+        raise GpError(problem, file=word, remedy=f"Let it end in {' or '.join(endings)}.")
+
+
+def _files_read(args: argparse.Namespace) -> Iterator[str | Path]:
+    """Yield every word that is no output, and the landmark files of those that are folders."""
+    for word in _words_read(args):
+        yield word
+        if Path(word).is_dir():
+            with suppress(GpError):  # a folder without any, which the command itself may complain about
+                yield from landmark_files(word)
+
+
+def _words_read(args: argparse.Namespace) -> Iterator[str]:
+    for name, value in vars(args).items():
+        if name not in _WRITTEN:
+            values = value if isinstance(value, list) else [value]
+            yield from (word for word in values if isinstance(word, str))
+
+
+def read_atlas(words: list[str]) -> AtlasSource:
+    """Return the atlas that ``--atlas`` names, or the specimens it is to be fitted to.
+
+    Raises
+    ------
+    GpError
+        A file cannot be read as either.
+    """
+    if words == ["published"]:
+        return Atlas.published(), None
+    if len(words) == 1 and _is_atlas_file(words[0]):
+        return Atlas.load(words[0]), None
+    return None, load_specimens(words)
+
+
+def _is_atlas_file(word: str) -> bool:
+    """Tell an atlas by what it holds, and what cannot be read by its name."""
+    path, name = Path(word), word.lower()
+    if path.is_dir():
+        return False
+    if b'"gpAtlas"' in read_head(path, 1000):
+        return True
+    return name.endswith(".json") and not name.endswith(".mrk.json")
+
+
+def save_json(path: str | None, content: Any) -> None:
+    """Write a result where ``--json`` was given."""
+    if path is not None:
+        write_text(path, json.dumps(content, indent=1) + "\n")
+
+
+def say(text: str = "") -> None:
+    """Write a line to the terminal."""
+    sys.stdout.write(text + "\n")

@@ -1,0 +1,110 @@
+"""Commands of the study on labelled animals: ``distances`` and ``leave-one-out``."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator
+
+from gp_core.cli.options import (
+    Subparsers,
+    add_command,
+    add_json,
+    add_specimens,
+    labelled_specimens,
+    save_json,
+    say,
+)
+from gp_core.cli.study_options import (
+    add_features,
+    add_figure,
+    add_method,
+    add_settings,
+    features_of,
+    save_figure_of,
+    settings_of,
+)
+from gp_core.registration.jrmpc import ESTIMATION
+from gp_core.study.distances import DistanceTable, distances
+from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out, summarise
+
+__all__ = ["add"]
+
+
+def add(commands: Subparsers) -> None:
+    """Add the commands."""
+    table = add_command(
+        commands,
+        "distances",
+        run_distances,
+        summary="measure mean and SD of the distances of all pairs of features (Figure 2)",
+        example="gp-core distances labelled/ --csv distances.csv --figure figure2.png",
+    )
+    add_specimens(table)
+    table.add_argument("--csv", metavar="FILE", help="write the table here")
+    add_figure(table)
+    add_json(table)
+    held_out = add_command(
+        commands,
+        "leave-one-out",
+        run_leave_one_out,
+        summary="estimate every labelled cochlea from the other animals (Figure 6 A, B)",
+        example="gp-core leave-one-out labelled/ --method jrmpc --figure figure6ab.png",
+    )
+    add_specimens(held_out)
+    add_method(held_out)
+    add_features(held_out)
+    add_settings(held_out, "estimation")
+    add_figure(held_out)
+    add_json(held_out)
+
+
+def run_distances(args: argparse.Namespace) -> int:
+    """Measure, print, and write what was asked for."""
+    table = distances(labelled_specimens(args))
+    save_json(args.json, table.as_dict())
+    if args.csv:
+        table.save_csv(args.csv)
+    save_figure_of(args.figure, "distance_matrix", table)
+    for line in _distance_lines(table):
+        say(line)
+    return 0
+
+
+def _distance_lines(table: DistanceTable) -> Iterator[str]:
+    yield f"Distances between features on {table.n_sides} sides"
+    yield "  feature   median SD of its distances to the others, mm"
+    for code, spread in table.typical_sd().items():
+        yield f"  {code:<9} {spread:5.2f}"
+
+
+def run_leave_one_out(args: argparse.Namespace) -> int:
+    """Estimate, print, and write what was asked for."""
+    training, probe = features_of(args)
+    report = leave_one_out(
+        labelled_specimens(args),
+        method=args.method,
+        training=training,
+        probe=probe,
+        settings=settings_of(args, ESTIMATION),
+    )
+    save_json(args.json, report.as_dict())
+    save_figure_of(args.figure, "error_histograms", report)
+    for line in _leave_one_out_lines(report):
+        say(line)
+    return 0
+
+
+def _leave_one_out_lines(report: LeaveOneOutReport) -> Iterator[str]:
+    yield f"Leave-one-out of {len(report.rows)} sides, method {report.method}"
+    yield f"touched: {' '.join(report.probe)}"
+    yield ""
+    width = max(8, *(len(row.specimen) for row in report.rows))
+    yield f"  {'specimen':<{width}}  side   E_CO mm   E_MA deg"
+    for row in report.rows:
+        yield f"  {row.specimen:<{width}}  {row.side:<4}  {row.e_co_mm:8.3f}  {row.e_ma_deg:9.2f}"
+    yield ""
+    summary = summarise(report.errors)
+    for name in ("mean", "median", "max"):
+        e_co, e_ma = summary["e_co_mm"][name], summary["e_ma_deg"][name]
+        yield f"  {name:<{width}}        {e_co:8.3f}  {e_ma:9.2f}"
+    yield f"  E_T {summary['e_t']:.2f}"

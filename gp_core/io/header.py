@@ -1,0 +1,130 @@
+"""The ``gpLabeler`` object: what this program adds to a markups file, beside what 3D Slicer keeps there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from os import PathLike
+from typing import Any
+
+from gp_core.errors import FeatureError, FileFormatError
+from gp_core.frames import FRAMES
+from gp_core.io.text import shown
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.scan_evidence import ScanEvidence
+
+__all__ = ["SCHEMA_VERSION", "FileHeader"]
+
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class FileHeader:
+    """Whose landmarks a file holds, of what, and how they came to be.
+
+    Parameters
+    ----------
+    specimen : str, optional
+        Name of the animal.
+    side : Side, optional
+        Side of the head.
+    frame : str
+        Frame of the positions.
+    volume : mapping, optional
+        Name, size, spacing and checksum of the volume that was labelled.
+    provenance : mapping of str to any
+        By label: how the point came to be, in plain JSON values.
+    extra : tuple of str
+        Labels beside the feature table that belong in the file.
+    scan_evidence : ScanEvidence, optional
+        How far the points are from bone, as measured in the scan.
+    """
+
+    specimen: str | None = None
+    side: Side | None = None
+    frame: str = "scan"
+    volume: Mapping[str, Any] | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+    extra: tuple[str, ...] = ()
+    scan_evidence: ScanEvidence | None = None
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the object as it stands in the file."""
+        content = {
+            "schemaVersion": SCHEMA_VERSION,
+            "specimen": self.specimen,
+            "side": None if self.side is None else self.side.value,
+            "frame": self.frame,
+            "volume": None if self.volume is None else dict(self.volume),
+            "provenance": dict(self.provenance),
+            "extra": list(self.extra),
+        }
+        if self.scan_evidence is not None:
+            content["boneDistanceMm"] = self.scan_evidence.as_json()
+        return content
+
+    @classmethod
+    def from_json(cls, value: object, file: str | PathLike[str]) -> FileHeader:
+        """Make a header of the file's object; what is absent keeps its default.
+
+        Raises
+        ------
+        FileFormatError
+            Not such an object, or of a later schema.
+        """
+        got: dict[str, Any] = value if isinstance(value, dict) else {"specimen": value}
+        version = got.get("schemaVersion", SCHEMA_VERSION)
+        if isinstance(version, int) and version > SCHEMA_VERSION:
+            raise FileFormatError(
+                f"has a gpLabeler object of schema version {shown(version)}; up to {SCHEMA_VERSION} is known",
+                file=file,
+                remedy="Update gp-labeler.",
+            )
+        header = cls(
+            specimen=got.get("specimen"),
+            side=_side(got.get("side"), file),
+            frame=got.get("frame", "scan"),
+            volume=got.get("volume"),
+            provenance=got.get("provenance", {}),
+            extra=tuple(got["extra"]) if isinstance(got.get("extra"), list) else (),
+            scan_evidence=_scan_evidence(got.get("boneDistanceMm"), file),
+        )
+        wrong = header._wrong_field()
+        if wrong:
+            raise FileFormatError(
+                f"its gpLabeler object has a wrong {wrong}, {shown(got.get(wrong))}",
+                file=file,
+                remedy="Correct it, or remove the object.",
+            )
+        return header
+
+    def _wrong_field(self) -> str | None:
+        checks = {
+            "specimen": self.specimen is None
+            or (isinstance(self.specimen, str) and bool(self.specimen.strip())),
+            "frame": self.frame in FRAMES,
+            "volume": self.volume is None or isinstance(self.volume, dict),
+            "provenance": isinstance(self.provenance, dict),
+            "extra": all(isinstance(label, str) for label in self.extra),
+        }
+        return next((name for name, proper in checks.items() if not proper), None)
+
+
+def _side(value: object, file: str | PathLike[str]) -> Side | None:
+    try:
+        return None if value is None else Side.parse(str(value))
+    except FeatureError:
+        raise FileFormatError(
+            f"its gpLabeler object has a wrong side, {shown(value)}", file=file, remedy="Write L or R."
+        ) from None
+
+
+def _scan_evidence(value: object, file: str | PathLike[str]) -> ScanEvidence | None:
+    try:
+        return None if value is None else ScanEvidence.from_json(value)
+    except ValueError as error:
+        raise FileFormatError(
+            f"its gpLabeler object has a wrong boneDistanceMm ({error})",
+            file=file,
+            remedy="Export the landmarks again, or remove the entry.",
+        ) from None

@@ -1,0 +1,228 @@
+"""Labelled points as a file holds them, before the feature table is asked."""
+
+from __future__ import annotations
+
+import logging
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from os import PathLike
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from gp_core.errors import FileFormatError
+from gp_core.io.header import FileHeader
+from gp_core.io.text import parse_position
+from gp_core.landmarks.features import FEATURES, Feature, Side
+from gp_core.landmarks.sets import LandmarkSet, Status
+from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import FloatArray
+
+__all__ = [
+    "STATUS_WORDS",
+    "LabelledPoint",
+    "PointList",
+    "as_suggested",
+    "is_computed",
+    "labelled_point",
+    "points_of",
+    "suggestions_of",
+]
+
+_log = logging.getLogger(__name__)
+
+# Slicer's words in the order of its numbers; a previewed point follows the mouse and is not placed.
+STATUS_WORDS: Mapping[str, Status] = {
+    "undefined": Status.TO_DO,
+    "preview": Status.TO_DO,
+    "defined": Status.PLACED,
+    "missing": Status.UNSEEN,
+}
+
+# What marks a suggestion in the one text that 3D Slicer shows of a point, and keeps when it saves.
+_SUGGESTED = re.compile(
+    r"suggested, not confirmed"
+    r"(?: \((?P<source>.*?)(?:; 95 % within (?P<radius>[0-9]{1,6}\.?[0-9]*) mm)?\)(?=\.|$))?",
+    re.IGNORECASE,
+)
+
+
+class LabelledPoint(NamedTuple):
+    """One point of a file: label, (3,) position in mm or None, how far it is, free text, side if it says one.
+
+    A suggested point has no `position`, which would be an observation, but a `suggestion`.
+    """
+
+    label: str
+    position: FloatArray | None
+    status: Status
+    description: str = ""
+    suggestion: Suggestion | None = None
+    side: Side | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class PointList:
+    """The labelled points of one file, in the file's order; labels may be anything, and doubled.
+
+    Parameters
+    ----------
+    points : tuple of LabelledPoint
+        The N points; positions in mm, LPS where the file has a coordinate system.
+    source : Path
+        The file.
+    frame : str
+        Frame of the positions.
+    header : FileHeader, optional
+        What this program wrote into the file, if it did.
+
+    Raises
+    ------
+    FileFormatError
+        There are no points.
+    """
+
+    points: tuple[LabelledPoint, ...]
+    source: Path
+    frame: str = "scan"
+    header: FileHeader | None = None
+
+    def __post_init__(self) -> None:
+        if not self.points:
+            raise FileFormatError("holds no points", file=self.source, remedy="Export the landmarks again.")
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """Labels, in the file's order."""
+        return tuple(point.label for point in self.points)
+
+    @property
+    def sides(self) -> frozenset[Side]:
+        """Sides of the head that the points themselves tell, in their labels or a column of the table."""
+        return frozenset(point.side for point in self.points if point.side is not None)
+
+    def of_side(self, side: Side) -> PointList:
+        """Return the points of one side, and those that lie on both or tell none.
+
+        Raises
+        ------
+        FileFormatError
+            There are none.
+        """
+        return replace(self, points=tuple(p for p in self.points if p.side in (side, None)))
+
+    @property
+    def positions(self) -> FloatArray:
+        """(N, 3) positions in mm, rows of NaN where there is none."""
+        return np.array([np.full(3, np.nan) if p.position is None else p.position for p in self.points])
+
+    @property
+    def statuses(self) -> tuple[Status, ...]:
+        """How far each point is."""
+        return tuple(point.status for point in self.points)
+
+    @property
+    def descriptions(self) -> tuple[str, ...]:
+        """Free text of each point."""
+        return tuple(point.description for point in self.points)
+
+
+def labelled_point(
+    label: str,
+    coordinates: Sequence[object],
+    status: Status = Status.PLACED,
+    *,
+    file: str | PathLike[str],
+    description: str = "",
+    flip_xy: bool = False,
+) -> LabelledPoint:
+    """Make a point of what a file says.
+
+    Parameters
+    ----------
+    label, description : str
+        As read; stray blanks and carriage returns are tidied away.
+    coordinates : sequence
+        Three numbers or texts. Not looked at unless `status` says that the point is placed:
+        Slicer leaves the last position, or the origin, at points that are not.
+    status : Status
+        How far the point is; a placed one without a position is one to do, as Slicer has it.
+    file : path
+        For messages.
+    flip_xy : bool
+        Whether the coordinates are RAS.
+
+    Raises
+    ------
+    FileFormatError
+        The coordinates are not three finite numbers, nor all missing.
+    """
+    label, description = " ".join(label.split()), description.strip()
+    if status is not Status.PLACED:
+        return LabelledPoint(label, None, status, description)
+    position = parse_position(coordinates, file=file, landmark=label)
+    if position is None:
+        _log.warning("%s: landmark %s is said to be placed but has no position", file, label)
+        return LabelledPoint(label, None, Status.TO_DO, description)
+    if flip_xy:
+        position[:2] *= -1.0
+    point = LabelledPoint(label, position, status, description)
+    return as_suggested(point) if _SUGGESTED.match(description) else point
+
+
+def as_suggested(point: LabelledPoint, source: str = "") -> LabelledPoint:
+    """Return a placed point as a suggestion; its description may say of what, else it is of `source`."""
+    if point.position is None:
+        return point
+    said = _SUGGESTED.match(point.description)
+    radius = float(said["radius"]) if said and said["radius"] else 0.0
+    x, y, z = point.position.tolist()
+    suggestion = Suggestion((x, y, z), radius or None, (said["source"] if said else "") or source)
+    return point._replace(position=None, status=Status.SUGGESTED, suggestion=suggestion)
+
+
+def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
+    """Return a set as a file is to hold it: every feature, in the table's order, then the extra points.
+
+    A feature that is only suggested is one to do: other programs would take its position as observed.
+    """
+    observed = replace(landmarks, suggested={})
+    positions = observed.as_mapping()
+    features = [
+        LabelledPoint(f.code, positions.get(f.code), observed.status(f.code), _description(f))
+        for f in FEATURES
+    ]
+    extra = [LabelledPoint(name, position, Status.PLACED) for name, position in landmarks.extra.items()]
+    return (*features, *extra)
+
+
+def suggestions_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
+    """Return the suggestions of a set as a file of their own is to hold them.
+
+    Every feature is there, in the table's order. The suggested ones have positions, for 3D Slicer to show;
+    each description says that nobody has confirmed the point.
+    """
+    return tuple(_suggested_point(f, landmarks.suggested.get(f.code)) for f in FEATURES)
+
+
+def _suggested_point(feature: Feature, suggestion: Suggestion | None) -> LabelledPoint:
+    if suggestion is None:
+        return LabelledPoint(feature.code, None, Status.TO_DO, _description(feature))
+    radius = "" if suggestion.radius_95 is None else f"; 95 % within {suggestion.radius_95:.3f} mm"
+    origin = f" ({suggestion.source}{radius})" if suggestion.source or radius else ""
+    text = f"Suggested, not confirmed{origin}. {_description(feature)}"
+    return LabelledPoint(feature.code, np.array(suggestion.position), Status.PLACED, text)
+
+
+def _description(feature: Feature) -> str:
+    return f"{feature.name}. {feature.where}" if feature.computed else feature.name
+
+
+def is_computed(label: str) -> bool:
+    """Return whether a label is a feature that follows from others, not to be dragged about in Slicer."""
+    return any(feature.code == label and feature.computed for feature in FEATURES)

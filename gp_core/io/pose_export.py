@@ -1,0 +1,56 @@
+"""A pose as plain numbers, and as landmarks for 3D Slicer."""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING
+
+from gp_core.disk import write_text
+from gp_core.io.header import FileHeader
+from gp_core.io.labelled_points import LabelledPoint
+from gp_core.io.markups import write_point_lists
+from gp_core.io.text import rows_text
+from gp_core.landmarks.sets import Status
+
+if TYPE_CHECKING:
+    from gp_core.pose.cochlea_pose import CochleaPose
+
+__all__ = ["AXIS_POINT_MM", "write_csv", "write_landmarks"]
+
+AXIS_POINT_MM = 5.0
+"""How far from CO, towards the apex, the point ``axis`` lies in a landmark file: about a cochlea's height."""
+
+
+def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:
+    """Write ``T_tracker_cochlea`` as four lines of four numbers, commas between them, and nothing else.
+
+    Rows of the matrix as they are written down, mm; it acts on columns: its first column is the modiolar axis
+    CB->CA, its last one CO. Numbers keep every bit.
+
+    Raises
+    ------
+    GpError
+        The file cannot be written.
+    """
+    write_text(path, rows_text(pose.transform))
+
+
+def write_landmarks(path: str | PathLike[str], pose: CochleaPose) -> None:
+    """Write CO and a point of the axis as 3D Slicer markups: a point list, and the line between them.
+
+    The points are ``CO`` and ``axis``, `AXIS_POINT_MM` from it towards the apex. The coordinates are those of
+    the touches' frame, which ``gpLabeler`` in the file names; Slicer takes them for LPS. So a pose in a
+    tracker's frame shows up over a scan only under the registration of the two.
+
+    Raises
+    ------
+    GpError
+        The file cannot be written.
+    """
+    end = pose.origin + AXIS_POINT_MM * pose.axis
+    points = (
+        LabelledPoint("CO", pose.origin, Status.PLACED, f"Cochlea origin, {pose.side.word} side, estimated"),
+        LabelledPoint("axis", end, Status.PLACED, f"{AXIS_POINT_MM:g} mm from CO towards the apex"),
+    )
+    header = FileHeader(side=pose.side, frame=pose.transform_to_touches.dst, extra=("axis",))
+    write_point_lists(path, {"Fiducial": points, "Line": points}, header)

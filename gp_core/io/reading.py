@@ -1,0 +1,376 @@
+"""Landmarks from any file: by its kind to points, by their labels to features."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+from os import PathLike, fspath
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from gp_core.errors import FeatureError, FileFormatError, GeometryError
+from gp_core.io.dat import is_sentinel, read_dat
+from gp_core.io.fcsv import read_fcsv
+from gp_core.io.file_names import is_named_suggested, name_parts
+from gp_core.io.labelled_points import LabelledPoint, PointList, as_suggested
+from gp_core.io.markups import read_markups
+from gp_core.io.table import read_table
+from gp_core.io.text import shown
+from gp_core.io.text_files import check_file
+from gp_core.landmarks.features import CODES, Side, feature
+from gp_core.landmarks.labels import LabelNames, is_skull_feature, parse_label, tidy_label
+from gp_core.landmarks.plausible_size import check_plausible_size
+from gp_core.landmarks.sets import LandmarkSet, Status
+from gp_core.validation import FloatArray, check_option, near_matches
+
+__all__ = [
+    "label_names",
+    "landmarks_of",
+    "read_landmarks",
+    "read_points",
+    "read_touches",
+    "sides_of",
+    "specimen_of",
+    "unknown_labels",
+]
+
+_log = logging.getLogger(__name__)
+
+Unknown = Literal["error", "extra"]
+
+_READERS = {
+    ".mrk.json": read_markups,
+    ".json": read_markups,
+    ".fcsv": read_fcsv,
+    ".csv": read_table,
+    ".tsv": read_table,
+    ".dat": read_dat,
+}
+_SAME_PLACE_MM = 1e-3  # far below a voxel, and still right for a file in metres, which is told elsewhere
+_MIN_TO_TELL_A_POINT_FROM_A_SHAPE = 3
+
+
+def _suffix(path: str | PathLike[str]) -> str:
+    name = fspath(path).lower()
+    found = next((suffix for suffix in _READERS if name.endswith(suffix)), None)
+    if found is None and name.endswith((".mha", ".mhd", ".nrrd")):
+        raise FileFormatError(
+            "is an image, or a recording of a tracker, and holds no named points",
+            file=path,
+            remedy="Make touches of a recording with 'gp-core touches'.",
+        )
+    if found is None:
+        check_file(path)
+        raise FileFormatError(
+            "is no kind of landmark file that is known", file=path, remedy=f"Give {', '.join(_READERS)}."
+        )
+    return found
+
+
+def read_points(path: str | PathLike[str], *, names: LabelNames | None = None) -> PointList:
+    """Read the labelled points of a landmark file, whatever their labels are.
+
+    Parameters
+    ----------
+    path : path
+        ``.mrk.json``, ``.json``, ``.fcsv``, ``.csv``, ``.tsv`` or ``.dat``.
+    names : LabelNames, optional
+        A lab's own names of the features.
+
+    Returns
+    -------
+    PointList
+        Sides in labels, such as ``CA_L`` or ``left CA``, are taken out of them.
+        Positions in mm; LPS, but of a ``.dat`` in the tracker frame. Points that the file marks as suggested,
+        in their description or because its name ends in ``_suggested``, have no position but a suggestion.
+
+    Raises
+    ------
+    FileFormatError
+        Another kind of file, or one that cannot be read.
+    FeatureError
+        A label tells another side than the table's column.
+    """
+    suffix = _suffix(path)
+    points = _READERS[suffix](path)
+    known = names or LabelNames({})
+    taken = tuple(_with_name(p, known, path) for p in points.points if not known.leaves_out(p.label))
+    points = replace(points, points=taken)
+    if not is_named_suggested(path, suffix):
+        return points
+    return replace(points, points=tuple(as_suggested(point) for point in points.points))
+
+
+def _with_name(point: LabelledPoint, names: LabelNames, file: str | PathLike[str]) -> LabelledPoint:
+    """Return a point under the name that its label stands for, with the side that the label tells."""
+    name, side = parse_label(names.translate(point.label))
+    if side is not None and point.side not in (None, side):
+        raise FeatureError(
+            f"is of the {side.word} side by its label, of the {side.other.word} by its column",
+            file=file,
+            landmark=point.label[:40],
+            remedy="Correct one of them.",
+        )
+    return point._replace(label=name, side=side or point.side)
+
+
+def read_landmarks(
+    path: str | PathLike[str],
+    *,
+    side: Side | str | None = None,
+    unknown: Unknown = "error",
+    names: LabelNames | None = None,
+) -> LandmarkSet:
+    """Read the landmarks of one side of a head.
+
+    Parameters
+    ----------
+    path : path
+        See `read_points`.
+    side : Side or str, optional
+        Needed only where neither the file's ``gpLabeler`` object, nor its labels (``CA_L``), nor a column
+        ``side``, nor its name (``_L``, ``left``, ...) says it, or where the file holds both sides.
+    unknown : {"error", "extra"}
+        What to do with labels outside the feature table: refuse, or keep in `LandmarkSet.extra`.
+        Skull features ``S1``, ``S2``, ... and what this program wrote as extra are always kept.
+    names : LabelNames, optional
+        A lab's own names of the features.
+
+    Returns
+    -------
+    LandmarkSet
+        In the frame that the file names, else ``scan`` (``.dat``: ``tracker``). What the file marks as
+        suggested is in `LandmarkSet.suggested`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read.
+    FeatureError
+        A label is unknown (near matches are named) or doubled, or the side is not known or contradicted.
+    GeometryError
+        All points are at one place.
+
+    Examples
+    --------
+    >>> read_landmarks("GP01_L.mrk.json").side  # doctest: +SKIP
+    <Side.LEFT: 'L'>
+    """
+    return landmarks_of(read_points(path, names=names), side=side, unknown=unknown)
+
+
+def landmarks_of(
+    points: PointList, *, side: Side | str | None = None, unknown: Unknown = "error"
+) -> LandmarkSet:
+    """Make landmarks of one side of the points of a file; see `read_landmarks`."""
+    chosen = _side_of(points, side)
+    return _landmark_set(_one_side(points, chosen), chosen, points.frame, unknown)
+
+
+def sides_of(points: PointList, *, unknown: Unknown = "error") -> tuple[LandmarkSet, ...]:
+    """Make landmarks of each side that a file holds; see `read_landmarks`."""
+    if len(points.sides) < 2:
+        return (landmarks_of(points, unknown=unknown),)
+    return tuple(landmarks_of(points, side=side, unknown=unknown) for side in Side)
+
+
+def read_touches(
+    path: str | PathLike[str],
+    side: Side | str,
+    *,
+    unknown: Unknown = "error",
+    names: LabelNames | None = None,
+) -> LandmarkSet:
+    """Read what was touched with the probe on one side of a head.
+
+    Parameters
+    ----------
+    path : path
+        See `read_points`. In a file of any kind, -1000 -1000 -1000 and 0 0 0 stand for *not seen*.
+    side : Side or str
+        Side of the head.
+    unknown : {"error", "extra"}
+        See `read_landmarks`.
+    names : LabelNames, optional
+        A lab's own names of the features.
+
+    Returns
+    -------
+    LandmarkSet
+        Positions in mm, tracker frame; the eight skull features in `extra`.
+
+    Raises
+    ------
+    FileFormatError
+        The file cannot be read.
+    FeatureError
+        A label is unknown or doubled, or the file says that it is the other side.
+    GeometryError
+        All points are at one place, or are not in millimetres.
+    """
+    points = read_points(path, names=names)
+    wanted = Side.parse(side)
+    _check_side(wanted, points.header.side if points.header else None, points)
+    points = _one_side(points, wanted)
+    seen = replace(points, points=tuple(_without_sentinel(point) for point in points.points))
+    touches = _landmark_set(seen, wanted, "tracker", unknown)
+    check_plausible_size(touches, path)
+    if touches.suggested:
+        _log.warning("%s: suggestions are no touches, left out: %s", path, " ".join(touches.suggested))
+    return touches
+
+
+def specimen_of(points: PointList) -> str:
+    """Return the specimen that a file names, in its ``gpLabeler`` object or by its name."""
+    name = points.header.specimen if points.header else None
+    return name or name_parts(points.source, _suffix(points.source))[0]
+
+
+def _without_sentinel(point: LabelledPoint) -> LabelledPoint:
+    if point.position is None or not is_sentinel(point.position):
+        return point
+    return point._replace(position=None, status=Status.UNSEEN)
+
+
+def _side_of(points: PointList, side: Side | str | None) -> Side:
+    given = None if side is None else Side.parse(side)
+    if len(points.sides) > 1:
+        if given is None:
+            raise FeatureError(
+                "holds both sides of the head, as its labels or its column 'side' say",
+                file=points.source,
+                remedy="Give the side (L or R) that is wanted.",
+            )
+        return given
+    if given is not None and points.sides:
+        return given
+    said = points.header.side if points.header else next(iter(points.sides), None)
+    said = said or name_parts(points.source, _suffix(points.source))[1]
+    if given is not None:
+        _check_side(given, said, points)
+    if (found := said or given) is None:
+        raise FeatureError(
+            "does not say which side of the head it is",
+            file=points.source,
+            remedy="Give the side (L or R), or let the file's name end in _L or _R.",
+        )
+    return found
+
+
+def _one_side(points: PointList, side: Side) -> PointList:
+    """Return the points of one side; in a file that tells sides, only what both share may tell none."""
+    told = points.sides
+    if not told:
+        return points
+    if told == {side.other}:
+        raise FeatureError(
+            f"holds points of the {side.other.word} side, as its labels or its column 'side' say, but was "
+            f"asked for as the {side.word} side",
+            file=points.source,
+            remedy=f"Give the side {side.other.value}, or correct the file.",
+        )
+    if len(told) == 1:
+        return points
+    without = (p.label for p in points.points if p.side is None and p.label in CODES)
+    lost = next((label for label in without if not feature(label).shared), None)
+    if lost is not None:
+        raise FeatureError(
+            "tells no side, although other points of the file do",
+            file=points.source,
+            landmark=lost,
+            remedy=f"Call it {lost}_L or {lost}_R.",
+        )
+    return points.of_side(side)
+
+
+def _check_side(wanted: Side, said: Side | None, points: PointList) -> None:
+    if said not in (None, wanted):
+        raise FeatureError(
+            f"is the {wanted.other.word} side, but was asked for as the {wanted.word} side",
+            file=points.source,
+            remedy=f"Give the side {wanted.other.value}, or correct the file.",
+        )
+
+
+def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -> LandmarkSet:
+    check_option(unknown, "unknown", ("error", "extra"))
+    names = label_names(points, unknown=unknown)
+    positions = dict(zip(names, points.positions, strict=True))
+    placed = np.array([p.position for p in points.points if p.position is not None])
+    if len(placed) >= _MIN_TO_TELL_A_POINT_FROM_A_SHAPE and (placed == placed[0]).all():
+        raise GeometryError(
+            f"all {len(placed)} points are at the same place",
+            file=points.source,
+            remedy="Export the landmarks again.",
+        )
+    rows = np.array([positions.get(code, np.full(3, np.nan)) for code in CODES])
+    unseen = {name for name, status in zip(names, points.statuses, strict=True) if status is Status.UNSEEN}
+    extra = {name: p for name, p in positions.items() if name not in CODES and np.isfinite(p).all()}
+    suggested = {
+        name: point.suggestion
+        for name, point in zip(names, points.points, strict=True)
+        if point.suggestion is not None and name in CODES and not feature(name).computed
+    }
+    _check_axis(positions, points)
+    evidence = points.header.scan_evidence if points.header else None
+    found = LandmarkSet(
+        rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra), scan_evidence=evidence
+    )
+    return found.with_suggestions(suggested)
+
+
+def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:
+    """Refuse an axis without a direction, whatever else is placed."""
+    ca, cb = (positions.get(code, np.full(3, np.nan)) for code in ("CA", "CB"))
+    if np.linalg.norm(ca - cb) < _SAME_PLACE_MM:
+        raise GeometryError(
+            "CA and CB are at the same place, so they give no axis",
+            file=points.source,
+            landmark="CA",
+            remedy="Place one of them again.",
+        )
+
+
+def unknown_labels(points: PointList) -> tuple[str, ...]:
+    """Return the labels of a file that name no feature and no skull feature, each once, in its order."""
+    known = set(points.header.extra) if points.header else set()
+    strange = (p.label for p in points.points if p.label not in CODES and not is_skull_feature(p.label))
+    return tuple(dict.fromkeys(label for label in strange if label not in known))
+
+
+def label_names(points: PointList, *, unknown: Unknown = "extra") -> list[str]:
+    """Return the names that the labels of a file stand for, in its order.
+
+    Raises
+    ------
+    FeatureError
+        A label is unknown, where `unknown` says that it is an error, or two of them name one point.
+    """
+    known = set(points.header.extra) if points.header else set()
+    names: dict[str, str] = {}
+    for label in points.labels:
+        name = tidy_label(label)
+        if not (name in CODES or name in known or is_skull_feature(name) or unknown == "extra"):
+            raise _unknown(label, points)
+        if name.casefold() in names:
+            other = names[name.casefold()]
+            also = "" if other == label else f", as {shown(label)} too"
+            raise FeatureError(
+                f"is in the file twice{also}",
+                file=points.source,
+                landmark=other[:40],
+                remedy="Remove one of them.",
+            )
+        names[name.casefold()] = name
+    return list(names.values())
+
+
+def _unknown(label: str, points: PointList) -> FeatureError:
+    return FeatureError(
+        f"unknown feature {shown(label)}{near_matches(label[:40], CODES)}",
+        file=points.source,
+        landmark=label[:40],
+        remedy=f"The features are {' '.join(CODES)}. Or give a table of your own names (--names FILE).",
+    )

@@ -1,0 +1,168 @@
+"""What the texts of all landmark files share: lines, fields, numbers, positions, coordinate systems."""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from os import PathLike
+
+import numpy as np
+
+from gp_core.errors import FileFormatError
+from gp_core.validation import FloatArray
+
+__all__ = [
+    "DECIMAL_POINTS",
+    "MAX_POINTS",
+    "as_csv_cell",
+    "check_count",
+    "flips_xy",
+    "has_decimal_comma",
+    "of_csv_cell",
+    "parse_position",
+    "rows_text",
+    "shown",
+    "split_fields",
+    "split_lines",
+]
+
+MAX_POINTS = 10_000
+"""What one landmark file may hold; more is refused before any of it is looked at."""
+
+_MAX_COORDINATE_MM = 1e9  # beyond nanometres of a large head: keeps squares and sums finite
+
+# What stands for "no number": R writes NA, or null through its JSON writer.
+_MISSING_WORDS = frozenset({"", "na", "null"})
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_NUMBER_WITH_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?", re.ASCII)
+_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+DECIMAL_POINTS = "Write decimal points, not commas."
+
+# 3D Slicer's words, and the numbers that old files have instead.
+_FLIPS_XY = {"LPS": False, "1": False, "RAS": True, "0": True, "": False}
+
+
+def check_count(n: int, what: str, file: str | PathLike[str], *, at_most: int = MAX_POINTS) -> None:
+    """Raise `FileFormatError` where a file holds more than `at_most` of something."""
+    if n > at_most:
+        raise FileFormatError(
+            f"holds {n} {what}, more than {at_most}", file=file, remedy=f"Give at most {at_most}."
+        )
+
+
+def shown(value: object) -> str:
+    """Return `value` as a message may show it: on one line, not too long."""
+    text = str(value) if isinstance(value, (int, float)) and abs(value) < 1e300 else repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def split_lines(text: str, file: str | PathLike[str], *, at_most: int = MAX_POINTS) -> list[tuple[int, str]]:
+    r"""Return the numbered lines that are not blank; stray carriage returns go, whoever wrote them.
+
+    Raises
+    ------
+    FileFormatError
+        There are more than `at_most` lines.
+    """
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    check_count(text.count("\n"), "lines", file, at_most=at_most)
+    lines = text.split("\n")
+    return [(number, line) for number, line in enumerate(lines, start=1) if line.strip()]
+
+
+def split_fields(line: str, delimiter: str, number: int, file: str | PathLike[str]) -> list[str]:
+    """Return the fields of a line, without blanks around them; quoted as in CSV.
+
+    Raises
+    ------
+    FileFormatError
+        The quotes do not close.
+    """
+    try:
+        return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, strict=True))]
+    except csv.Error as error:
+        raise FileFormatError(
+            f"line {number} cannot be split into columns ({error})", file=file, remedy="Mend its quotes."
+        ) from None
+
+
+def as_csv_cell(text: str) -> str:
+    """Return a text as a cell of a CSV file, which no spreadsheet takes for a formula."""
+    return f"'{text}" if text.lstrip("'").startswith(_FORMULA) else text
+
+
+def of_csv_cell(cell: str) -> str:
+    """Return the text that `as_csv_cell` made a cell of."""
+    return cell[1:] if cell.startswith("'") and cell.lstrip("'").startswith(_FORMULA) else cell
+
+
+def rows_text(rows: FloatArray) -> str:
+    """Return rows of numbers (N, C) as lines, commas between the numbers, which keep every bit."""
+    return "".join(f"{','.join(repr(float(n)) for n in row)}\n" for row in rows)
+
+
+def flips_xy(system: object, file: str | PathLike[str]) -> bool:
+    """Return whether x and y change sign on the way from a file's coordinate system to LPS.
+
+    Raises
+    ------
+    FileFormatError
+        Neither LPS nor RAS, by name or by Slicer's old numbers.
+    """
+    word = "" if system is None else str(system).strip().upper()
+    if word not in _FLIPS_XY:
+        raise FileFormatError(
+            f"coordinate system must be LPS or RAS, got {shown(system)}",
+            file=file,
+            remedy="Export it in one of them.",
+        )
+    return _FLIPS_XY[word]
+
+
+def parse_position(
+    values: Sequence[object], *, file: str | PathLike[str], landmark: str
+) -> FloatArray | None:
+    """Return the (3,) position that three numbers or texts give, mm, or None where all three are missing.
+
+    Raises
+    ------
+    FileFormatError
+        Not three, not numbers, not finite, or some missing and some not.
+    """
+    if all(_is_missing(value) for value in values):
+        return None
+    numbers = [_number(value) for value in values]
+    if len(numbers) == 3 and all(n is not None and abs(n) <= _MAX_COORDINATE_MM for n in numbers):
+        return np.array(numbers, dtype=np.float64)
+    got = ", ".join(shown(value) for value in values[:4])
+    raise FileFormatError(
+        f"position must be three finite numbers in mm, got [{got}]",
+        file=file,
+        landmark=landmark[:40],
+        remedy=DECIMAL_POINTS
+        if any(has_decimal_comma(value) for value in values)
+        else "Correct it, or clear all three if the landmark is not placed.",
+    )
+
+
+def has_decimal_comma(value: object) -> bool:
+    """Return whether a text is a number as much of the world writes it, such as ``1,5``."""
+    return isinstance(value, str) and _NUMBER_WITH_COMMA.fullmatch(value.strip()) is not None
+
+
+def _is_missing(value: object) -> bool:
+    return value is None or (isinstance(value, str) and value.strip().lower() in _MISSING_WORDS)
+
+
+def _number(value: object) -> float | None:
+    """Return a number, NaN where it is one in vain, None where it is none."""
+    if isinstance(value, str):
+        return float(value) if _NUMBER.fullmatch(value := value.strip()) else None
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return math.inf

@@ -1,0 +1,1 @@
+"""The pose of a cochlea, estimated from touched points."""

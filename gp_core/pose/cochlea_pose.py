@@ -1,0 +1,205 @@
+"""The estimated pose of a cochlea: plain data, with its uncertainty and its files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from os import PathLike
+from typing import Any
+
+import numpy as np
+
+from gp_core.disk import write_text
+from gp_core.frames import RigidTransform
+from gp_core.io.pose_export import write_csv, write_landmarks
+from gp_core.io.tfm import write_tfm
+from gp_core.landmarks.features import Side
+from gp_core.pose.covariance import cone_95, radius_95
+from gp_core.pose.mixture import UNDECIDED, Hypothesis, axis_part, holding_radius, origin_part
+from gp_core.validation import FloatArray, check_option
+
+__all__ = ["METHODS", "READING_STATES", "ROUND_WINDOWS", "CochleaPose"]
+
+METHODS = ("robust", "jrmpc")
+ROUND_WINDOWS = ("touched", "expected")
+"""Whose round window y of the cochlea frame points to: the touched one, or the one of the fitted atlas."""
+
+READING_STATES = ("clear", "undecided", "wrong", "unchecked")
+"""Whether the touches can be read otherwise: no; perhaps; another reading fits far better; nobody looked."""
+
+
+@dataclass(frozen=True)
+class CochleaPose:
+    """Where a cochlea is and how it is turned, in the frame of the touches.
+
+    Attributes
+    ----------
+    side : Side
+    method : str
+        ``robust`` or ``jrmpc``.
+    atlas : str
+        Name of the atlas, or of the specimens, behind it.
+    transform_to_touches : RigidTransform
+        ``T_tracker_cochlea`` (or scan): origin CO, x the modiolar axis CB->CA on both sides, y towards the
+        middle of the round window, z = x × y.
+    covariance : (6, 6) array
+        Of the origin (mm) and of a small rotation vector about it (rad), both in the frame of the touches.
+    residuals : dict of str to float
+        Distance of each touched point from the registered mean, mm.
+    suspects : tuple of str
+        Touched points that do not fit the others.
+    warnings : tuple of str
+        What the user should know before trusting the pose.
+    probe_noise : float or None
+        Scale of the touch errors that was found or given, mm a coordinate.
+    T_touches_atlas : RigidTransform or None
+        The registered atlas, for a left side; for a right side, from the atlas mirrored in x.
+    round_window : str
+        Of which round window the middle is: ``touched`` or ``expected``.
+    swapped : (str, str) or None
+        Two touched features that look, or may be, as if each had the other's name.
+    side_state, names_state : str
+        Of `READING_STATES`: whether the touches may be those of the other ear, and whether two of them may
+        each have the other's name. Only a pose of which both are ``clear`` is for a robot; see
+        `gp_core.pose.gate.PoseGate`.
+    shared_error : float or None
+        RMS length of the offset common to all touches that the regions allow for, mm; None: not considered.
+    probability : float
+        Of the touches as they are named, among all readings of them.
+    hypotheses : tuple of Hypothesis
+        Other readings that are not ruled out, the likeliest first.
+    """
+
+    side: Side
+    method: str
+    atlas: str
+    transform_to_touches: RigidTransform
+    covariance: FloatArray
+    residuals: dict[str, float]
+    suspects: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    probe_noise: float | None = None
+    T_touches_atlas: RigidTransform | None = field(default=None, repr=False)
+    round_window: str = "expected"
+    swapped: tuple[str, str] | None = None
+    side_state: str = "unchecked"
+    names_state: str = "unchecked"
+    shared_error: float | None = None
+    probability: float = 1.0
+    hypotheses: tuple[Hypothesis, ...] = ()
+
+    def __post_init__(self) -> None:
+        check_option(self.side_state, "state of the side", READING_STATES)
+        check_option(self.names_state, "state of the names", READING_STATES)
+
+    @property
+    def origin(self) -> FloatArray:
+        """(3,) cochlea origin CO, mm."""
+        return self.transform_to_touches.translation
+
+    @property
+    def axis(self) -> FloatArray:
+        """(3,) unit modiolar axis, from the base CB to the apex CA."""
+        return self.transform_to_touches.rotation[:, 0]
+
+    @property
+    def transform(self) -> FloatArray:
+        """(4, 4) homogeneous matrix ``T_tracker_cochlea``, mm."""
+        return self.transform_to_touches.matrix
+
+    @property
+    def state(self) -> str:
+        """Both states in words, such as ``side undecided, names clear``."""
+        return f"side {self.side_state}, names {self.names_state}"
+
+    @cached_property
+    def radius_95(self) -> float:
+        """Radius of the ball about the origin that holds the true CO with 95 %, whatever the reading, mm."""
+        if not self.hypotheses:
+            return self.plain_radius_95
+        return holding_radius([origin_part(p, o, self.origin, c) for p, o, _, c in self._readings()])
+
+    @cached_property
+    def cone_95(self) -> float:
+        """Half-angle of the cone that holds the true axis with 95 %, whatever the reading, rad."""
+        if not self.hypotheses:
+            return self.plain_cone_95
+        parts = [axis_part(p, a, self.axis, c) for p, _, a, c in self._readings()]
+        return min(holding_radius(parts), np.pi)
+
+    @property
+    def plain_radius_95(self) -> float:
+        """The radius where the touches are taken as they are named, mm."""
+        return radius_95(self.covariance)
+
+    @property
+    def plain_cone_95(self) -> float:
+        """The cone where the touches are taken as they are named, rad."""
+        return cone_95(self.covariance, self.axis)
+
+    @property
+    def has_parts(self) -> bool:
+        """Whether the 95 % region is of several parts, one a reading that is not ruled out."""
+        return any(h.probability >= UNDECIDED for h in self.hypotheses)
+
+    @property
+    def likelier_reading(self) -> Hypothesis | None:
+        """The other reading that is likelier than the touches as they are named; None where none is."""
+        best = next(iter(self.hypotheses), None)
+        return best if best is not None and best.probability > self.probability else None
+
+    def _readings(self) -> Iterator[tuple[float, FloatArray, FloatArray, FloatArray]]:
+        yield self.probability, self.origin, self.axis, self.covariance
+        for h in self.hypotheses:
+            yield h.probability, h.origin, h.axis, h.covariance
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the pose as the JSON file holds it; lengths in mm, angles in degrees."""
+        return {
+            "gpPose": 1,
+            "method": self.method,
+            "side": self.side.value,
+            "atlas": self.atlas,
+            "frame": self.transform_to_touches.dst,
+            "cochlea_origin_mm": self.origin.tolist(),
+            "modiolar_axis": self.axis.tolist(),
+            "transform": self.transform.tolist(),
+            "covariance": self.covariance.tolist(),
+            "radius_95_mm": self.radius_95,
+            "cone_95_deg": float(np.degrees(self.cone_95)),
+            "plain_radius_95_mm": self.plain_radius_95,
+            "plain_cone_95_deg": float(np.degrees(self.plain_cone_95)),
+            "shared_error_mm": self.shared_error,
+            "residuals_mm": self.residuals,
+            "probe_noise_mm": self.probe_noise,
+            "round_window": self.round_window,
+            "suspect": list(self.suspects),
+            "swapped": None if self.swapped is None else list(self.swapped),
+            "state": self.state,
+            "side_state": self.side_state,
+            "names_state": self.names_state,
+            "probability": self.probability,
+            "hypotheses": [h.as_dict() for h in self.hypotheses],
+            "warnings": list(self.warnings),
+            "registered_atlas": None
+            if self.T_touches_atlas is None
+            else self.T_touches_atlas.matrix.tolist(),
+        }
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the pose as JSON."""
+        write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
+
+    def save_tfm(self, path: str | PathLike[str]) -> None:
+        """Write the pose as an ITK transform file; see `gp_core.io.tfm.write_tfm`."""
+        write_tfm(path, self.transform_to_touches)
+
+    def save_csv(self, path: str | PathLike[str]) -> None:
+        """Write the 4x4 matrix as plain numbers; see `gp_core.io.pose_export.write_csv`."""
+        write_csv(path, self)
+
+    def save_landmarks(self, path: str | PathLike[str]) -> None:
+        """Write CO and axis as Slicer markups; see `gp_core.io.pose_export.write_landmarks`."""
+        write_landmarks(path, self)

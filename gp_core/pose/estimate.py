@@ -1,0 +1,113 @@
+"""Estimate the pose of a cochlea: the one function for both methods."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from numpy.typing import ArrayLike
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.fitting import fit_atlas
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.plausible_size import check_plausible_size
+from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS, CochleaPose
+from gp_core.pose.jrmpc_estimator import estimate_jrmpc
+from gp_core.pose.robust import estimate_robust
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
+from gp_core.pose.touched_window import towards_touched_window
+from gp_core.validation import check_option
+
+__all__ = ["estimate_pose"]
+
+
+def estimate_pose(
+    touches: Mapping[str, ArrayLike] | LandmarkSet,
+    side: Side | str,
+    atlas: Atlas | None = None,
+    *,
+    method: str = "robust",
+    specimens: Sequence[Specimen] | None = None,
+    probe_noise: float | None = None,
+    round_window: str = "touched",
+    shared_error: float = DEFAULT_SHARED_ERROR_MM,
+    times: Mapping[str, float] | None = None,
+) -> CochleaPose:
+    """Estimate the pose of a cochlea from a few touched features, with no CT.
+
+    Parameters
+    ----------
+    touches : mapping of str to (3,) array_like, or LandmarkSet
+        Position of each touched feature in the tracker's frame, mm; three or more, not on one line.
+    side : {"L", "R"}
+        Side of the head.
+    atlas : Atlas, optional
+        By default the one fitted to `specimens`, or the published one. Not used by ``jrmpc``.
+    method : {"robust", "jrmpc"}
+        ``robust`` uses the names of the points; ``jrmpc`` is the paper's method and needs `specimens`.
+    specimens : sequence of Specimen, optional
+        Labelled animals.
+    probe_noise : float, optional
+        Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+    round_window : {"touched", "expected"}
+        What y of the frame points to: the middle of the touched RWA and RWP, as the authors' robot had it,
+        where both are touched and fit; or that of the fitted atlas, nearer the truth where touches are rough.
+        Origin and axis are the same.
+    shared_error : float
+        RMS length of one offset common to all touches of the session, mm, in the frame of the touches: from
+        the covariance of the pivot calibration, the tracker's data sheet, soft tissue under the tip. It
+        widens the regions and moves nothing. With 0, touches err independently, and animals are like those
+        of the atlas.
+    times : mapping of str to float, optional
+        When each feature was touched, s. Where all have a time, a drift over the session is looked for.
+
+    Returns
+    -------
+    CochleaPose
+
+    Raises
+    ------
+    GpError
+        Touches that no pose can be made of, or a method without what it needs.
+
+    Examples
+    --------
+    >>> atlas = Atlas.published()
+    >>> touched = {code: atlas[code] for code in ("CL", "LLI", "MN", "OS", "RWA", "RWP")}
+    >>> pose = estimate_pose(touched, "L")
+    >>> bool(np.linalg.norm(pose.origin) < 1e-6)
+    True
+    """
+    check_option(method, "method", METHODS)
+    check_option(round_window, "round window", ROUND_WINDOWS)
+    landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
+    if landmarks.side is not Side.parse(side):
+        raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
+    check_plausible_size(landmarks, strict=True)
+    if method == "jrmpc":
+        pose = estimate_jrmpc(landmarks, specimens)
+    else:
+        pose = estimate_robust(
+            landmarks,
+            atlas or _default_atlas(specimens),
+            probe_noise=probe_noise,
+            shared_error=shared_error,
+            times=times,
+        )
+    if round_window == "expected":
+        return pose
+    return towards_touched_window(pose, landmarks)
+
+
+def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:
+    if not isinstance(touches, Mapping):
+        raise GpError(
+            f"touches must be a mapping of names to points, or a LandmarkSet, got {type(touches).__name__}",
+            remedy="Read a file of touches with read_touches.",
+        )
+    return LandmarkSet.from_mapping(touches, side, frame="tracker")
+
+
+def _default_atlas(specimens: Sequence[Specimen] | None) -> Atlas:
+    return fit_atlas(specimens) if specimens else Atlas.published()

@@ -1,0 +1,145 @@
+"""Whether a pose may be sent to a robot, and if not, why not.
+
+One rule for the window, the shell, a script and Python. It knows nothing of files or networks: the caller
+says whether a person has accepted the pose, and how old the last valid reading of the reference marker is.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gp_core.errors import GpError
+from gp_core.pose.cochlea_pose import CochleaPose
+
+__all__ = ["GateReason", "PoseGate", "against_writing", "doubt_about"]
+
+
+@dataclass(frozen=True)
+class GateReason:
+    """One reason to hold a pose back.
+
+    Attributes
+    ----------
+    code : str
+        For programs: ``no pose``, ``wrong side``, ``side undecided``, ``side unchecked``, ``wrong names``,
+        ``names undecided``, ``names unchecked``, ``radius``, ``cone``, ``not accepted`` or ``stale``.
+    text : str
+        For people, a clause without a full stop.
+    """
+
+    code: str
+    text: str
+
+
+@dataclass(frozen=True)
+class PoseGate:
+    """The limits within which a pose may be sent.
+
+    Parameters
+    ----------
+    max_radius_mm : float
+        Largest 95 % radius about the origin, mm.
+    max_cone_deg : float
+        Largest 95 % cone about the axis, half-angle in degrees.
+    max_age_s : float
+        How long ago the reference marker may have been seen last, s.
+
+    Raises
+    ------
+    GpError
+        A limit is no positive number.
+
+    Examples
+    --------
+    >>> gate = PoseGate(max_radius_mm=0.8)
+    >>> [reason.code for reason in gate.reasons(None, accepted=False)]
+    ['no pose']
+    """
+
+    max_radius_mm: float = 1.0
+    max_cone_deg: float = 15.0
+    max_age_s: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name, value, unit in (
+            ("radius", self.max_radius_mm, "mm"),
+            ("cone", self.max_cone_deg, "degrees"),
+            ("age", self.max_age_s, "s"),
+        ):
+            if not (math.isfinite(value) and value > 0):
+                raise GpError(
+                    f"the largest {name} of a pose that is sent must be above 0 {unit}, got {value!r}"
+                )
+
+    def reasons(
+        self, pose: CochleaPose | None, *, accepted: bool, reference_age_s: float | None = None
+    ) -> tuple[GateReason, ...]:
+        """Return every reason to hold a pose back, the gravest first; empty where it may be sent.
+
+        Parameters
+        ----------
+        pose : CochleaPose or None
+        accepted : bool
+            Whether a person accepted this very pose: since touches, atlas and settings last changed.
+        reference_age_s : float, optional
+            Time since the last valid reading of the reference marker, s; infinite where there was none yet.
+            None where the pose does not hang on a reference marker.
+        """
+        if pose is None:
+            return (GateReason("no pose", "there is no estimate"),)
+        return tuple(self._reasons(pose, accepted, reference_age_s))
+
+    def _reasons(self, pose: CochleaPose, accepted: bool, age: float | None) -> Iterator[GateReason]:
+        yield from doubt_about(pose)
+        radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
+        if not radius <= self.max_radius_mm:
+            yield GateReason("radius", f"the 95 % radius is {radius:.2f} mm, above {self.max_radius_mm:g} mm")
+        if not cone <= self.max_cone_deg:
+            yield GateReason("cone", f"the 95 % cone is {cone:.1f} deg, above {self.max_cone_deg:g} deg")
+        if not accepted:
+            yield GateReason(
+                "not accepted", "nobody has accepted it since touches, atlas or settings changed"
+            )
+        if age is not None and not age <= self.max_age_s:
+            yield GateReason("stale", _stale(age, self.max_age_s))
+
+
+def doubt_about(pose: CochleaPose) -> Iterator[GateReason]:
+    """Yield what speaks against the side and the names of a pose: what no limit and no person overrules."""
+    other = pose.side.other.word
+    words = {
+        "wrong": ("wrong side", f"the touches look like those of the {other} ear"),
+        "undecided": ("side undecided", f"the touches fit the {other} ear about as well"),
+        "unchecked": ("side unchecked", f"the method {pose.method} does not check the side"),
+    }
+    if pose.side_state in words:
+        yield GateReason(*words[pose.side_state])
+    words = {
+        "wrong": ("wrong names", f"{_pair(pose)} look exchanged"),
+        "undecided": ("names undecided", f"{_pair(pose)} may be exchanged"),
+        "unchecked": ("names unchecked", f"the method {pose.method} does not check the names"),
+    }
+    if pose.names_state in words:
+        yield GateReason(*words[pose.names_state])
+
+
+def against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
+    """Return why a pose is not written for a robot: its side or names look wrong, or are undecided.
+
+    A method that checks neither finds nothing against it.
+    """
+    return tuple(reason for reason in doubt_about(pose) if not reason.code.endswith("unchecked"))
+
+
+def _pair(pose: CochleaPose) -> str:
+    return " and ".join(pose.swapped or ()) or "two touches"
+
+
+def _stale(age: float, limit: float) -> str:
+    if not math.isfinite(age):
+        return "the reference marker has not been seen yet"
+    return f"the reference marker was last seen {age:.1f} s ago, more than {limit:g} s"

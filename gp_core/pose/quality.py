@@ -1,0 +1,81 @@
+"""How far an estimated pose can be trusted, in one plain word."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from gp_core.pose.cochlea_pose import CochleaPose
+
+__all__ = ["PoseQuality", "pose_quality"]
+
+_GOOD_MM, _GOOD_DEG = 0.75, 14.0
+"""What six careful touches of an ordinary animal give, with some room."""
+
+_POOR_MM, _POOR_DEG = 1.5, 25.0
+"""Beyond this, an opening drilled for the round window may well miss it."""
+
+
+@dataclass(frozen=True)
+class PoseQuality:
+    """A verdict on an estimate, before anybody looked at it.
+
+    Attributes
+    ----------
+    level : str
+        ``good``, ``warning`` or ``danger``.
+    word : str
+        For a label, such as ``Good``.
+    reason : str
+        A sentence.
+    """
+
+    level: str
+    word: str
+    reason: str
+
+
+def pose_quality(pose: CochleaPose) -> PoseQuality:
+    """Return how far a pose can be trusted, from its side and names, its 95 % region and its warnings.
+
+    Examples
+    --------
+    >>> from gp_core.atlas.atlas import Atlas
+    >>> from gp_core.pose.cochlea_pose import estimate_pose
+    >>> atlas = Atlas.published()
+    >>> touched = {code: atlas[code] for code in ("CL", "IN", "LLI", "MN", "OS", "RWA", "RWP")}
+    >>> pose_quality(estimate_pose(touched, "L", atlas)).word
+    'Good'
+    """
+    if (found := _doubtful_reading(pose)) is not None:
+        return found
+    radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
+    if radius > _POOR_MM or cone > _POOR_DEG:
+        return PoseQuality("danger", "Poor", "The true cochlea may lie well beside this one.")
+    if pose.warnings or pose.suspects:
+        return PoseQuality(
+            "warning", "Look twice", "The pose is usable only if what is said below is all right."
+        )
+    if radius > _GOOD_MM or cone > _GOOD_DEG:
+        return PoseQuality(
+            "warning", "Fair", "Less sure than six careful touches make it; touch more features."
+        )
+    return PoseQuality("good", "Good", "The touches agree, and are as many as a sure pose needs.")
+
+
+def _doubtful_reading(pose: CochleaPose) -> PoseQuality | None:
+    """Return the verdict on touches that may be of the other side, or under other names."""
+    if pose.side_state == "wrong":
+        return PoseQuality("danger", "Check the side", "The touches look like those of the other ear.")
+    if pose.names_state == "wrong":
+        return PoseQuality("danger", "Check the names", "Two touches look as if each had the other's name.")
+    if pose.names_state == "undecided":
+        return PoseQuality("danger", "Names undecided", "Two touches may each have the other's name.")
+    if pose.side_state == "undecided":
+        return PoseQuality(
+            "warning",
+            "Side undecided",
+            "The touches fit the other ear about as well; touch one more feature.",
+        )
+    return None

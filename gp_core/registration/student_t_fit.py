@@ -1,0 +1,378 @@
+"""The inner loop of the fit to named points, in plain Python that Numba can compile.
+
+There is one source and two ways to run it, to the same answers: as it stands, which needs no start-up and
+takes some milliseconds, and compiled by `gp_core.registration.student_t_fit_compiled`, which takes half a
+second to load and then a fortieth of the time. `gp_core.registration.named_points` says which is run when.
+
+So everything here is a number or a one-dimensional buffer, a memoryview in the one case and an array in the
+other, with x, y, z of each point in a row. Nothing is raised to a power, and nothing but an overflow divides
+by zero, where the two would differ.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import MutableSequence
+from typing import TypeAlias
+
+from gp_core.registration.rotation import as_matrix, best_turn
+
+__all__ = [
+    "KERNELS",
+    "NU",
+    "POSE_SIZE",
+    "PRIOR_WEIGHT",
+    "TOLERANCE",
+    "TYPICAL_NOISE_MM",
+    "best_exchange",
+    "settle",
+]
+
+Buffer: TypeAlias = MutableSequence[float]
+Vector: TypeAlias = tuple[float, float, float]
+Symmetric3: TypeAlias = tuple[float, float, float, float, float, float]
+
+TYPICAL_NOISE_MM = 0.05
+"""Scale of a careful touch, mm a coordinate, to which the estimate of sigma is drawn."""
+
+NU = 4.0
+"""Degrees of freedom of a touch error."""
+
+PRIOR_WEIGHT = 2.0
+"""How many coordinates the prior of sigma is worth."""
+
+POSE_SIZE = 16
+"""Quaternion (4), translation (3), rotation matrix row by row (9)."""
+
+TOLERANCE = 1e-5
+"""Change of a weight, and relative change of the squared scale, below which a fit has settled."""
+
+_STRIDE, _LONGEST_STRIDE = 2.0, 8.0
+_NEAR = 0.1  # step of the logarithm of the squared scale
+_SCREENING_ITERATIONS = 3
+_SLACK = 4.0
+
+
+def settle(
+    mean: Buffer,
+    variances: Buffer,
+    reading: Buffer,
+    weights: Buffer,
+    precision: Buffer,
+    points: Buffer,
+    errors: Buffer,
+    pose: Buffer,
+    noise: float,
+    n_iterations: int,
+) -> tuple[float, float, float]:
+    """Find pose, weights and scale of one reading of the touches; `named_points` explains the model.
+
+    Parameters
+    ----------
+    mean, reading : (3 n,)
+        Mean of the atlas, and the touches, mm.
+    variances : (n,)
+        Of the features between animals, mm^2 a coordinate.
+    weights : (n,)
+        In: where to start. Out: about 1 for an ordinary touch, towards 0 for one that does not fit.
+    precision, points, errors : (n,), (3 n,), (n,)
+        Out: inverse variances of the touches, the touches brought into the atlas frame, expected squared
+        touch errors.
+    pose : (16,)
+        In: a quaternion to start from. Out: quaternion, translation (mm), rotation matrix row by row.
+    noise : float
+        Scale of the touch errors, mm; 0: to be found.
+    n_iterations : int
+        Iterations at most.
+
+    Returns
+    -------
+    sigma2, change, misfit : float
+        Squared scale of the touch errors (mm^2), largest change that one more iteration would make,
+        negative log posterior.
+    """
+    given = noise > 0.0
+    sigma2 = noise * noise if given else TYPICAL_NOISE_MM * TYPICAL_NOISE_MM
+    change, shift, stride = math.inf, 0.0, _STRIDE
+    for iteration in range(n_iterations + 1):
+        total = _weigh(variances, weights, sigma2, precision)
+        centre, touched = _mean_of(mean, precision, total), _mean_of(reading, precision, total)
+        _turn(mean, centre, reading, touched, precision, total, pose)
+        _bring(reading, touched, pose, centre, points)
+        change = _expect(mean, centre, weights, sigma2, total, precision, points, errors)
+        if not given:
+            last, shift = shift, _shift(errors, sigma2)
+            stride = _next_stride(stride, last, shift)
+            change = max(change, abs(shift))
+        if change < TOLERANCE or iteration == n_iterations:
+            break
+        for k in range(len(weights)):
+            weights[k] = (NU + 3.0) / (NU + errors[k] / sigma2)
+        sigma2 *= math.exp(stride * shift)
+    for a in range(3):
+        r = 7 + 3 * a
+        pose[4 + a] = touched[a] - (pose[r] * centre[0] + pose[r + 1] * centre[1] + pose[r + 2] * centre[2])
+    return sigma2, change, _misfit(mean, variances, weights, precision, points, sigma2, given)
+
+
+def best_exchange(
+    mean: Buffer,
+    variances: Buffer,
+    reading: Buffer,
+    weights: Buffer,
+    precision: Buffer,
+    points: Buffer,
+    errors: Buffer,
+    pose: Buffer,
+    noise: float,
+    n_iterations: int,
+    below: float,
+) -> tuple[float, float, float]:
+    """Settle the reading with every two of its touches exchanged; parameters as of `settle`, and `below`.
+
+    Few iterations tell most exchanges off: early on, the misfit is hardly ever above the one it settles at,
+    and never by `_SLACK` in some thousands of real and drawn touches.
+
+    Parameters
+    ----------
+    below : float
+        Misfit below which an exchange is of interest.
+
+    Returns
+    -------
+    i, j : float
+        The touches whose exchange settles best.
+    misfit : float
+        With them exchanged; infinite where none comes near `below`.
+    """
+    n = len(variances)
+    first = second = 0
+    least = math.inf
+    start = (pose[0], pose[1], pose[2], pose[3])
+    for i in range(n):
+        for j in range(i + 1, n):
+            _exchange(reading, i, j)
+            misfit = below + _SLACK
+            for n_most in (_SCREENING_ITERATIONS, n_iterations):
+                if misfit > below + _SLACK:
+                    break
+                for k in range(n):
+                    weights[k] = 1.0
+                pose[0], pose[1], pose[2], pose[3] = start
+                _, _, misfit = settle(
+                    mean, variances, reading, weights, precision, points, errors, pose, noise, n_most
+                )
+            if misfit < least:
+                least, first, second = misfit, i, j
+            _exchange(reading, i, j)
+    return 1.0 * first, 1.0 * second, least
+
+
+def _exchange(reading: Buffer, i: int, j: int) -> None:
+    for a in range(3):
+        reading[3 * i + a], reading[3 * j + a] = reading[3 * j + a], reading[3 * i + a]
+
+
+def _weigh(variances: Buffer, weights: Buffer, sigma2: float, precision: Buffer) -> float:
+    """Write the inverse variance of each touch, the shape integrated out, and return their sum."""
+    total = 0.0
+    for j in range(len(variances)):
+        p = 1.0 / (variances[j] + sigma2 / weights[j])
+        precision[j] = p
+        total += p
+    return total
+
+
+def _mean_of(points: Buffer, precision: Buffer, total: float) -> Vector:
+    x = y = z = 0.0
+    for j in range(len(precision)):
+        p = precision[j]
+        x += p * points[3 * j]
+        y += p * points[3 * j + 1]
+        z += p * points[3 * j + 2]
+    return x / total, y / total, z / total
+
+
+def _turn(
+    mean: Buffer,
+    centre: Vector,
+    reading: Buffer,
+    touched: Vector,
+    precision: Buffer,
+    total: float,
+    pose: Buffer,
+) -> None:
+    """Turn the mean to the touches, both about their weighted centres (weighted Procrustes)."""
+    cx, cy, cz = centre
+    tx, ty, tz = touched
+    xx = xy = xz = yx = yy = yz = zx = zy = zz = 0.0
+    for j in range(len(precision)):
+        share = precision[j] / total
+        x, y, z = mean[3 * j] - cx, mean[3 * j + 1] - cy, mean[3 * j + 2] - cz
+        u = share * (reading[3 * j] - tx)
+        v = share * (reading[3 * j + 1] - ty)
+        w = share * (reading[3 * j + 2] - tz)
+        xx += u * x
+        xy += u * y
+        xz += u * z
+        yx += v * x
+        yy += v * y
+        yz += v * z
+        zx += w * x
+        zy += w * y
+        zz += w * z
+    turn = best_turn((xx, xy, xz, yx, yy, yz, zx, zy, zz), (pose[0], pose[1], pose[2], pose[3]))
+    pose[0], pose[1], pose[2], pose[3] = turn
+    rotation = as_matrix(turn)
+    for i in range(9):
+        pose[7 + i] = rotation[i]
+
+
+def _bring(reading: Buffer, touched: Vector, pose: Buffer, centre: Vector, points: Buffer) -> None:
+    """Write the touches in the atlas frame."""
+    tx, ty, tz = touched
+    cx, cy, cz = centre
+    r0, r1, r2, r3, r4 = pose[7], pose[8], pose[9], pose[10], pose[11]
+    r5, r6, r7, r8 = pose[12], pose[13], pose[14], pose[15]
+    for i in range(0, len(reading), 3):
+        x, y, z = reading[i] - tx, reading[i + 1] - ty, reading[i + 2] - tz
+        points[i] = r0 * x + r3 * y + r6 * z + cx
+        points[i + 1] = r1 * x + r4 * y + r7 * z + cy
+        points[i + 2] = r2 * x + r5 * y + r8 * z + cz
+
+
+def _expect(
+    mean: Buffer,
+    centre: Vector,
+    weights: Buffer,
+    sigma2: float,
+    total: float,
+    precision: Buffer,
+    points: Buffer,
+    errors: Buffer,
+) -> float:
+    """Write the expected squared error of each touch, and return the largest change of a weight by it.
+
+    The pose uses up part of each touch's precision. With the pose taken about the weighted centre,
+    translation and rotation separate, and the rotation's information is the inertia tensor of the points.
+    """
+    cx, cy, cz = centre
+    ixx, ixy, ixz, iyy, iyz, izz = _inverse(_inertia(points, centre, precision))
+    trace = ixx + iyy + izz
+    change = 0.0
+    for j in range(len(precision)):
+        px, py, pz = points[3 * j], points[3 * j + 1], points[3 * j + 2]
+        x, y, z = px - cx, py - cy, pz - cz
+        through_turn = (
+            (x * x + y * y + z * z) * trace
+            - (ixx * x * x + iyy * y * y + izz * z * z)
+            - 2.0 * (ixy * x * y + ixz * x * z + iyz * y * z)
+        )
+        x, y, z = px - mean[3 * j], py - mean[3 * j + 1], pz - mean[3 * j + 2]
+        p, w = precision[j], weights[j]
+        noise = sigma2 / w
+        squared = x * x + y * y + z * z + 3.0 / total + through_turn
+        error = noise * noise * p * p * squared + 3.0 * noise * (1.0 - noise * p)
+        errors[j] = error
+        step = abs((NU + 3.0) / (NU + error / sigma2) - w)
+        if not step <= change:
+            change = step
+    return change
+
+
+def _inertia(points: Buffer, centre: Vector, precision: Buffer) -> Symmetric3:
+    cx, cy, cz = centre
+    xx = xy = xz = yy = yz = zz = 0.0
+    for j in range(len(precision)):
+        p = precision[j]
+        x, y, z = points[3 * j] - cx, points[3 * j + 1] - cy, points[3 * j + 2] - cz
+        xx += p * x * x
+        xy += p * x * y
+        xz += p * x * z
+        yy += p * y * y
+        yz += p * y * z
+        zz += p * z * z
+    return yy + zz, -xy, -xz, xx + zz, -yz, xx + yy
+
+
+def _inverse(n: Symmetric3) -> Symmetric3:
+    """Return the inverse of a symmetric matrix, given by its upper triangle."""
+    a, b, c, d, e, f = n
+    af, bf, cf = d * f - e * e, c * e - b * f, b * e - c * d
+    size = 1.0 / (a * af + b * bf + c * cf)
+    return (
+        af * size,
+        bf * size,
+        cf * size,
+        (a * f - c * c) * size,
+        (b * c - a * e) * size,
+        (a * d - b * b) * size,
+    )
+
+
+def _shift(errors: Buffer, sigma2: float) -> float:
+    """Return by how much the logarithm of the squared scale should change, by the expected errors."""
+    total = PRIOR_WEIGHT * TYPICAL_NOISE_MM * TYPICAL_NOISE_MM
+    for k in range(len(errors)):
+        total += (NU + 3.0) / (NU + errors[k] / sigma2) * errors[k]
+    return math.log(total / ((PRIOR_WEIGHT + 3.0 * len(errors)) * sigma2))
+
+
+def _next_stride(stride: float, last: float, shift: float) -> float:
+    """Return how many times its step the scale shall take, after its last step and the present one.
+
+    It would creep where the touches leave open what is shape and what is error: near its rest the stride
+    grows while the steps agree, and shrinks when they turn. On the way there a long one could miss the rest.
+    """
+    if abs(shift) > _NEAR:
+        return _STRIDE
+    if last * shift > 0.0:
+        return min(1.3 * stride, _LONGEST_STRIDE)
+    return max(0.5 * stride, 1.0)
+
+
+def _misfit(
+    mean: Buffer,
+    variances: Buffer,
+    weights: Buffer,
+    precision: Buffer,
+    points: Buffer,
+    sigma2: float,
+    given: bool,
+) -> float:
+    """Return the negative log posterior: shape and touch errors, each by its own law, and their scale."""
+    shape = touch = 0.0
+    for j in range(len(weights)):
+        x, y, z = (
+            points[3 * j] - mean[3 * j],
+            points[3 * j + 1] - mean[3 * j + 1],
+            points[3 * j + 2] - mean[3 * j + 2],
+        )
+        squared = precision[j] * precision[j] * (x * x + y * y + z * z)
+        noise = sigma2 / weights[j]
+        shape += variances[j] * squared
+        touch += math.log1p(noise * noise * squared / (NU * sigma2))
+    misfit = 0.5 * (shape + (NU + 3.0) * touch)
+    if given:
+        return misfit
+    freedom = PRIOR_WEIGHT + 3.0 * len(weights)
+    prior = PRIOR_WEIGHT * TYPICAL_NOISE_MM * TYPICAL_NOISE_MM / sigma2
+    return misfit + 0.5 * (freedom * math.log(sigma2) + prior)
+
+
+KERNELS = (
+    _turn,
+    _weigh,
+    _mean_of,
+    _bring,
+    _inertia,
+    _inverse,
+    _expect,
+    _shift,
+    _next_stride,
+    _misfit,
+    settle,
+    _exchange,
+    best_exchange,
+)
+"""All functions of this module, each after those of it that it calls."""

@@ -1,0 +1,20 @@
+"""`student_t_fit`, compiled; importing this takes half a second, and some seconds once on each machine."""
+
+from __future__ import annotations
+
+from gp_core.registration import student_t_fit
+from gp_core.registration.compiling import compiled_together
+from gp_core.registration.rotation_compiled import as_matrix, best_turn
+
+__all__ = ["best_exchange", "settle"]
+
+_BUFFERS = ", ".join(["float64[::1]"] * 8)
+_SIGNATURES = {
+    "settle": f"UniTuple(float64, 3)({_BUFFERS}, float64, int64)",
+    "best_exchange": f"UniTuple(float64, 3)({_BUFFERS}, float64, int64, float64)",
+}
+
+_NAMES = {**vars(student_t_fit), "as_matrix": as_matrix, "best_turn": best_turn}
+_KERNELS = compiled_together(student_t_fit.KERNELS, _NAMES, _SIGNATURES)
+settle = _KERNELS["settle"]
+best_exchange = _KERNELS["best_exchange"]

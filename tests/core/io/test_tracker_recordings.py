@@ -1,0 +1,245 @@
+"""Recorded poses, as PLUS, 3D Slicer and NDI write them, and what is made of them."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from gp_core.cli import main
+from gp_core.errors import FileFormatError, GeometryError, GpError
+from gp_core.io.tracker_recordings import Recording, is_sequence, read_recording
+from gp_core.pose.recorded_touches import recorded_touches, resting_places
+from gp_core.registration.pivot import calibrate_pivot
+
+_TIP, _PIVOT = np.array([1.5, -2.0, 160.0]), np.array([10.0, 20.0, -900.0])
+
+
+def _turning(n: int = 80) -> np.ndarray:
+    rng = np.random.default_rng(3)
+    poses = np.tile(np.eye(4), (n, 1, 1))
+    poses[:, :3, :3] = Rotation.from_euler("zyx", rng.uniform(-40, 40, (n, 3)), degrees=True).as_matrix()
+    poses[:, :3, 3] = _PIVOT - poses[:, :3, :3] @ _TIP + rng.normal(0, 0.02, (n, 3))
+    return poses
+
+
+def _fields(poses: np.ndarray, mark: str, *, invalid: int = 0, reference: np.ndarray | None = None) -> str:
+    lines = []
+    for k, pose in enumerate(poses):
+        hidden = bool(invalid) and k % invalid == 0
+        flat = " ".join(f"{x:.9f}" for x in (np.eye(4) if hidden else pose).ravel())
+        lines += [f"Seq_Frame{k:04d}_StylusToTrackerTransform{mark}{flat}"]
+        lines += [f"Seq_Frame{k:04d}_StylusToTrackerTransformStatus{mark}{'INVALID' if hidden else 'OK'}"]
+        lines += [f"Seq_Frame{k:04d}_Timestamp{mark}{k / 20:.3f}"]
+        if reference is not None:
+            flat = " ".join(f"{x:.9f}" for x in reference[k].ravel())
+            lines += [f"Seq_Frame{k:04d}_ReferenceToTrackerTransform{mark}{flat}"]
+            lines += [f"Seq_Frame{k:04d}_ReferenceToTrackerTransformStatus{mark}OK"]
+    return "\n".join(lines) + "\n"
+
+
+def _mha(path, poses: np.ndarray, **how: object):
+    head = f"ObjectType = Image\nNDims = 3\nDimSize = 4 4 {len(poses)}\nElementType = MET_UCHAR\n"
+    head += _fields(poses, " = ", **how) + "ElementDataFile = LOCAL\n"
+    path.write_bytes(head.encode() + bytes(range(256)) * (len(poses) // 16 + 1))
+    return path
+
+
+def _nrrd(path, poses: np.ndarray):
+    head = f"NRRD0004\ntype: unsigned char\ndimension: 3\nsizes: 4 4 {len(poses)}\nencoding: raw\n"
+    path.write_bytes((head + _fields(poses, ":=") + "\n").encode() + bytes(16 * len(poses)))
+    return path
+
+
+def _table(path, header: str, rows: list[list[object]]):
+    path.write_text("\n".join([header, *(",".join(map(str, row)) for row in rows)]) + "\n", encoding="utf-8")
+    return path
+
+
+def _quaternion(pose: np.ndarray) -> list[float]:
+    x, y, z, w = Rotation.from_matrix(pose[:3, :3]).as_quat()
+    return [w, x, y, z]
+
+
+_WRITERS = {
+    "mha": lambda folder, poses: _mha(folder / "a.igs.mha", poses),
+    "mha, some unseen": lambda folder, poses: _mha(folder / "a.mha", poses, invalid=9),
+    "header alone": lambda folder, poses: _text(folder / "a.txt", _fields(poses, " = ")),
+    "nrrd": lambda folder, poses: _nrrd(folder / "a.igs.nrrd", poses),
+    "quaternions": lambda folder, poses: _table(
+        folder / "a.csv", "t,qw,qx,qy,qz,tx,ty,tz", [[0, *_quaternion(p), *p[:3, 3]] for p in poses]
+    ),
+    "NDI quaternions": lambda folder, poses: _table(
+        folder / "a.csv",
+        "Tools,Port 1,Frame,Face,State,Q0,Qx,Qy,Qz,Tx,Ty,Tz,Error",
+        [[1, k, k, 0, "OK", *_quaternion(p), *p[:3, 3], 0.1] for k, p in enumerate(poses)]
+        + [[1, 0, 0, 0, "MISSING", *[""] * 8]],
+    ),
+    "NDI angles": lambda folder, poses: _table(
+        folder / "a.csv",
+        "Frame,State,Rz,Ry,Rx,Tx,Ty,Tz",
+        [
+            [k, "OK", *Rotation.from_matrix(p[:3, :3]).as_euler("ZYX", degrees=True), *p[:3, 3]]
+            for k, p in enumerate(poses)
+        ],
+    ),
+    "column by column": lambda folder, poses: _table(folder / "a.csv", "", [[*p.T.ravel()] for p in poses]),
+    "brackets": lambda folder, poses: _text(
+        folder / "a.csv", "\n".join(str(p.ravel().tolist()) for p in poses) + "\n"
+    ),
+}
+
+
+def _text(path, text: str):
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("kind", _WRITERS)
+def test_the_tip_is_the_same_whatever_wrote_the_poses(tmp_path, kind) -> None:
+    recording = read_recording(_WRITERS[kind](tmp_path, _turning()))
+    found = calibrate_pivot(recording.poses)
+    assert found.tip_offset == pytest.approx(_TIP, abs=0.05)
+    assert found.pivot == pytest.approx(_PIVOT, abs=0.05)
+
+
+def test_frames_whose_status_is_not_ok_are_not_seen(tmp_path) -> None:
+    recording = read_recording(_mha(tmp_path / "a.mha", _turning(40), invalid=10))
+    assert np.flatnonzero(np.isnan(recording.poses[:, 0, 0])).tolist() == [0, 10, 20, 30]
+    assert recording.times == pytest.approx(np.arange(40) / 20)
+    assert recording.transform == "StylusToTracker"
+
+
+def test_poses_in_the_frame_of_a_reference_do_not_move_with_the_head(tmp_path) -> None:
+    rng, poses = np.random.default_rng(1), _turning()
+    head = np.tile(np.eye(4), (len(poses), 1, 1))
+    head[:, :3, :3] = Rotation.from_rotvec(rng.normal(0, 0.1, (len(poses), 3))).as_matrix()
+    head[:, :3, 3] = rng.normal(0, 20, (len(poses), 3))
+    file = _mha(tmp_path / "a.mha", head @ poses, reference=head)
+    for name in ("ReferenceToTracker", "ReferenceToTrackerTransform"):
+        found = read_recording(file, reference=name)
+        assert found.poses == pytest.approx(poses, abs=1e-5)
+    with pytest.raises(GpError, match=r"no transform 'RefToTracker'.*ReferenceToTracker, StylusToTracker"):
+        read_recording(file, reference="RefToTracker")
+
+
+def test_of_several_transforms_one_must_be_named(tmp_path) -> None:
+    text = _fields(_turning(20), " = ").replace("StylusToTracker", "AToTracker")
+    file = _text(tmp_path / "a.txt", text + text.replace("AToTracker", "BToTracker"))
+    with pytest.raises(GpError, match=r"several transforms.*--transform: AToTracker, BToTracker"):
+        read_recording(file)
+    assert read_recording(file, transform="BToTracker").transform == "BToTracker"
+
+
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [
+        (np.linalg.inv, "seem to be those of the tracker in the marker's frame"),
+        (
+            lambda p: np.concatenate([p[:, :, :3], p[:, :, 3:] * [[1e-3], [1e-3], [1e-3], [1]]], axis=2),
+            "metres",
+        ),
+        (lambda p: p * [[1.2, 1, 1, 1]], "none of the 80 poses is a rigid motion"),
+    ],
+)
+def test_poses_that_cannot_be_meant_are_refused_in_words(spoil, said) -> None:
+    with pytest.raises(GeometryError, match=said):
+        calibrate_pivot(spoil(_turning()))
+
+
+def test_a_pose_that_is_damaged_is_named(tmp_path) -> None:
+    file = _text(tmp_path / "a.txt", _fields(_turning(20), " = ").replace(" 1.000000000\n", "\n", 1))
+    with pytest.raises(FileFormatError, match="StylusToTrackerTransform of frame 0 must be 16 numbers"):
+        read_recording(file)
+
+
+@pytest.mark.parametrize("text", ["x,y\n1,2\n", "qw,qx,qy,qz,tx,ty,tz\n1,0,0,0,a,2,3\n", "1 2 3\n4 5 6\n"])
+def test_what_is_no_recording_is_refused(tmp_path, text) -> None:
+    file = _text(tmp_path / "a.csv", text)
+    assert not is_sequence(file)
+    with pytest.raises(FileFormatError, match="quaternions under a header"):
+        read_recording(file)
+
+
+def _touching(places: np.ndarray, *, hertz: float = 30.0) -> Recording:
+    """The tip goes from place to place, and rests a second at each."""
+    rng = np.random.default_rng(0)
+    way: list[np.ndarray] = []
+    for place in places:
+        if way:
+            way += list(np.linspace(way[-1], place, int(hertz)))
+        way += [place] * int(hertz)
+    tips = np.array(way) + rng.normal(0, 0.05, (len(way), 3))
+    poses = np.tile(np.eye(4), (len(tips), 1, 1))
+    poses[:, :3, :3] = Rotation.from_rotvec(rng.normal(0, 0.2, (len(tips), 3))).as_matrix()
+    poses[:, :3, 3] = tips - poses[:, :3, :3] @ _TIP
+    return Recording(poses, np.arange(len(tips)) / hertz)
+
+
+_PLACES = np.array([[0.0, 0, 0], [10, 0, 0], [10, 12, 0], [-5, 3, 9.0], [0, 0, 1]])
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_the_places_where_the_tip_rested_are_found_in_their_order(timed) -> None:
+    recording = _touching(_PLACES)
+    if not timed:
+        recording = Recording(recording.poses)
+    assert resting_places(recording, _TIP) == pytest.approx(_PLACES, abs=0.1 if timed else 0.3)
+    named = recorded_touches(recording, _TIP, ["CL", "MN", "OS", "RWA", "RWP"])
+    assert named["OS"] == pytest.approx(_PLACES[2], abs=0.1 if timed else 0.3)
+
+
+def test_more_or_fewer_rests_than_names_are_said() -> None:
+    with pytest.raises(
+        GeometryError, match=r"rested 5 times \(.*10\.0 12\.\d .*mm\), but 6 touches are named"
+    ):
+        recorded_touches(_touching(_PLACES), _TIP, list("ABCDEF"))
+
+
+def test_two_features_that_lie_close_are_two_touches_where_the_tip_was_away_between() -> None:
+    away = np.array([0.0, 0.0, 30.0])
+    places = np.array([[0.0, 0, 0], [1.4, 0, 0], [1.4, 0.5, 0]])
+    way = [places[0], places[0] + away, places[1], places[1] + away, places[2]]
+    found = resting_places(_touching(np.array(way)), _TIP)
+    assert found[::2] == pytest.approx(places, abs=0.1)
+    assert len(found) == 5
+
+
+def test_a_tip_that_slips_a_little_is_one_touch() -> None:
+    assert len(resting_places(_touching(np.array([[0.0, 0, 0], [1.5, 0, 0]])), _TIP)) == 1
+
+
+@pytest.mark.parametrize(
+    ("order", "tip", "said"),
+    [
+        ("RWA,CL,RWA", "0,0,0", "RWA: is named twice"),
+        ("RWA,CA", "0,0,0", "CA: is inside the bone"),
+        ("RWA,FOO", "0,0,0", "FOO: is no feature"),
+        ("RWA,CL", "0.001,0,0.16", "only 0.16 mm from its marker. Give it in mm"),
+        ("RWA,CL", "1,2", "three finite numbers in mm, got [1.0, 2.0]"),
+    ],
+)
+def test_what_is_named_wrongly_is_said_before_anything_is_written(tmp_path, capsys, order, tip, said) -> None:
+    file, csv = _mha(tmp_path / "a.mha", _touching(_PLACES).poses), tmp_path / "t.csv"
+    assert main(["touches", str(file), "--order", order, "--tip", tip, "-o", str(csv)]) == 2
+    assert said in capsys.readouterr().err
+    assert not csv.exists()
+
+
+def test_from_the_shell_a_pivot_and_touches_of_sequences(tmp_path, capsys) -> None:
+    pivot, touched = tmp_path / "pivot.igs.mha", tmp_path / "stylus.igs.mha"
+    _mha(pivot, _turning())
+    _mha(touched, _touching(_PLACES, hertz=20).poses)
+    tip, csv = tmp_path / "tip.json", tmp_path / "touches.csv"
+    assert main(["pivot", str(pivot), "--json", str(tip)]) == 0
+    assert json.loads(tip.read_text())["tip_offset_mm"] == pytest.approx(_TIP, abs=0.05)
+    order = ["--order", "CL,MN,OS,RWA,RWP"]
+    assert main(["touches", str(touched), "--tip", str(tip), *order, "-o", str(csv)]) == 0
+    rows = [line.split(",") for line in csv.read_text().splitlines()[1:]]
+    assert [row[0] for row in rows] == ["CL", "MN", "OS", "RWA", "RWP"]
+    assert np.array([[float(x) for x in row[1:]] for row in rows]) == pytest.approx(_PLACES, abs=0.15)
+    capsys.readouterr()
+    assert main(["estimate", str(touched), "--side", "L"]) == 2
+    assert "gp-core touches" in capsys.readouterr().err
