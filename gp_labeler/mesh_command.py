@@ -32,7 +32,8 @@ def make_mesh_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("volume", type=Path, metavar="VOLUME", help="file, or folder of slices")
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MESH", help=".ply, .stl or .vtp")
+    formats = ".ply, .stl, .vtp, .obj, .glb or .gltf"
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="MESH", help=formats)
     _add_surface(parser.add_argument_group("the surface"))
     _add_import(parser.add_argument_group("how the scan is read"))
     return parser

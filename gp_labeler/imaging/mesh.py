@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,7 +19,18 @@ from vtkmodules.vtkFiltersCore import vtkProbeFilter
 from gp_core.errors import GeometryError
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.cutting import crossing, joined, part_outside
-from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_numpy, to_vtk, triangles_of, triple
+from gp_labeler.imaging.vtk_arrays import (
+    cells_of,
+    points_of,
+    poly_data,
+    to_numpy,
+    to_vtk,
+    triangles_of,
+    triple,
+)
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 __all__ = ["Surface", "SurfaceHit"]
 
@@ -51,7 +62,7 @@ class Surface:
 
     Parameters
     ----------
-    mesh : vtkPolyData
+    mesh : pyvista.PolyData
         Triangles, with point normals.
     level : float
         Grey value at which the surface was cut.
@@ -63,7 +74,7 @@ class Surface:
         Voxels taken along each axis: 1 for full resolution.
     """
 
-    mesh: vtkPolyData
+    mesh: pv.PolyData
     level: float
     T_voxel_scan: FloatArray
     region: FloatArray
@@ -172,14 +183,18 @@ class Surface:
         within, through = crossing(index, self.triangles, region)
         kept, cut = _subset(self.mesh, ~(within | through)), _subset(self.mesh, through)
         mesh = joined(kept, part_outside(cut, self.T_voxel_scan, region)) if through.any() else kept
-        return Surface(mesh, self.level, self.T_voxel_scan, self.region, self.stride)
+        return Surface(poly_data(mesh), self.level, self.T_voxel_scan, self.region, self.stride)
 
     def only(self, kept: NDArray[np.bool_]) -> Surface:
         """Return the surface of some of the triangles, (T,) bool, and of the points they use."""
-        return Surface(_subset(self.mesh, kept), self.level, self.T_voxel_scan, self.region, self.stride)
+        return Surface(
+            poly_data(_subset(self.mesh, kept)), self.level, self.T_voxel_scan, self.region, self.stride
+        )
 
     def save(self, path: str | Path) -> None:
-        """Write the surface as ``.ply``, ``.stl`` or ``.vtp``, noting that its coordinates are LPS.
+        """Write the surface as ``.ply``, ``.stl``, ``.vtp``, ``.obj``, ``.gltf`` or ``.glb``.
+
+        All but glTF say that the coordinates are LPS.
 
         Raises
         ------

@@ -6,6 +6,7 @@ import numpy as np
 from vtkmodules.vtkFiltersCore import vtkBinnedDecimation
 
 from gp_labeler.imaging.mesh import Surface
+from gp_labeler.imaging.vtk_arrays import poly_data
 
 __all__ = ["coarse_surface"]
 
@@ -47,5 +48,5 @@ def _in_boxes(surface: Surface, box_mm: float) -> Surface:
     decimation.ProducePointDataOn()  # normals
     decimation.Update()
     return Surface(
-        decimation.GetOutput(), surface.level, surface.T_voxel_scan, surface.region, surface.stride
+        poly_data(decimation.GetOutput()), surface.level, surface.T_voxel_scan, surface.region, surface.stride
     )

@@ -20,7 +20,7 @@ from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import GreyArray, Volume
-from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of, triple
+from gp_labeler.imaging.vtk_arrays import poly_data, to_numpy, to_vtk, triangles_of, triple
 
 __all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
 
@@ -106,7 +106,7 @@ def extract_isosurface(
     mesh = _contour(*_image(volume, region, stride, level))
     if volume.is_mirrored:
         _turn_over(mesh)
-    surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
+    surface = Surface(poly_data(mesh), level, volume.T_voxel_scan, region, stride)
     report(0.6)
     if surface.n_triangles and (smallest_mm > 0 or largest is not None):
         points, triangles = surface.points, surface.triangles

@@ -40,7 +40,7 @@ _SCANS = (
     "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
-_MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp)"
+_MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp);;OBJ (*.obj);;glTF (*.glb *.gltf)"
 
 
 class WindowUi(AtlasUi, PoseUi):

@@ -180,7 +180,7 @@ class Mesh(Step):
     half_mm : float, optional
         Half the edge of the boxes around the ears.
     save : str, optional
-        File for the whole surface at full resolution: .ply, .stl or .vtp.
+        File for the whole surface at full resolution: .ply, .stl, .vtp, .obj, .gltf or .glb.
     """
 
     do: ClassVar[str] = "mesh"

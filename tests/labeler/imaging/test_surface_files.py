@@ -13,7 +13,7 @@ from vtkmodules.vtkFiltersSources import vtkSphereSource
 from gp_core.errors import GpError
 from gp_labeler.imaging.surface_files import write_mesh
 
-SUFFIXES = (".ply", ".stl", ".vtp")
+SUFFIXES = (".ply", ".stl", ".vtp", ".obj", ".gltf", ".glb")
 OLD = b"the mesh of yesterday"
 
 
