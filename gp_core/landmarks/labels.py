@@ -107,6 +107,9 @@ class LabelNames:
     def __iter__(self) -> Iterator[str]:
         return iter(self.codes)
 
+    def __contains__(self, label: str) -> bool:
+        return _key(label) in self.codes
+
     def leaves_out(self, label: str) -> bool:
         """Whether a point is not to be taken."""
         return self.codes.get(_key(label)) == ""

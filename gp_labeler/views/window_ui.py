@@ -148,7 +148,7 @@ class WindowUi(AtlasUi, PoseUi):
             self._remember_folder(files[0])
             if self._has_dialogs:
                 desk = self._desk
-                LandmarkImportDialog(desk, files, desk.near_bone, parent=self._window).open()
+                LandmarkImportDialog(desk, files, desk.near_bone, self.prompts, self._window).open()
             else:
                 import_asking(self._desk, files, self.prompts)
 

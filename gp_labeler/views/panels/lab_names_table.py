@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from PySide6.QtCore import Signal
-from PySide6.QtWidgets import QComboBox, QGridLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from PySide6.QtWidgets import (
+    QComboBox,
+    QGridLayout,
+    QHBoxLayout,
+    QPushButton,
+    QSizePolicy,
+    QVBoxLayout,
+    QWidget,
+)
 
-from gp_core.landmarks.features import FEATURES
+from gp_core.landmarks.features import FEATURES, Side
+from gp_core.landmarks.labels import LabelNames, parse_label
 from gp_labeler.views.bind import blocked
 from gp_labeler.views.panels.parts import emptied, text_label
 
@@ -15,26 +24,36 @@ __all__ = ["LabNamesTable"]
 
 _UNDECIDED = "Choose a feature…"
 _LEFT_OUT = "Leave out"
+_EITHER_SIDE = "side as in the file"
 
 
 class LabNamesTable(QWidget):
-    """Lets a person choose the feature that each unknown name stands for, or leave the point out."""
+    """Lets a person choose the feature, and its side, that each unknown name stands for, or leave it out."""
 
     changed = Signal()
     """Something was chosen."""
 
+    load_asked = Signal()
+    """A file of names is wanted."""
+
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._boxes: dict[str, QComboBox] = {}
+        self._sides: dict[str, QComboBox] = {}
         self.leave_rest = QPushButton("Leave out all that are not chosen")
         self.leave_rest.setProperty("role", "link")
         self.leave_rest.clicked.connect(self._leave_rest)
+        self.load = QPushButton("Load a table of names…")
+        self.load.setToolTip("A file of two columns: their name, our code (CA, or CA_L)")
+        self.load.setProperty("role", "link")
+        self.load.clicked.connect(lambda: self.load_asked.emit())
         self._rows = QGridLayout()
         self._rows.setColumnStretch(1, 1)
         self._rows.setHorizontalSpacing(12)
         self._rows.setVerticalSpacing(6)
         foot = QHBoxLayout()
         foot.addWidget(self.leave_rest)
+        foot.addWidget(self.load)
         foot.addStretch(1)
         column = QVBoxLayout(self)
         column.setContentsMargins(0, 0, 0, 0)
@@ -45,8 +64,14 @@ class LabNamesTable(QWidget):
 
     @property
     def codes(self) -> dict[str, str]:
-        """What was chosen: a code by the lab's name, an empty text for what is left out."""
-        return {name: box.currentData() for name, box in self._boxes.items() if box.currentData() is not None}
+        """What was chosen: a code by the lab's name (``CA``, or ``CA_L``), empty for what is left out."""
+        return dict(self._chosen())
+
+    def _chosen(self) -> Iterator[tuple[str, str]]:
+        for name, box in self._boxes.items():
+            code, side = box.currentData(), self._sides[name].currentData()
+            if code is not None:
+                yield name, f"{code}_{side}" if code and side else code
 
     @property
     def undecided(self) -> int:
@@ -57,6 +82,31 @@ class LabNamesTable(QWidget):
         """Return the choice that belongs to a name."""
         return self._boxes[name]
 
+    def side_box(self, name: str) -> QComboBox:
+        """Return the choice of the side that belongs to a name."""
+        return self._sides[name]
+
+    def choose(self, names: LabelNames) -> None:
+        """Choose, for the names that are shown, what a table of names says."""
+        for name in self._boxes:
+            if name in names or names.leaves_out(name):
+                self._set(name, "" if names.leaves_out(name) else names.translate(name))
+        self.changed.emit()
+
+    def _set(self, name: str, code: str) -> None:
+        parsed = parse_label(code)
+        for box, value in (
+            (self._boxes[name], parsed.name),
+            (self._sides[name], parsed.side and parsed.side.value),
+        ):
+            with blocked(box):
+                box.setCurrentIndex(max(box.findData(value), 0))
+        self._allow_side(name)
+
+    def _allow_side(self, name: str) -> None:
+        """Offer a side only for a feature that was chosen."""
+        self._sides[name].setEnabled(bool(self._boxes[name].currentData()))
+
     def show_names(self, names: Sequence[str]) -> None:
         """Show a row for each name; what was chosen for one before stays."""
         self.setVisible(bool(names))
@@ -64,19 +114,29 @@ class LabNamesTable(QWidget):
             return
         chosen = self.codes
         emptied(self._rows)
-        self._boxes = {}
+        self._boxes, self._sides = {}, {}
         for row, name in enumerate(names):
-            box = self._boxes[name] = _choice(name)
-            box.setCurrentIndex(max(box.findData(chosen.get(name)), 0) if name in chosen else 0)
-            box.currentIndexChanged.connect(lambda _: self.changed.emit())
+            self._boxes[name], self._sides[name] = _choice(name), _side_choice(name)
+            self._allow_side(name)
+            if name in chosen:
+                self._set(name, chosen[name])
             self._rows.addWidget(text_label(name), row, 0)
-            self._rows.addWidget(box, row, 1)
+            for column, box in enumerate((self._boxes[name], self._sides[name]), start=1):
+                box.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # never squeezed
+                box.currentIndexChanged.connect(lambda _, name=name: self._tell(name))
+                self._rows.addWidget(box, row, column)
+
+    def _tell(self, name: str) -> None:
+        self._allow_side(name)
+        self.changed.emit()
 
     def _leave_rest(self) -> None:
         for box in self._boxes.values():
             if box.currentData() is None:
                 with blocked(box):
                     box.setCurrentIndex(box.findData(""))
+        for name in self._boxes:
+            self._allow_side(name)
         self.changed.emit()
 
 
@@ -88,4 +148,13 @@ def _choice(name: str) -> QComboBox:
     for feature in FEATURES:
         if not feature.computed:
             box.addItem(f"{feature.code}  {feature.name}", feature.code)
+    return box
+
+
+def _side_choice(name: str) -> QComboBox:
+    box = QComboBox()
+    box.setAccessibleName(f"Side of the head that {name} is on")
+    box.addItem(_EITHER_SIDE, None)
+    for side in Side:
+        box.addItem(side.word, side.value)
     return box

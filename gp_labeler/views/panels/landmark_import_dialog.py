@@ -18,7 +18,7 @@ from PySide6.QtWidgets import (
 )
 
 from gp_core.errors import GpError
-from gp_core.io import landmarks_of, read_points, sides_of, unknown_labels
+from gp_core.io import landmarks_of, read_lab_names, read_points, sides_of, unknown_labels
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
@@ -26,9 +26,12 @@ from gp_labeler.session.lab_names import LabNamesMemory
 from gp_labeler.session.landmark_import import MisfitError, Predicate, import_landmarks
 from gp_labeler.views.panels.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
+from gp_labeler.views.prompts import Prompts
 from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkImportDialog"]
+
+_TABLES = "Tables of names (*.csv *.tsv *.txt *.json);;All files (*)"
 
 
 class LandmarkImportDialog(QDialog):
@@ -42,6 +45,8 @@ class LandmarkImportDialog(QDialog):
         The files.
     near_bone : callable, optional
         Tells which points are near bone; see `import_landmarks`.
+    prompts : Prompts, optional
+        Asks for a table of names.
     """
 
     def __init__(
@@ -49,11 +54,13 @@ class LandmarkImportDialog(QDialog):
         workbench: Workbench,
         files: Sequence[str | Path],
         near_bone: Predicate | None = None,
-        actions: object = None,
+        prompts: Prompts | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
         self._workbench, self._near_bone = workbench, near_bone
+        self._prompts = prompts or Prompts(self)
+        self._table: dict[str, str] = {}
         self._files = [Path(file) for file in files]
         self._misfit = ""
         self._memory = LabNamesMemory(workbench.directory)
@@ -86,6 +93,7 @@ class LandmarkImportDialog(QDialog):
         self.take.clicked.connect(self._import)
         self.names = LabNamesTable()
         self.names.changed.connect(self._look)
+        self.names.load_asked.connect(self._ask_table)
         self._findings = QVBoxLayout()
         self._findings.setSpacing(8)
         self._title = ElidedLabel("", "title")
@@ -139,19 +147,34 @@ class LandmarkImportDialog(QDialog):
         try:
             points = read_points(file, names=LabelNames(self._codes()))
             if unknown := unknown_labels(points):
-                return (
-                    "error",
-                    f"{file.name}: {len(unknown)} names are not known. Choose what they stand for.",
+                n = len(unknown)
+                what = (
+                    "1 name is not known. Choose what it"
+                    if n == 1
+                    else f"{n} names are not known. Choose what they"
                 )
+                return "error", f"{file.name}: {what} {'stands' if n == 1 else 'stand'} for."
             side = self.side.currentData()
             sets = sides_of(points) if side is None else (landmarks_of(points, side=side),)
         except GpError as error:
             return "error", str(error)
         return "info", f"{file.name}: {' and '.join(_words(landmarks) for landmarks in sets)}"
 
+    def _ask_table(self) -> None:
+        """Ask for a file that says what the names stand for, and choose what it says."""
+        for file in self._prompts.open_files("Open a table of names", str(self._files[0].parent), _TABLES):
+            try:
+                names = read_lab_names(file)
+            except GpError as error:
+                self._show([("error", str(error))])
+                return
+            self._table |= names.codes
+            self.names.choose(names)
+
     def _codes(self) -> dict[str, str]:
-        """Return what names stand for: as remembered, and as chosen here."""
-        return {**self._memory.recall().codes, **self.names.codes}
+        """Return what names stand for: as remembered, as a table said, and as chosen here."""
+        given = LabelNames(self.names.codes).codes
+        return {**self._memory.recall().codes, **self._table, **given}
 
     def _unknown(self) -> list[str]:
         """Return the names that neither the feature table nor the memory knows."""
@@ -199,7 +222,7 @@ class LandmarkImportDialog(QDialog):
         except GpError as error:
             self._show([("error", str(error))])
         else:
-            self._memory.remember(self.names.codes)
+            self._memory.remember({**self._table, **LabelNames(self.names.codes).codes})
             self._report(notes)
 
     def _report(self, notes: Sequence[str]) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from PySide6.QtCore import Qt
@@ -11,6 +13,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
 from gp_labeler.session.lab_names import LabNamesMemory
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.parts import Notice
 from gp_labeler.workbench import Workbench
 
 _CLICK = Qt.MouseButton.LeftButton
@@ -84,3 +87,45 @@ def test_a_memory_that_is_damaged_counts_as_empty(tmp_path) -> None:
     (tmp_path / "lab-names.json").write_text('{"Apex": "no feature"}', encoding="utf-8")
     assert memory.recall() == LabelNames({})
     assert LabNamesMemory(None).recall() == LabelNames({})
+
+
+def test_a_name_stands_for_a_feature_of_one_side(desk, parent, qtbot, theirs) -> None:
+    dialog = LandmarkImportDialog(desk, [theirs], parent=parent)
+    dialog.show()
+    assert not dialog.names.side_box("Apex R").isEnabled()
+    _choose(dialog, "Apex", "CA")
+    _choose(dialog, "Base", "CB")
+    _choose(dialog, "Apex R", "CA")
+    qtbot.mouseClick(dialog.names.leave_rest, _CLICK)
+    assert not dialog.take.isEnabled()  # a point of no side, among points that tell theirs
+    side = dialog.names.side_box("Apex R")
+    side.setCurrentIndex(side.findData("R"))
+    qtbot.mouseClick(dialog.take, _CLICK)
+    np.testing.assert_allclose(desk.session.landmarks(Side.LEFT)["CA"], [1, 2, 3])
+    np.testing.assert_allclose(desk.session.landmarks(Side.RIGHT)["CA"], [7, 8, 9])
+    assert LabNamesMemory(desk.directory).recall().translate("apex r") == "CA_R"
+
+
+def test_a_table_of_names_is_loaded_and_remembered(desk, parent, qtbot, theirs, tmp_path) -> None:
+    table = tmp_path / "names.csv"
+    table.write_text("their name,our code\nAPEX,CA\nbase,CB\nApex R,CA_R\nBregma,\nLambda,\nTip,OS\n")
+    prompts = SimpleNamespace(open_files=lambda *_: [table])
+    dialog = LandmarkImportDialog(desk, [theirs], None, prompts, parent)
+    dialog.show()
+    qtbot.mouseClick(dialog.names.load, _CLICK)
+    assert dialog.names.codes == {"Apex": "CA", "Base": "CB", "Apex R": "CA_R", "Bregma": ""}
+    qtbot.mouseClick(dialog.take, _CLICK)
+    assert set(desk.session.landmarks(Side.LEFT).placed) == {"CA", "CB"}
+    assert LabNamesMemory(desk.directory).recall().translate("tip") == "OS"  # of another file, next time
+
+
+def test_a_table_that_is_none_is_named(desk, parent, qtbot, theirs, tmp_path) -> None:
+    table = tmp_path / "names.csv"
+    table.write_text("Apex,no feature\n")
+    prompts = SimpleNamespace(open_files=lambda *_: [table])
+    dialog = LandmarkImportDialog(desk, [theirs], None, prompts, parent)
+    dialog.show()
+    qtbot.mouseClick(dialog.names.load, _CLICK)
+    said = [notice.words for notice in dialog.findChildren(Notice)]
+    assert any(text.startswith(str(table)) for text in said), said
+    assert not dialog.take.isEnabled()

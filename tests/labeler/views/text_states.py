@@ -261,6 +261,8 @@ def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], Q
     file = next(out.glob("*_L.mrk.json"))
     bad = folder / f"{LONG_NAME}.mrk.json"
     bad.write_text("{")
+    theirs = folder / "theirs_L.csv"
+    theirs.write_text(f"name,x,y,z\nApex,1,2,3\n{LONG_NAME},4,5,6\n")
     off_bone = lambda points: np.zeros(len(points), dtype=bool)  # noqa: E731
     saving = SimpleNamespace(save_file=lambda *_: None)
 
@@ -274,6 +276,7 @@ def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], Q
         "export, files there": lambda: ExportDialog(desk, out, parent=window),
         "import landmarks": lambda: LandmarkImportDialog(desk, [file], parent=window),
         "import landmarks, off the bone": off,
+        "import landmarks, other names": lambda: LandmarkImportDialog(desk, [theirs], parent=window),
         "import landmarks, torn": lambda: LandmarkImportDialog(desk, [bad], parent=window),
         "open a stack": lambda: ImportDialog(desk, inspect_volume(_stack(folder)), parent=window),
         "recover": lambda: RecoverDialog(_recoveries(), window),
