@@ -17,8 +17,8 @@ _ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(_ROOT)]
 
 import numpy as np  # noqa: E402
-from PySide6.QtGui import QImage, QPainter  # noqa: E402
-from PySide6.QtWidgets import QApplication  # noqa: E402
+from qtpy.QtGui import QImage, QPainter  # noqa: E402
+from qtpy.QtWidgets import QApplication  # noqa: E402
 
 from gp_core import PROBE, Atlas, RigidTransform, Side, estimate_pose  # noqa: E402
 from gp_core.pose.expected_landmarks import expected_features  # noqa: E402

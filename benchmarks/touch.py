@@ -20,8 +20,8 @@ _ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(_ROOT)]
 
 import numpy as np  # noqa: E402
-from PySide6.QtTest import QTest  # noqa: E402
-from PySide6.QtWidgets import QApplication, QWidget  # noqa: E402
+from qtpy.QtTest import QTest  # noqa: E402
+from qtpy.QtWidgets import QApplication, QWidget  # noqa: E402
 
 from gp_core import PROBE, RigidTransform, Side  # noqa: E402
 from gp_core.landmarks.features import FEATURES  # noqa: E402

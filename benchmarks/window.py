@@ -21,8 +21,8 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT)]
 
 import numpy as np  # noqa: E402
-from PySide6.QtCore import QPoint, QPointF, Qt, QTimer  # noqa: E402
-from PySide6.QtTest import QTest  # noqa: E402
+from qtpy.QtCore import QPoint, QPointF, Qt, QTimer  # noqa: E402
+from qtpy.QtTest import QTest  # noqa: E402
 
 from gp_core.validation import FloatArray  # noqa: E402
 from gp_labeler.imaging.volume import Volume  # noqa: E402

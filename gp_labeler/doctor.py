@@ -19,6 +19,7 @@ from gp_core import __version__
 from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
 from gp_labeler.installation import INSTALL, check_display, explain_import
+from gp_labeler.qt_binding import BINDINGS, choose_binding
 from gp_labeler.system_libraries import advice, missing
 
 __all__ = ["Examination", "examine", "run_doctor"]
@@ -73,6 +74,7 @@ def examine() -> Examination:
     """Return what this machine has and lacks. What may end a process is tried in another."""
     found = Examination()
     _machine(found)
+    _binding(found)
     _packages(found)
     _libraries(found)
     if not found.wrong:  # a probe would only say it again
@@ -94,8 +96,19 @@ def _machine(found: Examination) -> None:
     )
 
 
+def _binding(found: Examination) -> None:
+    """Say which Qt binding the window would use."""
+    try:
+        package = BINDINGS[choose_binding()]
+        found.note("Machine", f"Qt binding {package} {metadata.version(package)}")
+    except GpError as error:
+        found.wrong.append(str(error))
+    except metadata.PackageNotFoundError:  # PySide6-Essentials brings PySide6; what is missing is told below
+        found.note("Machine", f"Qt binding {package}")
+
+
 def _packages(found: Examination) -> None:
-    """Hold what is installed against what the distribution asks for."""
+    """Compare what is installed with what the distribution asks for."""
     from packaging.requirements import Requirement
 
     for text in metadata.requires("gp-labeler") or []:
@@ -168,7 +181,7 @@ def _in_another_process(facts: str, found: Examination, what: str) -> dict[str, 
 
 def qt_facts() -> dict[str, Any]:
     """Return what Qt draws on and with, where the window would; asked in a process of its own."""
-    from PySide6.QtGui import QFontDatabase, QFontInfo, QGuiApplication
+    from qtpy.QtGui import QFontDatabase, QFontInfo, QGuiApplication
 
     from gp_labeler.views.application import make_application
     from gp_labeler.views.fonts import base_font

@@ -22,7 +22,7 @@ _HARMLESS = {"offscreen", "minimal"}
 _PROBE = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-from PySide6.QtGui import QGuiApplication
+from qtpy.QtGui import QGuiApplication
 app = QGuiApplication([])
 sys.exit(None if app.primaryScreen() else "there is no screen")
 """
@@ -31,6 +31,8 @@ _PROBE_SECONDS = 30.0
 
 def explain_import(error: ImportError) -> GpError:
     """Return what a failed import means for the person who started the program."""
+    if type(error).__name__ == "QtBindingsNotFoundError" and isinstance(error.__context__, ImportError):
+        return explain_import(error.__context__)  # qtpy hides why the binding could not be imported
     library = _LIBRARY.search(str(error))
     if library is not None:
         return _lacks_library(library[1])

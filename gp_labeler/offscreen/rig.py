@@ -12,8 +12,8 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PySide6.QtCore import QCoreApplication, QEvent
-from PySide6.QtTest import QTest
+from qtpy.QtCore import QCoreApplication, QEvent
+from qtpy.QtTest import QTest
 
 from gp_core.disk import protect
 from gp_core.errors import GpError

@@ -11,8 +11,8 @@ import traceback
 from pathlib import Path
 from types import TracebackType
 
-from PySide6.QtCore import QLocale, QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
-from PySide6.QtWidgets import QApplication
+from qtpy.QtCore import QLocale, QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
+from qtpy.QtWidgets import QApplication
 
 from gp_core.errors import GpError
 from gp_labeler.installation import check_display
@@ -29,6 +29,8 @@ from gp_labeler.workbench import Workbench
 __all__ = ["make_application", "make_window", "run_window"]
 
 _log = logging.getLogger(__name__)
+_applications: list[QApplication] = []
+"""Keeps the application alive: PyQt deletes one that nothing refers to."""
 
 
 def make_application() -> QApplication:
@@ -49,6 +51,7 @@ def make_application() -> QApplication:
     check_display()
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
     app = QApplication(["gp-labeler"])
+    _applications.append(app)
     use_plain_numbers()  # Qt has just taken the locale from the environment
     app.setApplicationName("gp-labeler")
     app.setApplicationDisplayName("gp-labeler")

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-from PySide6.QtCore import QObject, QSignalBlocker
-from PySide6.QtWidgets import QWidget
+from qtpy.QtCore import QObject, QSignalBlocker
+from qtpy.QtWidgets import QWidget
 
 from gp_core.errors import GpError
 from gp_core.landmarks.suggestion import Suggestion

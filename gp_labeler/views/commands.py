@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from PySide6.QtCore import QObject, Qt, Signal
-from PySide6.QtGui import QAction, QKeySequence
-from PySide6.QtWidgets import QMenu, QMenuBar, QWidget
+from qtpy.QtCore import QObject, Qt, Signal
+from qtpy.QtGui import QAction, QKeySequence
+from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
 from gp_labeler.actions import ACTIONS, MENUS, Action, Ui, run
 from gp_labeler.views.bind import follow

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from PySide6.QtCore import QObject, Qt, Signal
+from qtpy.QtCore import QObject, Qt, Signal
 
 __all__ = ["QtDispatcher"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from functools import cache, lru_cache
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRectF, QSize, Qt
-from PySide6.QtGui import (
+from qtpy.QtCore import QPointF, QRectF, QSize, Qt
+from qtpy.QtGui import (
     QColor,
     QFont,
     QFontMetricsF,
@@ -18,7 +18,7 @@ from PySide6.QtGui import (
     QPixmap,
     QPolygonF,
 )
-from PySide6.QtWidgets import QWidget
+from qtpy.QtWidgets import QWidget
 
 from gp_core.landmarks.features import CODES, Side
 from gp_core.validation import FloatArray

@@ -25,9 +25,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from PySide6.QtCore import QEvent, QObject, Qt
-from PySide6.QtGui import QFont, QFontDatabase, QFontInfo, QFontMetricsF
-from PySide6.QtWidgets import QApplication, QWidget
+from qtpy.QtCore import QEvent, QObject, Qt
+from qtpy.QtGui import QFont, QFontDatabase, QFontInfo, QFontMetricsF
+from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_labeler.scene.typeface import FAMILY, font_files
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 
-from PySide6.QtCore import Qt, Signal
-from PySide6.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
-from PySide6.QtWidgets import (
+from qtpy.QtCore import Qt, Signal
+from qtpy.QtGui import QCloseEvent, QKeyEvent, QResizeEvent
+from qtpy.QtWidgets import (
     QHBoxLayout,
     QProgressBar,
     QPushButton,

@@ -5,19 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QBuffer, QIODevice, QSize
-from PySide6.QtGui import QImage, QPainter, QPixmap
-from PySide6.QtWidgets import QApplication, QWidget
+from qtpy.QtCore import QBuffer, QIODevice, QSize
+from qtpy.QtGui import QImage, QPainter, QPixmap
+from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_core.disk import write_bytes
 from gp_core.errors import GpError
 from gp_labeler.scene.planes import Plane
+from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.slice_view import SliceView
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
 
-__all__ = ["PICTURES", "picture", "picture_bytes", "write_picture"]
+__all__ = ["PICTURES", "grab", "picture", "picture_bytes", "write_picture"]
 
 PICTURES = ("window", "views", "slices", "3d", *(plane.value for plane in Plane))
 
@@ -53,7 +54,7 @@ def _resized(window: QWidget, part: QWidget, size: tuple[int, int] | None) -> QI
     if size is not None:
         window.resize(before + QSize(*size) - part.size())
         QApplication.processEvents()
-    image = part.grab().toImage()
+    image = grab(part).toImage()
     image.setDevicePixelRatio(1.0)
     if size is not None:
         window.resize(before)
@@ -66,7 +67,7 @@ def _grabbed(view: QWidget, size: tuple[int, int] | None) -> QImage:
     if size is not None:
         ratio = view.devicePixelRatioF()
         view.resize(round(size[0] / ratio), round(size[1] / ratio))
-    image = view.grab().toImage()
+    image = grab(view).toImage()
     image.setDevicePixelRatio(1.0)  # pixels are pixels from here on
     view.resize(before)
     return image
@@ -92,6 +93,14 @@ def _slices(views: list[SliceView], size: tuple[int, int] | None) -> QImage:
         painter.drawImage(n * (each + _GAP), 0, _slice(view, (each, height)))
     painter.end()
     return whole
+
+
+def grab(part: QWidget) -> QPixmap:
+    """Return what a part of the window shows, its 3D views finely drawn."""
+    for view in [part, *part.findChildren(QWidget)]:
+        if isinstance(view, SceneView) and view.isVisible():
+            view.finish()
+    return part.grab()
 
 
 def picture_bytes(image: QImage | QPixmap, suffix: str = ".png") -> bytes:

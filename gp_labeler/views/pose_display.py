@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from PySide6.QtCore import QObject
+from qtpy.QtCore import QObject
 
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import DrawnTip, PoseScene

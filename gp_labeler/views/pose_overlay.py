@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QObject
-from PySide6.QtGui import QPainter
+from qtpy.QtCore import QObject
+from qtpy.QtGui import QPainter
 
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.pose_data import PoseScene

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from PySide6.QtGui import QPainter
+from qtpy.QtGui import QPainter
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.mean_cochlea import cochlea_tubes

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from PySide6.QtCore import Qt
-from PySide6.QtGui import QGuiApplication
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QGuiApplication
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side

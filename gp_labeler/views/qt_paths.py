@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QByteArray, QDataStream, QIODevice
-from PySide6.QtGui import QPainterPath
+from qtpy.QtCore import QByteArray, QDataStream, QIODevice
+from qtpy.QtGui import QPainterPath
 
 from gp_core.validation import FloatArray
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from PySide6.QtCore import QObject
+from qtpy.QtCore import QObject
 
 from gp_core.disk import write_text
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from PySide6.QtCore import QObject
-from PySide6.QtGui import QPainter
+from qtpy.QtCore import QObject
+from qtpy.QtGui import QPainter
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.colours import DARK

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from PySide6.QtCore import QBuffer, QIODevice, QMarginsF, QSizeF, QUrl
-from PySide6.QtGui import QImage, QPageLayout, QPageSize, QPdfWriter, QTextDocument
+from qtpy.QtCore import QBuffer, QIODevice, QMarginsF, QSizeF, QUrl
+from qtpy.QtGui import QImage, QPageLayout, QPageSize, QPdfWriter, QTextDocument
 
 from gp_core.disk import write_bytes, write_text
 from gp_core.errors import GpError

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from PySide6.QtCore import QRectF, Qt
-from PySide6.QtGui import QColor, QFontMetricsF, QPainter, QPen
-from PySide6.QtWidgets import QWidget
+from qtpy.QtCore import QRectF, Qt
+from qtpy.QtGui import QColor, QFontMetricsF, QPainter, QPen
+from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.planes import Plane, letter_of, position_text

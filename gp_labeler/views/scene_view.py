@@ -10,8 +10,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from PySide6.QtCore import QEvent, QPointF, QSize, Qt, QTimer, Signal
-from PySide6.QtGui import (
+from qtpy.QtCore import QEvent, QPointF, QSize, Qt, QTimer, Signal
+from qtpy.QtGui import (
     QEnterEvent,
     QImage,
     QKeyEvent,
@@ -20,7 +20,7 @@ from PySide6.QtGui import (
     QPaintEvent,
     QWheelEvent,
 )
-from PySide6.QtWidgets import QWidget
+from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.cut import CutPlane
@@ -289,7 +289,7 @@ class SceneView(QWidget):
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
         painter = QPainter(self)
         if not self._is_screen(painter):
-            self._finish()
+            self.finish()
         elif self._stale and not self._has_frame:
             self._draw_frame(quick=True)
         elif self._stale:
@@ -309,7 +309,10 @@ class SceneView(QWidget):
 
     def _is_screen(self, painter: QPainter) -> bool:
         """Whether a painter paints what is on the screen, and not a picture of it."""
-        store = self.window().backingStore()
+        backing_store = getattr(self.window(), "backingStore", None)
+        if backing_store is None:  # PyQt6 does not wrap it; who takes a picture there calls `finish` before
+            return True
+        store = backing_store()
         return store is not None and painter.paintEngine().paintDevice() is store.paintDevice()
 
     @property
@@ -321,7 +324,7 @@ class SceneView(QWidget):
         ratio = self.devicePixelRatioF()
         return QSize(round(self.width() * ratio), round(self.height() * ratio))
 
-    def _finish(self) -> None:
+    def finish(self) -> None:
         """Draw all that is still to be drawn, at once."""
         if self._stale or not self._finished:
             self._draw_frame(quick=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol
 
-from PySide6.QtGui import QPainter
+from qtpy.QtGui import QPainter
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.slice_view import SliceView as Shown

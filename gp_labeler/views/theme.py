@@ -11,8 +11,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from PySide6.QtGui import QColor, QPalette
-from PySide6.QtWidgets import QApplication, QWidget
+from qtpy.QtGui import QColor, QPalette
+from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_labeler.scene.colours import DARK as DARK_SCENE
 from gp_labeler.scene.colours import LIGHT as LIGHT_SCENE

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from PySide6.QtCore import QEvent, QSize, Qt
-from PySide6.QtGui import QAction, QResizeEvent
-from PySide6.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
+from qtpy.QtCore import QEvent, QSize, Qt
+from qtpy.QtGui import QAction, QResizeEvent
+from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.views.bind import follow, set_role, size_text, spacing_text
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QObject, QTimer
-from PySide6.QtWidgets import QApplication
+from qtpy.QtCore import QObject, QTimer
+from qtpy.QtWidgets import QApplication
 
 from gp_labeler.scene.pose_data import DrawnTip
 from gp_labeler.views.bind import follow

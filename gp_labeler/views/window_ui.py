@@ -21,7 +21,7 @@ from gp_labeler.views.panels.export_dialog import ExportDialog
 from gp_labeler.views.panels.import_dialog import ImportDialog
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.recover_dialog import RecoverDialog
-from gp_labeler.views.pictures import write_picture
+from gp_labeler.views.pictures import grab, write_picture
 from gp_labeler.views.pose_ui import PoseUi
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_about, export_asking, import_asking
@@ -183,7 +183,7 @@ class WindowUi(AtlasUi, PoseUi):
         )
         if path is None:
             return
-        write_picture(self._window.grab(), path)
+        write_picture(grab(self._window), path)
         self._desk.say(f"Wrote {path.name}")
         self._desk.pictured.emit(path)
 

@@ -39,7 +39,7 @@ def ball() -> Volume:
 @pytest.fixture
 def make_window(qtbot, tmp_path) -> Iterator[Callable[..., object]]:
     """Make windows on one state directory; whatever is left of them afterwards is a leak."""
-    from PySide6.QtWidgets import QApplication
+    from qtpy.QtWidgets import QApplication
 
     from gp_labeler.views.application import make_window as make
 

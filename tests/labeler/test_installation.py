@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gp_labeler.installation import explain_import
+from gp_labeler.qt_binding import choose_binding
 from gp_labeler.system_libraries import NEEDS, Need, advice, missing, packages_of
 
 pytestmark = pytest.mark.machine
@@ -68,6 +69,30 @@ def test_without_the_extra_it_says_how_to_install_it(command, tmp_path) -> None:
 def test_a_missing_system_library_is_named_with_what_brings_it(tmp_path) -> None:
     done = run(tmp_path, "--demo", blocked=("PySide6",), library=True, DISPLAY=":0")
     refused(done, "the system library libEGL.so.1 is missing")
+
+
+@pytest.mark.parametrize(
+    ("asked", "blocked", "words"),
+    [
+        ("pyqt5", (), ("QT_API=pyqt5: the window needs Qt 6", "pyside6 or pyqt6")),
+        ("nonesuch", (), ("QT_API=nonesuch",)),
+        ("PyQt6", ("PyQt6",), ("QT_API=pyqt6: the package PyQt6 is not installed", "unset QT_API")),
+    ],
+)
+def test_a_qt_binding_that_cannot_be_used_is_one_line(asked, blocked, words, tmp_path) -> None:
+    for command in (["--demo"], ["--offscreen", "demo", "--output", "out"]):
+        refused(run(tmp_path, *command, blocked=blocked, DISPLAY=":0", QT_API=asked), *words)
+
+
+@pytest.mark.parametrize(
+    ("installed", "chosen"), [(("PySide6", "PyQt6"), "pyside6"), (("PyQt6",), "pyqt6"), ((), "pyside6")]
+)
+def test_the_binding_is_pyside6_unless_only_another_is_installed(installed, chosen, monkeypatch) -> None:
+    monkeypatch.delenv("QT_API", raising=False)
+    for package in ("PySide6", "PyQt6"):
+        monkeypatch.delitem(sys.modules, package, raising=False)
+    monkeypatch.setattr("gp_labeler.qt_binding.find_spec", lambda name: name if name in installed else None)
+    assert choose_binding() == os.environ["QT_API"] == chosen
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="elsewhere there is always a display")

@@ -19,8 +19,8 @@ SPACING, ORIGIN = 0.50075, (1.25, -2.75, 3.5)
 IN_THE_WINDOW = """
 import ctypes, json, locale, multiprocessing, sys
 from concurrent.futures import ProcessPoolExecutor
-from PySide6.QtCore import QLocale
-from PySide6.QtTest import QTest
+from qtpy.QtCore import QLocale
+from qtpy.QtTest import QTest
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.views.application import make_application, make_window
 from gp_labeler.views.panels.number_field import NumberField

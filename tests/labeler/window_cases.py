@@ -76,9 +76,9 @@ class Answers:
 
 def drop_file(widget, path: Path, x: float = 9, y: float = 9, entered: Callable[[], object] = bool) -> None:
     """Drag a file onto a widget and let it go; `entered` is called while it hovers."""
-    from PySide6.QtCore import QMimeData, QPointF, Qt, QUrl
-    from PySide6.QtGui import QDragEnterEvent, QDropEvent
-    from PySide6.QtWidgets import QApplication
+    from qtpy.QtCore import QMimeData, QPointF, Qt, QUrl
+    from qtpy.QtGui import QDragEnterEvent, QDropEvent
+    from qtpy.QtWidgets import QApplication
 
     data = QMimeData()
     data.setUrls([QUrl.fromLocalFile(str(path))])
@@ -96,10 +96,10 @@ def drop_file(widget, path: Path, x: float = 9, y: float = 9, entered: Callable[
 
 def close(window) -> None:
     """Close a window and let Qt delete it."""
-    from PySide6.QtCore import QCoreApplication, QEvent
-    from shiboken6 import isValid
+    from qtpy.compat import isalive
+    from qtpy.QtCore import QCoreApplication, QEvent
 
-    if not isValid(window):
+    if not isalive(window):
         return
     window.ui.prompts.answers = ["Do not save"]
     window.close()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from PySide6.QtCore import Signal
-from PySide6.QtWidgets import (
+from qtpy.QtCore import Signal
+from qtpy.QtWidgets import (
     QComboBox,
     QGridLayout,
     QHBoxLayout,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QMenu, QWidget
+from qtpy.QtGui import QGuiApplication
+from qtpy.QtWidgets import QMenu, QWidget
 
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.session import labelling

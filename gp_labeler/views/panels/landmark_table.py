@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt
-from PySide6.QtGui import QColor, QKeyEvent, QPainter, QPen, QResizeEvent
-from PySide6.QtWidgets import (
+from qtpy.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QRectF, QSize, Qt
+from qtpy.QtGui import QColor, QKeyEvent, QPainter, QPen, QResizeEvent
+from qtpy.QtWidgets import (
     QAbstractItemView,
     QHeaderView,
     QStyle,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QEvent, QObject, QTimer
-from PySide6.QtWidgets import QPlainTextEdit, QWidget
+from qtpy.QtCore import QEvent, QObject, QTimer
+from qtpy.QtWidgets import QPlainTextEdit, QWidget
 
 from gp_labeler.session.specimen_edits import SetNotes
 from gp_labeler.views.bind import attempt, blocked, follow

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import QRegularExpression, QSize, Qt, Signal
-from PySide6.QtGui import QKeyEvent, QRegularExpressionValidator, QWheelEvent
-from PySide6.QtWidgets import QLineEdit, QWidget
+from qtpy.QtCore import QRegularExpression, QSize, Qt, Signal
+from qtpy.QtGui import QKeyEvent, QRegularExpressionValidator, QWheelEvent
+from qtpy.QtWidgets import QLineEdit, QWidget
 
 from gp_labeler.views.bind import value_text
 from gp_labeler.views.fonts import field_width, fit

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from PySide6.QtCore import QEvent, Qt, Signal
-from PySide6.QtWidgets import (
+from qtpy.QtCore import QEvent, Qt, Signal
+from qtpy.QtWidgets import (
     QButtonGroup,
     QHBoxLayout,
     QLabel,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from PySide6.QtCore import (
+from qtpy.QtCore import (
     QEvent,
     QModelIndex,
     QObject,
@@ -13,7 +13,7 @@ from PySide6.QtCore import (
     Qt,
     Signal,
 )
-from PySide6.QtGui import (
+from qtpy.QtGui import (
     QColor,
     QKeyEvent,
     QKeySequence,
@@ -22,7 +22,7 @@ from PySide6.QtGui import (
     QPen,
     QResizeEvent,
 )
-from PySide6.QtWidgets import (
+from qtpy.QtWidgets import (
     QAbstractItemView,
     QApplication,
     QHeaderView,

@@ -12,9 +12,9 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from PySide6.QtCore import QPoint, QPointF
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QWidget
+from qtpy.QtCore import QPoint, QPointF
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QWidget
 from window_cases import BALL_MM, MIDDLE, Answers, ball_volume, close
 
 from gp_core.landmarks.features import Side

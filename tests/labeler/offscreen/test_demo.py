@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from PySide6.QtGui import QImage
+from qtpy.QtGui import QImage
 from script_cases import content
 
 from gp_core.io import read_landmarks

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtWidgets import QApplication
+from qtpy.QtWidgets import QApplication
 from script_cases import place, run
 from vtkmodules.vtkCommonCore import vtkObjectBase
 from window_cases import MIDDLE

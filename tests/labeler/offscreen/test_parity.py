@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtTest import QTest
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtTest import QTest
 from script_cases import run, untimed
 from window_cases import settle
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QImage
+from qtpy.QtGui import QImage
 from window_cases import MIDDLE, VOXEL_MM, settle
 
 from gp_labeler.imaging.volume import Volume

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QImage
+from qtpy.QtGui import QImage
 from scipy.spatial.transform import Rotation
 from script_cases import content, run
 from window_cases import MIDDLE

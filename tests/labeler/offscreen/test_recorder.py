@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from animal_cases import drawn_animals, write_animals
-from PySide6.QtCore import QCoreApplication, QEvent, QPoint, Qt
-from PySide6.QtTest import QTest
+from qtpy.QtCore import QCoreApplication, QEvent, QPoint, Qt
+from qtpy.QtTest import QTest
 from script_cases import write_ball
 from window_cases import BALL_MM, MIDDLE, settle
 

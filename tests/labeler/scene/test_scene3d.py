@@ -472,7 +472,8 @@ def test_without_a_display_nothing_is_said_on_stderr() -> None:
         "scene = Scene3D(RenderTarget.offscreen(64, 48))\n"
         "print(scene.image().shape)\n"
         "scene.close()\n"
-        "import sys; print([m for m in sys.modules if m.startswith(('PySide6', 'pyvista'))])\n"
+        "foreign = ('PySide6', 'PyQt6', 'qtpy', 'pyvista')\n"
+        "import sys; print([m for m in sys.modules if m.startswith(foreign)])\n"
     )
     without = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY")}
     done = subprocess.run(

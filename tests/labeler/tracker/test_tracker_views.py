@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QWidget
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtWidgets import QWidget
 from tracker_cases import POINTS, TIP, SimulatorProcess
 
 from gp_core import PROBE, Atlas, Side

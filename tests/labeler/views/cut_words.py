@@ -12,9 +12,9 @@ from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from PySide6.QtCore import QPointF, QRect, QRectF, Qt
-from PySide6.QtGui import QFontMetricsF, QPainter
-from PySide6.QtWidgets import (
+from qtpy.QtCore import QPointF, QRect, QRectF, Qt
+from qtpy.QtGui import QFontMetricsF, QPainter
+from qtpy.QtWidgets import (
     QAbstractButton,
     QAbstractItemView,
     QAbstractScrollArea,

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from PySide6.QtGui import QFontMetrics
-from PySide6.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWidget
+from qtpy.QtGui import QFontMetrics
+from qtpy.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWidget
 
 from gp_core import Atlas
 from gp_core.landmarks.features import Side

@@ -9,8 +9,8 @@ import os
 
 import pytest
 from cut_words import cut_words
-from PySide6.QtGui import QFontDatabase
-from PySide6.QtWidgets import QApplication, QCheckBox, QDialog, QHBoxLayout, QLabel, QPushButton, QWidget
+from qtpy.QtGui import QFontDatabase
+from qtpy.QtWidgets import QApplication, QCheckBox, QDialog, QHBoxLayout, QLabel, QPushButton, QWidget
 from text_states import OWN, walk_states
 
 from gp_labeler.views import fonts

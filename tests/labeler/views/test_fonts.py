@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 from fontTools.ttLib import TTFont
-from PySide6.QtGui import QFontDatabase, QFontInfo
-from PySide6.QtWidgets import QApplication, QLabel
+from qtpy.QtGui import QFontDatabase, QFontInfo
+from qtpy.QtWidgets import QApplication, QLabel
 from window_cases import ball_volume, settle
 
 from gp_core.landmarks.features import Side

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from animal_cases import drawn_animals, write_animals, write_side
 from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent, QFontMetrics
-from PySide6.QtWidgets import QApplication, QPushButton
+from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from qtpy.QtGui import QDropEvent, QFontMetrics
+from qtpy.QtWidgets import QApplication, QPushButton
 from window_cases import close, settle
 
 from gp_core.atlas.atlas import Atlas

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 import tifffile
 from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import Qt
-from PySide6.QtWidgets import QApplication, QWidget
+from qtpy.QtCore import Qt
+from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.readers import inspect_volume

@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
-from PySide6.QtGui import QFontMetrics, QGuiApplication
-from PySide6.QtWidgets import QMenu
-from shiboken6 import isValid
+from qtpy.compat import isalive
+from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
+from qtpy.QtGui import QFontMetrics, QGuiApplication
+from qtpy.QtWidgets import QMenu
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
 from gp_labeler.session import labelling
@@ -339,7 +339,7 @@ def test_a_panel_that_is_gone_hears_nothing_more(desk, qtbot):
     panel.close()
     panel.deleteLater()
     QCoreApplication.sendPostedEvents(panel, QEvent.Type.DeferredDelete)
-    assert not isValid(panel)
+    assert not isalive(panel)
     place(desk, "CA")  # would raise in a slot of a deleted widget
 
 

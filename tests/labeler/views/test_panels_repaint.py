@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from panel_cases import ATLAS, PANEL_WIDTH, deliver, desk_with_scan, in_scan, place
-from PySide6.QtCore import QEvent, QModelIndex, QObject, QSize
-from PySide6.QtGui import QColor, QImage, QPixmap, QRegion
-from PySide6.QtWidgets import QApplication, QDialog, QWidget
+from qtpy.QtCore import QEvent, QModelIndex, QObject, QSize
+from qtpy.QtGui import QColor, QImage, QPixmap, QRegion
+from qtpy.QtWidgets import QApplication, QDialog, QWidget
 
 from gp_core import PROBE
 from gp_core.atlas.sampling import draw_animal

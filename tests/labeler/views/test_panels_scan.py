@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from panel_cases import cut_words, deliver, desk_with_scan, grey_volume, place
-from PySide6.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
-from PySide6.QtGui import QDropEvent
-from PySide6.QtWidgets import QApplication, QPushButton
+from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
+from qtpy.QtGui import QDropEvent
+from qtpy.QtWidgets import QApplication, QPushButton
 
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.volume import Volume

@@ -25,7 +25,7 @@ from pose_cases import (
     pose,
     without,
 )
-from PySide6.QtGui import QImage, QPainter
+from qtpy.QtGui import QImage, QPainter
 
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.mean_cochlea import duct_curve

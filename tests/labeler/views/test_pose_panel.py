@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan
-from PySide6.QtCore import QEvent, QPoint, QSize, Qt
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtWidgets import QApplication, QLabel, QLineEdit
+from qtpy.QtCore import QEvent, QPoint, QSize, Qt
+from qtpy.QtGui import QGuiApplication
+from qtpy.QtWidgets import QApplication, QLabel, QLineEdit
 from window_cases import drop_file
 
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches

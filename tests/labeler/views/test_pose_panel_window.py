@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtWidgets import QApplication
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtWidgets import QApplication
 from window_cases import BALL_MM, MIDDLE, ball_volume, close, drop_file, settle
 
 from gp_core import PROBE, Atlas, Side

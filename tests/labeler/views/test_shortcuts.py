@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from PySide6.QtGui import QGuiApplication
-from PySide6.QtTest import QTest
+from qtpy.QtGui import QGuiApplication
+from qtpy.QtTest import QTest
 from window_cases import MIDDLE, VOXEL_MM
 
 from gp_labeler.actions import ACTIONS

@@ -15,9 +15,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PySide6.QtCore import Qt, QTimer
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QMenu
+from qtpy.QtCore import Qt, QTimer
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QMenu
 from window_cases import MIDDLE, Answers, ball_volume, close, settle
 
 from gp_core.landmarks.features import Side
@@ -161,8 +161,8 @@ def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_p
 _KILLED = """
 import sys, time
 from pathlib import Path
-from PySide6.QtCore import QPoint, Qt, QTimer
-from PySide6.QtTest import QTest
+from qtpy.QtCore import QPoint, Qt, QTimer
+from qtpy.QtTest import QTest
 from gp_labeler.views.application import make_application, make_window
 from window_cases import MIDDLE, ball_volume
 app = make_application()
@@ -265,7 +265,7 @@ def test_damaged_memory_does_no_harm(make_window, tmp_path) -> None:
 
 
 def test_the_sheet_lists_every_key(window) -> None:
-    from PySide6.QtWidgets import QLabel
+    from qtpy.QtWidgets import QLabel
 
     QTest.keyClick(window.grid.scene_view, "?")
     sheet = next(child for child in window.findChildren(ShortcutsSheet))
@@ -332,7 +332,7 @@ def test_work_can_be_stopped(qtbot, window) -> None:
 
 @pytest.mark.slow
 def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
-    from PySide6.QtWidgets import QApplication
+    from qtpy.QtWidgets import QApplication
 
     remains = []
     for _ in range(20):

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, QPointF, Qt
-from PySide6.QtGui import QWheelEvent
-from PySide6.QtTest import QTest
-from PySide6.QtWidgets import QApplication
+from qtpy.QtCore import QPoint, QPointF, Qt
+from qtpy.QtGui import QWheelEvent
+from qtpy.QtTest import QTest
+from qtpy.QtWidgets import QApplication
 from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
@@ -50,8 +50,8 @@ def drag(view, start: QPoint, end: QPoint, modifiers=NO_KEYS) -> None:
 
 
 def _moved(view, at: QPointF, modifiers):
-    from PySide6.QtCore import QEvent
-    from PySide6.QtGui import QMouseEvent
+    from qtpy.QtCore import QEvent
+    from qtpy.QtGui import QMouseEvent
 
     return QMouseEvent(
         QEvent.Type.MouseMove, at, view.mapToGlobal(at), Qt.MouseButton.NoButton, LEFT_BUTTON, modifiers

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from PySide6.QtCore import QPoint, Qt
-from PySide6.QtTest import QTest
+from qtpy.QtCore import QPoint, Qt
+from qtpy.QtTest import QTest
 from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
@@ -270,9 +270,9 @@ def test_enter_suggests_the_ghost(qtbot, window) -> None:
 
 
 def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
-    from PySide6.QtCore import QPointF
-    from PySide6.QtGui import QWheelEvent
-    from PySide6.QtWidgets import QApplication
+    from qtpy.QtCore import QPointF
+    from qtpy.QtGui import QWheelEvent
+    from qtpy.QtWidgets import QApplication
 
     view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
     session.set_crosshair(MIDDLE)
@@ -374,7 +374,7 @@ def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
 
 
 def test_a_right_click_on_a_point_offers_its_menu(window, scene) -> None:
-    from PySide6.QtWidgets import QApplication, QMenu
+    from qtpy.QtWidgets import QApplication, QMenu
 
     where = on_ball(0, -1, 0)
     labelling.place(window.workbench.session, where, side=Side.LEFT, code="CA")

@@ -11,8 +11,8 @@ import numpy as np
 import tifffile
 from animal_cases import drawn_animals, write_animals
 from panel_cases import ATLAS, grey_volume, in_scan, place
-from PySide6.QtCore import QTimer
-from PySide6.QtWidgets import QApplication, QWidget
+from qtpy.QtCore import QTimer
+from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_core import PROBE, Side
 from gp_core.atlas.sampling import draw_animal
