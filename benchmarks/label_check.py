@@ -38,7 +38,7 @@ def new_check(atlas: Atlas) -> Check:
 
     def check(landmarks: LandmarkSet) -> tuple[bool, set[frozenset[str]], set[str]]:
         found = check_side(landmarks, atlas)
-        pairs = {frozenset(f.landmarks) for f in found.findings if f.kind == "swapped"}
+        pairs = {frozenset(f.landmarks) for f in found.findings if f.kind == "exchanged"}
         doubted = {
             code for f in found.findings if f.is_doubt and f.kind != "other side" for code in f.landmarks
         }

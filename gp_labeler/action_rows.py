@@ -256,9 +256,10 @@ def edit_rows() -> Iterator[Action]:
               lambda d: d.session.undo_text is not None, "undo")
     yield row("redo", "Redo", ("Ctrl+Y", "Ctrl+Shift+Z"), lambda d, ui: d.session.redo(),
               lambda d: d.session.redo_text is not None, "redo")
-    yield row("swap", "Swap with…", (), lambda d, ui: ui.ask_swap(), _is_free, "swap",
+    yield row("swap", "Exchange with…", (), lambda d, ui: ui.ask_swap(), _is_free, "swap",
               "Exchange two points placed under each other's names")
-    yield row("swap_sides", "Swap left and right", (), lambda d, ui: d.session.do(SwapSides()), _has_labels)
+    yield row("swap_sides", "Exchange left and right", (), lambda d, ui: d.session.do(SwapSides()),
+              _has_labels)
 
 
 def view_rows() -> Iterator[Action]:

@@ -26,6 +26,7 @@ from gp_core.validation import FloatArray
 
 __all__ = [
     "DOUBTFUL_SD",
+    "SHARED_WRONG_MM",
     "Departure",
     "Finding",
     "SideCheck",
@@ -50,6 +51,9 @@ SAME_PLACE_MM = 0.05
 
 SHARED_MM = 0.5
 """Up to here two labels of one point differ as labels do."""
+
+SHARED_WRONG_MM = 1.0
+"""From here on one of two labels of one point is wrong: 7 SD of the difference of two labels."""
 
 HEAD_MM = 40.0
 """No two features of a head are farther apart."""
@@ -121,8 +125,9 @@ class Finding:
     specimen : str
     side : Side
     kind : str
-        ``other side``, ``swapped``, ``duplicate``, ``outside``, ``off bone``, ``far``,
-        ``shared point differs``, ``missing``, ``suggested``, ``unseen`` or ``unchecked``.
+        ``other side``, ``exchanged``, ``duplicate``, ``outside``, ``off bone``, ``far``,
+        ``shared point differs``, ``shared point wrong``, ``missing``, ``suggested``, ``unseen`` or
+        ``unchecked``.
     landmarks : tuple of str
         Features concerned.
     text : str
@@ -130,9 +135,9 @@ class Finding:
     remedy : str
         What to do about it, one sentence.
     certainty : float or None
-        For ``other side`` and ``swapped``, its probability among the explanations that were considered.
+        For ``other side`` and ``exchanged``, its probability among the explanations that were considered.
     departures : tuple of Departure
-        How far each of the landmarks is from where the others put it, for ``far`` and ``swapped``.
+        How far each of the landmarks is from where the others put it, for ``far`` and ``exchanged``.
     """
 
     specimen: str
@@ -159,7 +164,7 @@ class Finding:
 
     @property
     def word(self) -> str:
-        """For a cell of a table, such as ``2.6 mm`` or ``swapped``."""
+        """For a cell of a table, such as ``2.6 mm`` or ``exchanged``."""
         return self.departures[0].word if self.kind == "far" else self.kind
 
     def departure_of(self, code: str) -> Departure | None:
@@ -180,7 +185,7 @@ class Finding:
         }
 
 
-_RANKS = {"other side": 5, "swapped": 4, "duplicate": 3, "outside": 2, "off bone": 1}
+_RANKS = {"other side": 5, "exchanged": 4, "duplicate": 3, "outside": 2, "off bone": 1}
 
 
 def _nothing() -> Mapping[str, Departure]:
@@ -366,7 +371,7 @@ def _explain(
     departures = _departures(model, codes, labels, reading, side)
     for (i, j), certainty in zip(reading.exchanged, reading.certainties, strict=True):
         found.append(_exchanged(landmarks, departures, (codes[i], codes[j]), certainty))
-    explained = {code for finding in found if finding.kind == "swapped" for code in finding.landmarks}
+    explained = {code for finding in found if finding.kind == "exchanged" for code in finding.landmarks}
     found += [
         far(landmarks.side, away)
         for away in departures.values()
@@ -377,7 +382,7 @@ def _explain(
 
 def _other_side(landmarks: LandmarkSet, codes: tuple[str, ...], certainty: float) -> Finding:
     text = f"these labels fit the {landmarks.side.other.word} side: left and right are exchanged"
-    remedy = "Swap left and right."
+    remedy = "Exchange left and right."
     return _finding(landmarks, "other side", codes, text, remedy, certainty=certainty)
 
 
@@ -387,7 +392,7 @@ def _exchanged(
     names = " and ".join(pair)
     away = tuple(departures[code] for code in pair)
     text, remedy = f"{names} look exchanged", f"Exchange the names of {names}."
-    return _finding(landmarks, "swapped", pair, text, remedy, certainty=certainty, departures=away)
+    return _finding(landmarks, "exchanged", pair, text, remedy, certainty=certainty, departures=away)
 
 
 def _departures(
@@ -413,5 +418,9 @@ def _shared_points(specimen: Specimen) -> Iterator[Finding]:
             apart = float(np.linalg.norm(left[row.code] - right[row.code]))
             if apart > SHARED_MM:
                 text = f"{row.code} is one point of both sides, but its labels are {apart:.2f} mm apart"
-                remedy = f"Place {row.code} once more; a fit takes the mean."
-                yield Finding(specimen.name, Side.LEFT, "shared point differs", (row.code,), text, remedy)
+                kind, what = "shared point differs", "takes the mean"
+                if apart > SHARED_WRONG_MM:
+                    text += ": one of them is wrong"
+                    kind, what = "shared point wrong", "leaves it out"
+                remedy = f"Place {row.code} once more; a fit {what}."
+                yield Finding(specimen.name, Side.LEFT, kind, (row.code,), text, remedy)

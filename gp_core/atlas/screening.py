@@ -8,13 +8,13 @@ agree on.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.label_check import FEWEST, Finding, check_specimen
+from gp_core.atlas.label_check import FEWEST, SHARED_WRONG_MM, Finding, check_specimen
 from gp_core.atlas.plain_fit import fit_consensus
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, Side
@@ -26,15 +26,12 @@ __all__ = ["Screened", "mean_shared_points", "screen_labels"]
 DOUBTFUL_WEIGHT = 0.02
 """How much an animal counts in which labels are left out: where one is wrong, others may be."""
 
-_LEAVES_OUT = ("other side", "swapped", "duplicate", "far")
+_LEAVES_OUT = ("other side", "exchanged", "duplicate", "far", "shared point wrong")
 _FOREIGN = 0.25
 """Where more of the labels of most sides are far from where an atlas has them, it is of other animals."""
 
 _FEWEST_SIDES = 3
 """That must have a feature elsewhere before that counts as their way to label it."""
-
-_SHARED_AT_MOST_MM = 5.0
-"""Farther apart, two labels of one point are not two tries at it."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +110,7 @@ def screen_labels(
 
 
 def mean_shared_points(specimen: Specimen) -> Specimen:
-    """Return an animal with the same IN on both sides: the mean of the two labels."""
+    """Return an animal with the same IN on both sides: the mean of two labels that differ as labels do."""
     sides = dict(specimen.sides)
     frames = {side.frame for side in sides.values()}
     if len(sides) < 2 or len(frames) > 1 or "cochlea" in frames:  # which is another for each side
@@ -121,7 +118,7 @@ def mean_shared_points(specimen: Specimen) -> Specimen:
     for code in (row.code for row in FEATURES if row.shared):
         if all(code in side for side in sides.values()):
             one, other = (side[code] for side in sides.values())
-            if 0 < np.linalg.norm(one - other) <= _SHARED_AT_MOST_MM:
+            if 0 < np.linalg.norm(one - other) <= SHARED_WRONG_MM:
                 sides = {key: side.with_point(code, (one + other) / 2) for key, side in sides.items()}
     return Specimen(specimen.name, sides)
 
@@ -175,17 +172,27 @@ def _without(specimen: Specimen, findings: Sequence[Finding]) -> Specimen:
         left = _side_without(landmarks, [finding for finding in findings if finding.side is side])
         if sum(code != "CO" for code in left.placed) >= FEWEST:
             sides[side] = left
-    return Specimen(specimen.name, sides)
+    return Specimen(specimen.name, _without_shared(sides, findings))
+
+
+def _without_shared(
+    sides: Mapping[Side, LandmarkSet], findings: Sequence[Finding]
+) -> Mapping[Side, LandmarkSet]:
+    """Leave out a point of both sides whose two labels cannot both be right, unless one has gone already."""
+    for finding in findings:
+        if finding.kind == "shared point wrong" and all(finding.landmarks[0] in s for s in sides.values()):
+            sides = {key: side.with_point(finding.landmarks[0], None) for key, side in sides.items()}
+    return sides
 
 
 def _side_without(landmarks: LandmarkSet, findings: Sequence[Finding]) -> LandmarkSet:
-    far = {code for finding in findings if finding.kind in ("far", "swapped") for code in finding.landmarks}
+    far = {code for finding in findings if finding.kind in ("far", "exchanged") for code in finding.landmarks}
     for finding in findings:
         if finding.kind == "other side":
             return LandmarkSet.empty(landmarks.side, frame=landmarks.frame)
         if finding.kind == "duplicate" and far.intersection(finding.landmarks):
             continue  # it is known which of the two it is
-        if finding.kind in _LEAVES_OUT:
+        if finding.kind in _LEAVES_OUT and finding.kind != "shared point wrong":
             for code in finding.landmarks:
                 landmarks = landmarks.with_point(code, None)
     return landmarks

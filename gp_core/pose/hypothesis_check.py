@@ -73,7 +73,7 @@ def reading_warnings(pose: CochleaPose) -> Iterator[str]:
     if pose.names_state == "undecided":
         yield f"{names} may be exchanged: touch both again"
     elif pose.swapped is not None:
-        yield f"{names} look swapped"
+        yield f"{names} look exchanged"
     if pose.side_state == "wrong":
         yield f"the {other} side fits these points better than the {this}: check the side"
     elif pose.side_state == "undecided":

@@ -294,8 +294,8 @@ class SwapPoints:
 
     @property
     def text(self) -> str:
-        """Such as ``swap RWA and RWP left``."""
-        return f"swap {self.code} and {self.other} {Side.parse(self.side).word}"
+        """Such as ``exchange RWA and RWP left``."""
+        return f"exchange {self.code} and {self.other} {Side.parse(self.side).word}"
 
     def dropped_text(self, state: SpecimenState) -> str:
         """Say which suggestions it drops; empty where it drops none."""
@@ -320,8 +320,8 @@ class SwapSides:
 
     @property
     def text(self) -> str:
-        """``swap left and right``."""
-        return "swap left and right"
+        """``exchange left and right``."""
+        return "exchange left and right"
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the sides exchanged; raises `GpError` where a point is locked."""

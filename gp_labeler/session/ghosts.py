@@ -5,11 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
 
+from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
 from gp_core.landmarks.sets import LandmarkSet, Status
@@ -28,11 +31,13 @@ CHI2_95 = 7.815
 
 N_REMEMBERED = 24
 
-MIRROR_SD_MM = 0.2
-MIRROR_SD_PER_MM = 0.07
-"""Of a coordinate, and more for each mm from the nearest point that is placed on both sides: the ears of an
-animal differ, and the plane between them is known to some 4 degrees. Chosen on drawn animals, so that regions
-are no wider than they must be; measured on others (benchmarks/suggestions.py)."""
+MIRROR_ASYMMETRY = 0.9
+"""2 (1 - r), where r is how alike the two ears of an animal are in what sets them apart from the mean: 0.5 on
+average over the features of the authors' eleven animals, 0.6 on drawn ones."""
+
+MIRROR_TILT = 0.04
+"""Of the plane between the ears, known from one pair of labels, rad (2.5 degrees). Chosen on drawn animals,
+measured on others (benchmarks/suggestions.py)."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +137,9 @@ class Expectations:
 def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost]:
     """Expect the points of the other side, mirrored in the plane between the features placed on both.
 
+    Each is known as well as two labels are, as the feature is alike on both sides of an animal, and as the
+    plane is known so far from the nearest feature that is placed on both.
+
     Returns
     -------
     dict of str to Ghost
@@ -148,13 +156,23 @@ def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost
         return {}
     normal = across / np.linalg.norm(across)
     middle = (here + there).mean(axis=0) / 2
+    of_pairs = float(np.mean([_side_variance(code) for code in paired])) / len(paired)
     found = {}
     for code, point in other.as_mapping().items():
         position = point - 2 * np.dot(point - middle, normal) * normal
         reach = float(np.linalg.norm(position - here, axis=1).min())
-        variance = MIRROR_SD_MM**2 + (MIRROR_SD_PER_MM * reach) ** 2
+        tilt = MIRROR_TILT**2 * reach**2 / len(paired)
+        variance = 2 * LABELLING_NOISE_MM**2 + _side_variance(code) + of_pairs + tilt
         found[code] = Ghost(code, position, variance * np.eye(3), "mirror")
     return found
+
+
+@cache
+def _side_variance(code: str) -> float:
+    """Return how much a feature differs between the two ears of an animal, mm^2 a coordinate."""
+    published = Atlas.published()
+    codes = (code,) if code in published.codes else DEFINING  # CO is computed from these
+    return MIRROR_ASYMMETRY * float(published.variances(codes).mean())
 
 
 def _without(landmarks: LandmarkSet, code: str) -> LandmarkSet:

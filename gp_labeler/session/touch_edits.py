@@ -130,8 +130,8 @@ class SwapTouches:
 
     @property
     def text(self) -> str:
-        """Such as ``swap MN and OS left``."""
-        return f"swap {self.name} and {self.other} {self.side.word}"
+        """Such as ``exchange MN and OS left``."""
+        return f"exchange {self.name} and {self.other} {self.side.word}"
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the names exchanged; raises `GpError` where one of them is not touched."""

@@ -233,9 +233,9 @@ class WindowUi(AtlasUi, PoseUi):
             return
         others = [f for f in FEATURES if not (f.computed or f.shared or f.code == active.code)]
         if feature(active.code).shared:
-            raise GpError(f"{active.code} is shared by both sides and cannot be swapped")
+            raise GpError(f"{active.code} is shared by both sides and cannot be exchanged")
         text = f"Exchange {active.code} {active.side.word} with"
-        chosen = self.prompts.item("Swap", text, [f"{f.code}  {f.name}" for f in others])
+        chosen = self.prompts.item("Exchange", text, [f"{f.code}  {f.name}" for f in others])
         if chosen:
             self._desk.swap(active.side, active.code, chosen.split()[0])
 

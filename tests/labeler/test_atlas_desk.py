@@ -296,7 +296,7 @@ def test_views_are_told_of_a_judgement_that_changes_what_they_show(desk) -> None
     told = []
     desk.doubts_changed.connect(lambda: told.append(1))
     fine = SideCheck((Finding("", L, "missing", ("CB",), "not placed"),))
-    doubtful = SideCheck((Finding("", L, "swapped", ("CA", "CB"), "CA and CB look exchanged"),))
+    doubtful = SideCheck((Finding("", L, "exchanged", ("CA", "CB"), "CA and CB look exchanged"),))
     desk._take_judged(False, fine)
     assert told == [], "no point looks otherwise than before"
     desk._take_judged(True, fine)

@@ -211,7 +211,7 @@ def test_two_touches_exchange_their_names_in_one_step(desk, animal):
     touching.swap_touches(desk.session, "L", "mn", "OS")
     after, (mn, os) = desk.session.state.touches, ((Side.LEFT, "MN"), (Side.LEFT, "OS"))
     assert (after[mn], after[os]) == (before[os], before[mn])
-    assert desk.session.undo_text == "swap MN and OS left"
+    assert desk.session.undo_text == "exchange MN and OS left"
     desk.session.undo()
     assert desk.session.state.touches == before
     with pytest.raises(GpError, match="RWA left is not touched yet"):

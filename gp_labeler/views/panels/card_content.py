@@ -130,8 +130,8 @@ def _next_action(session: Session, side: Side, code: str, state: PointState) -> 
     """Return id and words of the one next action: for a doubt that has a remedy, that remedy."""
     doubt = session.near_doubts(side).get(code) if state is PointState.DOUBTFUL else None
     if doubt is not None and doubt.kind == "other side":
-        return "swap_sides", "Swap left and right"
-    if doubt is not None and doubt.kind == "swapped":
+        return "swap_sides", "Exchange left and right"
+    if doubt is not None and doubt.kind == "exchanged":
         return "swap_names", "Exchange " + " and ".join(doubt.landmarks)
     return _ACTIONS[state]
 

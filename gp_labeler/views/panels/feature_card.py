@@ -249,7 +249,7 @@ def _swap_names(workbench: Workbench) -> None:
     session = workbench.session
     side, code = session.active.side, session.active.code
     doubt = session.near_doubts(side).get(code or "")
-    if doubt is not None and doubt.kind == "swapped":
+    if doubt is not None and doubt.kind == "exchanged":
         workbench.swap(side, *doubt.landmarks)
 
 

@@ -75,9 +75,9 @@ def _arm_replacing(workbench: Workbench, side: Side, code: str) -> None:
 
 
 def _add_swaps(add: Callable[..., None], menu: QMenu, workbench: Workbench, side: Side, code: str) -> None:
-    """Offer to swap with each settled feature of the same side that is not locked."""
+    """Offer to exchange with each settled feature of the same side that is not locked."""
     session = workbench.session
-    others = menu.addMenu("Swap with")
+    others = menu.addMenu("Exchange with")
     for row in FEATURES:
         if row.computed or row.shared != feature(code).shared or row.code == code:
             continue

@@ -103,7 +103,7 @@ class ResultCard(Card):
         likely = _likely(pose, desk.swapped)
         self.other_side.setText(f"They are of {side}" if wrong else f"Take as {side}  ({likely[0]})")
         self.swap.setVisible(desk.swapped is not None)
-        names = f"Swap {' and '.join(desk.swapped or ())}"
+        names = f"Exchange {' and '.join(desk.swapped or ())}"
         sure = pose is None or pose.names_state != "undecided"
         self.swap.setText(names if sure else f"{names}  ({likely[1]})")
 

@@ -54,7 +54,7 @@ def test_mistakes_are_found_at_least_as_often_as_by_the_two_checkers_before(publ
     for ear in _ears(published, n, N_EARS, seed=1):
         a, b = ear.placed[0], ear.placed[-1]
         exchanged = check_side(_swapped(ear, a, b), published)
-        named = [set(f.landmarks) for f in exchanged.findings if f.kind == "swapped"] == [{a, b}]
+        named = [set(f.landmarks) for f in exchanged.findings if f.kind == "exchanged"] == [{a, b}]
         both = {a, b} <= set(exchanged.doubts)
         found += (check_side(_renamed(ear), published).is_other_side, named or both, named)
     assert (found >= np.array(LEAST[n]) - CHANCE).all(), found
@@ -77,7 +77,7 @@ def test_the_real_labels_are_left_alone_and_their_mistakes_found(
             assert check_side(some, published).doubts == {}
             assert check_side(_renamed(some), published).is_other_side
             doubt = check_side(_swapped(some, *codes[:2]), published).doubts[codes[0]]
-            assert (doubt.kind, set(doubt.landmarks)) == ("swapped", set(codes[:2]))
+            assert (doubt.kind, set(doubt.landmarks)) == ("exchanged", set(codes[:2]))
 
 
 def test_a_finding_says_what_how_sure_and_what_to_do(published: Atlas) -> None:
@@ -85,10 +85,10 @@ def test_a_finding_says_what_how_sure_and_what_to_do(published: Atlas) -> None:
     (finding,) = (f for f in check_side(_renamed(ear), published).findings if f.is_doubt)
     assert (finding.kind, finding.landmarks, finding.side) == ("other side", ear.placed, ear.side.other)
     assert finding.certainty == pytest.approx(1, abs=1e-3)
-    assert finding.remedy == "Swap left and right."
+    assert finding.remedy == "Exchange left and right."
     a, b = ear.placed[2:4]
     (finding,) = (f for f in check_side(_swapped(ear, a, b), published).findings if f.is_doubt)
-    assert (finding.kind, finding.landmarks) == ("swapped", (a, b))
+    assert (finding.kind, finding.landmarks) == ("exchanged", (a, b))
     assert finding.certainty > 0.95
     assert finding.remedy == f"Exchange the names of {a} and {b}."
     np.testing.assert_allclose(finding.departure_of(a).expected, ear[a], atol=1.0)
@@ -100,8 +100,8 @@ def test_several_mistakes_are_told_apart(published: Atlas) -> None:
     found = {(f.kind, f.landmarks) for f in check_side(_renamed(wrong), published).findings if f.is_doubt}
     assert found == {
         ("other side", tuple(wrong.placed)),
-        ("swapped", ("CA", "CB")),
-        ("swapped", ("RWA", "RWP")),
+        ("exchanged", ("CA", "CB")),
+        ("exchanged", ("RWA", "RWP")),
         ("far", ("OS",)),
     }
 

@@ -90,7 +90,7 @@ def test_a_label_in_the_wrong_place_is_found(published: Atlas, side: LandmarkSet
 
 def test_exchanged_names_and_sides_are_found(published: Atlas, side: LandmarkSet) -> None:
     swapped = side.with_point("FPA", side["LLI"]).with_point("LLI", side["FPA"])
-    assert set(_kinds(swapped, published)["swapped"]) == {"FPA", "LLI"}
+    assert set(_kinds(swapped, published)["exchanged"]) == {"FPA", "LLI"}
     other = LandmarkSet(side.points, Side.RIGHT, side.frame)
     assert "other side" in _kinds(other, published)
 

@@ -139,7 +139,7 @@ def test_fit_leaves_out_what_check_doubts(tmp_path: Path, capsys: pytest.Capture
     assert "! left  CA CB    CA and CB look exchanged. Exchange the names of CA and CB." in told
     assert "--keep-doubtful" in told
     (left_out,) = json.loads((tmp_path / "fit.json").read_text())["left_out"]
-    assert (left_out["kind"], left_out["landmarks"], left_out["side"]) == ("swapped", ["CA", "CB"], "L")
+    assert (left_out["kind"], left_out["landmarks"], left_out["side"]) == ("exchanged", ["CA", "CB"], "L")
     (tmp_path / "fit.json").unlink()
     assert main(["fit", str(tmp_path), "-o", str(atlases[1]), "--keep-doubtful"]) == 0
     without, kept = (gp_core.Atlas.load(path) for path in atlases)

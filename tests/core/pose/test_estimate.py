@@ -195,7 +195,7 @@ def test_exchanged_names_are_called_out(published: Atlas) -> None:
         pose = estimate_pose(swapped, "L", published)
         assert pose.swapped is not None
         assert set(pose.swapped) == {a, b}
-        assert f"{' and '.join(pose.swapped)} look swapped" in pose.warnings
+        assert f"{' and '.join(pose.swapped)} look exchanged" in pose.warnings
     assert estimate_pose(touches, "L", published).swapped is None
 
 
@@ -203,10 +203,10 @@ def test_names_exchanged_in_real_touches_are_called_out(published: Atlas, shared
     named = []
     for file, side in (("SkullE_Right.dat", "R"), ("SkullD_Right.dat", "R"), ("SkullA_Left_new.dat", "L")):
         touches = read_touches(shared_data / "probe" / file, side).as_mapping()
-        assert not any("swapped" in w for w in estimate_pose(touches, side, published).warnings)
+        assert not any("exchanged" in w for w in estimate_pose(touches, side, published).warnings)
         for a, b in combinations(PROBE, 2):
             swapped = {**touches, a: touches[b], b: touches[a]}
-            named.append(f"{a} and {b} look swapped" in estimate_pose(swapped, side, published).warnings)
+            named.append(f"{a} and {b} look exchanged" in estimate_pose(swapped, side, published).warnings)
     assert sum(named) >= 43  # of 45
 
 

@@ -146,7 +146,7 @@ def test_what_must_be_known_of_an_estimate_is_told_with_its_step(tmp_path) -> No
     )
     assert report.ok, report.error
     first, right, other = (record.warnings for record in report.steps if record.title.startswith("estimate"))
-    assert first == ("robust: CL and MN look swapped",)
+    assert first == ("robust: CL and MN look exchanged",)
     assert right == ()
     assert other == ("robust: the left side fits these points better than the right: check the side",)
 

@@ -312,7 +312,7 @@ def test_labels_under_the_name_of_the_other_side_are_called_so():
     session.set_active(Active(L, "CB"))
     card = content_of(session, has_scan=True)
     assert "fit the right side" in card.status
-    assert (card.action, card.action_text) == ("swap_sides", "Swap left and right")
+    assert (card.action, card.action_text) == ("swap_sides", "Exchange left and right")
     session.do(SwapSides())
     assert not judged(R)
     assert not judged(L)

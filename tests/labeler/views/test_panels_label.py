@@ -157,7 +157,7 @@ def test_the_menu_locks_swaps_checks_and_clears(desk, panel):
     place(desk, "RWA", "RWP", "CA")
     before = {code: desk.session.landmarks(LEFT)[code].copy() for code in ("RWA", "RWP")}
     menu = landmark_menu(desk, LEFT, "RWA", panel)
-    swaps = next(m for m in menu.findChildren(QMenu) if m.title() == "Swap with")
+    swaps = next(m for m in menu.findChildren(QMenu) if m.title() == "Exchange with")
     next(a for a in swaps.actions() if a.text().startswith("RWP")).trigger()
     np.testing.assert_allclose(desk.session.landmarks(LEFT)["RWP"], before["RWA"])
     desk.session.undo()
@@ -222,7 +222,7 @@ def test_labels_of_the_other_side_are_swapped_by_the_primary_button(desk, panel,
     deliver(desk)
     desk.go_to(LEFT, "CL")
     assert "fit the right side" in panel.card.content.status
-    assert panel.card.primary.text().startswith("Swap left and right")
+    assert panel.card.primary.text().startswith("Exchange left and right")
     assert list(cut_words(panel)) == []
     qtbot.mouseClick(panel.card.primary, CLICK)
     assert set(desk.session.landmarks(RIGHT).placed) >= set(codes)

@@ -374,9 +374,9 @@ def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbo
     at = touches(desk)
     desk.pose.record(at["MN"], TouchHow.TYPED, name="OS")
     desk.pose.record(at["OS"], TouchHow.TYPED, name="MN")
-    assert "look swapped" in notices(panel)
+    assert "look exchanged" in notices(panel)
     assert panel.result.verdict.label.text() == "Check the names"
-    assert panel.result.swap.text() in ("Swap MN and OS", "Swap OS and MN")
+    assert panel.result.swap.text() in ("Exchange MN and OS", "Exchange OS and MN")
     assert not panel.result.next.isVisible()
     wrong = touches(desk)
     qtbot.mouseClick(panel.result.swap, CLICK)
