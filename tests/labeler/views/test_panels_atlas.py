@@ -95,6 +95,18 @@ def test_labels_are_held_against_it_and_doubts_flagged(desk, panel, qtbot) -> No
     assert (desk.session.active.side, desk.session.active.code) == (L, "OI")
 
 
+def test_points_that_are_doubted_for_another_reason_are_named_beside_the_table(desk, panel) -> None:
+    place(desk, "CA", "CB", "RWP", "OS", "LLI")
+    labelling.place(desk.session, in_scan("LLI"), side=L, code="RWA")  # half a millimetre off, and on LLI
+    deliver(desk)
+    assert panel.labels.verdict.text() == (
+        "All 6 labels that can be checked fit the atlas; 2 have other doubts: LLI left, RWA left."
+    )
+    labelling.place(desk.session, in_scan("RWA"), side=L, code="RWA")
+    deliver(desk)
+    assert panel.labels.verdict.text() == "All 6 labels that can be checked fit the atlas."
+
+
 def test_an_atlas_is_fitted_and_tried_out(desk, panel, folder, qtbot) -> None:
     asked = []
     panel.asked.connect(asked.append)
