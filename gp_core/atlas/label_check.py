@@ -138,6 +138,9 @@ class Finding:
         For ``other side`` and ``exchanged``, its probability among the explanations that were considered.
     departures : tuple of Departure
         How far each of the landmarks is from where the others put it, for ``far`` and ``exchanged``.
+    checked_by : str or None
+        Who looked at all of these labels again and found them right, empty where no name is known; None
+        where nobody did. It is a finding all the same.
     """
 
     specimen: str
@@ -148,6 +151,12 @@ class Finding:
     remedy: str = ""
     certainty: float | None = None
     departures: tuple[Departure, ...] = ()
+    checked_by: str | None = None
+
+    @property
+    def is_checked(self) -> bool:
+        """Whether a person looked at these labels again and found them right."""
+        return self.checked_by is not None
 
     @property
     def is_doubt(self) -> bool:
@@ -182,6 +191,7 @@ class Finding:
             "remedy": self.remedy,
             "certainty": self.certainty,
             "departures": [away.as_dict() for away in self.departures],
+            "checked_by": self.checked_by,
         }
 
 
@@ -276,8 +286,18 @@ def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | Non
     except GpError as error:
         text = f"positions not checked: {error.problem}"
         found.append(_finding(landmarks, "unchecked", (), text, error.remedy or ""))
+    found = [_as_checked(finding, landmarks) for finding in found]
     found.sort(key=lambda finding: -finding.severity)
     return SideCheck((*found, *_not_placed(landmarks)), MappingProxyType(departures))
+
+
+def _as_checked(finding: Finding, *sets: LandmarkSet) -> Finding:
+    """Say who looked at all labels of a finding again, and found them right."""
+    names = {landmarks.checked.get(code) for landmarks in sets for code in finding.landmarks}
+    if not finding.is_doubt or not names or None in names:
+        return finding
+    who = ", ".join(sorted(name for name in names if name))
+    return replace(finding, checked_by=who)
 
 
 def departure(code: str, position: FloatArray, expected: FloatArray, covariance: FloatArray) -> Departure:
@@ -423,4 +443,5 @@ def _shared_points(specimen: Specimen) -> Iterator[Finding]:
                     text += ": one of them is wrong"
                     kind, what = "shared point wrong", "leaves it out"
                 remedy = f"Place {row.code} once more; a fit {what}."
-                yield Finding(specimen.name, Side.LEFT, kind, (row.code,), text, remedy)
+                found = Finding(specimen.name, Side.LEFT, kind, (row.code,), text, remedy)
+                yield _as_checked(found, left, right)

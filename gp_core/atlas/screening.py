@@ -63,7 +63,7 @@ class Screened:
     @property
     def left_out(self) -> tuple[Finding, ...]:
         """Those of the findings whose labels are left out."""
-        return tuple(finding for finding in self.findings if finding.kind in _LEAVES_OUT)
+        return tuple(finding for finding in self.findings if _is_left_out(finding))
 
 
 def screen_labels(
@@ -78,7 +78,8 @@ def screen_labels(
     ----------
     specimens : sequence of Specimen
     confirmed : collection of (str, Side, str)
-        Labels (animal, side, feature) that a person has looked at again and found right: they stay.
+        Labels (animal, side, feature) that a person has looked at again and found right: they stay, as do
+        those whose provenance says so.
     tell : callable
         Receives the fraction done, and may raise to stop.
     """
@@ -133,7 +134,11 @@ def _found(specimen: Specimen, atlas: Atlas, confirmed: Collection[tuple[str, Si
 
 
 def _leave_out(findings: Sequence[Finding]) -> bool:
-    return any(finding.kind in _LEAVES_OUT for finding in findings)
+    return any(_is_left_out(finding) for finding in findings)
+
+
+def _is_left_out(finding: Finding) -> bool:
+    return finding.kind in _LEAVES_OUT and not finding.is_checked
 
 
 def _is_foreign(specimens: Sequence[Specimen], found: Sequence[Sequence[Finding]]) -> bool:
@@ -179,20 +184,21 @@ def _without_shared(
     sides: Mapping[Side, LandmarkSet], findings: Sequence[Finding]
 ) -> Mapping[Side, LandmarkSet]:
     """Leave out a point of both sides whose two labels cannot both be right, unless one has gone already."""
-    for finding in findings:
+    for finding in filter(_is_left_out, findings):
         if finding.kind == "shared point wrong" and all(finding.landmarks[0] in s for s in sides.values()):
             sides = {key: side.with_point(finding.landmarks[0], None) for key, side in sides.items()}
     return sides
 
 
 def _side_without(landmarks: LandmarkSet, findings: Sequence[Finding]) -> LandmarkSet:
+    findings = [finding for finding in findings if _is_left_out(finding)]
     far = {code for finding in findings if finding.kind in ("far", "exchanged") for code in finding.landmarks}
     for finding in findings:
         if finding.kind == "other side":
             return LandmarkSet.empty(landmarks.side, frame=landmarks.frame)
         if finding.kind == "duplicate" and far.intersection(finding.landmarks):
             continue  # it is known which of the two it is
-        if finding.kind in _LEAVES_OUT and finding.kind != "shared point wrong":
+        if finding.kind != "shared point wrong":
             for code in finding.landmarks:
                 landmarks = landmarks.with_point(code, None)
     return landmarks

@@ -168,7 +168,8 @@ def _say_findings(name: str, findings: list[Finding]) -> None:
     for finding in findings:
         mark = "!" if finding.is_doubt else " "
         codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
-        remedy = f". {finding.remedy}" if finding.remedy else ""
+        said = f"Checked by {finding.checked_by or 'unnamed'}." if finding.is_checked else finding.remedy
+        remedy = f". {said}" if said else ""
         say(f"  {mark} {finding.side.word:<5} {codes:<8} {finding.text}{remedy}")
 
 

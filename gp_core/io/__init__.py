@@ -18,18 +18,20 @@ from gp_core.io.reading import (
     specimen_of,
     unknown_labels,
 )
-from gp_core.io.specimens import landmark_files, load_specimens
+from gp_core.io.specimens import Labelling, landmark_files, load_labellings, load_specimens
 from gp_core.io.table import write_csv
 
 __all__ = [
     "FileHeader",
     "LabelledPoint",
+    "Labelling",
     "PointList",
     "import_mat",
     "label_names",
     "landmark_file_name",
     "landmark_files",
     "landmarks_of",
+    "load_labellings",
     "load_specimens",
     "natural_key",
     "read_authors_mat",

@@ -55,7 +55,9 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
     heads = [line.lstrip('" ') for _, line in lines]
     system = next((m[1].strip(' ",;') for line in heads if (m := _SYSTEM.match(line))), None)
     body = [numbered for numbered, head in zip(lines, heads, strict=True) if not head.startswith("#")]
-    mark = ";" if body and body[0][1].count(";") >= 4 else ","  # as a spreadsheet saves it
+    first = body[0][1] if body else ""
+    n_marks = first.count(";")  # as a spreadsheet saves it; a description may hold some, too
+    mark = ";" if n_marks >= 4 and n_marks > first.count(",") else ","
     rows = [(number, _unpadded(split_fields(line, mark, number, path))) for number, line in body]
     old = bool(rows) and all(4 <= len(fields) <= 7 for _, fields in rows)
     if system is None and not old:

@@ -8,10 +8,20 @@ from pathlib import Path
 
 from gp_core.landmarks.features import Side
 
-__all__ = ["is_named_suggested", "landmark_file_name", "name_parts", "named_side", "natural_key"]
+__all__ = [
+    "is_named_suggested",
+    "labelling_named",
+    "landmark_file_name",
+    "name_parts",
+    "named_side",
+    "natural_key",
+    "specimen_named",
+]
 
 _SUGGESTED_ENDING = re.compile(r"[ _.\-]+suggested$", re.IGNORECASE)
 _MARKS = " _.-"
+_LABELLING = re.compile(r"(?P<specimen>.+)_(?P<observer>[^_]+)_r(?P<round>[1-9][0-9]{0,3})", re.IGNORECASE)
+"""GP01_AB_r2: specimen, observer, round."""
 # left_GP01, GP01_L_final: a whole word, wherever it stands
 _SIDE_WORDS = tuple(
     re.compile(rf"(?<![^ _.\-])(?P<side>{words})(?![^ _.\-])", re.IGNORECASE)
@@ -19,9 +29,35 @@ _SIDE_WORDS = tuple(
 )
 
 
-def landmark_file_name(specimen: str, side: Side, *, suggested: bool = False) -> str:
-    """Return the name of the file that holds one side of a specimen, or what is only suggested there."""
+def landmark_file_name(
+    specimen: str, side: Side, *, suggested: bool = False, observer: str = "", round_: int | None = None
+) -> str:
+    """Return the name of the file that holds one side of a specimen, or what is only suggested there.
+
+    With a round, it is the file of one of several labellings.
+
+    Examples
+    --------
+    >>> landmark_file_name("GP01", Side.LEFT), landmark_file_name("GP01", Side.LEFT, observer="AB", round_=2)
+    ('GP01_L.mrk.json', 'GP01_AB_r2_L.mrk.json')
+    """
+    if round_ is not None:
+        who = re.sub(r"[^\w\-]+|_", "-", observer).strip("-") or "unnamed"
+        specimen = f"{specimen}_{who}_r{round_}"
     return f"{specimen}_{side.value}{'_suggested' if suggested else ''}.mrk.json"
+
+
+def labelling_named(path: str | PathLike[str], suffix: str) -> tuple[str, int]:
+    """Return observer and round that a file is named for, as ``GP01_AB_r2_L``; else no observer, and 1."""
+    match = _LABELLING.fullmatch(name_parts(path, suffix)[0])
+    return (match["observer"], int(match["round"])) if match else ("", 1)
+
+
+def specimen_named(path: str | PathLike[str], suffix: str) -> str:
+    """Return the specimen that a file is named for: ``GP01`` for ``GP01_L`` and for ``GP01_AB_r2_L``."""
+    name = name_parts(path, suffix)[0]
+    match = _LABELLING.fullmatch(name)
+    return match["specimen"] if match else name
 
 
 def is_named_suggested(path: str | PathLike[str], suffix: str) -> bool:

@@ -38,6 +38,10 @@ class FileHeader:
         Labels beside the feature table that belong in the file.
     scan_evidence : ScanEvidence, optional
         How far the points are from bone, as measured in the scan.
+    observer : str, optional
+        Who placed them; None where nobody said.
+    round : int
+        Which of the observer's labellings of this side it is, from 1.
     """
 
     specimen: str | None = None
@@ -47,6 +51,8 @@ class FileHeader:
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extra: tuple[str, ...] = ()
     scan_evidence: ScanEvidence | None = None
+    observer: str | None = None
+    round: int = 1
 
     def as_json(self) -> dict[str, Any]:
         """Return the object as it stands in the file."""
@@ -54,6 +60,8 @@ class FileHeader:
             "schemaVersion": SCHEMA_VERSION,
             "specimen": self.specimen,
             "side": None if self.side is None else self.side.value,
+            "observer": self.observer,
+            "round": self.round,
             "frame": self.frame,
             "volume": None if self.volume is None else dict(self.volume),
             "provenance": dict(self.provenance),
@@ -88,6 +96,8 @@ class FileHeader:
             provenance=got.get("provenance", {}),
             extra=tuple(got["extra"]) if isinstance(got.get("extra"), list) else (),
             scan_evidence=_scan_evidence(got.get("boneDistanceMm"), file),
+            observer=got.get("observer"),
+            round=1 if got.get("round") is None else got["round"],
         )
         wrong = header._wrong_field()
         if wrong:
@@ -103,6 +113,8 @@ class FileHeader:
             "specimen": self.specimen is None
             or (isinstance(self.specimen, str) and bool(self.specimen.strip())),
             "frame": self.frame in FRAMES,
+            "observer": self.observer is None or isinstance(self.observer, str),
+            "round": isinstance(self.round, int) and not isinstance(self.round, bool) and self.round > 0,
             "volume": self.volume is None or isinstance(self.volume, dict),
             "provenance": isinstance(self.provenance, dict),
             "extra": all(isinstance(label, str) for label in self.extra),

@@ -16,6 +16,7 @@ from gp_core.errors import FileFormatError
 from gp_core.io.header import FileHeader
 from gp_core.io.text import parse_position
 from gp_core.landmarks.features import FEATURES, Feature, Side
+from gp_core.landmarks.provenance import LabelProvenance, described, without_description
 from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
@@ -52,7 +53,8 @@ _SUGGESTED = re.compile(
 class LabelledPoint(NamedTuple):
     """One point of a file: label, (3,) position in mm or None, how far it is, free text, side if it says one.
 
-    A suggested point has no `position`, which would be an observation, but a `suggestion`.
+    A suggested point has no `position`, which would be an observation, but a `suggestion`. What the
+    description says of observer, certainty, note and check is in `provenance`.
     """
 
     label: str
@@ -61,6 +63,8 @@ class LabelledPoint(NamedTuple):
     description: str = ""
     suggestion: Suggestion | None = None
     side: Side | None = None
+    provenance: LabelProvenance | None = None
+    round: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,18 +107,32 @@ class PointList:
 
     @property
     def sides(self) -> frozenset[Side]:
-        """Sides of the head that the points themselves tell, in their labels or a column of the table."""
-        return frozenset(point.side for point in self.points if point.side is not None)
+        """Sides of the head that the points themselves tell, in their labels or a column of the table.
+
+        What a point of both sides (IN) tells does not count beside other points.
+        """
+        of_a_side = tuple(point for point in self.points if not _is_shared(point.label))
+        return frozenset(point.side for point in of_a_side or self.points if point.side is not None)
 
     def of_side(self, side: Side) -> PointList:
         """Return the points of one side, and those that lie on both or tell none.
+
+        A point of both sides (IN) that is given once, for either side, counts for both.
 
         Raises
         ------
         FileFormatError
             There are none.
         """
-        return replace(self, points=tuple(p for p in self.points if p.side in (side, None)))
+        own = {p.label for p in self.points if p.side in (side, None)}
+        return replace(
+            self,
+            points=tuple(
+                p
+                for p in self.points
+                if p.side in (side, None) or (_is_shared(p.label) and p.label not in own)
+            ),
+        )
 
     @property
     def positions(self) -> FloatArray:
@@ -162,16 +180,17 @@ def labelled_point(
     FileFormatError
         The coordinates are not three finite numbers, nor all missing.
     """
-    label, description = " ".join(label.split()), description.strip()
+    label = " ".join(label.split())
+    description, about, round_ = without_description(description.strip())
     if status is not Status.PLACED:
-        return LabelledPoint(label, None, status, description)
+        return LabelledPoint(label, None, status, description, provenance=about, round=round_)
     position = parse_position(coordinates, file=file, landmark=label)
     if position is None:
         _log.warning("%s: landmark %s is said to be placed but has no position", file, label)
         return LabelledPoint(label, None, Status.TO_DO, description)
     if flip_xy:
         position[:2] *= -1.0
-    point = LabelledPoint(label, position, status, description)
+    point = LabelledPoint(label, position, status, description, provenance=about, round=round_)
     return as_suggested(point) if _SUGGESTED.match(description) else point
 
 
@@ -194,7 +213,7 @@ def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
     observed = replace(landmarks, suggested={})
     positions = observed.as_mapping()
     features = [
-        LabelledPoint(f.code, positions.get(f.code), observed.status(f.code), _description(f))
+        LabelledPoint(f.code, positions.get(f.code), observed.status(f.code), _described(f, observed))
         for f in FEATURES
     ]
     extra = [LabelledPoint(name, position, Status.PLACED) for name, position in landmarks.extra.items()]
@@ -221,6 +240,18 @@ def _suggested_point(feature: Feature, suggestion: Suggestion | None) -> Labelle
 
 def _description(feature: Feature) -> str:
     return f"{feature.name}. {feature.where}" if feature.computed else feature.name
+
+
+def _is_shared(label: str) -> bool:
+    return any(feature.code == label and feature.shared for feature in FEATURES)
+
+
+def _described(feature: Feature, landmarks: LandmarkSet) -> str:
+    """Describe a feature, with what is known of its label where a person has decided on it."""
+    text, about = _description(feature), landmarks.provenance.get(feature.code)
+    if feature.computed or landmarks.status(feature.code) is Status.TO_DO:
+        return text
+    return described(text, about, landmarks.observer, landmarks.round)
 
 
 def is_computed(label: str) -> bool:

@@ -205,7 +205,8 @@ def write_markups(
     volume : mapping, optional
         ``name``, ``size``, ``spacing`` and ``checksum`` of the labelled volume.
     provenance : mapping, optional
-        For each feature code, how the point came to be.
+        For each feature code, how the point came to be, in plain JSON values; it goes before what
+        `LandmarkSet.provenance` says of that feature.
 
     Raises
     ------
@@ -217,9 +218,14 @@ def write_markups(
         side=landmarks.side,
         frame=landmarks.frame,
         volume=volume,
-        provenance=provenance or {},
+        provenance={
+            **{code: about.as_json() for code, about in landmarks.provenance.items()},
+            **(provenance or {}),
+        },
         extra=tuple(landmarks.extra),
         scan_evidence=landmarks.scan_evidence,
+        observer=landmarks.observer or None,
+        round=landmarks.round,
     )
     write_point_lists(path, {"Fiducial": points_of(landmarks)}, header)
 

@@ -10,10 +10,10 @@ from typing import Literal
 
 import numpy as np
 
-from gp_core.errors import FeatureError, FileFormatError, GeometryError
+from gp_core.errors import FeatureError, FileFormatError, GeometryError, GpError
 from gp_core.io.dat import is_sentinel, read_dat
 from gp_core.io.fcsv import read_fcsv
-from gp_core.io.file_names import is_named_suggested, name_parts
+from gp_core.io.file_names import is_named_suggested, labelling_named, name_parts, specimen_named
 from gp_core.io.labelled_points import LabelledPoint, PointList, as_suggested
 from gp_core.io.markups import read_markups
 from gp_core.io.table import read_table
@@ -22,6 +22,7 @@ from gp_core.io.text_files import check_file
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.labels import LabelNames, is_skull_feature, parse_label, tidy_label
 from gp_core.landmarks.plausible_size import check_plausible_size
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_core.validation import FloatArray, check_option, near_matches
 
@@ -225,7 +226,7 @@ def read_touches(
 def specimen_of(points: PointList) -> str:
     """Return the specimen that a file names, in its ``gpLabeler`` object or by its name."""
     name = points.header.specimen if points.header else None
-    return name or name_parts(points.source, _suffix(points.source))[0]
+    return name or specimen_named(points.source, _suffix(points.source))
 
 
 def _without_sentinel(point: LabelledPoint) -> LabelledPoint:
@@ -262,8 +263,6 @@ def _side_of(points: PointList, side: Side | str | None) -> Side:
 def _one_side(points: PointList, side: Side) -> PointList:
     """Return the points of one side; in a file that tells sides, only what both share may tell none."""
     told = points.sides
-    if not told:
-        return points
     if told == {side.other}:
         raise FeatureError(
             f"holds points of the {side.other.word} side, as its labels or its column 'side' say, but was "
@@ -271,8 +270,8 @@ def _one_side(points: PointList, side: Side) -> PointList:
             file=points.source,
             remedy=f"Give the side {side.other.value}, or correct the file.",
         )
-    if len(told) == 1:
-        return points
+    if len(told) < 2:
+        return points.of_side(side)
     without = (p.label for p in points.points if p.side is None and p.label in CODES)
     lost = next((label for label in without if not feature(label).shared), None)
     if lost is not None:
@@ -315,10 +314,53 @@ def _landmark_set(points: PointList, side: Side, frame: str, unknown: Unknown) -
     }
     _check_axis(positions, points)
     evidence = points.header.scan_evidence if points.header else None
+    observer, round_ = _labelling_of(points)
     found = LandmarkSet(
-        rows, side, frame, frozenset(unseen & set(CODES)), MappingProxyType(extra), scan_evidence=evidence
+        rows,
+        side,
+        frame,
+        frozenset(unseen & set(CODES)),
+        MappingProxyType(extra),
+        scan_evidence=evidence,
+        provenance=_provenance(points, names),
+        observer=observer,
+        round=round_,
     )
     return found.with_suggestions(suggested)
+
+
+def _labelling_of(points: PointList) -> tuple[str, int]:
+    """Return who labelled, and in which round: as the header says, else all descriptions, else the name."""
+    if points.header is not None and points.header.observer is not None:
+        return points.header.observer, points.header.round
+    said = {(p.provenance.observer, p.round) for p in points.points if p.provenance is not None}
+    observer, round_ = labelling_named(points.source, _suffix(points.source))
+    if len(said) == 1 and not observer:
+        observer, round_ = said.pop()
+    return observer, max(round_, points.header.round if points.header else 1)
+
+
+def _provenance(points: PointList, names: list[str]) -> dict[str, LabelProvenance]:
+    """Return what is known of each feature: as the header says, else its description."""
+    told = points.header.provenance if points.header else {}
+    found = {}
+    for name, point in zip(names, points.points, strict=True):
+        if name not in CODES:
+            continue
+        content = told.get(point.label)
+        if isinstance(content, dict):
+            try:
+                found[name] = LabelProvenance.from_json(content)
+            except GpError as error:
+                raise FileFormatError(
+                    f"its gpLabeler object has a wrong provenance: {error.problem}",
+                    file=points.source,
+                    landmark=name,
+                    remedy="Correct it, or remove the entry.",
+                ) from None
+        elif point.provenance is not None and points.header is None:
+            found[name] = point.provenance
+    return found
 
 
 def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:

@@ -2,31 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import logging
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from os import PathLike, fspath
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from gp_core.errors import FeatureError, FileFormatError
-from gp_core.io.file_names import natural_key
+from gp_core.io.file_names import landmark_file_name, natural_key
 from gp_core.io.reading import read_points, sides_of, specimen_of
 from gp_core.landmarks.anatomy import with_cochlea_origin
-from gp_core.landmarks.features import Side
+from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.plausible_size import check_plausible_size
-from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 
-__all__ = ["landmark_files", "load_specimens"]
+__all__ = ["Labelling", "landmark_files", "load_labellings", "load_specimens"]
+
+_log = logging.getLogger(__name__)
 
 _SAME_MM = 1e-6
+_ROUNDED_MM = 1e-3
+"""Two files of a side that differ by no more hold the same labels, in another format."""
+
 _IN_FOLDERS = (".mrk.json", ".fcsv")
+_RICHEST_FIRST = (".mrk.json", ".json", ".fcsv")
+
+
+@dataclass(frozen=True)
+class Labelling:
+    """One animal as one observer labelled it in one round.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        The animal with the landmarks of its labelled sides.
+    observer : str
+        Who labelled it; empty where nobody said.
+    round : int
+        Which of the observer's labellings of the animal it is, from 1.
+    """
+
+    specimen: Specimen
+    observer: str = ""
+    round: int = 1
+
+    @property
+    def who(self) -> str:
+        """Such as ``AB, round 2``."""
+        return f"{self.observer or 'unnamed'}, round {self.round}"
 
 
 def load_specimens(
     paths: str | PathLike[str] | Iterable[str | PathLike[str]],
     *,
     names: LabelNames | None = None,
+    observer: str | None = None,
+    round: int | None = None,
 ) -> list[Specimen]:
     """Read landmark files, or folders of them, and put the sides of each animal together.
 
@@ -37,43 +72,177 @@ def load_specimens(
         ``.fcsv``. A file may hold both sides, told by its labels (``CA_L``) or a column ``side``.
     names : LabelNames, optional
         A lab's own names of the features.
+    observer : str, optional
+        Take the labels of this observer alone.
+    round : int, optional
+        Take the labels of this round alone.
 
     Returns
     -------
     list of Specimen
         By name, GP2 before GP10. Files belong together by the specimen in their ``gpLabeler`` object,
         else by their name without ``_L`` or ``_R``. CO is computed where a file lacks it or differs.
-        A file of suggestions (``_L_suggested``) adds to the file of that side.
+        A file of suggestions (``_L_suggested``) adds to the file of that side. IN, which both sides share,
+        counts for both where one file alone has it. An animal that was labelled several times is one
+        specimen, with the mean of its labels (which is logged); `load_labellings` keeps them apart.
 
     Raises
     ------
     FileFormatError
         A file cannot be read, or a folder holds none.
     FeatureError
-        Two files hold the same side of a specimen, a side is not known, or a label is unknown or doubled.
+        Two files hold the same side of a specimen by one observer in one round, with other labels; nothing
+        is by that observer or of that round; a side is not known, or a label is unknown or doubled.
     GeometryError
         All points of a file are at one place, or not in millimetres.
     """
+    found = load_labellings(paths, names=names)
+    chosen = [
+        each
+        for each in found
+        if (observer is None or each.observer.casefold() == observer.casefold())
+        and (round is None or each.round == round)
+    ]
+    if not chosen:
+        what = [] if observer is None else [f"by {observer}"]
+        what += [] if round is None else [f"of round {round}"]
+        raise FeatureError(
+            f"no labels {' '.join(what)} are among the files",
+            remedy=f"There are: {'; '.join(sorted({each.who for each in found}))}.",
+        )
+    of_animals: dict[str, list[Labelling]] = {}
+    for each in chosen:
+        of_animals.setdefault(each.specimen.name, []).append(each)
+    return [_mean_of(labellings) for labellings in of_animals.values()]
+
+
+def load_labellings(
+    paths: str | PathLike[str] | Iterable[str | PathLike[str]], *, names: LabelNames | None = None
+) -> list[Labelling]:
+    """Read landmark files, or folders of them, and keep each observer's labels, and each round's, apart.
+
+    Parameters
+    ----------
+    paths, names
+        As for `load_specimens`. Observer and round are those in the file's ``gpLabeler`` object, else in its
+        points' descriptions, else in its name (``GP01_AB_r2_L``).
+
+    Returns
+    -------
+    list of Labelling
+        By animal, observer and round.
+
+    Raises
+    ------
+    GpError
+        As for `load_specimens`.
+    """
     files = _files([paths] if isinstance(paths, (str, PathLike)) else list(paths))
-    sides: dict[str, dict[Side, LandmarkSet]] = {}
-    sources: dict[tuple[str, Side, bool], Path] = {}
-    read = ((file, read_points(file, names=names)) for file in files)
+    sides: dict[_Key, dict[Side, LandmarkSet]] = {}
+    sources: dict[tuple[_Key, Side, bool], tuple[Path, LandmarkSet]] = {}
+    read = ((file, read_points(file, names=names)) for file in sorted(files, key=_richest))
     for file, name, landmarks in (
         (file, specimen_of(points), one) for file, points in read for one in sides_of(points)
     ):
         check_plausible_size(landmarks, file)
+        key = _Key(name, landmarks.observer, landmarks.round)
         only_suggested = bool(landmarks.suggested) and not landmarks.placed
-        earlier = sources.setdefault((name, landmarks.side, only_suggested), file)
+        if only_suggested:
+            key = next((k for k in sides if k.name == name and landmarks.side in sides[k]), key)
+        earlier, labels = sources.setdefault((key, landmarks.side, only_suggested), (file, landmarks))
         if earlier is not file:
+            if _kind(earlier) != _kind(file) and _are_same(labels, landmarks):
+                continue  # one export in two formats
             raise FeatureError(
                 f"the {landmarks.side.word} side is in {fspath(earlier)} too",
                 file=file,
                 specimen=name,
-                remedy="Give one file a side, or name the specimens apart.",
+                remedy=f"Leave one of them out. If it was labelled twice, say so in the names: "
+                f"{landmark_file_name(name, landmarks.side, observer='AB', round_=2)} (observer, round).",
             )
-        known = sides.setdefault(name, {})
+        known = sides.setdefault(key, {})
         known[landmarks.side] = _together(known.get(landmarks.side), _with_true_origin(landmarks), file)
-    return [Specimen(name, sides[name]) for name in sorted(sides, key=natural_key)]
+    order = sorted(sides, key=lambda k: (natural_key(k.name), natural_key(k.observer), k.round))
+    return [Labelling(Specimen(key.name, _sharing(sides[key])), key.observer, key.round) for key in order]
+
+
+class _Key(NamedTuple):
+    name: str
+    observer: str
+    round: int
+
+
+def _kind(file: Path) -> int:
+    """Tell formats apart; those that say more of their labels come first."""
+    name = file.name.lower()
+    return next((i for i, suffix in enumerate(_RICHEST_FIRST) if name.endswith(suffix)), len(_RICHEST_FIRST))
+
+
+def _richest(file: Path) -> int:
+    """Sort files that say more of their labels before those that say less, suggestions last."""
+    return _kind(file) + 10 * ("suggested" in file.name.lower())
+
+
+def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
+    """Whether two files hold the same labels, but for rounding, such as one exported in two formats."""
+    return (
+        one.frame == other.frame
+        and one.placed == other.placed
+        and bool(np.abs(one.array(one.placed) - other.array(one.placed)).max(initial=0.0) < _ROUNDED_MM)
+        and set(one.suggested) == set(other.suggested)
+    )
+
+
+def _sharing(sides: Mapping[Side, LandmarkSet]) -> dict[Side, LandmarkSet]:
+    """Let a point of both sides that one side alone has count for the other as well."""
+    found = dict(sides)
+    if len({landmarks.frame for landmarks in sides.values()}) > 1:
+        return found
+    for side, landmarks in sides.items():
+        for row in FEATURES:
+            other = found.get(side.other)
+            if not row.shared or other is None or landmarks.frame == "cochlea":
+                continue
+            if row.code in landmarks and other.status(row.code) is not Status.PLACED:
+                about = landmarks.provenance.get(row.code)
+                other = other.with_point(row.code, landmarks[row.code])
+                found[side.other] = other if about is None else other.with_provenance({row.code: about})
+    return found
+
+
+def _mean_of(labellings: list[Labelling]) -> Specimen:
+    """Return one animal with the mean of its labels."""
+    first = labellings[0].specimen
+    if len(labellings) == 1:
+        return first
+    sides = {}
+    for side in Side:
+        of_side = [each.specimen.sides[side] for each in labellings if side in each.specimen.sides]
+        if of_side:
+            sides[side] = _mean_side(of_side, first.name)
+    told = "; ".join(each.who for each in labellings)
+    _log.warning("%s: labelled %d times, the mean is taken (%s)", first.name, len(labellings), told)
+    return Specimen(first.name, sides)
+
+
+def _mean_side(labelled: list[LandmarkSet], name: str) -> LandmarkSet:
+    if len(labelled) == 1:
+        return labelled[0]
+    first = labelled[0]
+    if other := next((each for each in labelled if each.frame != first.frame), None):
+        raise FeatureError(
+            f"its labels are in the frames {first.frame} and {other.frame}",
+            specimen=name,
+            remedy="Export them all in the frame of the scan.",
+        )
+    points = {
+        row.code: np.mean([each[row.code] for each in labelled if row.code in each], axis=0)
+        for row in FEATURES
+        if not row.computed and any(row.code in each for each in labelled)
+    }
+    unseen = frozenset.union(*(each.unseen for each in labelled))
+    mean = LandmarkSet.from_mapping(points, first.side, frame=first.frame)
+    return with_cochlea_origin(replace(mean, unseen=unseen - set(points)))
 
 
 def _together(known: LandmarkSet | None, read: LandmarkSet, file: Path) -> LandmarkSet:

@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from gp_core.disk import write_text
-from gp_core.errors import FeatureError, FileFormatError
+from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.io.labelled_points import (
     STATUS_WORDS,
     LabelledPoint,
@@ -31,6 +31,7 @@ from gp_core.io.text import (
 )
 from gp_core.io.text_files import read_text
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.landmarks.sets import LandmarkSet, Status
 
 __all__ = ["read_rows", "read_table", "write_csv"]
@@ -39,6 +40,15 @@ _NAME_COLUMNS = ("label", "name", "landmark", "feature", "code", "point")
 _AXES = {"lps": False, "ras": True, "xyz": False}  # whether x and y change sign on the way to LPS
 _UNIT_MM = re.compile(r"\s*[\[(_ ]\s*mm\s*[\])]?$")  # x_mm, "x (mm)", "x [mm]"
 _HEADER = ("label", "l", "p", "s", "defined", "selected", "visible", "locked", "description", "status")
+_ABOUT = {
+    "certainty": "certainty",
+    "observer": "by",
+    "time": "time",
+    "checked_by": "checked_by",
+    "note": "note",
+}
+"""Columns of what is known of a label, and the keys of `LabelProvenance.from_json`."""
+
 _NO = ("0", "false", "no")
 _SEPARATOR_LINE = re.compile(r"\"?sep=([,;\t|])\"?[,;]*", re.IGNORECASE)  # for Excel, in the first line
 _SIDE_COLUMNS = ("side", "ear", "laterality")
@@ -161,7 +171,7 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         return fields[i] if i < len(fields) else ""
 
     label = of_csv_cell(fields[columns.label])
-    return labelled_point(
+    point = labelled_point(
         label,
         [fields[i] for i in columns.axes],
         _status(other("status"), other("defined"), label, file),
@@ -169,6 +179,13 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         description=of_csv_cell(other("description")),
         flip_xy=columns.flip_xy,
     )._replace(side=_side(other, label, file))
+    about = {key: text for name, key in _ABOUT.items() if (text := of_csv_cell(other(name)))}
+    if point.provenance is not None or not about:
+        return point
+    try:
+        return point._replace(provenance=LabelProvenance.from_json(about))
+    except GpError as error:
+        raise FileFormatError(error.problem, file=file, landmark=label[:40], remedy="Correct it.") from None
 
 
 def _side(other: Callable[[str], str], label: str, file: str | PathLike[str]) -> Side | None:
@@ -199,7 +216,8 @@ def _status(word: str, defined: str, label: str, file: str | PathLike[str]) -> S
 def write_csv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
     """Write a landmark set as Slicer's table, to the last bit of every coordinate.
 
-    One column is added, ``status``, since Slicer's ``defined`` does not tell *to do* from *cannot be seen*.
+    One column is added, ``status``, since Slicer's ``defined`` does not tell *to do* from *cannot be seen*;
+    and where more is known of the labels, ``certainty``, ``observer``, ``time``, ``checked_by`` and ``note``.
     The format has no place for specimen, side and frame; name the file ``<specimen>_L`` or ``_R``.
 
     Raises
@@ -209,11 +227,15 @@ def write_csv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
     """
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
-    writer.writerow(_HEADER)
+    about = _ABOUT if landmarks.provenance else {}
+    writer.writerow((*_HEADER, *about))
     for point in points_of(landmarks):
         lps = ["", "", ""] if point.position is None else point.position.tolist()
         defined = int(point.position is not None)
         locked = int(is_computed(point.label))
         label, description = as_csv_cell(point.label), as_csv_cell(point.description)
-        writer.writerow([label, *lps, defined, 1, 1, locked, description, point.status.value])
+        known = landmarks.provenance.get(point.label)
+        content = {} if known is None else known.as_json()
+        told = [as_csv_cell(str(content.get(key, ""))) for key in about.values()]
+        writer.writerow([label, *lps, defined, 1, 1, locked, description, point.status.value, *told])
     write_text(path, stream.getvalue())

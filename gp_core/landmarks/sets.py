@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import CODES, Side, feature, index_of
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray, as_points
@@ -61,6 +62,13 @@ class LandmarkSet:
         is placed or unseen, a person has decided, and its suggestion is dropped.
     scan_evidence : ScanEvidence, optional
         How far the points are from bone, as measured in the scan; dropped for a point that is moved.
+    provenance : mapping of str to LabelProvenance
+        What is known of each placed or unseen feature beside its position: observer, time, certainty, note,
+        who checked it; dropped for a point that is placed anew.
+    observer : str
+        Who labelled this side; empty where nobody said.
+    round : int
+        Which of the observer's labellings of this side it is, from 1.
 
     Examples
     --------
@@ -76,6 +84,9 @@ class LandmarkSet:
     extra: Mapping[str, FloatArray] = field(default_factory=_nothing)
     suggested: Mapping[str, Suggestion] = field(default_factory=_nothing)
     scan_evidence: ScanEvidence | None = None
+    provenance: Mapping[str, LabelProvenance] = field(default_factory=_nothing)
+    observer: str = ""
+    round: int = 1
 
     def __post_init__(self) -> None:
         points = as_points(self.points, "points", missing_allowed=True).copy()
@@ -89,6 +100,13 @@ class LandmarkSet:
         object.__setattr__(self, "suggested", self._undecided(self.suggested))
         if self.scan_evidence is not None:
             object.__setattr__(self, "scan_evidence", self.scan_evidence.of(self.as_mapping()))
+        if self.provenance:
+            known = {feature(code).code: about for code, about in self.provenance.items()}
+            decided = self.unseen.union(self.placed)
+            kept = {code: known[code] for code in CODES if code in known and code in decided}
+            object.__setattr__(self, "provenance", MappingProxyType(kept))
+        if not isinstance(self.round, int) or self.round < 1:
+            raise GpError(f"a round is a whole number from 1, got {self.round!r:.40}")
 
     def _undecided(self, suggested: Mapping[str, Suggestion]) -> Mapping[str, Suggestion]:
         """Return the suggestions of the features that are to do."""
@@ -126,7 +144,8 @@ class LandmarkSet:
     def __reduce__(self) -> tuple[object, ...]:
         """Let pickle carry the set to other processes, though it cannot carry a read-only mapping."""
         mappings = (dict(self.extra), dict(self.suggested))
-        return LandmarkSet, (self.points, self.side, self.frame, self.unseen, *mappings, self.scan_evidence)
+        about = (self.scan_evidence, dict(self.provenance), self.observer, self.round)
+        return LandmarkSet, (self.points, self.side, self.frame, self.unseen, *mappings, *about)
 
     def __getitem__(self, code: str) -> FloatArray:
         """Return the (3,) position of a feature, NaN where it is not placed."""
@@ -192,12 +211,28 @@ class LandmarkSet:
         points[index_of(code)] = np.nan if position is None else _position(position, code)
         code = feature(code).code
         others = {key: value for key, value in self.suggested.items() if key != code}
-        return replace(self, points=points, unseen=self.unseen - {code}, suggested=others)
+        about = {key: value for key, value in self.provenance.items() if key != code}
+        return replace(self, points=points, unseen=self.unseen - {code}, suggested=others, provenance=about)
 
     def with_unseen(self, code: str) -> LandmarkSet:
         """Return a copy in which one feature is marked as one that cannot be seen."""
         cleared = self.with_point(code, None)
         return replace(cleared, unseen=cleared.unseen | {feature(code).code})
+
+    def with_provenance(self, provenance: Mapping[str, LabelProvenance]) -> LandmarkSet:
+        """Return a copy in which more is known of these features, where they are placed or unseen.
+
+        Raises
+        ------
+        FeatureError
+            A name is unknown.
+        """
+        return replace(self, provenance={**self.provenance, **provenance})
+
+    @property
+    def checked(self) -> Mapping[str, str]:
+        """Features that a person looked at again and found right, and who that was (empty: unnamed)."""
+        return {code: about.checked_by for code, about in self.provenance.items() if about.checked}
 
     def with_suggestions(self, suggestions: Mapping[str, Suggestion]) -> LandmarkSet:
         """Return a copy with these suggestions, in this set's frame, where the feature is still to do.
