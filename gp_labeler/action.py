@@ -25,6 +25,7 @@ class Ui(Protocol):
     def ask_import(self) -> None: ...  # noqa: D102
     def ask_export(self) -> None: ...  # noqa: D102
     def ask_references(self) -> None: ...  # noqa: D102
+    def ask_add_mesh(self) -> None: ...  # noqa: D102
     def ask_save_mesh(self) -> None: ...  # noqa: D102
     def ask_screenshot(self) -> None: ...  # noqa: D102
     def ask_swap(self) -> None: ...  # noqa: D102

@@ -242,6 +242,11 @@ def file_rows() -> Iterator[Action]:
               group="references")
     yield row("clear_references", "Clear reference points", (), lambda d, ui: d.references.clear(),
               lambda d: bool(d.references.points), group="references")
+    yield row("add_mesh", "Add mesh…", (), lambda d, ui: ui.ask_add_mesh(), _has_scan,
+              hint="Draw a surface from another program with the bone: no part of the specimen",
+              group="references")
+    yield row("remove_meshes", "Remove added meshes", (), lambda d, ui: d.meshes.clear(),
+              lambda d: bool(d.meshes.meshes), group="references")
     yield row("close", "Close", ("Ctrl+Q",), lambda d, ui: ui.close_window(), group="close")
 
 

@@ -19,6 +19,7 @@ from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
 from gp_core.terminal import printable
 from gp_core.validation import FloatArray
+from gp_labeler.added_meshes import AddedMeshes
 from gp_labeler.atlas_desk import AtlasDesk, expecting, is_atlas_file
 from gp_labeler.bone_desk import BoneDesk
 from gp_labeler.imaging.readers import ImportPlan
@@ -116,6 +117,7 @@ class Workbench(AtlasDesk, BoneDesk):
         self.pose = PoseDesk(self)
         self.tracker = TrackerDesk(self)
         self.references = ReferencePoints(self)
+        self.meshes = AddedMeshes(self)
 
     @property
     def _session_options(self) -> dict[str, Any]:

@@ -15,13 +15,14 @@ from gp_core.validation import near_matches
 if TYPE_CHECKING:
     from gp_labeler.offscreen.rig import Rig
 
-__all__ = ["Lengths", "Pair", "Positions", "Ranges", "Step", "Texts", "Triple", "make_step"]
+__all__ = ["Lengths", "Options", "Pair", "Positions", "Ranges", "Step", "Texts", "Triple", "make_step"]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
 Positions = dict[str, Triple]
 Lengths = dict[str, float]
 Texts = dict[str, str]
+Options = dict[str, Any]
 Ranges = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 S = TypeVar("S", bound="Step")
 
@@ -174,6 +175,10 @@ def _lengths(value: Any) -> dict[str, float]:
     return {_text(name): _number(length) for name, length in value.items()}
 
 
+def _options(value: Any) -> dict[str, Any]:
+    return {_text(key): each for key, each in value.items()}
+
+
 def _table_of_texts(value: Any) -> dict[str, str]:
     return {_text(key): _text(text) for key, text in value.items()}
 
@@ -191,4 +196,5 @@ _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     Positions: ("a table of positions", _positions),
     Lengths: ("a table of numbers", _lengths),
     Texts: ("a table of texts", _table_of_texts),
+    Options: ("a table", _options),
 }

@@ -7,14 +7,15 @@ changes, never for a point; and it is drawn in pieces, between which the window 
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from vtkmodules.vtkCommonDataModel import vtkPolyData
-from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkRenderer
+from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkProp3D, vtkRenderer
 
 from gp_core.validation import FloatArray
+from gp_labeler.scene.added_meshes import AddedMeshActors
 from gp_labeler.scene.bone import BoneActor
 from gp_labeler.scene.furniture import OrientationCube
 from gp_labeler.scene.pieces import Piece
@@ -66,12 +67,21 @@ class Backdrop:
         Where.
     bone : BoneActor
         What is drawn.
+    added : AddedMeshActors
+        What others add, drawn with the bone.
     cube : OrientationCube
         Drawn into the picture too: it changes with the camera only, and its letters take their time.
     """
 
-    def __init__(self, stage: Stage, target: RenderTarget, bone: BoneActor, cube: OrientationCube) -> None:
-        self._stage, self._target, self._bone, self._cube = stage, target, bone, cube
+    def __init__(
+        self,
+        stage: Stage,
+        target: RenderTarget,
+        bone: BoneActor,
+        added: AddedMeshActors,
+        cube: OrientationCube,
+    ) -> None:
+        self._stage, self._target, self._bone, self._added, self._cube = stage, target, bone, added, cube
         self._smoother, self._nothing = _smoother()
         target.add(self._smoother)
         self._kept, self._next = "bone", "bone to be"
@@ -155,11 +165,12 @@ class Backdrop:
             self._warm = sight.mesh
             yield
         groups = self._bone.groups(direction, at_once=bool(self._stage.bone.GetUseSSAO()))
-        for n, group in enumerate(groups or [[]]):
+        drawn = bool(groups or self._added.names)
+        for n, actors in enumerate(self._batches(groups)):
             self._stage.bone.SetErase(n == 0)
-            self._draw(group)
+            self._draw(actors)
             yield
-        n_strips = max(1, round(sight.size[0] * sight.size[1] / _STRIP_PIXELS)) if groups else 0
+        n_strips = max(1, round(sight.size[0] * sight.size[1] / _STRIP_PIXELS)) if drawn else 0
         for n in range(n_strips):
             self._smoother.SetViewport(0.0, n / n_strips, 1.0, (n + 1) / n_strips)
             self._target.draw(self._smoother)
@@ -169,13 +180,22 @@ class Backdrop:
         """Draw the stand-in into the lower left part of the picture."""
         renderer = self._stage.bone
         renderer.SetViewport(0.0, 0.0, part[0] / whole[0], part[1] / whole[1])
-        renderer.EraseOn()
-        for group in self._bone.groups(direction, quick=True) or [[]]:
-            self._draw(group)
+        for n, actors in enumerate(self._batches(self._bone.groups(direction, quick=True), quick=True)):
+            renderer.SetErase(n == 0)
+            self._draw(actors)
         renderer.SetViewport(0.0, 0.0, 1.0, 1.0)
 
-    def _draw(self, pieces: list[Piece]) -> None:
-        actors = self._bone.actors(pieces)
+    def _batches(self, groups: list[list[Piece]], *, quick: bool = False) -> Iterator[Sequence[vtkProp3D]]:
+        """Return what is drawn one after the other: solid first, so that transparent bone lies over it."""
+        solid, clear = (self._added.actors(solid=each, quick=quick) for each in (True, False))
+        if solid or not groups:
+            yield solid
+        for group in groups:
+            yield self._bone.actors(group)
+        if clear:
+            yield clear
+
+    def _draw(self, actors: Sequence[vtkProp3D]) -> None:
         for actor in actors:
             actor.VisibilityOn()
         self._target.draw(self._stage.bone)

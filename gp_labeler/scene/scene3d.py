@@ -5,12 +5,15 @@ Adapters only draw what they are shown; who shows what when is for the view that
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING, Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import SurfaceHit
+from gp_labeler.scene.added_meshes import AddedMeshActors
 from gp_labeler.scene.backdrop import Backdrop, Sight
 from gp_labeler.scene.bone import BoneActor
 from gp_labeler.scene.camera import SceneCamera
@@ -26,6 +29,9 @@ from gp_labeler.scene.segments import CrosshairActor, SegmentActor
 from gp_labeler.scene.slice_planes import SlicePlaneActor
 from gp_labeler.scene.stage import Stage
 from gp_labeler.scene.target import RenderTarget
+
+if TYPE_CHECKING:
+    import pyvista as pv
 
 __all__ = ["Scene3D"]
 
@@ -71,6 +77,7 @@ class Scene3D:
         self.camera = SceneCamera(bone.GetActiveCamera(), lambda: target.size)
         self.control = CameraControl(self.camera)
         self.bone = BoneActor(self._stage)
+        self.added = AddedMeshActors(self._stage)
         self.slices = SlicePlaneActor(self._stage)
         self.lines = SegmentActor(self._stage)
         self.crosshair = CrosshairActor(self._stage)
@@ -82,7 +89,7 @@ class Scene3D:
         self.scale_bar = ScaleBar(self._stage)
         self.cube = OrientationCube(self._stage)
         target.add(self.cube.renderer)
-        self._backdrop = Backdrop(self._stage, target, self.bone, self.cube)
+        self._backdrop = Backdrop(self._stage, target, self.bone, self.added, self.cube)
         self._behind: tuple[object, dict[bytes, bool]] = (None, {})
         self.set_colours(self._stage.colours)
         self.camera.view_from("A")
@@ -129,18 +136,60 @@ class Scene3D:
     @property
     def bounds(self) -> FloatArray:
         """(2, 3) lowest and highest coordinates of the bone and the marks, mm."""
-        boxes = [] if self.bone.bounds is None else [self.bone.bounds]
+        boxes = [box for box in (self.bone.bounds, self.added.bounds) if box is not None]
         if len(self.marks.positions):
             boxes.append(np.stack([self.marks.positions.min(axis=0), self.marks.positions.max(axis=0)]))
         if not boxes:
             return _EMPTY_BOUNDS
         return np.stack([np.min(boxes, axis=(0, 1)), np.max(boxes, axis=(0, 1))])
 
+    def add_mesh(self, dataset: Any, *, name: str = "mesh", **options: Any) -> pv.Actor:
+        """Draw a dataset with the bone, until `remove_mesh`.
+
+        Each hides the other, as they lie in the scan; clicks go through it to the bone, and cuts spare it.
+
+        Parameters
+        ----------
+        dataset : pyvista dataset
+            Scan frame (LPS), mm: a mesh, points, a grid, an image or a ``MultiBlock`` of them.
+        name : str
+            A dataset of the same name is replaced.
+        **options
+            As for `pyvista.Plotter.add_mesh`, such as ``color="red"``, ``opacity=0.5``, ``scalars="height"``
+            or ``style="wireframe"``.
+
+        Returns
+        -------
+        pyvista.Actor
+            Its ``prop`` may be changed; call `render` then.
+
+        Raises
+        ------
+        GpError
+            pyvista cannot draw it, or not with these options.
+
+        Examples
+        --------
+        >>> import pyvista as pv
+        >>> scene = Scene3D(RenderTarget.offscreen(64, 64))
+        >>> _ = scene.add_mesh(pv.Sphere(radius=2.0), name="marker", color="red")
+        >>> scene.remove_mesh("marker")
+        True
+        >>> scene.close()
+        """
+        return self.added.add(dataset, name, options)
+
+    def remove_mesh(self, name: str = "mesh") -> bool:
+        """Take away what `add_mesh` drew under a name; return whether it was there."""
+        return self.added.remove(name)
+
     def fit(self) -> None:
         """Show everything from where the eye looks now."""
-        shown = [
+        shown: list[NDArray[Any]] = [
             surface.points[:: max(1, len(surface.points) // _FIT_SAMPLES)] for surface in self.bone.surfaces
         ]
+        if self.added.bounds is not None:
+            shown.append(_corners_of(self.added.bounds))
         points = np.concatenate([*shown, self.marks.positions]) if shown else self.marks.positions
         self.camera.fit(points if len(points) > 1 else _EMPTY_BOUNDS)
 
@@ -198,7 +247,13 @@ class Scene3D:
         self.target.draw(self._stage.base, *over, self._stage.overlay)
 
     def _sight(self) -> Sight:
-        look = (*self.bone.look, self.cube.visible, self._stage.scale, self._stage.bone.GetUseSSAO())
+        look = (
+            *self.bone.look,
+            self.added.look,
+            self.cube.visible,
+            self._stage.scale,
+            self._stage.bone.GetUseSSAO(),
+        )
         matrix = self.camera.viewpoint().matrix
         return Sight(matrix.tobytes(), self.target.size, look, self.bone.version)
 
@@ -283,6 +338,7 @@ class Scene3D:
             self.crosshair,
             self.lines,
             self.slices,
+            self.added,
             self.bone,
         ):
             adapter.close()
@@ -328,6 +384,11 @@ class _Room:
         self._box = box + margin * np.array([[-1.0], [1.0]])
         self._renderer.ResetCameraClippingRange(self._box.T.ravel().tolist())
         self._time = camera.GetMTime()
+
+
+def _corners_of(box: FloatArray) -> FloatArray:
+    """Return the (8, 3) corners of a (2, 3) box."""
+    return np.array([[box[a][0], box[b][1], box[c][2]] for a, b, c in np.ndindex(2, 2, 2)])
 
 
 def _light(renderer: vtkRenderer) -> None:

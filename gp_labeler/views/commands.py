@@ -72,6 +72,7 @@ class Commands(QObject):
             workbench.pose.overlay_changed,
             workbench.tracker.changed,
             workbench.references.changed,
+            workbench.meshes.changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()

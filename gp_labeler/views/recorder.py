@@ -6,12 +6,13 @@ import json
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from qtpy.QtCore import QObject
 
 from gp_core.disk import write_text
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
+from gp_labeler.added_meshes import AddedMesh
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.pose_desk import OverlayOptions
 from gp_labeler.scene.pose_data import PARTS
@@ -36,6 +37,8 @@ if TYPE_CHECKING:
 __all__ = ["LOOKS", "Recorder", "script_text"]
 
 _PHANTOM = "phantom-"
+_PLAIN = (str, int, float, bool, list, tuple)
+"""Kinds of options that a script can hold."""
 
 LOOKS = (
     *("view.reset", "view.projection", "view.from_", "view.cut_", "view.slices_visible"),
@@ -76,6 +79,7 @@ class Recorder(QObject):
         self.tables: list[Table] = []
         self._starts: list[tuple[Table, SpecimenState]] = []
         self._replayed = History(desk.session.state)
+        self._meshes: dict[str, AddedMesh] = {}
         self._begin()
         self._take_as_here()
         for signal, slot in (
@@ -90,6 +94,7 @@ class Recorder(QObject):
             (desk.atlas_changed, self._on_atlas),
             (desk.pose.path_changed, self._on_path),
             (desk.references.changed, self._on_references),
+            (desk.meshes.changed, self._on_meshes),
             (desk.view_changed, self._on_view_changed),
             (desk.tool_changed, self._on_tool),
             (desk.pose.overlay_changed, self._on_overlay),
@@ -147,6 +152,7 @@ class Recorder(QObject):
         self._on_path(desk.pose.path)
         if desk.references.points:
             self._on_references()
+        self._on_meshes()
 
     def _on_volume(self, _: Volume) -> None:
         self._begin()
@@ -287,6 +293,18 @@ class Recorder(QObject):
     def _on_references(self) -> None:
         files = self._window.workbench.references.files
         self.tables.append({"do": "reference", "files": [str(file.absolute()) for file in files]})
+
+    def _on_meshes(self) -> None:
+        """Record the meshes that were added from files, and those that were removed."""
+        shown = {mesh.name: mesh for mesh in self._window.workbench.meshes.meshes if mesh.file}
+        for name in self._meshes.keys() - shown.keys():
+            self.tables.append(step("remove_mesh", name=name))
+        for name, mesh in shown.items():
+            if self._meshes.get(name) is not mesh:
+                options = {key: value for key, value in mesh.options.items() if isinstance(value, _PLAIN)}
+                file = str(cast(Path, mesh.file).absolute())
+                self.tables.append(step("add_mesh", file=file, name=name, options=options or None))
+        self._meshes = shown
 
     def _on_job(self, task: Task[Any]) -> None:
         if isinstance(task.job, SaveMesh):

@@ -86,6 +86,7 @@ class SceneView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self._desk = workbench
         self.scene = Scene3D(RenderTarget.offscreen())
+        workbench.meshes.scene = self.scene
         self._hand = Hand(workbench)
         self._frame: QImage | None = None
         self._finished = False
@@ -191,6 +192,7 @@ class SceneView(QWidget):
             follow(self, signal, self._show_cursor)
         for signal in (desk.pose.overlay_changed, desk.references.changed):
             follow(self, signal, self._show_points)
+        follow(self, desk.meshes.changed, self.redraw)
         follow(self, desk.crosshair_changed, self._on_crosshair)
         follow(self, desk.point_shown, self.go_to)
         follow(self, desk.dragged, self._on_dragged)

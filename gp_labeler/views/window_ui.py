@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
 from gp_labeler.atlas_desk import is_atlas_file
+from gp_labeler.imaging.mesh_files import MESH_SUFFIXES
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.session.edited_specimen import VolumeChangedError
@@ -158,6 +159,13 @@ class WindowUi(AtlasUi, PoseUi):
         if files:
             self._remember_folder(files[0])
             self._desk.references.show(*files)
+
+    def ask_add_mesh(self) -> None:
+        """Ask for mesh files, and draw them with the bone."""
+        wanted = f"Meshes ({' '.join('*' + suffix for suffix in MESH_SUFFIXES)})"
+        for path in self.prompts.open_files("Add a mesh", self._folder, wanted, many=True):
+            self._remember_folder(path)
+            self._desk.meshes.open(path)
 
     def ask_export(self) -> None:
         """Ask for a folder, and write the landmarks of both sides into it."""

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from gp_labeler.offscreen.step import Step
 from gp_labeler.offscreen.steps.atlas import Check, Fit, UseAtlas
 from gp_labeler.offscreen.steps.expecting import Expect
-from gp_labeler.offscreen.steps.files import Details, Export, Import, Reference, Save
+from gp_labeler.offscreen.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
 from gp_labeler.offscreen.steps.looking import Act, Key, Look, Screenshot, Undo
 from gp_labeler.offscreen.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
 from gp_labeler.offscreen.steps.pose import CarryPath, Estimate, Overlay, Report, Verdict
@@ -19,7 +19,21 @@ __all__ = ["STEPS"]
 
 _ALL: tuple[type[Step], ...] = (
     *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, Key, Act, Undo),
-    *(Details, Import, Reference, Export, Fit, UseAtlas, Touches, Skull, Register, Estimate, Overlay),
+    *(
+        Details,
+        Import,
+        Reference,
+        AddMesh,
+        RemoveMesh,
+        Export,
+        Fit,
+        UseAtlas,
+        Touches,
+        Skull,
+        Register,
+        Estimate,
+        Overlay,
+    ),
     *(Verdict, Report, CarryPath, Check, Screenshot, Save, Expect),
 )
 

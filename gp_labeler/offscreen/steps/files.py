@@ -8,13 +8,13 @@ from typing import ClassVar
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.offscreen.rig import Rig
-from gp_labeler.offscreen.step import Step, Texts
+from gp_labeler.offscreen.step import Options, Step, Texts
 from gp_labeler.session.landmark_export import export_landmarks
 from gp_labeler.session.landmark_import import import_landmarks
 from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
 from gp_labeler.session.specimen_file import SUFFIX
 
-__all__ = ["Details", "Export", "Import", "Reference", "Save"]
+__all__ = ["AddMesh", "Details", "Export", "Import", "Reference", "RemoveMesh", "Save"]
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,53 @@ class Reference(Step):
             rig.desk.references.show(*[rig.to_read(file) for file in self.files])
         else:
             rig.desk.references.clear()
+        rig.settle(in_passing=False)
+
+
+@dataclass(frozen=True)
+class AddMesh(Step):
+    """Draw a mesh with the bone.
+
+    Parameters
+    ----------
+    file : text
+        PLY, STL, VTP, OBJ or glTF; LPS, mm.
+    name : text, optional
+        What to remove it by; by default the file's name without its suffix.
+    options : table, optional
+        As for ``pyvista.Plotter.add_mesh``, such as ``{color = "red", opacity = 0.5}``.
+    """
+
+    do: ClassVar[str] = "add_mesh"
+    file: str
+    name: str | None = None
+    options: Options = field(default_factory=dict)
+
+    def run(self, rig: Rig) -> str:  # noqa: D102
+        _ = rig.voxel  # a scan must be there
+        name = rig.desk.meshes.add(rig.to_read(self.file), name=self.name, **self.options)
+        rig.settle(in_passing=False)
+        return name
+
+
+@dataclass(frozen=True)
+class RemoveMesh(Step):
+    """Take away a mesh that was added, or all.
+
+    Parameters
+    ----------
+    name : text, optional
+        Of which one; by default all.
+    """
+
+    do: ClassVar[str] = "remove_mesh"
+    name: str | None = None
+
+    def run(self, rig: Rig) -> None:  # noqa: D102
+        if self.name is None:
+            rig.desk.meshes.clear()
+        else:
+            rig.desk.meshes.remove(self.name)
         rig.settle(in_passing=False)
 
 
