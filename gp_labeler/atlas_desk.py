@@ -15,6 +15,7 @@ from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Specimen
+from gp_core.terminal import printable
 from gp_labeler.atlas_work import (
     FEWEST_ANIMALS,
     FitAtlas,
@@ -248,7 +249,7 @@ class AtlasDesk(DeskSignals):
             self.use_atlas(recalled.fitted.atlas)
             self.atlas_problem = f"The atlas of {source.text} cannot be had any more: {recalled.problem}"
             self.atlas_details_changed.emit()
-            self.message.emit(f"{self.atlas_problem} The published one is in use.", "warning")
+            self.message.emit(printable(f"{self.atlas_problem} The published one is in use."), "warning")
         elif source.file is not None:
             self._take_read(recalled.fitted.atlas, source.file)
         else:
@@ -264,7 +265,7 @@ class AtlasDesk(DeskSignals):
 
     def _take_read(self, atlas: Atlas, file: Path) -> None:
         self.use_atlas(atlas, file=file)
-        self.message.emit(f"The atlas of {file.name} is in use", "info")
+        self.message.emit(printable(f"The atlas of {file.name} is in use"), "info")
 
     def _take_fitted(self, fitted: FittedAtlas, source: AtlasSource) -> None:
         self._take(fitted.atlas, fitted.animals, source)
@@ -274,7 +275,7 @@ class AtlasDesk(DeskSignals):
         if doubted:
             many = "animal" if len(doubted) == 1 else "animals"
             text += f"; {len(doubted)} {many} in doubt: {', '.join(doubted)}"
-        self.message.emit(text, "warning" if n or doubted else "info")
+        self.message.emit(printable(text), "warning" if n or doubted else "info")
 
     def _take_trial(self, trial: Trial) -> None:
         self.trial = trial

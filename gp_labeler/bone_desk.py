@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from gp_core.errors import GpError
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.terminal import printable
 from gp_core.validation import FloatArray
 from gp_labeler.bone import Bone
 from gp_labeler.desk_signals import DeskSignals
@@ -103,4 +104,4 @@ class BoneDesk(DeskSignals):
         """Write the whole bone surface at full resolution, in the background."""
         if self.volume is not None and self.threshold is not None:
             job = SaveMesh(self.volume, self.threshold, Path(path), self.smallest_part_mm)
-            self.jobs.submit(job, lambda file: self.message.emit(f"Wrote {file.name}", "info"))
+            self.jobs.submit(job, lambda file: self.message.emit(printable(f"Wrote {file.name}"), "info"))

@@ -75,6 +75,7 @@ def _tables(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
     np.savetxt(folder / "poses.csv", poses.reshape(-1, 16), delimiter=",")
     np.savetxt(folder / "poses.txt", poses[:, :3].reshape(-1, 12))
     _recordings(folder, poses)
+    (folder / "tip.json").write_text(json.dumps({"tip_offset_mm": [0.0, 0.0, 100.0], "rms_mm": 0.1}))
     (folder / "names.csv").write_text("their name,our code\nApex,CA\nBase,CB\n\nBolt,\n")
     (folder / "names.json").write_text(json.dumps({"Apex": "CA", "Base": "CB"}))
     angle = np.linspace(0, 9, 60)
@@ -95,6 +96,7 @@ def _tables(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
     return {
         "poses": [folder / "poses.csv", folder / "poses.txt"],
         "recording": [folder / name for name in ("a.igs.mha", "a.igs.nrrd", "quaternions.csv")],
+        "tip": [folder / "tip.json"],
         "names": [folder / "names.csv", folder / "names.json"],
         "path": [folder / "path.csv"],
         "mat": [folder / "sets.mat", folder / "plain.mat"],
@@ -173,9 +175,14 @@ def _scans(folder: Path, rng: np.random.Generator) -> list[Path]:
     image = SimpleITK.GetImageFromArray(voxels)
     image.SetSpacing((0.1, 0.1, 0.2))
     found = []
-    for name in ("a.nrrd", "a.mha", "a.nii", "a.nii.gz", "a.vtk"):
+    for name in ("a.nrrd", "a.mha", "a.nii", "a.nii.gz", "a.vtk", "a.gipl"):
         SimpleITK.WriteImage(image, str(folder / name), useCompression=name in ("a.nrrd", "a.nii.gz"))
         found.append(folder / name)
+    words = " ".join(map(str, voxels.ravel().tolist()))
+    about = "# vtk DataFile Version 3.0\nscan\nASCII\nDATASET STRUCTURED_POINTS\nDIMENSIONS 14 12 10\n"
+    about += "ORIGIN 0 0 0\nSPACING 0.1 0.1 0.2\nPOINT_DATA 1680\nSCALARS grey int 1\nLOOKUP_TABLE default\n"
+    (folder / "words.vtk").write_text(about + words + "\n")
+    found.append(folder / "words.vtk")
     for name in ("b.nhdr", "b.mhd", "b.hdr"):
         pair = folder / name.replace(".", "_")
         pair.mkdir()

@@ -41,6 +41,7 @@ from gp_labeler.views.window_state import WindowState
 __all__ = ["TARGETS", "Outcome", "Target"]
 
 MARKS = "{good}/landmarks"
+TABLES = "{good}/tables"
 FEW = "--settings estimation --max-iterations 3 --json {out}"
 COMMANDS = (
     ("touches", "estimate {in} --side L --json {out}"),
@@ -57,7 +58,9 @@ COMMANDS = (
     ),
     ("poses", "pivot {in} --json {out}"),
     ("recording", "pivot {in} --json {out}"),
-    ("recording", "touches {in} --tip 0,0,100 --order CL,MN -o {out}"),
+    ("recording", "touches {in} --tip 0,0,100 --order CL,MN -o {dir}.csv"),
+    ("tip", f"touches {TABLES}/a.igs.mha --tip {{in}} --order CL,MN -o {{dir}}.csv"),
+    ("animals", "conditions {in} --groups shared --repeats 1 --animals 3 --workers 1 --json {out}"),
     ("names", f"check {MARKS}/one_L.csv --names {{in}} --json {{out}}"),
     ("animals", "fit {in} -o {out}"),
     ("animals", "check {in} --json {out}"),
@@ -86,6 +89,8 @@ STEPS: tuple[tuple[str, dict[str, object]], ...] = (
     ("animals", {"do": "atlas", "specimens": ["{in}"]}),
     ("landmarks", {"do": "import", "files": ["{in}"], "side": "L"}),
     ("touches", {"do": "touches", "side": "L", "points": "{in}"}),
+    ("landmarks", {"do": "skull", "points": "{in}"}),
+    ("path", {"do": "path", "path": "{in}", "side": "L", "units": "mm"}),
 )
 
 OLD = b'{"what was": "there before"}\n'

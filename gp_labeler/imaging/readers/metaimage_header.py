@@ -81,7 +81,7 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
         files=tuple(dict.fromkeys((path, *files))),
         geometry=geometry,
         found=(*shortage(source), *found),
-        notes=notes,
+        notes=(*notes, *_unscaled(fields)),
         channels=layout.channels,
         n_volumes=layout.n_volumes,
     )
@@ -151,6 +151,21 @@ def _geometry(fields: dict[str, str]) -> tuple[Geometry, tuple[str, ...], tuple[
         reason=reason,
     )
     return geometry, notes, _contradictions(letters, direction if oriented else np.eye(3))
+
+
+def _unscaled(fields: dict[str, str]) -> tuple[str, ...]:
+    """Say so where the header scales values: ITK, and so every other program, takes them as stored."""
+    slope, offset = (
+        numbers({name.lower(): default} | fields, name, 1)[0]
+        for name, default in (
+            ("ElementToIntensityFunctionSlope", "1"),
+            ("ElementToIntensityFunctionOffset", "0"),
+        )
+    )
+    if (slope, offset) == (1.0, 0.0):
+        return ()
+    scale = f"ElementToIntensityFunction ({slope:g}, {offset:g})"
+    return (f"its {scale} is not applied, as in ITK: values are as stored",)
 
 
 def _spacing(fields: dict[str, str], n: int, unit: float) -> tuple[Spacing | None, str, Spacing | None]:

@@ -19,6 +19,7 @@ _POSITION = re.compile(r"(\d+)\.(\d+)")
 _HEX_TAIL = re.compile(r"(.*?)([0-9a-fA-F]{2,8})")
 _FEWEST_HEX, _HOLES = 10, 0.1
 _SPARSEST = 100
+_SPELLINGS = {".tiff": ".tif", ".jpeg": ".jpg"}
 
 
 @dataclass(frozen=True)
@@ -75,7 +76,29 @@ def group_slices(files: Iterable[Path]) -> tuple[SliceGroup, ...]:
     for file in others:
         shapes[_RUN.sub("#", file.name).lower()].append(file)
     groups = [*hexadecimal, *(group for members in shapes.values() for group in _split(members))]
+    groups = _under_two_suffixes(groups)
     return tuple(sorted(groups, key=lambda group: (-len(group.files), group.pattern)))
+
+
+def _under_two_suffixes(groups: Sequence[SliceGroup]) -> list[SliceGroup]:
+    """Join groups that differ in their suffix only (``.tif``, ``.tiff``) and share no number."""
+    alike: dict[str, list[SliceGroup]] = defaultdict(list)
+    for group in groups:
+        name = group.pattern.lower()
+        alike[
+            next((name.removesuffix(s) + t for s, t in _SPELLINGS.items() if name.endswith(s)), name)
+        ].append(group)
+    joined = []
+    for members in alike.values():
+        slices = sorted(
+            zip((n for g in members for n in g.numbers), (f for g in members for f in g.files), strict=True)
+        )
+        numbers, files = zip(*slices, strict=True)
+        if len(members) > 1 and len(set(numbers)) == len(numbers):
+            joined.append(SliceGroup(members[0].pattern, files, numbers))
+        else:
+            joined += members
+    return joined
 
 
 def _hexadecimal(files: Sequence[Path]) -> tuple[list[SliceGroup], list[Path]]:
@@ -92,9 +115,10 @@ def _hexadecimal(files: Sequence[Path]) -> tuple[list[SliceGroup], list[Path]]:
         differs = (n for n, letters in enumerate(zip(*tails, strict=True)) if len(set(letters)) > 1)
         same = next(differs, width)  # letters before it belong to a word
         tails = [tail[same:] for tail in tails]
-        lettered = sum(not tail.isdecimal() for tail in tails)
+        lettered = sum(not tail.isdecimal() for tail in tails if tail)
+        counted = lettered < len(tails) or any(tail[-1:].isalpha() for tail in tails)
         holes = max(numbers) - min(numbers) + 1 - len(numbers)
-        if 0 < lettered < len(tails) and len(tails) > _FEWEST_HEX and holes <= _HOLES * len(tails):
+        if lettered and counted and len(tails) > _FEWEST_HEX and holes <= _HOLES * len(tails):
             counts, ordered = zip(*sorted(members), strict=True)
             first = ordered[0]
             groups.append(SliceGroup(f"{first.stem[:-width]}#{first.suffix}", ordered, counts))

@@ -218,10 +218,21 @@ def _by_spacings(fields: dict[str, str], layout: Layout) -> tuple[Geometry, tupl
     n = len(layout.sizes)
     units, unknown, note = lengths_in_mm([_quoted(fields, "units", n)[axis] for axis in layout.space])
     spacing, thickness = (_along(fields, name, layout, units) for name in ("spacings", "thicknesses"))
-    if _positive(spacing):
-        return _with_units(Geometry(spacing, sides_known=False), unknown), note
+    if spacing is not None and _positive(spacing):
+        origin = _first_centre(fields, layout, units, spacing)
+        return _with_units(Geometry(spacing, origin, sides_known=False), unknown), note
     reason = "its header has neither spacings nor space directions for all axes"
     return Geometry(None, sides_known=False, suggested=_positive(thickness), reason=reason), note
+
+
+def _first_centre(fields: dict[str, str], layout: Layout, units: list[float], spacing: Spacing) -> Spacing:
+    """Return the centre of the first voxel, if the axes say where they begin: a cell at its edge."""
+    begins = _along(fields, "axis mins", layout, units)
+    if begins is None or not np.isfinite(begins).all():
+        return 0.0, 0.0, 0.0
+    words = _words(fields, "centerings", len(layout.sizes), "cell")
+    half = [0.0 if words[axis].lower() == "node" else 0.5 for axis in layout.space]
+    return _three(np.array(begins) + np.array(half) * spacing)
 
 
 def _with_units(geometry: Geometry, unknown: str) -> Geometry:
@@ -238,11 +249,11 @@ def _with_units(geometry: Geometry, unknown: str) -> Geometry:
 
 
 def _along(fields: dict[str, str], name: str, layout: Layout, units: list[float]) -> Spacing | None:
-    words = _words(fields, name, len(layout.sizes), "nan")
+    words = _words(fields, "".join(name.split()), len(layout.sizes), "nan")
     try:
         values = [float(words[axis]) for axis in layout.space]
     except ValueError:
-        raise VolumeError(f"its {name} are {fields[name]!r}", remedy="Correct its header.") from None
+        raise VolumeError(f"its {name} are {' '.join(words)}", remedy="Correct its header.") from None
     return _three(np.array(values) * units)
 
 

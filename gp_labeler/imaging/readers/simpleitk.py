@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -34,6 +35,7 @@ def read_itk_header(path: Path, channel: int | None = None, *, kind: str = "") -
     VolumeError
         SimpleITK cannot read it.
     """
+    _check_image(path)
     reader = _sitk.ImageFileReader()
     with _quiet(), _plain_name(path) as name:
         reader.SetFileName(name)
@@ -58,6 +60,18 @@ def read_itk_header(path: Path, channel: int | None = None, *, kind: str = "") -
         n_volumes=int(size[3]) if n > 3 else 1,
         format=kind or None,
     )
+
+
+def _check_image(path: Path) -> None:
+    """Refuse a VTK file that holds a mesh."""
+    with path.open("rb") as file:
+        head = file.read(1000)
+    kind = re.search(rb"^DATASET +(\w+)", head, re.MULTILINE)
+    if head.startswith(b"# vtk") and kind and kind[1].upper() != b"STRUCTURED_POINTS":
+        name = kind[1].decode("ascii", "replace")
+        raise VolumeError(
+            f"it holds {name}, which is no image", file=path, remedy="Give the scan it was made from."
+        )
 
 
 def read_itk_planes(path: Path) -> Plane:

@@ -498,3 +498,30 @@ def test_voxels_without_a_finite_value_become_the_lowest(tmp_path: Path) -> None
     volume = read_volume(write_nifti(scan, tmp_path / "nan.nii"))
     assert volume.array[0, 0, 0] == volume.array[5, 5, 5] == -50
     assert any("4 voxels without a finite value" in note for note in volume.notes)
+
+
+@pytest.mark.parametrize("centering", ["cell", "node", "???"])
+def test_nrrd_axes_that_say_where_they_begin_lie_where_itk_has_them(centering: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.nrrd"
+    header = {"spacings": [0.1, 0.2, 0.3], "axis mins": [-3.0, 4.0, 12.0], "centerings": [centering] * 3}
+    nrrd.write(str(path), load_mouse().array[:8, :9, :10].transpose(2, 1, 0), header)
+    accepted = read_volume(path, accept=["extent"])
+    expected = SimpleITK.ReadImage(str(path)).GetOrigin()
+    np.testing.assert_allclose(accepted.T_scan_voxel[:3, 3], expected, atol=1e-12)
+
+
+def test_a_scale_of_metaimage_that_nobody_applies_is_said(tmp_path: Path) -> None:
+    path = tmp_path / "a.mha"
+    write_sitk(cropped(), path)
+    content = path.read_bytes()
+    path.write_bytes(content.replace(b"ElementType", b"ElementToIntensityFunctionSlope = 2\nElementType"))
+    volume = read_volume(path)
+    assert any("ElementToIntensityFunction (2, 0) is not applied" in note for note in volume.notes)
+    np.testing.assert_array_equal(volume.array, SimpleITK.GetArrayFromImage(SimpleITK.ReadImage(str(path))))
+
+
+def test_a_vtk_mesh_is_no_scan(tmp_path: Path) -> None:
+    path = tmp_path / "a.vtk"
+    path.write_text("# vtk DataFile Version 3.0\nbone\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n0 0 0\n")
+    with pytest.raises(VolumeError, match="it holds POLYDATA, which is no image"):
+        read_volume(path)

@@ -496,6 +496,8 @@ def test_a_preview_is_coarse_and_needs_no_voxel_size(tmp_path: Path) -> None:
 NAMES = {
     "hexadecimal": lambda k: f"im_{k + 3:04x}.tif",
     "hexadecimal, capital": lambda k: f"face{k:04X}.tif",
+    "hexadecimal, every one with a letter": lambda k: f"im_{k + 200:04x}.tif",
+    "two spellings of the suffix": lambda k: f"im_{k:03d}.{'tif' if k % 3 else 'TIFF'}",
     "position": lambda k: f"head_z{0.3 * k:.2f}.tif",
     "position in the middle": lambda k: f"head_{0.125 * k:07.3f}mm.tif",
     "time": lambda k: f"2024-05-03_12-{k // 60:02d}-{k % 60:02d}_slice{k:04d}.tif",
@@ -533,3 +535,13 @@ def test_a_hexadecimal_slice_that_is_missing_is_named() -> None:
     files = [Path(f"im_{k:03x}.tif") for k in range(40) if k != 27]
     (group,) = group_slices(files)
     assert number_slices(group).missing == (27,)
+
+
+def test_two_copies_of_a_stack_under_two_suffixes_stay_two() -> None:
+    files = [Path(f"im_{k:03d}{suffix}") for k in range(20) for suffix in (".tif", ".tiff")]
+    assert [len(group.files) for group in group_slices(files)] == [20, 20]
+
+
+def test_letters_that_name_a_stack_are_no_digits() -> None:
+    files = [Path(f"{letter}{k:02d}.tif") for letter in "ab" for k in range(20)]
+    assert [len(group.files) for group in group_slices(files)] == [20, 20]
