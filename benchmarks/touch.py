@@ -26,9 +26,9 @@ from qtpy.QtWidgets import QApplication, QWidget  # noqa: E402
 from gp_core import PROBE, RigidTransform, Side  # noqa: E402
 from gp_core.landmarks.features import FEATURES  # noqa: E402
 from gp_core.validation import FloatArray  # noqa: E402
-from gp_labeler.session import touching  # noqa: E402
-from gp_labeler.session.edits import PlacePoint  # noqa: E402
-from gp_labeler.session.state import How, Provenance  # noqa: E402
+from gp_labeler.document import touching  # noqa: E402
+from gp_labeler.document.edits import PlacePoint  # noqa: E402
+from gp_labeler.document.state import How, Provenance  # noqa: E402
 from gp_labeler.views.application import make_window  # noqa: E402
 from gp_labeler.views.main_window import MainWindow  # noqa: E402
 

@@ -26,10 +26,10 @@ from qtpy.QtTest import QTest  # noqa: E402
 
 from gp_core.validation import FloatArray  # noqa: E402
 from gp_labeler.imaging.volume import Volume  # noqa: E402
-from gp_labeler.session.jobs import Job  # noqa: E402
+from gp_labeler.jobs.runner import Job  # noqa: E402
+from gp_labeler.jobs.work import MeshFirst, MeshOverview  # noqa: E402
 from gp_labeler.views.application import make_window  # noqa: E402
 from gp_labeler.views.main_window import MainWindow  # noqa: E402
-from gp_labeler.work import MeshFirst, MeshOverview  # noqa: E402
 
 N_POINTS, N_TURNS = 20, 20
 LEFT = Qt.MouseButton.LeftButton

@@ -11,10 +11,10 @@ from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.mesh_files import read_mesh
-from gp_labeler.session.jobs import Progress
+from gp_labeler.jobs.runner import Progress
 
 if TYPE_CHECKING:
-    from gp_labeler.workbench import Workbench
+    from gp_labeler.models.workspace import Workbench
 
 __all__ = ["AddedMesh", "AddedMeshes", "ReadMesh"]
 

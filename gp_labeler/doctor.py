@@ -220,7 +220,7 @@ def opengl_facts() -> dict[str, Any]:
 
 def _state_folder(found: Examination) -> None:
     try:
-        from gp_labeler.session.places import default_directory
+        from gp_labeler.document.paths import default_directory
     except ImportError as error:
         found.note("State folder", "unknown")
         problem = str(explain_import(error))

@@ -51,8 +51,8 @@ def run_export(arguments: Sequence[str]) -> int:
         A specimen cannot be read, nothing is placed in it, or a file is there already or cannot be written.
     """
     args = make_export_parser().parse_args(arguments)
-    from gp_labeler.session.landmark_export import export_landmarks  # here: `--help` need not wait
-    from gp_labeler.session.specimen_file import read_specimen
+    from gp_labeler.document.landmark_export import export_landmarks  # here: `--help` need not wait
+    from gp_labeler.document.specimen_file import read_specimen
 
     states = [read_specimen(path) for path in args.specimens]
     with protected_inputs(args.specimens):

@@ -11,10 +11,10 @@ from typing import Any
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.io.text import as_csv_cell
+from gp_labeler.document.opening import tidy_name
 from gp_labeler.offscreen.report import Report
 from gp_labeler.offscreen.runner import Tell, run_script
 from gp_labeler.offscreen.script import Script
-from gp_labeler.session.opening import tidy_name
 
 __all__ = ["SUMMARY", "run_batch", "summary_lines"]
 

@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from gp_core.landmarks.features import FEATURES, Side
+from gp_labeler.models.workflow import OPENING
 from gp_labeler.offscreen.script import Script, make_script
-from gp_labeler.session.workflow import OPENING
 
 __all__ = ["demo_script"]
 

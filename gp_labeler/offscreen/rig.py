@@ -19,11 +19,11 @@ from gp_core.disk import protect
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature, index_of
 from gp_core.validation import FloatArray
+from gp_labeler.document.animals import labelled_files
+from gp_labeler.models.workflow import Active
 from gp_labeler.offscreen.events import click
 from gp_labeler.offscreen.prompts import ScriptPrompts
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session.animals import labelled_files
-from gp_labeler.session.workflow import Active
 
 if TYPE_CHECKING:
     from gp_labeler.offscreen.steps.pose import Estimated

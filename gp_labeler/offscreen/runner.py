@@ -9,11 +9,11 @@ from contextlib import suppress
 from pathlib import Path
 
 from gp_core.errors import GpError
+from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.offscreen.report import Report, StepRecord
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.script import Script, StepError
 from gp_labeler.offscreen.step import Step
-from gp_labeler.session.specimen_file import SUFFIX
 
 __all__ = ["REPORT", "Tell", "do_step", "run_script"]
 

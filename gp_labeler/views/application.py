@@ -15,16 +15,16 @@ from qtpy.QtCore import QLocale, QMessageLogContext, Qt, QTimer, QtMsgType, qIns
 from qtpy.QtWidgets import QApplication
 
 from gp_core.errors import GpError
+from gp_labeler.document.paths import default_directory
+from gp_labeler.document.recovery import find_recoveries, unreadable_journals
 from gp_labeler.installation import check_display
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.plain_numbers import use_plain_numbers
-from gp_labeler.session.places import default_directory
-from gp_labeler.session.recovery import find_recoveries, unreadable_journals
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.state_question import directory_to_use
 from gp_labeler.views.window_state import WindowState
-from gp_labeler.workbench import Workbench
 
 __all__ = ["make_application", "make_window", "run_window"]
 

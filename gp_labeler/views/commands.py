@@ -10,10 +10,10 @@ from qtpy.QtCore import QObject, Qt, Signal
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
-from gp_labeler.actions import ACTIONS, MENUS, Action, Ui, run
+from gp_labeler.commands.actions import ACTIONS, MENUS, Action, Ui, run
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow
 from gp_labeler.views.shortcuts_sheet import keys_text
-from gp_labeler.workbench import Workbench
 
 __all__ = ["Commands"]
 

@@ -11,13 +11,13 @@ from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
+from gp_labeler.models.ghosts import CHI2_95
+from gp_labeler.models.workflow import PointState
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import Ghost
 from gp_labeler.scene.marks import REFERENCE, Mark
 from gp_labeler.scene.segments import Segment
-from gp_labeler.session.ghosts import CHI2_95
-from gp_labeler.session.workflow import PointState
-from gp_labeler.workbench import Workbench
 
 __all__ = ["drawn_ghosts", "drawn_marks", "drawn_references", "drawn_segments", "key_of", "point_of"]
 

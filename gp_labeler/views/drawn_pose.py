@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from gp_core.pose.mixture import UNDECIDED
 from gp_core.validation import FloatArray
-from gp_labeler.pose_desk import OverlayOptions
+from gp_labeler.document.touches import Touches
+from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.pose import OverlayOptions
+from gp_labeler.models.pose_exports import InsertionPath
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.pose_data import (
     METHOD_ROLES,
     PARTS,
@@ -16,10 +20,6 @@ from gp_labeler.scene.pose_data import (
     DrawnVector,
     PoseScene,
 )
-from gp_labeler.session.estimate import Estimate
-from gp_labeler.session.pose_exports import InsertionPath
-from gp_labeler.session.touches import Touches
-from gp_labeler.workbench import Workbench
 
 __all__ = ["pose_scene"]
 

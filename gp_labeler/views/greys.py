@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.window_level import WindowLevel
-from gp_labeler.workbench import Workbench
 
 __all__ = ["drag_greys", "greys_of"]
 

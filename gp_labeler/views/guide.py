@@ -17,7 +17,8 @@ from qtpy.QtWidgets import (
 
 from gp_core.landmarks.features import CODES, RECOMMENDED, Side, feature
 from gp_core.pose.quality import pose_quality
-from gp_labeler.pose_desk import ORDER
+from gp_labeler.models.pose import ORDER
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels, styled, text_scale
@@ -25,7 +26,6 @@ from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import scrolled, text_label
 from gp_labeler.views.panels.pose_words import sentence
 from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
-from gp_labeler.workbench import Workbench
 
 __all__ = ["GuideWindow"]
 

@@ -8,13 +8,13 @@ from qtpy.QtWidgets import QAbstractSpinBox, QApplication, QLineEdit, QPlainText
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
 from gp_core.validation import FloatArray
+from gp_labeler.document.state import How, Landmark
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.gestures import CLICK_PIXELS
-from gp_labeler.session import labelling
-from gp_labeler.session.state import How, Landmark
-from gp_labeler.session.touches import TouchHow
 from gp_labeler.views.drawn import point_of
 from gp_labeler.views.panels.landmark_menu import landmark_menu
-from gp_labeler.workbench import Workbench
 
 __all__ = ["Hand", "nudge"]
 

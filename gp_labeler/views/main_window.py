@@ -20,9 +20,10 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.session.animals import may_hold_labels
-from gp_labeler.session.view import View as SessionView
-from gp_labeler.session.view import ViewState
+from gp_labeler.document.animals import may_hold_labels
+from gp_labeler.models.view import View as SessionView
+from gp_labeler.models.view import ViewState
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
@@ -44,7 +45,6 @@ from gp_labeler.views.tracker_display import TrackerDisplay
 from gp_labeler.views.view_grid import ViewGrid
 from gp_labeler.views.window_state import WindowState
 from gp_labeler.views.window_ui import WindowUi
-from gp_labeler.workbench import Workbench
 
 __all__ = ["MainWindow"]
 

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 from qtpy.QtCore import QObject
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import DrawnTip, PoseScene
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.pose_overlay import PoseOverlay
 from gp_labeler.views.view_grid import ViewGrid
-from gp_labeler.workbench import Workbench
 
 __all__ = ["PoseDisplay"]
 

@@ -11,10 +11,10 @@ from qtpy.QtGui import QGuiApplication
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.pose.insertion_path import UNITS
+from gp_labeler.document import touching
+from gp_labeler.models.pose_exports import FORMATS, InsertionPath
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
-from gp_labeler.session import touching
-from gp_labeler.session.pose_exports import FORMATS, InsertionPath
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.panels.physical_dialog import PhysicalDialog
 from gp_labeler.views.panels.tracker_dialog import TrackerDialog

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.errors import GpError
+from gp_labeler.document.landmark_export import export_landmarks
+from gp_labeler.document.landmark_import import MisfitError, import_landmarks
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.landmark_import import MisfitError, import_landmarks
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ask_about", "export_asking", "import_asking"]
 

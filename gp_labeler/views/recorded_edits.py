@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 from gp_core.landmarks.features import Side
-from gp_labeler.session.edits import (
+from gp_labeler.document.edits import (
     CheckPoint,
     ClearPoint,
     ConfirmPoint,
@@ -19,10 +19,10 @@ from gp_labeler.session.edits import (
     SwapPoints,
     SwapSides,
 )
-from gp_labeler.session.landmark_import import ImportLandmarks
-from gp_labeler.session.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
-from gp_labeler.session.state import PointKey, SpecimenState, point_key
-from gp_labeler.session.touch_edits import (
+from gp_labeler.document.landmark_import import ImportLandmarks
+from gp_labeler.document.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
+from gp_labeler.document.state import PointKey, SpecimenState, point_key
+from gp_labeler.document.touch_edits import (
     LeaveOutTouch,
     MoveTouches,
     RecordTouch,
@@ -31,7 +31,7 @@ from gp_labeler.session.touch_edits import (
     SwapTouches,
     TakeTouches,
 )
-from gp_labeler.session.touches import Touch
+from gp_labeler.document.touches import Touch
 
 __all__ = ["RECORDED", "Table", "step", "steps_of"]
 

@@ -13,23 +13,23 @@ from qtpy.QtCore import QObject
 from gp_core.disk import write_text
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_labeler.added_meshes import AddedMesh
+from gp_labeler.document.edits import Edit
+from gp_labeler.document.history import History
+from gp_labeler.document.landmark_export import FORMATS, ExportReport
+from gp_labeler.document.opening import tidy_name
+from gp_labeler.document.specimen_edits import RecordPoseCheck
+from gp_labeler.document.specimen_file import SUFFIX, write_specimen
+from gp_labeler.document.specimen_json import document_of
+from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.pose_desk import OverlayOptions
+from gp_labeler.jobs.runner import Task
+from gp_labeler.jobs.work import SaveMesh
+from gp_labeler.models.pose import OverlayOptions
+from gp_labeler.models.pose_exports import InsertionPath
+from gp_labeler.models.view import ViewState
 from gp_labeler.scene.pose_data import PARTS
-from gp_labeler.session.document import document_of
-from gp_labeler.session.edits import Edit
-from gp_labeler.session.history import History
-from gp_labeler.session.jobs import Task
-from gp_labeler.session.landmark_export import FORMATS, ExportReport
-from gp_labeler.session.opening import tidy_name
-from gp_labeler.session.pose_exports import InsertionPath
-from gp_labeler.session.specimen_edits import RecordPoseCheck
-from gp_labeler.session.specimen_file import SUFFIX, write_specimen
-from gp_labeler.session.state import SpecimenState
-from gp_labeler.session.view import ViewState
 from gp_labeler.views.bind import follow
 from gp_labeler.views.recorded_edits import Table, step, steps_of
-from gp_labeler.work import SaveMesh
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow

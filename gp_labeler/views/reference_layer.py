@@ -9,6 +9,7 @@ from qtpy.QtCore import QObject
 from qtpy.QtGui import QPainter
 
 from gp_core.validation import FloatArray
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.slice_view import SliceView as Shown
@@ -17,7 +18,6 @@ from gp_labeler.views.drawn import drawn_references
 from gp_labeler.views.marker_pictures import marker_picture
 from gp_labeler.views.slice_layers import SliceName
 from gp_labeler.views.slice_painter import reach_of
-from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
     from gp_labeler.views.slice_view import SliceView

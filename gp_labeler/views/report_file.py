@@ -11,17 +11,17 @@ from qtpy.QtGui import QImage, QPageLayout, QPageSize, QPdfWriter, QTextDocument
 
 from gp_core.disk import write_bytes, write_text
 from gp_core.errors import GpError
+from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.pose_report import PoseReport
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
-from gp_labeler.session.estimate import Estimate
-from gp_labeler.session.pose_report import PoseReport
 from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.pictures import picture, picture_bytes
 
 if TYPE_CHECKING:
+    from gp_labeler.models.workspace import Workbench
     from gp_labeler.views.main_window import MainWindow
-    from gp_labeler.workbench import Workbench
 
 __all__ = ["report_of", "report_pictures", "reported_estimate", "save_report"]
 

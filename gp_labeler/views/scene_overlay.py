@@ -8,9 +8,9 @@ from qtpy.QtGui import QColor, QFontMetricsF, QPainter, QPen
 from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
+from gp_labeler.models.view import Cut
 from gp_labeler.scene.planes import Plane, letter_of, position_text
 from gp_labeler.scene.scene3d import Scene3D
-from gp_labeler.session.view import Cut
 from gp_labeler.views.fonts import font_of
 from gp_labeler.views.mouse import painted
 from gp_labeler.views.theme import theme_of

@@ -23,6 +23,9 @@ from qtpy.QtGui import (
 from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
+from gp_labeler.document.state import How
+from gp_labeler.models.view import Cut
+from gp_labeler.models.workspace import Drag, Workbench
 from gp_labeler.scene.cut import CutPlane
 from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize
@@ -30,8 +33,6 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.target import RenderTarget
-from gp_labeler.session.state import How
-from gp_labeler.session.view import Cut
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.fonts import text_scale
@@ -40,7 +41,6 @@ from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.scene_overlay import paint_crosshair, paint_cut, paint_pointer
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Drag, Workbench
 
 __all__ = ["SceneView"]
 

@@ -14,7 +14,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.actions import ACTIONS, MENUS, gestures
+from gp_labeler.commands.actions import ACTIONS, MENUS, gestures
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import open_at, scrolled

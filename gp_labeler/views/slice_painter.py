@@ -9,6 +9,7 @@ from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.validation import FloatArray
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import Ghost, ellipse
 from gp_labeler.scene.label_layout import lines_within, place_labels
@@ -27,7 +28,6 @@ from gp_labeler.views.slice_layers import SliceName
 from gp_labeler.views.slice_lines import paint_lines
 from gp_labeler.views.theme import Theme, theme_of
 from gp_labeler.views.word_pictures import word_picture
-from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
     from gp_labeler.views.slice_view import SliceView

@@ -9,14 +9,15 @@ from qtpy.QtWidgets import QWidget
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.document.state import How
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.bone_edge import BoneEdge
 from gp_labeler.scene.gestures import Button, Modifier, SliceControl
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.scene.slices import SliceSource
 from gp_labeler.scene.window_level import WindowLevel
-from gp_labeler.session.state import How
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.greys import drag_greys, greys_of
@@ -24,7 +25,6 @@ from gp_labeler.views.hand import Hand, nudge
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.slice_layers import SliceLayer
 from gp_labeler.views.slice_painter import SlicePainter, reach_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["SliceView"]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gp_labeler.session.state_directory import stand_in_directory, write_problem
+from gp_labeler.document.state_directory import stand_in_directory, write_problem
 from gp_labeler.views.prompts import Prompts
 
 __all__ = ["directory_to_use"]

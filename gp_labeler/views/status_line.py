@@ -10,15 +10,15 @@ from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QToolButton, QWidget
 
 from gp_core.validation import FloatArray
+from gp_labeler.document.edits import point_text
+from gp_labeler.jobs.runner import Task
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.planes import LETTERS
-from gp_labeler.session.edits import point_text
-from gp_labeler.session.jobs import Task
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["StatusLine", "where_text"]
 

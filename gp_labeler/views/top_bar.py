@@ -8,12 +8,12 @@ from qtpy.QtCore import QEvent, QSize, Qt
 from qtpy.QtGui import QAction, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow, set_role, size_text, spacing_text
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import ElidedLabel
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["TopBar"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from qtpy.QtCore import QObject, QTimer
 from qtpy.QtWidgets import QApplication
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.pose_data import DrawnTip
 from gp_labeler.views.bind import follow
 from gp_labeler.views.pose_display import PoseDisplay
-from gp_labeler.workbench import Workbench
 
 __all__ = ["TrackerDisplay"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow

@@ -7,6 +7,7 @@ from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from gp_core.validation import FloatArray
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
@@ -15,7 +16,6 @@ from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.slice_slider import SliceSlider
 from gp_labeler.views.slice_view import SliceView
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ViewFrame", "ViewGrid"]
 

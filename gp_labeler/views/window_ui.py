@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
-from gp_labeler.atlas_desk import is_atlas_file
+from gp_labeler.document.lock import InUseError
+from gp_labeler.document.opening import UnsavedEditsError
+from gp_labeler.document.recovery import Recovery
+from gp_labeler.document.specimen_document import VolumeChangedError
+from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.imaging.mesh_files import MESH_SUFFIXES
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.session.edited_specimen import VolumeChangedError
-from gp_labeler.session.lock import InUseError
-from gp_labeler.session.opening import UnsavedEditsError
-from gp_labeler.session.recovery import Recovery
-from gp_labeler.session.specimen_file import SUFFIX
+from gp_labeler.models.atlas import is_atlas_file
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.panels.export_dialog import ExportDialog
@@ -29,7 +30,6 @@ from gp_labeler.views.questions import ask_about, export_asking, import_asking
 from gp_labeler.views.recorder import Recorder
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.views.view_grid import CLOSE_MM
-from gp_labeler.workbench import Workbench
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -310,7 +310,7 @@ class WindowUi(AtlasUi, PoseUi):
 
     def show_about(self) -> None:
         """Say what this program is."""
-        from gp_labeler.session.specimen_file import application
+        from gp_labeler.document.specimen_file import application
 
         self.prompts.tell(
             "About gp-labeler",

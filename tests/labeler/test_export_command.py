@@ -9,11 +9,11 @@ import numpy as np
 from gp_core.cli import main as core
 from gp_core.io import load_specimens
 from gp_labeler.__main__ import main
+from gp_labeler.document.specimen_file import read_specimen, write_specimen
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.session import labelling
-from gp_labeler.session.session import Session
-from gp_labeler.session.specimen_file import read_specimen, write_specimen
+from gp_labeler.models import labelling
+from gp_labeler.models.session import Session
 
 
 def _specimen(folder):

@@ -18,11 +18,11 @@ from window_cases import MIDDLE, ball_volume, settle, write_ball
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_labeler.document.state import How
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.session import labelling
-from gp_labeler.session.jobs import Progress, QueueDispatcher
-from gp_labeler.session.state import How
-from gp_labeler.workbench import Workbench
+from gp_labeler.jobs.runner import Progress, QueueDispatcher
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 
 Refs = dict[str, weakref.ref]
 

@@ -130,9 +130,9 @@ def _recordings(folder: Path, poses: np.ndarray) -> None:
 
 
 def _sessions(folder: Path) -> dict[str, list[Path]]:
-    from gp_labeler.session.opening import new_session
-    from gp_labeler.session.specimen_edits import SetNotes, SetThreshold
-    from gp_labeler.session.touching import load_skull, load_touches, record_touch
+    from gp_labeler.document.opening import new_session
+    from gp_labeler.document.specimen_edits import SetNotes, SetThreshold
+    from gp_labeler.document.touching import load_skull, load_touches, record_touch
 
     folder.mkdir()
     session = new_session(folder / "state", specimen="GP-014")

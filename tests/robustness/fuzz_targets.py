@@ -24,18 +24,18 @@ from gp_core.pose.insertion_path import read_path
 from gp_core.registration.pivot import calibrate_pivot
 from gp_core.study.checkpoint import Checkpoint
 from gp_labeler.__main__ import main as gp_labeler_main
+from gp_labeler.document.animals import read_animals
+from gp_labeler.document.atlas_memory import AtlasMemory
+from gp_labeler.document.journal import read_journal
+from gp_labeler.document.landmark_import import import_landmarks
+from gp_labeler.document.opening import recover_session
+from gp_labeler.document.recent_files import RecentFiles
+from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_file import read_specimen
+from gp_labeler.document.touching import load_skull, load_touches
 from gp_labeler.imaging.readers import inspect_volume, read_volume
+from gp_labeler.models.session import Session
 from gp_labeler.offscreen.script import read_script
-from gp_labeler.session.animals import read_animals
-from gp_labeler.session.atlas_memory import AtlasMemory
-from gp_labeler.session.journal import read_journal
-from gp_labeler.session.landmark_import import import_landmarks
-from gp_labeler.session.opening import recover_session
-from gp_labeler.session.recent import RecentFiles
-from gp_labeler.session.recovery import find_recoveries
-from gp_labeler.session.session import Session
-from gp_labeler.session.specimen_file import read_specimen
-from gp_labeler.session.touching import load_skull, load_touches
 from gp_labeler.views.window_state import WindowState
 
 __all__ = ["TARGETS", "Outcome", "Target"]

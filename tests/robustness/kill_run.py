@@ -28,10 +28,10 @@ from gp_core import Atlas, load_specimens
 from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_core.io import read_landmarks, write_csv, write_markups
-from gp_labeler.session.opening import new_session, open_session, recover_session
-from gp_labeler.session.recovery import find_recoveries
-from gp_labeler.session.specimen_edits import SetNotes
-from gp_labeler.session.specimen_file import read_specimen
+from gp_labeler.document.opening import new_session, open_session, recover_session
+from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_edits import SetNotes
+from gp_labeler.document.specimen_file import read_specimen
 
 __all__ = ["KILLS", "Result", "run"]
 
@@ -307,8 +307,8 @@ def window_killed(folder: Path, rng: np.random.Generator) -> int:
     state = folder / "state"
     code = (
         "import sys; from pathlib import Path; from gp_labeler.views.application import make_window\n"
-        "from gp_labeler.session.specimen_edits import SetNotes\n"
-        "from gp_labeler.session.touching import record_touch\n"
+        "from gp_labeler.document.specimen_edits import SetNotes\n"
+        "from gp_labeler.document.touching import record_touch\n"
         "window = make_window(Path(sys.argv[1])); window.show(); session = window.workbench.session\n"
         "record_touch(session, 'L', 'OS', (1, 2, 3))\n"
         "for n in range(10000):\n"

@@ -7,12 +7,12 @@ from typing import ClassVar
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_labeler.document.landmark_export import export_landmarks
+from gp_labeler.document.landmark_import import import_landmarks
+from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes
+from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Options, Step, Texts
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.landmark_import import import_landmarks
-from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
-from gp_labeler.session.specimen_file import SUFFIX
 
 __all__ = ["AddMesh", "Details", "Export", "Import", "Reference", "RemoveMesh", "Save"]
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
-from gp_labeler.actions import action
+from gp_labeler.commands.actions import action
 from gp_labeler.offscreen.events import leave, press_keys
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Pair, Step, Triple

@@ -12,14 +12,14 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
+from gp_labeler.document.edits import PlacePoint, SuggestPoints
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
 from gp_labeler.offscreen.aiming import aim_at_bone, scroll_to
 from gp_labeler.offscreen.events import click, drag, press_keys
 from gp_labeler.offscreen.rig import VIEWS, Rig
 from gp_labeler.offscreen.step import Lengths, Pair, Positions, Step, Triple
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.edits import PlacePoint, SuggestPoints
-from gp_labeler.session.state import How
 
 __all__ = ["Choose", "Confirm", "Drag", "Place", "Put", "Suggest"]
 

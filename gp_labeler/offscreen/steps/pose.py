@@ -13,14 +13,14 @@ from gp_core.landmarks.anatomy import modiolar_axis
 from gp_core.landmarks.features import Side
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.validation import FloatArray
+from gp_labeler.models.estimate import Estimate as SideEstimate
+from gp_labeler.models.estimate import apart
+from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.offscreen.events import leave
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step
 from gp_labeler.offscreen.steps.touching import Points, Touches, current_estimate
 from gp_labeler.scene.pose_data import PARTS
-from gp_labeler.session.estimate import Estimate as SideEstimate
-from gp_labeler.session.estimate import apart
-from gp_labeler.session.pose_exports import InsertionPath
 from gp_labeler.views.report_file import report_of, save_report
 
 __all__ = ["CarryPath", "Estimate", "Estimated", "Overlay", "Report", "Verdict"]
@@ -32,7 +32,7 @@ class Estimated:
 
     Parameters
     ----------
-    estimate : gp_labeler.session.estimate.Estimate
+    estimate : gp_labeler.models.estimate.Estimate
         With a pose.
     pose : CochleaPose
         That pose.

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from gp_core.errors import GpError
+from gp_labeler.document.specimen_file import SUFFIX
+from gp_labeler.document.volume_reference import VolumeReference
 from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Ranges, Step, Triple
-from gp_labeler.session.specimen_file import SUFFIX
-from gp_labeler.session.volume_reference import VolumeReference
 
 __all__ = ["Mesh", "Open", "Spacing", "Threshold"]
 

@@ -14,12 +14,12 @@ from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.validation import FloatArray
+from gp_labeler.document import touching
+from gp_labeler.document.touch_edits import RecordTouch, SetSkull, TakeTouches
+from gp_labeler.document.touches import Touch, TouchHow, touch_name
+from gp_labeler.models.estimate import Estimate, Registered
 from gp_labeler.offscreen.rig import Rig
 from gp_labeler.offscreen.step import Step, Triple
-from gp_labeler.session import touching
-from gp_labeler.session.estimate import Estimate, Registered
-from gp_labeler.session.touch_edits import RecordTouch, SetSkull, TakeTouches
-from gp_labeler.session.touches import Touch, TouchHow, touch_name
 
 __all__ = ["Points", "Register", "Skull", "Touches", "current_estimate", "take_touches"]
 

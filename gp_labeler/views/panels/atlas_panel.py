@@ -17,9 +17,10 @@ from qtpy.QtWidgets import (
 )
 
 from gp_core.atlas.label_check import Finding
-from gp_labeler.atlas_work import FEWEST_ANIMALS, FitAtlas
-from gp_labeler.session.animals import Animals
-from gp_labeler.session.jobs import Task
+from gp_labeler.document.animals import Animals
+from gp_labeler.jobs.atlas import FEWEST_ANIMALS, FitAtlas
+from gp_labeler.jobs.runner import Task
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.atlas_table import AtlasTable
@@ -27,7 +28,6 @@ from gp_labeler.views.panels.finding_list import FindingList, FindingRow
 from gp_labeler.views.panels.import_words import sentence
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, emptied, scrolled, text_label
 from gp_labeler.views.panels.pose_parts import Notices
-from gp_labeler.workbench import Workbench
 
 __all__ = ["AtlasPanel"]
 

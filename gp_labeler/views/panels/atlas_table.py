@@ -20,13 +20,13 @@ from qtpy.QtWidgets import (
 
 from gp_core.atlas.label_check import Departure
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
-from gp_labeler.session.edits import point_text
-from gp_labeler.session.workflow import PointState
+from gp_labeler.document.edits import point_text
+from gp_labeler.models.workflow import PointState
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["AtlasModel", "AtlasTable"]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from qtpy.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gp_labeler.imaging.histogram import histogram_of
+from gp_labeler.jobs.work import ProposeThreshold
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.histogram_slider import HistogramSlider
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.work import ProposeThreshold
-from gp_labeler.workbench import Workbench
 
 __all__ = ["BoneCard"]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from gp_core.landmarks.features import FEATURES, Side, feature
-from gp_labeler.session.edits import point_text
-from gp_labeler.session.session import Session
-from gp_labeler.session.workflow import OPENING, PointState
+from gp_labeler.document.edits import point_text
+from gp_labeler.models.session import Session
+from gp_labeler.models.workflow import OPENING, PointState
 from gp_labeler.views.bind import mm_text, suggestion_text
 from gp_labeler.views.panels.parts import breakable
 

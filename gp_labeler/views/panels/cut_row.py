@@ -7,12 +7,12 @@ from functools import partial
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from gp_labeler.actions import action
-from gp_labeler.session.view import CUTS
+from gp_labeler.commands.actions import action
+from gp_labeler.models.view import CUTS
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import text_label
 from gp_labeler.views.scene_overlay import cut_text
-from gp_labeler.workbench import Workbench
 
 __all__ = ["CutRow"]
 

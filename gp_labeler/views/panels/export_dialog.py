@@ -21,8 +21,9 @@ from qtpy.QtWidgets import (
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
-from gp_labeler.session.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
-from gp_labeler.session.workflow import PointState
+from gp_labeler.document.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
+from gp_labeler.models.workflow import PointState
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
@@ -33,7 +34,6 @@ from gp_labeler.views.panels.parts import (
     scrolled,
     text_label,
 )
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ExportDialog"]
 

@@ -18,10 +18,11 @@ from qtpy.QtWidgets import (
 )
 
 from gp_core.landmarks.features import Side
-from gp_labeler.actions import ACTIONS
-from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, SwapSides
-from gp_labeler.session.state import How
+from gp_labeler.commands.actions import ACTIONS
+from gp_labeler.document.edits import CheckPoint, SwapSides
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
@@ -30,7 +31,6 @@ from gp_labeler.views.panels.card_content import CardContent, content_of
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["FeatureCard"]
 

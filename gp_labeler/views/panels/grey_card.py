@@ -5,10 +5,10 @@ from __future__ import annotations
 from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.imaging.histogram import window_presets
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.workbench import Workbench
 
 __all__ = ["GreyCard"]
 

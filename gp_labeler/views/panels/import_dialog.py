@@ -19,7 +19,9 @@ from qtpy.QtWidgets import (
 
 from gp_labeler.imaging.preview import PreviewPlane
 from gp_labeler.imaging.readers import ImportPlan, Problem
-from gp_labeler.session.jobs import Task
+from gp_labeler.jobs.runner import Task
+from gp_labeler.jobs.work import InspectScan
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.panels.import_words import MB, PreviewScan, bare, facts_of, remedy, sentence, why_not
 from gp_labeler.views.panels.parts import (
@@ -35,8 +37,6 @@ from gp_labeler.views.panels.parts import (
 )
 from gp_labeler.views.panels.preview_picture import PreviewPicture
 from gp_labeler.views.panels.spacing_fields import SpacingFields
-from gp_labeler.work import InspectScan
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ImportDialog"]
 

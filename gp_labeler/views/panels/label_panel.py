@@ -5,11 +5,11 @@ from __future__ import annotations
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QVBoxLayout, QWidget
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.feature_card import FeatureCard
 from gp_labeler.views.panels.landmark_table import LandmarkTable
 from gp_labeler.views.panels.parts import Scrolled
-from gp_labeler.workbench import Workbench
 
 __all__ = ["LabelPanel"]
 

@@ -22,12 +22,12 @@ from gp_core.io import landmarks_of, read_lab_names, read_points, sides_of, unkn
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
-from gp_labeler.session.lab_names import LabNamesMemory
-from gp_labeler.session.landmark_import import MisfitError, Predicate, import_landmarks
+from gp_labeler.document.lab_names import LabNamesMemory
+from gp_labeler.document.landmark_import import MisfitError, Predicate, import_landmarks
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.panels.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkImportDialog"]
 

@@ -9,11 +9,11 @@ from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QMenu, QWidget
 
 from gp_core.landmarks.features import FEATURES, Side, feature
-from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, ClearPoint, MarkUnseen, point_text
-from gp_labeler.session.state import How, Landmark
+from gp_labeler.document.edits import CheckPoint, ClearPoint, MarkUnseen, point_text
+from gp_labeler.document.state import How, Landmark
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt
-from gp_labeler.workbench import Workbench
 
 __all__ = ["landmark_menu"]
 

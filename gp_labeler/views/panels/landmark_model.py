@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt, Signal
 
 from gp_core.landmarks.features import CODES, Side, feature, index_of
-from gp_labeler.session.workflow import PointState
+from gp_labeler.models.workflow import PointState
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow, mm_text, suggestion_text
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkModel"]
 

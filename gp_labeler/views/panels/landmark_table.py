@@ -16,8 +16,9 @@ from qtpy.QtWidgets import (
 )
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
-from gp_labeler.session.edits import ClearPoint
-from gp_labeler.session.workflow import PointState
+from gp_labeler.document.edits import ClearPoint
+from gp_labeler.models.workflow import PointState
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
@@ -31,7 +32,6 @@ from gp_labeler.views.panels.landmark_model import (
     LandmarkModel,
 )
 from gp_labeler.views.theme import Theme, theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["LandmarkTable"]
 

@@ -7,13 +7,13 @@ from typing import Any
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QSlider, QWidget
 
-from gp_labeler.session.jobs import Task
+from gp_labeler.jobs.runner import Task
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import blocked, follow, mm_text
 from gp_labeler.views.fonts import fit, pixels, text_width
 from gp_labeler.views.panels.cut_row import CutRow
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.workbench import Workbench
 
 __all__ = ["MeshCard"]
 

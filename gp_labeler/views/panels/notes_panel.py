@@ -5,10 +5,10 @@ from __future__ import annotations
 from qtpy.QtCore import QEvent, QObject, QTimer
 from qtpy.QtWidgets import QPlainTextEdit, QWidget
 
-from gp_labeler.session.specimen_edits import SetNotes
+from gp_labeler.document.specimen_edits import SetNotes
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.panels.parts import Card
-from gp_labeler.workbench import Workbench
 
 __all__ = ["NotesPanel"]
 

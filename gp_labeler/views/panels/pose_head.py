@@ -6,13 +6,13 @@ from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from gp_core.landmarks.features import Side
-from gp_labeler.session.specimen_edits import RenameSpecimen
+from gp_labeler.document.specimen_edits import RenameSpecimen
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
 from gp_labeler.views.panels.pose_parts import Segments, link
-from gp_labeler.workbench import Workbench
 
 __all__ = ["HeadCard"]
 

@@ -10,9 +10,9 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentMo
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
-from gp_labeler.session.touches import Touch, TouchHow, frame_of
+from gp_labeler.document.touches import Touch, TouchHow, frame_of
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.panels.pose_words import fine_mm, parse_position, touch_text, triple
-from gp_labeler.workbench import Workbench
 
 __all__ = ["CLEAR", "MISFIT", "NAME", "ROW_ROLE", "USE", "XYZ", "TouchModel", "TouchRow"]
 

@@ -8,12 +8,12 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QAction
 from qtpy.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import link
-from gp_labeler.workbench import Workbench
 
 __all__ = ["OverlayCard"]
 

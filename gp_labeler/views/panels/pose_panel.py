@@ -17,6 +17,7 @@ from qtpy.QtGui import (
 )
 from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.parts import Card, scrolled
@@ -27,7 +28,6 @@ from gp_labeler.views.panels.pose_scan import InScanCard
 from gp_labeler.views.panels.pose_touches import TouchesCard
 from gp_labeler.views.panels.pose_verdict import VerdictCard
 from gp_labeler.views.panels.welcome import dropped_path
-from gp_labeler.workbench import Workbench
 
 __all__ = ["PosePanel", "holds_touches"]
 

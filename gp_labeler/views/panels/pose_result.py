@@ -10,9 +10,10 @@ from qtpy.QtWidgets import QGridLayout, QWidget
 
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.quality import pose_quality
-from gp_labeler.session import touching
-from gp_labeler.session.estimate import Estimate
-from gp_labeler.session.touches import TouchHow
+from gp_labeler.document import touching
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt
 from gp_labeler.views.fonts import HEADING, TITLE, styled
 from gp_labeler.views.panels.flow import FlowLayout
@@ -29,7 +30,6 @@ from gp_labeler.views.panels.pose_words import (
     triple,
     unit_triple,
 )
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ResultCard"]
 

@@ -8,14 +8,14 @@ from pathlib import Path
 from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
-from gp_labeler.session import touching
-from gp_labeler.session.estimate import Estimate
+from gp_labeler.document import touching
+from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import NONE, attempt, follow, position_text
 from gp_labeler.views.fonts import HEADING, styled
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.pose_words import METHOD_WORDS, fine_mm, sentence
-from gp_labeler.workbench import Workbench
 
 __all__ = ["InScanCard"]
 

@@ -9,15 +9,15 @@ from qtpy.QtCore import QPoint, Qt, QTimer, Signal
 from qtpy.QtWidgets import QHBoxLayout, QMenu, QSizePolicy, QToolButton, QWidget
 
 from gp_core.errors import GpError
-from gp_labeler.session import touching
-from gp_labeler.session.touches import Touch
+from gp_labeler.document import touching
+from gp_labeler.document.touches import Touch
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import blocked, follow, set_role
 from gp_labeler.views.panels.parts import Card, ElidedLabel
 from gp_labeler.views.panels.pose_model import TouchModel
 from gp_labeler.views.panels.pose_parts import Notices, link
 from gp_labeler.views.panels.pose_table import TouchTable
 from gp_labeler.views.panels.pose_words import change_text
-from gp_labeler.workbench import Workbench
 
 __all__ = ["TouchesCard"]
 

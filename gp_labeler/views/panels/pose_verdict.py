@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
-from gp_labeler.session.state import PoseCheck
+from gp_labeler.document.state import PoseCheck
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
-from gp_labeler.workbench import Workbench
 
 __all__ = ["VerdictCard"]
 

@@ -9,8 +9,8 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, feature
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.next_touch import TouchGain
-from gp_labeler.session.estimate import Estimate
-from gp_labeler.session.touches import Touch, TouchHow
+from gp_labeler.document.touches import Touch, TouchHow
+from gp_labeler.models.estimate import Estimate
 from gp_labeler.views.bind import NONE, degrees_text
 
 __all__ = [

@@ -9,12 +9,12 @@ from qtpy.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
 from qtpy.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayout, QWidget
 
 from gp_core.landmarks.features import Side
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.theme import theme_of
-from gp_labeler.workbench import Workbench
 
 __all__ = ["STEPS", "Rail", "Step"]
 

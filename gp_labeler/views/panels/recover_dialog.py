@@ -15,7 +15,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.session.recovery import Recovery
+from gp_labeler.document.recovery import Recovery
 from gp_labeler.views.fonts import fit
 from gp_labeler.views.panels.parts import IconLabel, open_at, text_label
 

@@ -6,13 +6,13 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
 from gp_labeler.views.panels.bone_card import BoneCard
 from gp_labeler.views.panels.grey_card import GreyCard
 from gp_labeler.views.panels.mesh_card import MeshCard
 from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
-from gp_labeler.workbench import Workbench
 
 __all__ = ["ScanPanel", "facts_of"]
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QWidget
 
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.tracker import LinkPhase
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.workbench import Workbench
 
 __all__ = ["TrackerCard", "tracker_role", "tracker_words"]
 

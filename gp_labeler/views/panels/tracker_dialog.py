@@ -23,6 +23,7 @@ from qtpy.QtWidgets import (
 from gp_core.errors import GpError
 from gp_core.pose.gate import PoseGate
 from gp_core.validation import FloatArray
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.bind import follow, set_role
@@ -31,7 +32,6 @@ from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
 from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
 from gp_labeler.views.window_state import WindowState
-from gp_labeler.workbench import Workbench
 
 __all__ = ["TrackerDialog"]
 

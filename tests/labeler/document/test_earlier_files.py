@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
+from gp_labeler.document.opening import open_session, recover_session
+from gp_labeler.document.paths import journal_folder
+from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_json import document_of
 from gp_labeler.offscreen.runner import run_script
 from gp_labeler.offscreen.script import read_script
-from gp_labeler.session.document import document_of
-from gp_labeler.session.opening import open_session, recover_session
-from gp_labeler.session.places import journal_folder
-from gp_labeler.session.recovery import find_recoveries
 
 EARLIER = Path(__file__).parent / "earlier"
 EXPECTED = json.loads((EARLIER / "expected.json").read_text())

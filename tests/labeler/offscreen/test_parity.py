@@ -13,14 +13,14 @@ from window_cases import settle
 
 from gp_core.io import read_landmarks
 from gp_core.landmarks.features import Side, index_of
+from gp_labeler.document.landmark_export import export_landmarks
+from gp_labeler.document.opening import new_session
+from gp_labeler.document.state import How
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.threshold import propose_threshold
+from gp_labeler.models import labelling
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.opening import new_session
-from gp_labeler.session.state import How
 
 SIZE = (1200, 800)
 CLICKS = (

@@ -16,19 +16,20 @@ from window_cases import BALL_MM, MIDDLE, settle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
-from gp_labeler.actions import ACTIONS
+from gp_labeler.commands.actions import ACTIONS
+from gp_labeler.document import edits, landmark_import, specimen_edits, touch_edits, touching
+from gp_labeler.document.edits import SwapPoints
+from gp_labeler.document.landmark_export import export_landmarks
+from gp_labeler.document.landmark_import import import_landmarks
+from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes
+from gp_labeler.document.state import How
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.models import labelling
+from gp_labeler.models.workflow import Active
 from gp_labeler.offscreen.runner import run_script
 from gp_labeler.offscreen.script import make_script, read_script
 from gp_labeler.offscreen.steps import STEPS
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import edits, labelling, landmark_import, specimen_edits, touch_edits, touching
-from gp_labeler.session.edits import SwapPoints
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.landmark_import import import_landmarks
-from gp_labeler.session.specimen_edits import RenameSpecimen, SetNotes
-from gp_labeler.session.state import How
-from gp_labeler.session.touches import TouchHow
-from gp_labeler.session.workflow import Active
 from gp_labeler.views.recorded_edits import RECORDED
 from gp_labeler.views.recorder import Recorder, script_text
 

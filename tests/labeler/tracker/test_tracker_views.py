@@ -10,15 +10,15 @@ from tracker_cases import POINTS, TIP, SimulatorProcess
 
 from gp_core import PROBE, Atlas, Side
 from gp_core.pose.quality import pose_quality
-from gp_labeler.pose_desk import ORDER
-from gp_labeler.session.touches import TouchHow
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.models.pose import ORDER
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.panels.tracker_card import TrackerCard
 from gp_labeler.views.panels.tracker_dialog import TrackerDialog
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.window_state import WindowState
-from gp_labeler.workbench import Workbench
 
 
 @pytest.fixture

@@ -11,9 +11,9 @@ from qtpy.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWi
 from gp_core import Atlas
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.session import labelling
-from gp_labeler.session.jobs import QueueDispatcher
-from gp_labeler.workbench import Workbench
+from gp_labeler.jobs.runner import QueueDispatcher
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 
 ATLAS = Atlas.published()
 PANEL_WIDTH = 472

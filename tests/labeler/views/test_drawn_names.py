@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from gp_labeler.session.edits import PlacePoint
-from gp_labeler.session.state import How, Provenance
-from gp_labeler.session.workflow import Active
+from gp_labeler.document.edits import PlacePoint
+from gp_labeler.document.state import How, Provenance
+from gp_labeler.models.workflow import Active
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.drawn import drawn_marks
-from gp_labeler.workbench import Workbench
 
 
 def test_under_an_estimate_only_the_active_landmark_is_named() -> None:

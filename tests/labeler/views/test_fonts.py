@@ -13,11 +13,11 @@ from qtpy.QtWidgets import QApplication, QLabel
 from window_cases import ball_volume, settle
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
 from gp_labeler.scene.colours import DARK, LIGHT, contrast
 from gp_labeler.scene.sprites import Text, text_image
 from gp_labeler.scene.typeface import FAMILY, font_file, font_files
-from gp_labeler.session import labelling
-from gp_labeler.session.state import How
 from gp_labeler.views import fonts
 from gp_labeler.views.word_pictures import word_picture
 

@@ -11,10 +11,10 @@ from qtpy.QtWidgets import QWidget
 
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
-from gp_labeler.session.lab_names import LabNamesMemory
+from gp_labeler.document.lab_names import LabNamesMemory
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
-from gp_labeler.workbench import Workbench
 
 _CLICK = Qt.MouseButton.LeftButton
 

@@ -15,17 +15,17 @@ from window_cases import close, settle
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.features import Side, feature
-from gp_labeler.session import labelling
-from gp_labeler.session.edited_specimen import utc_now
-from gp_labeler.session.landmark_import import ImportLandmarks
-from gp_labeler.session.specimen_file import write_specimen
-from gp_labeler.session.state import How, Provenance, SpecimenState
+from gp_labeler.document.landmark_import import ImportLandmarks
+from gp_labeler.document.specimen_document import utc_now
+from gp_labeler.document.specimen_file import write_specimen
+from gp_labeler.document.state import How, Provenance, SpecimenState
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.panels.atlas_panel import AtlasCard, AtlasPanel
 from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
 from gp_labeler.views.panels.card_content import content_of
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
-from gp_labeler.workbench import Workbench
 
 CLICK = Qt.MouseButton.LeftButton
 L, R = Side.LEFT, Side.RIGHT

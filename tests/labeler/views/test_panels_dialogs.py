@@ -16,18 +16,18 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.landmark_export import export_landmarks
+from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.readers import inspect_volume
-from gp_labeler.session import labelling
-from gp_labeler.session.jobs import QueueDispatcher
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.recovery import find_recoveries
+from gp_labeler.jobs.runner import QueueDispatcher
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.panels.export_dialog import ExportDialog
 from gp_labeler.views.panels.import_dialog import ImportDialog
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.recover_dialog import RecoverDialog
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
-from gp_labeler.workbench import Workbench
 
 CLICK = Qt.MouseButton.LeftButton
 
@@ -275,8 +275,8 @@ def state_directory(tmp_path) -> Path:
     """What two programs left that were killed in the middle of their work."""
     directory = tmp_path / "state"
     code = (
-        "import os; from pathlib import Path; from gp_labeler.session import labelling\n"
-        "from gp_labeler.session.opening import new_session\n"
+        "import os; from pathlib import Path; from gp_labeler.models import labelling\n"
+        "from gp_labeler.document.opening import new_session\n"
         f"for n in ('GP-014', 'GP-015'):\n    s = new_session(Path({str(directory)!r}), specimen=n)\n"
         "    labelling.place(s, [1, 2, 3], side='L', code='CA')\n"
         "os._exit(9)"

@@ -13,9 +13,10 @@ from qtpy.QtGui import QFontMetrics, QGuiApplication
 from qtpy.QtWidgets import QMenu
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
-from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint, SwapPoints
-from gp_labeler.session.workflow import Active
+from gp_labeler.document.edits import CheckPoint, SwapPoints
+from gp_labeler.models import labelling
+from gp_labeler.models.workflow import Active
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
 from gp_labeler.views.panels.feature_card import FeatureCard
@@ -24,7 +25,6 @@ from gp_labeler.views.panels.landmark_menu import landmark_menu
 from gp_labeler.views.panels.landmark_table import LandmarkTable
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme, contrast
-from gp_labeler.workbench import Workbench
 
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
 

@@ -15,20 +15,20 @@ from qtpy.QtWidgets import QApplication, QDialog, QWidget
 from gp_core import PROBE
 from gp_core.atlas.sampling import draw_animal
 from gp_core.landmarks.features import CODES, Side, index_of
-from gp_labeler.session import labelling
-from gp_labeler.session.edits import MarkUnseen, PlacePoint, SwapSides
-from gp_labeler.session.jobs import QueueDispatcher
-from gp_labeler.session.session import Session
-from gp_labeler.session.state import How, Provenance
-from gp_labeler.session.touches import TouchHow
-from gp_labeler.session.workflow import Active
+from gp_labeler.document.edits import MarkUnseen, PlacePoint, SwapSides
+from gp_labeler.document.state import How, Provenance
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.jobs.runner import QueueDispatcher
+from gp_labeler.models import labelling
+from gp_labeler.models.session import Session
+from gp_labeler.models.workflow import Active
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views import feature_picture as pictures
 from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
 from gp_labeler.views.panels.label_panel import LabelPanel
 from gp_labeler.views.panels.landmark_model import LandmarkModel
 from gp_labeler.views.panels.pose_model import MISFIT, TouchModel
 from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of
-from gp_labeler.workbench import Workbench
 
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
 

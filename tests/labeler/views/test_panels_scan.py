@@ -13,8 +13,9 @@ from qtpy.QtGui import QDropEvent
 from qtpy.QtWidgets import QApplication, QPushButton
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.specimen_edits import SetThreshold
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.session.specimen_edits import SetThreshold
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.bind import mm_text, position_text, spacing_text, value_text, voxel_text
 from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.number_field import NumberField
@@ -22,7 +23,6 @@ from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.panels.scan_panel import ScanPanel, facts_of
 from gp_labeler.views.panels.welcome import Welcome
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
-from gp_labeler.workbench import Workbench
 
 CLICK = Qt.MouseButton.LeftButton
 

@@ -12,14 +12,14 @@ from qtpy.QtWidgets import QWidget
 from gp_core import PROBE, Atlas
 from gp_core.atlas.sampling import draw_animal
 from gp_core.frames import RigidTransform
-from gp_labeler.physical_work import PhysicalTest
-from gp_labeler.session import touching
-from gp_labeler.session.edits import PlacePoint
-from gp_labeler.session.jobs import Progress
-from gp_labeler.session.state import How, Provenance
+from gp_labeler.document import touching
+from gp_labeler.document.edits import PlacePoint
+from gp_labeler.document.state import How, Provenance
+from gp_labeler.jobs.physical import PhysicalTest
+from gp_labeler.jobs.runner import Progress
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.panels.physical_dialog import PhysicalDialog
-from gp_labeler.workbench import Workbench
 
 SKULL = {f"S{n}": position for n, position in enumerate(np.random.default_rng(8).uniform(-15, 15, (8, 3)), 1)}
 

@@ -17,16 +17,17 @@ from window_cases import drop_file
 from gp_core import PROBE, Atlas, Side, estimate_pose, read_touches
 from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
-from gp_labeler.pose_desk import ORDER
-from gp_labeler.session import labelling, touching
-from gp_labeler.session.jobs import QueueDispatcher
-from gp_labeler.session.touches import TouchHow
+from gp_labeler.document import touching
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.jobs.runner import QueueDispatcher
+from gp_labeler.models import labelling
+from gp_labeler.models.pose import ORDER
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
 from gp_labeler.views.panels.pose_words import parse_position
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
-from gp_labeler.workbench import Workbench
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"
 FILES = {

@@ -10,10 +10,10 @@ from window_cases import BALL_MM, MIDDLE, ball_volume, close, drop_file, settle
 
 from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.sampling import draw_animal
-from gp_labeler.pose_desk import ORDER
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.models import labelling
+from gp_labeler.models.pose import ORDER
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.touches import TouchHow
 from gp_labeler.tracker import TrackerAddress
 
 pytestmark = pytest.mark.machine

@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QApplication, QLabel
 from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
-from gp_labeler.session.touches import TouchHow
+from gp_labeler.document.touches import TouchHow
 
 ATLAS = Atlas.published()
 ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")

@@ -11,11 +11,11 @@ from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workbench
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.state import How
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
-from gp_labeler.workbench import Workbench
 
 _LEFT = Qt.MouseButton.LeftButton
 INSIDE = MIDDLE + np.array([2.125, -1.625, 0.125])

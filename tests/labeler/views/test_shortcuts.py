@@ -14,7 +14,7 @@ from qtpy.QtGui import QGuiApplication
 from qtpy.QtTest import QTest
 from window_cases import MIDDLE, VOXEL_MM
 
-from gp_labeler.actions import ACTIONS
+from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.scene.planes import Plane
 
 KEYS = [(row.id, keys) for row in ACTIONS.values() for keys in row.shortcuts]

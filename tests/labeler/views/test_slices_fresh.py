@@ -7,12 +7,12 @@ import pytest
 from window_cases import MIDDLE, settle
 
 from gp_core import Atlas, Side
+from gp_labeler.document.edits import CheckPoint
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
+from gp_labeler.models.session import Session
+from gp_labeler.models.workflow import Active
 from gp_labeler.scene.colours import DARK
-from gp_labeler.session import labelling
-from gp_labeler.session.edits import CheckPoint
-from gp_labeler.session.session import Session
-from gp_labeler.session.state import How
-from gp_labeler.session.workflow import Active
 from gp_labeler.views import slice_painter
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 

@@ -21,11 +21,11 @@ from qtpy.QtWidgets import QMenu
 from window_cases import MIDDLE, Answers, ball_volume, close, settle
 
 from gp_core.landmarks.features import Side
-from gp_labeler.actions import ACTIONS
+from gp_labeler.commands.actions import ACTIONS
+from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.models import labelling
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.recovery import find_recoveries
 from gp_labeler.views.application import make_window as make_plain
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.views.top_bar import TopBar

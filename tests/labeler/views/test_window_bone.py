@@ -11,10 +11,10 @@ from qtpy.QtWidgets import QApplication
 from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
+from gp_labeler.models.view import CUTS
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.state import How
-from gp_labeler.session.view import CUTS
 
 LEFT_BUTTON, NO_KEYS = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 

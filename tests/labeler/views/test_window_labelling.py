@@ -9,10 +9,10 @@ from qtpy.QtTest import QTest
 from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
+from gp_labeler.models.workflow import Active
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.state import How
-from gp_labeler.session.workflow import Active
 
 THREE_LEFT = np.array([3, 0, 0])
 LEFT_BUTTON = Qt.MouseButton.LeftButton

@@ -13,10 +13,10 @@ from qtpy.QtWidgets import QApplication
 from window_cases import MIDDLE, settle
 
 from gp_core.landmarks.features import Side
+from gp_labeler.document.state import How
+from gp_labeler.models import labelling
+from gp_labeler.models.workflow import PointState
 from gp_labeler.scene.planes import Plane
-from gp_labeler.session import labelling
-from gp_labeler.session.state import How
-from gp_labeler.session.workflow import PointState
 from gp_labeler.views.drawn import drawn_marks
 from gp_labeler.views.panels.export_dialog import ExportDialog
 

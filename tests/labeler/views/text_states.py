@@ -16,11 +16,12 @@ from qtpy.QtWidgets import QApplication, QWidget
 
 from gp_core import PROBE, Side
 from gp_core.atlas.sampling import draw_animal
+from gp_labeler.document import touching
+from gp_labeler.document.landmark_export import export_landmarks
+from gp_labeler.document.touches import TouchHow
 from gp_labeler.imaging.readers import inspect_volume
-from gp_labeler.session import labelling, touching
-from gp_labeler.session.landmark_export import export_landmarks
-from gp_labeler.session.touches import TouchHow
-from gp_labeler.session.workflow import Active
+from gp_labeler.models import labelling
+from gp_labeler.models.workflow import Active
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.panels.export_dialog import ExportDialog

@@ -1,0 +1,100 @@
+"""Every command of the window, as one table that menus, buttons, the sheet of shortcuts and scripts read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from gp_core.errors import GpError
+from gp_labeler.commands.action import MENUS, Action, Ui
+from gp_labeler.commands.atlas_rows import atlas_rows
+from gp_labeler.commands.pose_rows import pose_rows
+from gp_labeler.commands.rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
+from gp_labeler.commands.view_rows import cut_rows
+from gp_labeler.models.workspace import Workbench
+
+__all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
+
+ACTIONS: Mapping[str, Action] = MappingProxyType(
+    {
+        row.id: row
+        for rows in (
+            file_rows,
+            edit_rows,
+            view_rows,
+            cut_rows,
+            landmark_rows,
+            atlas_rows,
+            pose_rows,
+            help_rows,
+        )
+        for row in rows()
+    }
+)
+
+
+def action(id: str) -> Action:
+    """Return an action by its id.
+
+    Raises
+    ------
+    GpError
+        There is none of this name.
+    """
+    if id not in ACTIONS:
+        raise GpError(f"unknown action {id!r}", remedy=f"There are {', '.join(ACTIONS)}.")
+    return ACTIONS[id]
+
+
+def run(id: str, workbench: Workbench, ui: Ui) -> bool:
+    """Do an action; where it cannot be done, the user is told why.
+
+    Returns
+    -------
+    bool
+        Whether it was done.
+    """
+    row = action(id)
+    if not row.enabled(workbench):
+        return False
+    try:
+        row.run(workbench, ui)
+    except GpError as error:
+        workbench.say(str(error), "warning")
+        return False
+    return True
+
+
+def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
+    """Return what the mouse and the arrow keys do, by where: for the sheet of shortcuts."""
+    return (
+        (
+            "In the 3D view",
+            (
+                ("Click on bone", "place the point that is to do"),
+                ("Drag a point", "move it, on the bone"),
+                ("Left drag", "rotate (Ctrl: spin)"),
+                ("Middle drag, Shift+drag", "pan"),
+                ("Wheel, right drag", "zoom"),
+                ("Alt+wheel", "move the cut through bone"),
+                ("Shift+move", "move the crosshair"),
+                ("Arrow keys", "rotate"),
+                ("Right click on a point", "what else can be done"),
+                ("Double click", "maximise or restore"),
+            ),
+        ),
+        (
+            "On a slice",
+            (
+                ("Click", "place the point that is to do"),
+                ("Drag a point", "move it, on bone if placed there (Alt: freely)"),
+                ("Arrow keys", "move the point a voxel"),
+                ("Wheel, F and B", "next and previous slice"),
+                ("Right drag, Ctrl+wheel", "zoom"),
+                ("Middle drag, Shift+drag", "pan"),
+                ("Shift+move", "move the crosshair"),
+                ("Right click on a point", "what else can be done"),
+                ("Double click", "maximise or restore"),
+            ),
+        ),
+    )

@@ -1,0 +1,92 @@
+"""The rows of the menu View about what is seen inside of bone: cuts, and slices in the 3D view."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.models.workspace import Workbench
+
+__all__ = ["cut_rows"]
+
+_STEP_MM = 0.5
+
+
+def _has_bone(desk: Workbench) -> bool:
+    return bool(desk.surfaces)
+
+
+def _has_scan(desk: Workbench) -> bool:
+    return desk.volume is not None
+
+
+def _is_cut(desk: Workbench) -> bool:
+    return desk.session.view.state.cut is not None
+
+
+def _is_cut_by(plane: str) -> Test:
+    def test(desk: Workbench) -> bool:
+        cut = desk.session.view.state.cut
+        return cut is not None and cut.plane == plane
+
+    return test
+
+
+def _cut_by(plane: str) -> Run:
+    """Cut by a plane, or leave bone whole again where it is cut by it."""
+
+    def change(desk: Workbench, ui: Ui) -> None:
+        if _is_cut_by(plane)(desk):
+            desk.session.view.update(cut=None)
+        else:
+            ui.cut(plane)
+
+    return change
+
+
+def _flip(desk: Workbench, ui: Ui) -> None:
+    cut = desk.session.view.state.cut
+    if cut is not None:
+        desk.session.view.update(cut=cut.flipped())
+
+
+def _cut_here(desk: Workbench, ui: Ui) -> None:
+    cut = desk.session.view.state.cut
+    if cut is not None:
+        desk.session.view.update(cut=cut.through(desk.session.crosshair))
+
+
+def _move(mm: float) -> Run:
+    def change(desk: Workbench, ui: Ui) -> None:
+        cut = desk.session.view.state.cut
+        if cut is not None:
+            desk.session.view.update(cut=cut.moved(mm))
+
+    return change
+
+
+def _toggle_slices(desk: Workbench, ui: Ui) -> None:
+    desk.session.view.update(slices_visible=not desk.session.view.state.slices_visible)
+
+
+# fmt: off
+def cut_rows() -> Iterator[Action]:
+    """Return the commands of the menu View that look into bone."""
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _is_cut, *,
+            checked: Test | None = None, hint: str = "", group: str = "cut") -> Action:
+        return Action(f"view.{id}", "View", title, keys, run, enabled, checked, hint, group)
+
+    for plane, key in (("axial", "Shift+Z"), ("sagittal", "Shift+S"), ("coronal", "Shift+C")):
+        yield row(f"cut_{plane}", f"Cut bone: {plane}", (key,), _cut_by(plane), _has_bone,
+                  checked=_is_cut_by(plane),
+                  hint=f"Take away what lies before the {plane} plane through the crosshair")
+    yield row("cut_view", "Cut bone: across the view", ("Shift+V",), _cut_by("view"), _has_bone,
+              checked=_is_cut_by("view"), hint="Take away what lies nearer than the crosshair")
+    yield row("cut_flip", "Cut: leave the other side", ("Shift+X",), _flip)
+    yield row("cut_here", "Cut: through the crosshair", ("Shift+H",), _cut_here,
+              hint="Bring the cut to where the crosshair is now")
+    yield row("cut_deeper", "Cut: deeper", ("Shift+]",), _move(_STEP_MM), hint="By half a millimetre")
+    yield row("cut_shallower", "Cut: less deep", ("Shift+[",), _move(-_STEP_MM),
+              hint="By half a millimetre")
+    yield row("slices_visible", "Slices in the 3D view", ("Shift+D",), _toggle_slices, _has_scan,
+              checked=lambda desk: desk.session.view.state.slices_visible, group="slices")

@@ -1,0 +1,1 @@
+"""A specimen as it is edited: its state, edits, history, journal and files. No Qt, no VTK."""

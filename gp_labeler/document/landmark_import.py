@@ -1,0 +1,259 @@
+"""Taking over the landmarks of files, with a look at whether they can belong to this scan."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.errors import GpError, blaming
+from gp_core.io import PointList, landmarks_of, read_points, sides_of
+from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.labels import LabelNames
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.validation import FloatArray
+from gp_labeler.document.edits import as_position, point_text, require_free
+from gp_labeler.document.specimen_json import provenance_of
+from gp_labeler.document.state import TO_DO, How, Landmark, PointKey, Provenance, SpecimenState, point_key
+from gp_labeler.models.labelling import provenance
+from gp_labeler.models.session import Session
+
+__all__ = ["ImportLandmarks", "MisfitError", "Predicate", "import_landmarks"]
+
+Predicate = Callable[[FloatArray], NDArray[np.bool_]]
+"""Tells for (N, 3) points, mm, scan frame, whether each is inside, or near bone."""
+
+_TURN_RAS = np.array([-1.0, -1.0, 1.0])
+
+
+class MisfitError(GpError):
+    """Landmarks cannot belong to this scan: they lie outside it, or most lie off the bone."""
+
+
+def import_landmarks(
+    session: Session,
+    paths: Iterable[str | PathLike[str]],
+    *,
+    side: Side | str | None = None,
+    names: Mapping[str, str] | None = None,
+    near_bone: Predicate | None = None,
+    accept_misfit: bool = False,
+    replace_placed: bool = True,
+) -> tuple[str, ...]:
+    """Take over the landmarks of one or more files; one edit, all or nothing.
+
+    A valid header proves nothing: real files exist whose points all lie outside their scan. So the loaded
+    volume is asked whether the points lie in it.
+
+    Parameters
+    ----------
+    session : Session
+        Where to.
+    paths : iterable of path
+        Any landmark file that `gp_core.io` reads.
+    side : Side or str, optional
+        Where the files do not say it, or hold both and one is wanted.
+    names : mapping of str to str, optional
+        Our code by the lab's own name of a point; see `gp_core.landmarks.labels.LabelNames`.
+    near_bone : callable, optional
+        Tells which points are near bone.
+    accept_misfit : bool
+        Import nevertheless.
+    replace_placed : bool
+        Whether placed points give way; otherwise only what is still to do is filled.
+
+    Returns
+    -------
+    tuple of str
+        What the user should know.
+
+    Raises
+    ------
+    MisfitError
+        Points lie outside the volume, or more than half are off the bone.
+    GpError
+        A file cannot be read, or a point that would change is locked.
+    """
+    paths = list(paths)
+    lists = [read_points(path, names=LabelNames(names or {})) for path in paths]
+    if not lists:
+        raise GpError("no landmark file was given")
+    read = [(points, one) for points in lists for one in _sides(points, side)]
+    sets = tuple(one for _, one in read)
+    off_bone = _misfit(session, sets, near_bone, accept_misfit)
+    known = {key: found for points, one in read for key, found in _known(points, one.side).items()}
+    source = ", ".join(points.source.name for points in lists)
+    asked = {
+        "files": [str(Path(path).absolute()) for path in paths],
+        "side": None if side is None else Side.parse(side).value,
+        "names": dict(names or {}),
+        "accept_misfit": accept_misfit,
+    }
+    new = provenance(session, How.IMPORTED, source=source)
+    with blaming(source):
+        session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
+    return (*_doubtful_origin(session, lists), *off_bone, *_suggested(sets))
+
+
+def _sides(points: PointList, side: Side | str | None) -> tuple[LandmarkSet, ...]:
+    return sides_of(points) if side is None else (landmarks_of(points, side=side),)
+
+
+def _suggested(sets: tuple[LandmarkSet, ...]) -> list[str]:
+    names = dict.fromkeys(
+        point_text(landmarks.side, code) for landmarks in sets for code in landmarks.suggested
+    )
+    if not names:
+        return []
+    many = "is only a suggestion" if len(names) == 1 else "are only suggestions"
+    return [f"{_shortened(list(names))} {many}: confirm or correct each"]
+
+
+def _misfit(
+    session: Session, sets: tuple[LandmarkSet, ...], near_bone: Predicate | None, accepted: bool
+) -> tuple[str, ...]:
+    observed = {(s.side, code): s[code] for s in sets for code in s.placed if not feature(code).computed}
+    suggested = {
+        (s.side, code): np.array(found.position) for s in sets for code, found in s.suggested.items()
+    }
+    if not (located := suggested | observed):
+        return ()
+    names, points = [point_text(*key) for key in located], np.array(list(located.values()))
+    contains: Predicate | None = getattr(session.volume, "contains", None)
+    problem, remedy = "", ""
+    if contains is not None and not (inside := contains(points)).all():
+        problem = f"{_listed(names, ~inside)} lie outside the scan"
+        turned = bool(contains(points * _TURN_RAS).all())
+        remedy = "With x and y negated all lie inside: is the file RAS, called LPS?" if turned else ""
+    off = np.zeros(len(points), bool) if near_bone is None else ~near_bone(points)
+    if not problem and off.mean() > 0.5:
+        problem = f"{_listed(names, off)} lie off the bone"
+    if problem and not accepted:
+        remedy = remedy or "Are they of another scan? Import them nevertheless only if you know why."
+        raise MisfitError(problem, specimen=session.state.specimen, remedy=remedy)
+    warning = problem or (f"{_listed(names, off)} lie off the bone" if off.any() else "")
+    return (warning,) if warning else ()
+
+
+def _listed(names: list[str], chosen: NDArray[np.bool_]) -> str:
+    wanted = [name for name, is_chosen in zip(names, chosen, strict=True) if is_chosen]
+    return f"{len(wanted)} of {len(names)} points ({_shortened(wanted)})"
+
+
+def _shortened(names: list[str]) -> str:
+    return ", ".join(names[:6]) + (", ..." if len(names) > 6 else "")
+
+
+def _known(points: PointList, side: Side) -> dict[tuple[Side, str], Provenance]:
+    """Return the provenance that a file of this program carries; what cannot be read is passed over."""
+    found = {}
+    for label, content in (points.header.provenance if points.header else {}).items():
+        try:
+            found[side, feature(label).code] = provenance_of(content, label)
+        except GpError:
+            continue
+    return found
+
+
+def _doubtful_origin(session: Session, lists: list[PointList]) -> list[str]:
+    found = []
+    for points in lists:
+        header, reference = points.header, session.state.volume
+        if header is None:
+            continue
+        if header.specimen and header.specimen != session.state.specimen:
+            found.append(f"{points.source.name} is of specimen {header.specimen}")
+        theirs = (header.volume or {}).get("checksum")
+        if reference and reference.checksum and theirs and theirs != reference.checksum:
+            found.append(f"{points.source.name} was labelled on another scan")
+    return found
+
+
+@dataclass(frozen=True)
+class ImportLandmarks:
+    """Take over the landmarks of a file.
+
+    Parameters
+    ----------
+    landmarks : tuple of LandmarkSet
+        One or both sides, scan frame. A computed CO in them is not taken: it is computed anew.
+    provenance : Provenance
+        Of those points that bring none of their own.
+    known : mapping of (Side, str) to Provenance
+        Provenance that the file carries.
+    replace_placed : bool
+        Whether placed points give way; otherwise only what is still to do is filled. A suggestion never
+        replaces a placed or unseen point.
+    asked : mapping, optional
+        How `import_landmarks` was asked for it, for a script that does it again.
+    """
+
+    landmarks: tuple[LandmarkSet, ...]
+    provenance: Provenance
+    known: Mapping[tuple[Side, str], Provenance] | None = None
+    replace_placed: bool = True
+    asked: Mapping[str, Any] | None = None
+
+    @property
+    def text(self) -> str:
+        """Such as ``import 38 points``."""
+        marks = self._marks().values()
+        n, n_suggested = (sum(bool(getattr(m, name)) for m in marks) for name in ("position", "suggestion"))
+        text = f"import {n} point{'' if n == 1 else 's'}"
+        return f"{text}, {n_suggested} suggestion{'' if n_suggested == 1 else 's'}" if n_suggested else text
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the points taken over.
+
+        Raises
+        ------
+        GpError
+            They are not in the scan frame, the sides disagree on IN, or a locked point would change.
+        """
+        for landmarks in self.landmarks:
+            if landmarks.frame != "scan":
+                raise GpError(f"landmarks to import must be in the scan frame, got {landmarks.frame!r}")
+        changes = {
+            key: mark
+            for key, mark in self._marks().items()
+            if not state.landmarks.get(key, TO_DO).settled
+            or (self.replace_placed and mark.suggestion is None)
+        }
+        moved = [key for key, mark in changes.items() if _moves(state.landmarks.get(key, TO_DO), mark)]
+        require_free(state, moved)
+        return state.with_landmarks({key: changes[key] for key in moved})
+
+    def _marks(self) -> dict[PointKey, Landmark]:
+        marks: dict[PointKey, Landmark] = {}
+        for landmarks in self.landmarks:
+            for code in (*landmarks.placed, *sorted(landmarks.unseen)):
+                if feature(code).computed:
+                    continue
+                key, mark = point_key(landmarks.side, code), self._mark(landmarks, code)
+                if _moves(marks.setdefault(key, mark), mark):
+                    raise GpError(
+                        f"the sides share {code}, but have it at {marks[key].position} and {mark.position}",
+                        landmark=code,
+                        remedy="Correct one of the files, or import one side.",
+                    )
+        for landmarks in self.landmarks:
+            for code in landmarks.suggested:
+                marks.setdefault(point_key(landmarks.side, code), self._mark(landmarks, code))
+        return marks
+
+    def _mark(self, landmarks: LandmarkSet, code: str) -> Landmark:
+        provenance = (self.known or {}).get((landmarks.side, code), self.provenance)
+        if code in landmarks.unseen:
+            return Landmark(unseen=True, provenance=provenance)
+        if code in landmarks.suggested:
+            return Landmark(suggestion=landmarks.suggested[code], provenance=provenance)
+        return Landmark(as_position(landmarks[code], code), provenance=provenance)
+
+
+def _moves(old: Landmark, new: Landmark) -> bool:
+    return (old.position, old.unseen, old.suggestion) != (new.position, new.unseen, new.suggestion)

@@ -1,0 +1,138 @@
+"""The specimen file, ``<specimen>.gpspecimen.json``: what the application saves.
+
+Layout (version 3): ``format``, ``version``, ``application``, ``specimen``, ``volume`` (name, size, spacing,
+checksum, path, and path relative to the file), ``landmarks`` (by ``L``, ``R`` and ``both``, then by feature
+code: position in scan mm, LPS, or suggestion; unseen, locked, checked; provenance), ``threshold``,
+``import_choices``, ``notes`` and ``pose_checks``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+from collections.abc import Mapping
+from importlib.metadata import PackageNotFoundError, version
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from gp_core.disk import read_bytes, read_json, write_text
+from gp_core.errors import FileFormatError, GpError
+from gp_labeler.document.specimen_json import Document, document_of, state_of
+from gp_labeler.document.state import SpecimenState
+
+__all__ = [
+    "SUFFIX",
+    "application",
+    "digest",
+    "read_document",
+    "read_specimen",
+    "state_in",
+    "write_specimen",
+]
+
+SUFFIX = ".gpspecimen.json"
+FORMAT = "gp-labeler specimen"
+VERSION = 3
+
+
+def application() -> str:
+    """Return the program's name and version, as written into files."""
+    try:
+        return f"gp-labeler {version('gp-labeler')}"
+    except PackageNotFoundError:
+        return "gp-labeler (from source)"
+
+
+def write_specimen(path: str | PathLike[str], state: SpecimenState) -> None:
+    """Write a specimen file, all of it or nothing.
+
+    Raises
+    ------
+    GpError
+        It cannot be written there; what was there before is untouched.
+    """
+    target = Path(path)
+    document = {"format": FORMAT, "version": VERSION, "application": application(), **document_of(state)}
+    document = _with_relative_path(document, target.absolute().parent)
+    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+    write_text(target, text)
+
+
+def read_specimen(path: str | PathLike[str]) -> SpecimenState:
+    """Read a specimen file.
+
+    The volume's path is the one relative to the file where a volume is there (the folder may have been moved
+    or copied as a whole), else the one it had when it was saved.
+
+    Raises
+    ------
+    GpError
+        It cannot be opened, is no specimen file, is of a newer version, or an entry is not what it should be.
+    """
+    return state_in(read_document(path), path)
+
+
+def read_document(path: str | PathLike[str]) -> Mapping[str, Any]:
+    """Read the document of a specimen file as it was saved; raises as `read_specimen` does."""
+    source = Path(path)
+    content = read_json(source, what="specimen file", remedy=f"Choose a *{SUFFIX} file.")
+    _check_header(content, source)
+    return _with_found_volume(content, source.absolute().parent)
+
+
+def state_in(document: Mapping[str, Any], path: str | PathLike[str]) -> SpecimenState:
+    """Return the state of the document that was read from `path`; raises `FileFormatError`."""
+    try:
+        return state_of(document)
+    except GpError as error:
+        raise FileFormatError(
+            error.problem, file=path, landmark=error.landmark, remedy=error.remedy
+        ) from None
+
+
+def _check_header(content: Any, source: Path) -> None:
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise FileFormatError("is not a specimen file", file=source, remedy=f"Choose a *{SUFFIX} file.")
+    found = content.get("version")
+    if not isinstance(found, int) or found < 1:
+        raise FileFormatError(f"version must be a whole number from 1, got {found!r:.20}", file=source)
+    if found > VERSION:
+        raise FileFormatError(
+            f"was saved by a newer program (version {found}, this one reads up to {VERSION})",
+            file=source,
+            remedy="Update gp-labeler.",
+        )
+
+
+def _with_relative_path(document: Document, folder: Path) -> Document:
+    path = document.get("volume", {}).get("path")
+    if not path:
+        return document
+    try:
+        relative = os.path.relpath(path, folder)
+    except ValueError:  # another drive
+        return document
+    return document | {"volume": document["volume"] | {"relative_path": Path(relative).as_posix()}}
+
+
+def _with_found_volume(document: Mapping[str, Any], folder: Path) -> Mapping[str, Any]:
+    volume = document.get("volume")
+    relative = volume.get("relative_path") if isinstance(volume, dict) else None
+    if not isinstance(relative, str) or not (folder / relative).exists():
+        return document
+    assert isinstance(volume, dict)
+    saved = volume.get("path")
+    found = os.path.normpath(folder / relative)
+    if isinstance(saved, str) and Path(saved).exists() and Path(saved).samefile(found):
+        return document
+    return {**document, "volume": volume | {"path": found}}
+
+
+def digest(path: str | PathLike[str]) -> str | None:
+    """Return a checksum of a file's bytes; None where there is no such file."""
+    try:
+        return hashlib.blake2b(read_bytes(path), digest_size=16).hexdigest()
+    except GpError:
+        return None

@@ -1,0 +1,335 @@
+"""Everything a specimen file holds, as one value that is never changed in place.
+
+Each point is kept once: what is shared by both sides (IN) has one record, under the key ``(None, "IN")``, so
+the two sides cannot contradict each other. CO has none: it is computed from CA, CB, RWA and RWP whenever they
+change.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from functools import cache
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from gp_core.errors import FeatureError, GpError
+from gp_core.landmarks.anatomy import with_cochlea_origin
+from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_core.landmarks.scan_evidence import ScanEvidence
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.suggestion import Suggestion
+from gp_core.validation import check_option
+from gp_labeler.document.frozen_json import freeze
+from gp_labeler.document.touches import Touch, TouchKey, touched_set
+from gp_labeler.document.volume_reference import VolumeReference
+
+__all__ = [
+    "How",
+    "Landmark",
+    "PointKey",
+    "PoseCheck",
+    "Provenance",
+    "SpecimenState",
+    "changed_points",
+    "measured",
+    "point_key",
+]
+
+LARGEST_MM = 1e4
+"""No scan is ten metres wide: a coordinate beyond this is a slip of units."""
+
+VERDICTS = ("accept", "reject")
+
+Position = tuple[float, float, float]
+PointKey = tuple["Side | None", str]
+"""Whose point, and which feature; no side for what both sides share."""
+
+
+class How(str, Enum):
+    """How a point came to be where it is."""
+
+    MESH = "mesh"
+    SLICE = "slice"
+    GHOST = "accepted ghost"
+    CONFIRMED = "confirmed suggestion"
+    NUDGED = "nudged suggestion"
+    IMPORTED = "imported"
+    TYPED = "typed"
+    UNSEEN = "looked for"
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a position comes from.
+
+    Parameters
+    ----------
+    how : How
+        On the mesh, on a slice, from the atlas, ...
+    time : str
+        When, ISO 8601 in UTC.
+    by : str
+        Who.
+    voxel_mm : (3,) tuple of float, optional
+        Voxel size of the scan it was placed on, mm.
+    source : str
+        The file it was imported from, or what suggested it.
+    """
+
+    how: How
+    time: str = ""
+    by: str = ""
+    voxel_mm: Position | None = None
+    source: str = ""
+
+
+@dataclass(frozen=True)
+class Landmark:
+    """One point of one side (or shared by both): position in scan mm, and what is known about it.
+
+    A `position` is an observation. A point that is only suggested has none, but a `suggestion`, whose
+    `provenance` says who accepted it. A position that came about by accepting a ghost, as earlier versions
+    kept it, is a suggestion.
+    """
+
+    position: Position | None = None
+    unseen: bool = False
+    locked: bool = False
+    checked: bool = False
+    provenance: Provenance | None = None
+    suggestion: Suggestion | None = None
+
+    def __post_init__(self) -> None:
+        suggestion = self.suggestion
+        if self.position is not None and self.provenance is not None and self.provenance.how is How.GHOST:
+            suggestion = suggestion or Suggestion(self.position, source="atlas")
+            object.__setattr__(self, "position", None)
+        if self.position is not None or self.unseen:
+            suggestion = None
+        object.__setattr__(self, "suggestion", suggestion)
+        if suggestion is not None:  # there is nothing yet to check or to lock
+            object.__setattr__(self, "checked", False)
+            object.__setattr__(self, "locked", False)
+
+    @property
+    def settled(self) -> bool:
+        """Whether a person has decided: it was placed, or looked for and not seen."""
+        return self.unseen or self.position is not None
+
+    @property
+    def shown_position(self) -> Position | None:
+        """Where it is shown: where it was placed, else where it is suggested."""
+        if self.position is not None:
+            return self.position
+        return None if self.suggestion is None else self.suggestion.position
+
+
+TO_DO = Landmark()
+
+
+@dataclass(frozen=True)
+class PoseCheck:
+    """A person's verdict on an estimated pose seen over the scan.
+
+    Parameters
+    ----------
+    side : Side
+        Side of the head.
+    verdict : str
+        ``accept`` or ``reject``.
+    by, time, note : str
+        Initials, when (ISO 8601, UTC), and why.
+    pose : mapping
+        The estimate that was judged, as its pose JSON has it.
+    """
+
+    side: Side
+    verdict: str
+    by: str
+    time: str
+    note: str = ""
+    pose: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_option(self.verdict, "verdict", VERDICTS)
+        object.__setattr__(self, "side", Side.parse(self.side))
+        object.__setattr__(self, "pose", freeze(self.pose, "pose"))
+
+
+@cache  # asked some hundred times a click, of a few dozen points
+def point_key(side: Side | str, code: str) -> PointKey:
+    """Return the key under which a state keeps a point.
+
+    Raises
+    ------
+    FeatureError
+        The feature is unknown, or computed (CO): that one is nobody's to place.
+    """
+    row = feature(code)
+    if row.computed:
+        raise FeatureError(
+            f"{row.code} is computed, not placed",
+            landmark=row.code,
+            remedy="It moves with CA, CB, RWA and RWP.",
+        )
+    return (None if row.shared else Side.parse(side), row.code)
+
+
+@dataclass(frozen=True)
+class SpecimenState:
+    """Everything that is saved of a specimen.
+
+    Parameters
+    ----------
+    specimen : str
+        Name of the specimen; exported files are called after it.
+    landmarks : mapping of PointKey to Landmark
+        What was placed, suggested, marked or locked; a point that is to do has no entry.
+    volume : VolumeReference, optional
+        The scan.
+    import_choices : mapping
+        What the user answered when the scan was read (spacing, reversed stack, ...).
+    threshold : float, optional
+        Bone threshold, in grey values of the scan.
+    notes : str
+        Free text.
+    pose_checks : tuple of PoseCheck
+        Verdicts, oldest first.
+    touches : mapping of TouchKey to Touch
+        What was touched with the probe; all touches of a side are in one frame.
+    skull : mapping of str to (3,) tuple
+        Skull features on the scan by which touches are registered to it, scan frame, mm.
+    scan_evidence : mapping of Side to ScanEvidence
+        How far the points were from bone when that was last measured in the scan; see `measured`.
+
+    Raises
+    ------
+    GpError
+        The name cannot stand in a file name, the threshold is not finite, CA and CB are at the same place, or
+        touches of a side are partly in the tracker's frame and partly in the scan's.
+    """
+
+    specimen: str = "unnamed"
+    landmarks: Mapping[PointKey, Landmark] = field(default_factory=dict)
+    volume: VolumeReference | None = None
+    import_choices: Mapping[str, Any] = field(default_factory=dict)
+    threshold: float | None = None
+    notes: str = ""
+    pose_checks: tuple[PoseCheck, ...] = ()
+    touches: Mapping[TouchKey, Touch] = field(default_factory=dict)
+    skull: Mapping[str, Position] = field(default_factory=dict)
+    scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
+    sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        name = self.specimen.strip()
+        if not name or set(name) & set('/\\:*?"<>|\n\t') or name.startswith("."):
+            raise GpError(
+                f"a specimen's name must do as a file name, got {self.specimen!r}", remedy="Such as GP-014."
+            )
+        kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
+        sets = {
+            side: replace(_landmark_set(kept, side), scan_evidence=self.scan_evidence.get(side))
+            for side in Side
+        }
+        if self.threshold is not None:
+            object.__setattr__(self, "threshold", freeze(float(self.threshold), "threshold"))
+        object.__setattr__(self, "specimen", name)
+        object.__setattr__(self, "landmarks", MappingProxyType(kept))
+        object.__setattr__(self, "import_choices", freeze(self.import_choices, "import choices"))
+        object.__setattr__(self, "sets", MappingProxyType(sets))
+        _check_touches(self.touches)
+        object.__setattr__(self, "touches", MappingProxyType(dict(self.touches)))
+        skull = {name: _plausible(position, name) for name, position in self.skull.items()}
+        object.__setattr__(self, "skull", MappingProxyType(skull))
+
+    def side(self, side: Side | str) -> LandmarkSet:
+        """Return the landmarks of one side in the scan frame, with IN and, once determined, CO."""
+        return self.sets[Side.parse(side)]
+
+    def touched(self, side: Side | str) -> LandmarkSet:
+        """Return the touches of one side that count, in their own frame; skull features in `extra`."""
+        return touched_set(self.touches, Side.parse(side))
+
+    def landmark(self, side: Side | str, code: str) -> Landmark:
+        """Return what is known of one point; see `point_key` for what it raises."""
+        return self.landmarks.get(point_key(side, code), TO_DO)
+
+    def with_landmarks(self, changes: Mapping[PointKey, Landmark]) -> SpecimenState:
+        """Return a copy in which these points are replaced."""
+        return replace(self, landmarks={**self.landmarks, **changes})
+
+    def on_volume(self, volume: VolumeReference | None, import_choices: Mapping[str, Any]) -> SpecimenState:
+        """Return a copy that belongs to another volume, or to the same one elsewhere."""
+        return replace(self, volume=volume, import_choices=import_choices, scan_evidence={})
+
+
+def measured(state: SpecimenState, measure: Callable[[LandmarkSet], ScanEvidence] | None) -> SpecimenState:
+    """Return a state with the distances of its points from bone, to be saved or exported.
+
+    Parameters
+    ----------
+    state : SpecimenState
+    measure : callable, optional
+        Asks the scan; None where there is none, and what was measured before is kept.
+    """
+    if measure is None:
+        return state
+    return replace(state, scan_evidence={side: measure(state.side(side)) for side in Side})
+
+
+def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Side, str]]:
+    """Return the points in which two states differ: IN on both sides, and CO where it was computed anew."""
+    changed = set()
+    for side, code in old.landmarks.keys() | new.landmarks.keys():
+        if old.landmarks.get((side, code)) != new.landmarks.get((side, code)):
+            changed |= {(each, code) for each in (Side if side is None else (side,))}
+    for side in Side:
+        computed = (f.code for f in FEATURES if f.computed)
+        changed |= {
+            (side, code)
+            for code in computed
+            if not np.array_equal(old.side(side)[code], new.side(side)[code], True)
+        }
+    return frozenset(changed)
+
+
+def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> LandmarkSet:
+    positions, unseen, suggested = {}, set(), {}
+    for row in FEATURES:
+        mark = TO_DO if row.computed else landmarks.get(point_key(side, row.code), TO_DO)
+        if mark.position is not None:
+            positions[row.code] = _plausible(mark.position, row.code)
+        elif mark.unseen:
+            unseen.add(row.code)
+        elif mark.suggestion is not None:
+            _plausible(mark.suggestion.position, row.code)
+            suggested[row.code] = mark.suggestion
+    placed = replace(LandmarkSet.from_mapping(positions, side), unseen=frozenset(unseen))
+    return with_cochlea_origin(placed).with_suggestions(suggested)
+
+
+def _check_touches(touches: Mapping[TouchKey, Touch]) -> None:
+    frames: dict[Side, str] = {}
+    for (side, name), touch in touches.items():
+        _plausible(touch.position, name)
+        if frames.setdefault(side, touch.frame) != touch.frame:
+            raise GpError(
+                f"the {side.word} side has touches in the {frames[side]}'s frame already",
+                landmark=name,
+                remedy="Clear these first: one estimate cannot mix tracker and scan positions.",
+            )
+
+
+def _plausible(position: Position, code: str) -> Position:
+    if not all(abs(x) <= LARGEST_MM for x in position):
+        raise GpError(
+            f"a position must be three numbers within ±{LARGEST_MM:g} mm, got {position}",
+            landmark=code,
+            remedy="Are its units millimetres?",
+        )
+    return position

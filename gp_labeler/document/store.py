@@ -1,0 +1,250 @@
+"""What of a session is safe on disk: its specimen file, its journal and its locks."""
+
+from __future__ import annotations
+
+import logging
+from os import PathLike
+from pathlib import Path
+from uuid import uuid4
+
+from gp_core.disk import read_bytes, write_bytes
+from gp_core.errors import GpError
+from gp_labeler.document.journal import Journal, read_journal
+from gp_labeler.document.lock import FileLock, InUseError
+from gp_labeler.document.paths import (
+    UNSAVED,
+    absolute_path,
+    journal_folder,
+    journal_path,
+    lock_path,
+    volume_lock_path,
+)
+from gp_labeler.document.recovery import Recovery
+from gp_labeler.document.specimen_file import SUFFIX, digest, write_specimen
+from gp_labeler.document.specimen_json import document_of
+from gp_labeler.document.state import SpecimenState
+
+__all__ = ["Keeper"]
+
+_log = logging.getLogger(__name__)
+
+
+class Keeper:
+    """Keeps one session safe.
+
+    Parameters
+    ----------
+    directory : Path, optional
+        State directory; None keeps neither journal nor lock, for scripts that need none.
+    specimen_file : Path, optional
+        The file the specimen is saved in.
+    """
+
+    def __init__(self, directory: Path | None = None, specimen_file: Path | None = None) -> None:
+        self.directory = directory
+        self.specimen_file = None if specimen_file is None else absolute_path(specimen_file)
+        self._saved = None if specimen_file is None else digest(specimen_file)
+        self._journal: Journal | None = None
+        self._lock: FileLock | None = None
+        self._volume_lock: FileLock | None = None
+
+    @classmethod
+    def begin(cls, directory: Path | None, state: SpecimenState, specimen_file: Path | None = None) -> Keeper:
+        """Begin to keep a session that stands at `state`.
+
+        Raises
+        ------
+        InUseError
+            Another window has this specimen file open.
+        GpError
+            The state directory cannot be written.
+        """
+        keeper = cls(directory, specimen_file)
+        keeper._journal, keeper._lock = keeper._begun(keeper.specimen_file, state, keeper._saved)
+        return keeper
+
+    @classmethod
+    def resume(cls, directory: Path | None, recovery: Recovery) -> Keeper:
+        """Go on with a journal that a killed program left; raises as `begin` does."""
+        keeper = cls(directory, recovery.specimen_file)
+        keeper._saved = recovery.content.saved
+        if directory is None:
+            return keeper
+        file = keeper.specimen_file
+        is_here = recovery.journal.parent == journal_folder(directory)
+        path = recovery.journal if file is None and is_here else journal_path(directory, file)
+        keeper._lock = keeper._locked(path, file)
+        try:
+            keeper._journal = _resumed(recovery, path)
+        except OSError as error:
+            keeper._lock.release()
+            raise GpError(f"cannot be moved: {error.strerror}", file=recovery.journal) from None
+        except GpError:
+            keeper._lock.release()
+            raise
+        return keeper
+
+    def record(self, kind: str, text: str, state: SpecimenState, *, time: str) -> None:
+        """Write an edit down; only then may it show.
+
+        Raises
+        ------
+        GpError
+            The disk does not take it.
+        """
+        if self._journal is not None:
+            self._journal.append(kind, text, document_of(state), time=time)
+
+    def save(
+        self, state: SpecimenState, path: str | PathLike[str] | None = None, *, overwrite: bool = False
+    ) -> Path:
+        """Write the specimen file and begin the journal anew.
+
+        Parameters
+        ----------
+        state : SpecimenState
+            What to save.
+        path : path, optional
+            Where; by default where it was last. The suffix is added where it lacks.
+        overwrite : bool
+            Whether a file may be replaced that is not the one this session wrote or read last.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        InUseError
+            Another window has that file open.
+        GpError
+            No path, a file that is not ours, or it cannot be written. Nothing has changed then.
+        """
+        target = self._target(path)
+        moves = target != self.specimen_file
+        self._check_ours(target, overwrite, moves)
+        lock = (
+            self._locked(journal_path(self.directory, target), target) if moves and self.directory else None
+        )
+        try:
+            write_specimen(target, state)
+        except GpError:
+            if lock is not None:
+                lock.release()
+            raise
+        self._saved = digest(target)
+        self._rebase(target, state, lock)
+        return target
+
+    def claim_volume(self, path: str | PathLike[str] | None) -> str | None:
+        """Note that this window labels a scan; return a warning where another window does too."""
+        _let_go(self._volume_lock)
+        self._volume_lock = None
+        if self.directory is None or path is None:
+            return None
+        try:
+            self._volume_lock = FileLock(
+                volume_lock_path(self.directory, path), f"The scan {Path(path).name}"
+            )
+        except InUseError as error:
+            return f"{error.problem}. Labels made there are not seen here."
+        except GpError as error:
+            _log.warning("%s", error)
+        return None
+
+    def close(self, *, keep_journal: bool) -> None:
+        """Let go of everything; the journal stays where `keep_journal`, and is offered at the next start."""
+        if self._journal is not None:
+            (self._journal.close if keep_journal else self._journal.remove)()
+        for lock in (self._lock, self._volume_lock):
+            _let_go(lock)
+        self._journal = self._lock = self._volume_lock = None
+
+    def _target(self, path: str | PathLike[str] | None) -> Path:
+        if path is None and self.specimen_file is None:
+            raise GpError("the specimen was never saved", remedy=f"Give a file name, <specimen>{SUFFIX}.")
+        target = absolute_path(path or self.specimen_file or "")
+        return target if target.name.endswith(SUFFIX) else target.with_name(target.name + SUFFIX)
+
+    def _check_ours(self, target: Path, overwrite: bool, moves: bool) -> None:
+        if overwrite or not target.exists():
+            return
+        if moves:
+            raise GpError("exists already", file=target, remedy="Choose another name, or overwrite it.")
+        if digest(target) != self._saved:
+            raise GpError(
+                "was changed by another program since it was opened here",
+                file=target,
+                remedy="Save under another name, or overwrite it.",
+            )
+
+    def _locked(self, journal: Path, specimen_file: Path | None) -> FileLock:
+        return FileLock(lock_path(journal), specimen_file.name if specimen_file else "this specimen")
+
+    def _begun(
+        self,
+        specimen_file: Path | None,
+        state: SpecimenState,
+        saved: str | None,
+        lock: FileLock | None = None,
+    ) -> tuple[Journal | None, FileLock | None]:
+        if self.directory is None:
+            return None, None
+        path = lock.path.with_suffix(".jsonl") if lock else journal_path(self.directory, specimen_file)
+        lock = lock or self._locked(path, specimen_file)
+        try:
+            _set_aside(path)
+            return Journal.create(path, document_of(state), specimen_file=specimen_file, saved=saved), lock
+        except GpError:
+            lock.release()
+            raise
+
+    def _rebase(self, target: Path, state: SpecimenState, lock: FileLock | None) -> None:
+        """Begin the journal anew at what was saved; under another name where it was saved under another."""
+        old_journal, old_lock = self._journal, self._lock
+        try:
+            if lock is None and old_journal is not None:
+                old_journal.restart(document_of(state), specimen_file=target, saved=self._saved)
+            elif lock is not None:
+                self._journal, self._lock = self._begun(target, state, self._saved, lock)
+                if old_journal is not None:
+                    old_journal.remove()
+                _let_go(old_lock)
+        except GpError as error:  # saved it is, and the old journal still tells the same
+            _log.warning("the journal could not be begun anew after saving: %s", error)
+        self.specimen_file = target
+
+
+def _resumed(recovery: Recovery, path: Path) -> Journal:
+    """Go on with a journal at `path`; a copy of a damaged one is kept, and one in another folder stays."""
+    content = recovery.content
+    elsewhere = recovery.journal.parent != path.parent
+    if content.damage and not elsewhere:
+        copy = recovery.journal.with_name(f"{recovery.journal.stem}-{uuid4().hex[:8]}.damaged")
+        write_bytes(copy, read_bytes(recovery.journal, what="journal"))
+    if path != recovery.journal:
+        _set_aside(path)
+    if content.damage or elsewhere:
+        journal = Journal.create(path, content.base, specimen_file=content.specimen_file, saved=content.saved)
+        journal.append("edit", "recover edits", content.document, time=content.time)
+        if path != recovery.journal and not elsewhere:
+            recovery.discard()
+        return journal
+    if path != recovery.journal:  # it was set aside
+        recovery.journal.replace(path)
+    return Journal.resume(path, read_journal(path))
+
+
+def _set_aside(journal: Path) -> None:
+    """Rename a journal that a killed program left, so that it is still offered at the next start."""
+    try:
+        if journal.exists():
+            journal.replace(journal.with_name(f"{journal.stem}-{uuid4().hex[:8]}.jsonl"))
+    except OSError as error:
+        raise GpError(f"cannot be moved: {error.strerror}", file=journal) from None
+
+
+def _let_go(lock: FileLock | None) -> None:
+    if lock is not None:
+        lock.release(remove=lock.path.name.startswith(UNSAVED))

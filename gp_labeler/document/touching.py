@@ -1,0 +1,155 @@
+"""What touching means: a few functions on a session, for panels, actions and scripts alike."""
+
+from __future__ import annotations
+
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from gp_core.errors import GpError, blaming
+from gp_core.io import label_names, read_points, read_touches
+from gp_core.io.file_names import named_side
+from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.labels import same_label, tidy_label
+from gp_labeler.document.edits import as_position
+from gp_labeler.document.touch_edits import (
+    LeaveOutTouch,
+    MoveTouches,
+    RecordTouch,
+    RemoveTouches,
+    SetSkull,
+    SwapTouches,
+    TakeTouches,
+)
+from gp_labeler.document.touches import Touch, TouchHow, touch_name
+from gp_labeler.models.session import Session
+
+__all__ = [
+    "clear_touches",
+    "leave_out",
+    "load_skull",
+    "load_touches",
+    "mark_skull",
+    "move_touches",
+    "named_side",
+    "record_touch",
+    "swap_touches",
+]
+
+
+def record_touch(
+    session: Session,
+    side: Side | str,
+    name: str,
+    position: ArrayLike,
+    how: TouchHow = TouchHow.TYPED,
+    **details: Any,
+) -> bool:
+    """Record one touch, in place of an earlier one of the same name.
+
+    Parameters
+    ----------
+    session : Session
+    side : Side or str
+    name : str
+        An external feature, or a skull feature such as ``S1``.
+    position : (3,) array_like
+        Tracker frame, mm; scan frame where `how` is ``TouchHow.SCAN``.
+    how : TouchHow
+    **details
+        `source`, `n_samples` and `spread_mm` of `Touch`.
+
+    Returns
+    -------
+    bool
+        Whether anything changed.
+
+    Raises
+    ------
+    GpError
+        The feature cannot be touched, or the side's other touches are in another frame.
+    """
+    where = as_position(position, name)
+    touch = Touch(where, how, time=session.now(), by=session.author, **details)
+    return session.do(RecordTouch(Side.parse(side), name, touch))
+
+
+def load_touches(session: Session, path: str | PathLike[str], side: Side | str) -> tuple[str, ...]:
+    """Take the touches of a file in place of all that side has.
+
+    Returns
+    -------
+    tuple of str
+        What the user should know: what the tracker did not see, a file named for the other side.
+
+    Raises
+    ------
+    GpError
+        As `gp_core.read_touches`.
+    """
+    touched = read_touches(path, side)
+    about: dict[str, Any] = {"how": TouchHow.FILE, "time": session.now(), "by": session.author}
+    points = {**touched.as_mapping(), **touched.extra}
+    source = Path(path).name
+    with blaming(path):
+        taken = {name: Touch(as_position(p, name), source=source, **about) for name, p in points.items()}
+    if not taken:
+        raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
+    with blaming(path):
+        session.do(TakeTouches(Side.parse(side), taken))
+    named, unseen = named_side(source), " ".join(sorted(touched.unseen))
+    doubts = [f"Not seen by the tracker: {unseen}"] if unseen else []
+    if named not in (None, Side.parse(side)):
+        doubts.append(f"By its name it is of the {named.word} side: check the side")
+    return tuple(doubts)
+
+
+def leave_out(session: Session, side: Side | str, name: str, left_out: bool = True) -> bool:
+    """Let the estimate do without a touch, or take it in again."""
+    return session.do(LeaveOutTouch(Side.parse(side), name, left_out))
+
+
+def swap_touches(session: Session, side: Side | str, name: str, other: str) -> bool:
+    """Give each of two touches of a side the other's name; raises `GpError` where one is not touched."""
+    return session.do(SwapTouches(Side.parse(side), touch_name(name), touch_name(other)))
+
+
+def move_touches(session: Session, side: Side | str) -> bool:
+    """Give all touches of a side to the other one; raises `GpError` where that was touched too."""
+    return session.do(MoveTouches(Side.parse(side)))
+
+
+def clear_touches(session: Session, side: Side | str, name: str | None = None) -> bool:
+    """Forget one touch of a side, or all of them."""
+    return session.do(RemoveTouches(Side.parse(side), name))
+
+
+def load_skull(session: Session, path: str | PathLike[str]) -> tuple[str, ...]:
+    """Take the skull's registration features from a landmark file of the scan; returns their names.
+
+    Raises
+    ------
+    GpError
+        The file cannot be read, or names nothing beside the 20 features.
+    """
+    points = read_points(path)
+    named = zip(label_names(points), points.points, strict=True)
+    skull = {name: p.position for name, p in named if p.position is not None and name not in CODES}
+    if not skull:
+        raise GpError(
+            "names no skull feature", file=path, remedy="Name them as the touches do, such as S1 to S8."
+        )
+    with blaming(path):
+        session.do(SetSkull({name: as_position(point, name) for name, point in skull.items()}))
+    return tuple(skull)
+
+
+def mark_skull(session: Session, name: str, position: ArrayLike | None) -> bool:
+    """Say where one skull feature is on the scan, (3,) mm, or forget it (None)."""
+    name = tidy_label(name)
+    skull = {n: p for n, p in session.state.skull.items() if not same_label(n, name)}
+    if position is not None:
+        skull[name] = as_position(position, name)
+    return session.do(SetSkull(skull))

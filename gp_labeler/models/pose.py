@@ -1,0 +1,434 @@
+"""What of a workbench concerns touching and the pose: the estimate, what to touch next, how it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from itertools import count
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from psygnal import Signal
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.gate import against_writing
+from gp_core.pose.mixture import Hypothesis
+from gp_core.pose.next_touch import TouchGain, gains
+from gp_labeler.document import touching
+from gp_labeler.document.touches import TouchHow
+from gp_labeler.jobs.work import WarmFit, WarmJoint
+from gp_labeler.models.estimate import Estimate, verdict_on
+from gp_labeler.models.estimating import Estimating
+from gp_labeler.models.pose_exports import InsertionPath, save_pose, says_its_state
+
+if TYPE_CHECKING:
+    from gp_labeler.models.workspace import Workbench
+
+__all__ = ["ORDER", "OverlayOptions", "PoseDesk"]
+
+_FIRST = (*RECOMMENDED, "ZL")
+ORDER = (*_FIRST, *(code for code in EXTERNAL if code not in _FIRST))
+"""The paper's six features first, as they give most of the pose; then IN, which tells the side; else ZL."""
+
+
+@dataclass(frozen=True)
+class OverlayOptions:
+    """What of an estimate is drawn over bone and slices; the names of parts are those of `scene.pose_data`.
+
+    Parameters
+    ----------
+    visible : bool
+        Whether anything is; then landmarks go without their names, which would hide it.
+    estimate, region, cochlea, truth, features, vectors, touches, tip, path, names : bool
+        Origin and axis; where they are with 95 %; the outline of the cochlea; the labelled CO and axis; the
+        atlas's features in this pose; from there to the labelled ones; the touched points; the tracked probe;
+        the insertion path; names and errors.
+    opacity : float
+        From 0 to 1.
+    """
+
+    visible: bool = False
+    estimate: bool = True
+    region: bool = True
+    cochlea: bool = True
+    truth: bool = True
+    features: bool = False
+    vectors: bool = False
+    touches: bool = True
+    tip: bool = True
+    path: bool = True
+    names: bool = True
+    opacity: float = 1.0
+
+
+@dataclass(frozen=True)
+class _Touched:
+    """What was touched on the side in work, and on the other."""
+
+    side: Side
+    here: frozenset[str]
+    there: frozenset[str]
+
+    def was_moved(self, now: _Touched) -> bool:
+        """Whether all touches of this side are those of the other one now."""
+        return bool(self.here) and not self.there and not now.here and now.there == self.here
+
+
+class PoseDesk:
+    """Keeps the estimate in step with whatever session, atlas and touches a workbench has.
+
+    Parameters
+    ----------
+    desk : Workbench
+        Whose part it is.
+    """
+
+    changed = Signal()
+    """The estimate, or what it is made of, changed: ask `estimate` again."""
+    target_changed = Signal(object)
+    """The feature to touch next, or None where all are touched."""
+    overlay_changed = Signal(object)
+    """The `OverlayOptions`."""
+    path_changed = Signal(object)
+    """The `InsertionPath` that is carried to the estimate now, or None."""
+    recorded = Signal(str)
+    """Name of a touch that was recorded just now: time for a sound."""
+
+    def __init__(self, desk: Workbench) -> None:
+        self._desk = desk
+        self._target: str | None = ORDER[0]
+        self._overlay = OverlayOptions()
+        self._skipped: frozenset[tuple[Side, str]] = frozenset()
+        self._gains: tuple[Estimate, tuple[TouchGain, ...]] | None = None
+        self._path: InsertionPath | None = None
+        self._prepared = False
+        self.estimating = self._begin()
+        self._seen = self._touched_now()
+        desk.session_replaced.connect(self._on_session_replaced)
+        desk.atlas_changed.connect(self._on_atlas_changed)
+
+    # The estimate
+
+    @property
+    def side(self) -> Side:
+        """Side of the head that is touched."""
+        return self.estimating.settings.side
+
+    @property
+    def estimate(self) -> Estimate | None:
+        """The estimate of that side; None with fewer than three touches."""
+        return self.estimating.current
+
+    def choose(self, **fields: Any) -> None:
+        """Change `EstimateSettings`; ``jrmpc`` is made ready in the background first."""
+        methods = fields.get("methods", self.estimating.settings.methods)
+        if "jrmpc" in methods and not self.estimating.joint_ready:
+            self._desk.jobs.submit(WarmJoint(), lambda _: self.estimating.set_joint_ready(), key="joint")
+        old_side = self.side
+        self.estimating.choose(**fields)
+        if self.side is not old_side:
+            self._aim(self._first_untouched())
+
+    def gains(self) -> tuple[TouchGain, ...]:
+        """Return what one more touch would gain, the best first; empty without an estimate."""
+        estimate = self.estimate
+        if estimate is None or "robust" not in estimate.poses:
+            return ()
+        if self._gains is None or self._gains[0] is not estimate:
+            touches = replace(estimate.touches, extra={})
+            settings = estimate.settings
+            found = gains(
+                touches,
+                estimate.atlas,
+                probe_noise=settings.probe_noise,
+                shared_error=settings.shared_error,
+            )
+            self._gains = (estimate, found)
+        return self._gains[1]
+
+    def prepare(self) -> None:
+        """Load what makes estimates quick, in the background, once; the first touch does this too."""
+        if not self._prepared:
+            self._prepared = True
+            self._desk.jobs.submit(WarmFit(), key="fit")
+
+    # Touching
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """What can be touched: the features in the order they are asked for, then the skull's."""
+        known = self._touched() | self._desk.session.state.skull.keys() | {self._target or ORDER[0]}
+        return (*ORDER, *sorted(known - set(ORDER), key=_by_number))
+
+    @property
+    def next_skull(self) -> str:
+        """Name of the first skull feature not yet touched, such as ``S1``."""
+        touched = self._touched()
+        return next(name for n in count(1) if (name := f"S{n}") not in touched)
+
+    @property
+    def target(self) -> str | None:
+        """The feature to touch next."""
+        return self._target
+
+    @property
+    def names_touched(self) -> frozenset[str]:
+        """What is touched on this side, left out or not."""
+        return self._touched()
+
+    def aim(self, name: str) -> None:
+        """Choose what is touched next."""
+        self._skipped -= {(self.side, name)}
+        self._aim(name)
+
+    def skip(self) -> None:
+        """Go on to the next feature; this one comes again when all others are touched."""
+        if self._target is not None:
+            self._skipped |= {(self.side, self._target)}
+            self._aim(self._first_untouched(after=self._target))
+
+    def record(self, position: ArrayLike, how: TouchHow, *, name: str | None = None, **details: Any) -> None:
+        """Record a touch of the target, or of a feature named, and go on to the next.
+
+        Parameters
+        ----------
+        position : (3,) array_like, mm
+            Tracker frame; scan frame where it was placed on the scan.
+        how : TouchHow
+        name : str, optional
+        **details
+            `source`, `n_samples` and `spread_mm` of `Touch`.
+
+        Raises
+        ------
+        GpError
+            Nothing is left to touch, or as `touching.record_touch`.
+        """
+        wanted = name or self._target
+        if wanted is None:
+            raise GpError("all features are touched", remedy="Choose one to touch again.")
+        touching.record_touch(self._desk.session, self.side, wanted, position, how, **details)
+        self.recorded.emit(wanted)
+        if wanted == self._target:
+            self._aim(self._first_untouched(after=wanted))
+
+    def change_side(self) -> None:
+        """Say that the touches are those of the other side, and go on there.
+
+        Raises
+        ------
+        GpError
+            The other side was touched too.
+        """
+        other = self.side.other
+        touching.move_touches(self._desk.session, self.side)
+        self.choose(side=other)
+
+    @property
+    def swapped(self) -> tuple[str, str] | None:
+        """Two touched features that look, or may be, as if each had the other's name, by any method."""
+        poses = () if self.estimate is None else self.estimate.poses.values()
+        return next((pose.swapped for pose in poses if pose.swapped is not None), None)
+
+    def swap_names(self) -> None:
+        """Give each of these two the other's name; raises `GpError` where none look so."""
+        if self.swapped is None:
+            raise GpError("no two touches look as if each had the other's name")
+        touching.swap_touches(self._desk.session, self.side, *self.swapped)
+
+    def take_likelier(self) -> Hypothesis | None:
+        """Read the touches as they are likeliest to be meant; None where that is how they are named.
+
+        Raises
+        ------
+        GpError
+            They would go to the other side, which was touched too.
+        """
+        pose = None if self.estimate is None else self.estimate.poses.get("robust")
+        best = None if pose is None else pose.likelier_reading
+        if best is None:
+            return None
+        if best.exchanged is not None:
+            touching.swap_touches(self._desk.session, self.side, *best.exchanged)
+        else:
+            self.change_side()
+        return best
+
+    def show(self, name: str) -> None:
+        """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""
+        estimate, touch = self.estimate, self._desk.session.state.touches.get((self.side, name))
+        registered = None if estimate is None else estimate.registered
+        if touch is None or (registered is None and touch.frame != "scan"):
+            return
+        position = np.array(touch.position)
+        if registered is not None:
+            position = registered.T_scan_touches.apply(position[None])[0]
+        self._desk.session.set_crosshair(position)
+        self._desk.point_shown.emit(position)
+
+    def load(self, path: str | PathLike[str]) -> None:
+        """Take the touches of a file for this side in place of those there are."""
+        doubts = touching.load_touches(self._desk.session, path, self.side)
+        self._aim(self._first_untouched())
+        taken = f"Took {len(self._touched())} touches from {Path(path).name}"
+        self._desk.say(". ".join((taken, *doubts)), "warning" if doubts else "info")
+
+    # What leaves
+
+    def export(self, path: str | PathLike[str], *, accept_warnings: bool = False) -> Path:
+        """Write the pose in the format that the file's name asks for; see `pose_exports.save_pose`.
+
+        Parameters
+        ----------
+        path : path
+        accept_warnings : bool
+            Write a file that a robot could run although side or names are in doubt, and nobody has accepted
+            the estimate. The pose's JSON, which says its state, is written in any case.
+
+        Raises
+        ------
+        GpError
+            It is in doubt, or as `save_pose`.
+        """
+        pose = self._pose()
+        if not (accept_warnings or says_its_state(path)):
+            self._check_doubt(pose, path)
+        file = save_pose(pose, path)
+        self._desk.say(f"Wrote {file.name}, y to the {pose.round_window} round window")
+        self._desk.wrote.emit("pose", file)
+        return file
+
+    def carry(self, path: InsertionPath | None) -> None:
+        """Carry an insertion path to the estimate, or none any more; raises `GpError` where it cannot be."""
+        if path is not None and self.estimate is not None:
+            path.in_touches(self.estimate)
+        self._path = path
+        self.path_changed.emit(path)
+        self.changed.emit()
+
+    @property
+    def path(self) -> InsertionPath | None:
+        """The insertion path that goes with the estimate."""
+        return self._path
+
+    def save_path(self, path: str | PathLike[str]) -> Path:
+        """Write the carried insertion path in the frame of the touches.
+
+        Raises
+        ------
+        GpError
+            There is none, the pose is in doubt as for `export`, or the file cannot be written.
+        """
+        if self._path is None:
+            raise GpError("there is no insertion path", remedy="Carry one to the estimate first.")
+        self._check_doubt(self._pose(), path)
+        assert self.estimate is not None
+        file = self._path.save_carried(self.estimate, path)
+        self._desk.say(f"Wrote {file.name}")
+        self._desk.wrote.emit("path", file)
+        return file
+
+    def _check_doubt(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
+        """Refuse to write for a robot what is in doubt, unless a person has accepted this very estimate."""
+        reasons = against_writing(pose)
+        estimate = self.estimate
+        accepted = estimate is not None and verdict_on(estimate, self._desk.session.state) == "accept"
+        if reasons and not accepted:
+            raise GpError(
+                f"not written, as {' and '.join(reason.text for reason in reasons)}",
+                file=path,
+                remedy="Correct the touches, or accept the estimate (script: accept_warnings = true).",
+            )
+
+    def _pose(self) -> CochleaPose:
+        estimate = self.estimate
+        if estimate is None or estimate.pose is None:
+            raise GpError("there is no estimate yet", remedy=self.estimating.waiting_text or None)
+        return estimate.pose
+
+    # Drawing
+
+    @property
+    def overlay(self) -> OverlayOptions:
+        """What is drawn of the estimate."""
+        return self._overlay
+
+    def draw(self, **fields: Any) -> None:
+        """Change `OverlayOptions`."""
+        options = replace(self._overlay, **fields)
+        if options != self._overlay:
+            self._overlay = options
+            self.overlay_changed.emit(options)
+
+    # Inside
+
+    def _begin(self) -> Estimating:
+        estimating = Estimating(self._desk.session)
+        if self._desk.atlas is not None:
+            estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
+        estimating.changed.connect(self._on_changed)
+        return estimating
+
+    def _on_session_replaced(self, _: object) -> None:
+        old = self.estimating
+        old.close()
+        self.estimating = self._begin()
+        self.estimating.joint_ready = old.joint_ready
+        self.estimating.choose(**vars(old.settings))
+        self._skipped = frozenset()
+        self._aim(self._first_untouched())
+        self.changed.emit()
+
+    def _on_atlas_changed(self) -> None:
+        if self._desk.atlas is not None:
+            self.estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
+
+    def _on_changed(self) -> None:
+        if self._desk.session.state.touches:
+            self.prepare()
+        self._follow_touches()
+        self.changed.emit()
+
+    def _follow_touches(self) -> None:
+        """Ask again for what was undone or cleared, and go on where the target was touched."""
+        before, self._seen = self._seen, self._touched_now()
+        if before.side is not self.side:
+            return
+        if before.was_moved(self._seen):  # undone or redone: else the side in work would look cleared
+            self.choose(side=self.side.other)
+            return
+        lost, gained = before.here - self._seen.here, self._seen.here - before.here
+        if lost:
+            self._aim(next(name for name in (*ORDER, *sorted(lost, key=_by_number)) if name in lost))
+        elif self._target is None or self._target in gained:
+            self._aim(self._first_untouched(after=self._target))
+
+    def _touched(self, side: Side | None = None) -> frozenset[str]:
+        wanted = side or self.side
+        return frozenset(name for side, name in self._desk.session.state.touches if side is wanted)
+
+    def _touched_now(self) -> _Touched:
+        return _Touched(self.side, self._touched(), self._touched(self.side.other))
+
+    def _first_untouched(self, after: str | None = None) -> str | None:
+        start = ORDER.index(after) + 1 if after in ORDER else 0
+        around: Iterable[str] = (*ORDER[start:], *ORDER[:start])
+        left = [code for code in around if code not in self._touched()]
+        fresh = [code for code in left if (self.side, code) not in self._skipped]
+        return next(iter(fresh or left), None)
+
+    def _aim(self, name: str | None) -> None:
+        if name != self._target:
+            self._target = name
+            self.target_changed.emit(name)
+
+
+def _by_number(name: str) -> tuple[str, int, str]:
+    """Sort S2 before S10."""
+    letters = name.rstrip("0123456789")
+    return letters, int(name[len(letters) :] or 0), name

@@ -1,0 +1,197 @@
+"""Shared by the tests of the session: random edits, a scan that is none, an atlas of four lines."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.label_check import check_side
+from gp_core.landmarks.features import CODES, FEATURES, Side
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.suggestion import Suggestion
+from gp_labeler.document.edits import (
+    CheckPoint,
+    ClearPoint,
+    ConfirmPoint,
+    LockPoints,
+    MarkUnseen,
+    PlacePoint,
+    SuggestPoints,
+    SwapPoints,
+    SwapSides,
+)
+from gp_labeler.document.landmark_import import ImportLandmarks
+from gp_labeler.document.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
+from gp_labeler.document.specimen_json import document_of
+from gp_labeler.document.state import How, PoseCheck, Provenance, SpecimenState
+from gp_labeler.document.touch_edits import (
+    LeaveOutTouch,
+    MoveTouches,
+    RecordTouch,
+    RemoveTouches,
+    SetSkull,
+    SwapTouches,
+    TakeTouches,
+)
+from gp_labeler.document.touches import Touch, TouchHow
+
+PLACEABLE = tuple(f.code for f in FEATURES if not f.computed)
+quick = settings(
+    deadline=None, max_examples=40, derandomize=True, suppress_health_check=[HealthCheck.too_slow]
+)
+MARK = Provenance(How.MESH, "2026-01-01T00:00:00+00:00", "AB", (0.1, 0.1, 0.2))
+
+
+@dataclass(frozen=True)
+class FakeVolume:
+    """A scan by its attributes only."""
+
+    name: str = "GP-014"
+    size: tuple[int, int, int] = (40, 50, 60)
+    spacing: tuple[float, float, float] = (0.1, 0.1, 0.2)
+    checksum: str = "abc"
+    path: Path | None = None
+
+    def contains(self, points):
+        return (np.abs(points) < 50).all(axis=1)
+
+
+def shape(side: Side = Side.LEFT) -> LandmarkSet:
+    """An animal that never was: 19 features within some millimetres; right is left, mirrored."""
+    rng = np.random.default_rng(7)
+    rows = rng.normal(size=(len(CODES), 3)) * 5 + [20, 0, 0]
+    rows[CODES.index("IN"), 0] = 0.0
+    if side is Side.RIGHT:
+        rows[:, 0] *= -1
+    points = dict(zip(CODES, rows, strict=True))
+    return LandmarkSet.from_mapping({code: points[code] for code in PLACEABLE}, side)
+
+
+def predict(landmarks: LandmarkSet):
+    """An atlas that knows `shape` moved by the mean offset of the given points."""
+    mean = shape(landmarks.side)
+    offset = (landmarks.array(landmarks.placed) - mean.array(landmarks.placed)).mean(axis=0)
+    return {code: (mean[code] + offset, np.eye(3) * 0.04) for code in PLACEABLE}
+
+
+def atlas_of_shape() -> Atlas:
+    """The same animal as an atlas."""
+    side = shape()
+    spread = np.eye(3 * len(PLACEABLE)) * 0.04
+    return Atlas("shape", PLACEABLE, side.array(PLACEABLE), spread, spread, 22)
+
+
+check = partial(check_side, atlas=atlas_of_shape())
+"""Doubts what is not where `shape` has it."""
+
+
+def text_of(state: SpecimenState) -> str:
+    """The state to the last bit, as text."""
+    return json.dumps(document_of(state), sort_keys=True)
+
+
+coordinates = st.floats(-1e4, 1e4, allow_nan=False, width=64)
+positions = st.tuples(coordinates, coordinates, coordinates)
+sides = st.sampled_from(Side)
+codes = st.sampled_from(PLACEABLE)
+few_codes = st.sampled_from(("CA", "CB", "IN", "RWA", "RWP", "ZL"))
+"""Few, so that edits meet."""
+
+provenances = st.builds(
+    Provenance,
+    st.sampled_from(How),
+    st.text(max_size=5),
+    st.text(max_size=5),
+    st.none() | st.tuples(*[st.floats(1e-3, 1.0)] * 3),
+    st.text(max_size=5),
+)
+names = st.from_regex(r"[A-Za-z][A-Za-z0-9 _.\-]{0,8}", fullmatch=True)
+json_values = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers(-9, 9)
+    | st.floats(allow_nan=False, allow_infinity=False)
+    | st.text(max_size=4),
+    lambda inner: st.lists(inner, max_size=2) | st.dictionaries(st.text(max_size=3), inner, max_size=2),
+    max_leaves=5,
+)
+pose_checks = st.builds(
+    PoseCheck,
+    sides,
+    st.sampled_from(("accept", "reject")),
+    st.text(max_size=3),
+    st.text(max_size=3),
+    st.text(max_size=9),
+    st.dictionaries(st.text(max_size=3), json_values, max_size=2),
+)
+
+
+suggestions = st.builds(
+    Suggestion, positions, st.none() | st.floats(1e-3, 1e3), st.sampled_from(("", "atlas", "mirror"))
+)
+
+
+@st.composite
+def landmark_sets(draw, side: Side):
+    points = draw(st.dictionaries(few_codes, positions, max_size=4))
+    unseen = draw(st.sets(few_codes, max_size=2))
+    landmarks = LandmarkSet.from_mapping(points, side)
+    for code in sorted(unseen - set(points)):
+        landmarks = landmarks.with_unseen(code)
+    suggested = draw(st.dictionaries(few_codes, suggestions, max_size=2))
+    return landmarks.with_suggestions(suggested)
+
+
+touches = st.builds(
+    Touch,
+    positions,
+    st.sampled_from([how for how in TouchHow if how is not TouchHow.SCAN]),
+    st.text(max_size=5),
+    st.text(max_size=5),
+    st.text(max_size=5),
+    left_out=st.booleans(),
+)
+tracked = st.builds(
+    Touch, positions, st.just(TouchHow.TRACKED), n_samples=st.integers(2, 99), spread_mm=st.floats(0, 1)
+)
+touched_names = st.sampled_from(("MN", "LLI", "IN", "S1"))
+
+edits = st.one_of(
+    st.builds(PlacePoint, sides, few_codes, positions, provenances),
+    st.builds(PlacePoint, sides, few_codes, positions, provenances, st.just("nudge")),
+    st.builds(SuggestPoints, sides, st.dictionaries(few_codes, suggestions, max_size=3), provenances),
+    st.builds(ConfirmPoint, sides, few_codes, provenances),
+    st.builds(ClearPoint, sides, few_codes),
+    st.builds(MarkUnseen, sides, few_codes, st.none() | provenances),
+    st.builds(CheckPoint, sides, few_codes, st.booleans()),
+    st.builds(
+        LockPoints, st.lists(st.tuples(sides, few_codes), min_size=1, max_size=3).map(tuple), st.booleans()
+    ),
+    st.builds(SwapPoints, sides, few_codes, few_codes),
+    st.builds(SwapSides),
+    st.builds(
+        ImportLandmarks,
+        st.one_of(*[landmark_sets(side).map(lambda one: (one,)) for side in Side]),
+        provenances,
+        st.none(),
+        st.booleans(),
+    ),
+    st.builds(SetThreshold, st.floats(-1e5, 1e5)),
+    st.builds(SetNotes, st.text(max_size=20)),
+    st.builds(RenameSpecimen, names),
+    st.builds(RecordPoseCheck, pose_checks),
+    st.builds(RecordTouch, sides, touched_names, touches | tracked),
+    st.builds(TakeTouches, sides, st.dictionaries(touched_names, touches, max_size=3)),
+    st.builds(RemoveTouches, sides, st.none() | touched_names),
+    st.builds(LeaveOutTouch, sides, touched_names, st.booleans()),
+    st.builds(SwapTouches, sides, touched_names, touched_names),
+    st.builds(MoveTouches, sides),
+    st.builds(SetSkull, st.dictionaries(st.sampled_from(("S1", "S2")), positions, max_size=2)),
+)
