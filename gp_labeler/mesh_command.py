@@ -16,6 +16,7 @@ __all__ = ["make_mesh_parser", "run_mesh"]
 
 _EXAMPLE = """examples:
   gp-labeler mesh head.nrrd -o head.ply
+  gp-labeler mesh head.nrrd -o head.ply --method skimage
   gp-labeler mesh slices_tif/ -o head.stl --spacing 0.035 --reverse
   gp-labeler mesh dicom/ -o head.vtp --series bone --accept gap --threshold 1200
 
@@ -45,6 +46,12 @@ def _add_surface(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--smallest", type=float, metavar="MM", help="leave out parts smaller than this across, by default 1"
+    )
+    group.add_argument(
+        "--method",
+        choices=("flying-edges", "marching-cubes", "skimage"),
+        default="flying-edges",
+        help="how the surface is found; all give the same, flying edges on all cores (default)",
     )
     group.add_argument("--largest", type=int, metavar="N", help="keep only so many parts, the largest")
 
@@ -107,7 +114,7 @@ def run_mesh(arguments: Sequence[str]) -> int:
     with protected_inputs([args.volume, *slices]):
         volume = read_volume(args.volume, **options)
         threshold = propose_threshold(volume) if args.threshold is None else args.threshold
-        surface = extract_isosurface(volume, threshold, **surface_options)
+        surface = extract_isosurface(volume, threshold, method=args.method, **surface_options)
         surface.save(args.output)
     for note in volume.notes:
         sys.stderr.write(f"gp-labeler: {volume.name}: {note}\n")

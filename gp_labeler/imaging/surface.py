@@ -6,23 +6,26 @@ compiled loops.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import vtkSMPTools
-from vtkmodules.vtkCommonDataModel import vtkImageData, vtkPolyData
-from vtkmodules.vtkFiltersCore import vtkFlyingEdges3D
 
 from gp_core.errors import GpError
-from gp_core.validation import FloatArray, as_points
+from gp_core.validation import FloatArray, as_points, check_option
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import GreyArray, Volume
-from gp_labeler.imaging.vtk_arrays import poly_data, to_numpy, to_vtk, triangles_of, triple
+from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of
 
-__all__ = ["Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
+if TYPE_CHECKING:
+    import pyvista as pv
+
+__all__ = ["METHODS", "Surface", "SurfaceHit", "box_around", "extract_isosurface", "overview_stride"]
 
 OVERVIEW_VOXELS = 256**3
 """For the first look."""
@@ -56,6 +59,7 @@ def extract_isosurface(
     stride: int = 1,
     smallest_mm: float = SMALLEST_PART_MM,
     largest: int | None = None,
+    method: str = "flying-edges",
     progress: Progress | None = None,
     cancel: Callable[[], bool] | None = None,
 ) -> Surface:
@@ -76,6 +80,9 @@ def extract_isosurface(
         Drop parts smaller than this across; 0 keeps all.
     largest : int, optional
         Keep only so many parts, those of the most triangles.
+    method : str
+        Of `METHODS`. All three find the same surface, but where a cube may be cut in two ways.
+        ``flying-edges`` runs on all cores; ``skimage`` is `skimage.measure.marching_cubes`.
     progress : callable, optional
         Called with the fraction done.
     cancel : callable, optional
@@ -89,24 +96,26 @@ def extract_isosurface(
     Raises
     ------
     GpError
-        No surface at this threshold, or the box lies outside the volume.
+        No surface at this threshold, the box lies outside the volume, or there is no such method.
     Cancelled
         `cancel` said so.
 
     References
     ----------
+    Lorensen and Cline 1987, Marching cubes, doi:10.1145/37402.37422.
     Schroeder, Maynard and Geveci 2015, Flying edges, doi:10.1109/LDAV.2015.7348069.
     """
     from gp_labeler.imaging.islands import kept_triangles  # numba takes long to import: not at start-up
 
+    check_option(method, "method", METHODS)
     report = Report(progress, cancel)
     report(0.0)
     region = _region(volume, box)
     level = surface_level(threshold, volume.array)
-    mesh = _contour(*_image(volume, region, stride, level))
+    mesh = METHODS[method](*_image(volume, region, stride, level))
     if volume.is_mirrored:
         _turn_over(mesh)
-    surface = Surface(poly_data(mesh), level, volume.T_voxel_scan, region, stride)
+    surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
     report(0.6)
     if surface.n_triangles and (smallest_mm > 0 or largest is not None):
         points, triangles = surface.points, surface.triangles
@@ -146,11 +155,13 @@ def _region(volume: Volume, box: ArrayLike | None) -> FloatArray:
     return region
 
 
-def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tuple[vtkImageData, float]:
+def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tuple[pv.ImageData, float]:
     """Wrap (a part of) the voxels for VTK, with the level to cut them at.
 
     Narrow types are not copied at full resolution. Others, and means, become heights above the level.
     """
+    import pyvista as pv  # takes 0.6 s: not before the window shows
+
     (i0, j0, k0), (i1, j1, k1) = region.astype(int)
     part = volume.array[k0 : k1 + 1, j0 : j1 + 1, i0 : i1 + 1]
     first = region[:1]
@@ -161,12 +172,13 @@ def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tup
         level = 0.0
     elif part.dtype.name not in _CUT_BY_VTK:
         part, level = _heights(part, level), 0.0
-    image = vtkImageData()
-    image.SetDimensions(part.shape[::-1])
-    image.SetOrigin(triple(volume.voxel_to_scan(first)[0]))
-    image.SetSpacing(triple(np.array(volume.spacing) * stride))
-    image.SetDirectionMatrix(volume.direction.ravel().tolist())
-    image.GetPointData().SetScalars(to_vtk(np.ascontiguousarray(part).ravel(), share=True))
+    image = pv.ImageData(
+        dimensions=part.shape[::-1],
+        origin=volume.voxel_to_scan(first)[0],
+        spacing=np.array(volume.spacing) * stride,
+        direction_matrix=volume.direction,
+    )
+    image.GetPointData().SetScalars(to_vtk(np.ascontiguousarray(part).ravel(), "values", share=True))
     return image, level
 
 
@@ -178,22 +190,65 @@ def _heights(values: GreyArray, level: float) -> NDArray[np.float32]:
     return heights
 
 
-def _contour(image: vtkImageData, level: float) -> vtkPolyData:
+def _flying_edges(image: pv.ImageData, level: float) -> pv.PolyData:
     """Run flying edges on all cores.
 
     It is not stopped in the middle: aborted, it goes on with counts that it has not made (VTK 9.7).
     """
     vtkSMPTools.SetBackend("STDThread")  # the wheel's default is one thread
-    edges = vtkFlyingEdges3D()
-    edges.SetInputData(image)
-    edges.SetValue(0, level)
-    edges.ComputeScalarsOff()
-    edges.Update()
-    mesh: vtkPolyData = edges.GetOutput()
+    mesh: pv.PolyData = image.contour(
+        [level], method="flying_edges", compute_normals=True, compute_scalars=False, preference="point"
+    )
     return mesh
 
 
-def _turn_over(mesh: vtkPolyData) -> None:
+def _marching_cubes(image: pv.ImageData, level: float) -> pv.PolyData:
+    """Run VTK's marching cubes, which puts images that are mirrored in the wrong place (9.7), in voxels."""
+    import pyvista as pv
+
+    low, high = image.get_data_range()
+    if not low < level <= high:
+        return pv.PolyData()
+    plain = pv.ImageData(dimensions=image.dimensions)
+    plain.GetPointData().SetScalars(image.GetPointData().GetScalars())
+    mesh = plain.contour([level], method="marching_cubes", compute_scalars=False, preference="point")
+    return _placed(image, mesh.points, mesh.regular_faces)
+
+
+def _skimage(image: pv.ImageData, level: float) -> pv.PolyData:
+    """Run scikit-image's marching cubes, of Lorensen and Cline as the others are."""
+    import pyvista as pv
+    from skimage import measure
+
+    find: Any = measure.marching_cubes  # it has no types
+    values = np.asarray(image.active_scalars).reshape(image.dimensions[::-1])
+    try:
+        corners, faces, _, _ = find(values.astype(np.float32), level, method="lorensen")
+    except (ValueError, RuntimeError):  # the level lies outside the values, or no cube is cut
+        return pv.PolyData()
+    return _placed(image, corners[:, ::-1], faces)
+
+
+def _placed(image: pv.ImageData, voxels: NDArray[Any], faces: NDArray[Any]) -> pv.PolyData:
+    """Return the mesh of (N, 3) voxel indices and (T, 3) corners where the image lies, with normals."""
+    import pyvista as pv
+
+    axes = np.asarray(image.direction_matrix) * image.spacing
+    points: Any = (voxels.astype(np.float64) @ axes.T + image.origin).astype(np.float32)
+    mesh = pv.PolyData.from_regular_faces(points, faces)
+    smooth: pv.PolyData = mesh.compute_normals(
+        cell_normals=False, split_vertices=False, consistent_normals=False
+    )
+    return smooth
+
+
+METHODS: Mapping[str, Callable[[pv.ImageData, float], pv.PolyData]] = MappingProxyType(
+    {"flying-edges": _flying_edges, "marching-cubes": _marching_cubes, "skimage": _skimage}
+)
+"""How an isosurface is found, by the names that ``gp-labeler mesh --method`` takes."""
+
+
+def _turn_over(mesh: pv.PolyData) -> None:
     """Turn triangles and normals outwards: from an image whose axes mirror both come inwards."""
     corners = triangles_of(mesh)
     corners[:, [1, 2]] = corners[:, [2, 1]]
