@@ -19,7 +19,6 @@ from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import Specimen
 from gp_core.terminal import printable
 from gp_core.validation import FloatArray
-from gp_labeler.added_meshes import AddedMeshes
 from gp_labeler.document.atlas_memory import AtlasMemory
 from gp_labeler.document.edits import SwapPoints, point_text, require_free
 from gp_labeler.document.opening import new_session, open_session, recover_session, tidy_name
@@ -34,6 +33,7 @@ from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import Dispatcher, Jobs, Task
 from gp_labeler.jobs.work import Demo, InspectScan, MakeDemo, ReadScan, phantom_seed
 from gp_labeler.models import labelling
+from gp_labeler.models.added_meshes import AddedMeshes
 from gp_labeler.models.atlas import AtlasDesk, expecting, is_atlas_file
 from gp_labeler.models.bone_desk import BoneDesk
 from gp_labeler.models.pose import PoseDesk

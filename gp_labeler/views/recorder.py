@@ -12,7 +12,6 @@ from qtpy.QtCore import QObject
 
 from gp_core.disk import write_text
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
-from gp_labeler.added_meshes import AddedMesh
 from gp_labeler.document.edits import Edit
 from gp_labeler.document.history import History
 from gp_labeler.document.landmark_export import FORMATS, ExportReport
@@ -24,6 +23,7 @@ from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.work import SaveMesh
+from gp_labeler.models.added_meshes import AddedMesh
 from gp_labeler.models.pose import OverlayOptions
 from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.models.view import ViewState
