@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -20,12 +22,13 @@ from gp_core.cli.options import (
     check_ending,
     lab_names,
     labelled_specimens,
+    labellings,
     read_atlas,
     save_json,
     say,
 )
 from gp_core.errors import GpError
-from gp_core.io import import_mat, landmarks_of, read_points, specimen_of
+from gp_core.io import Labelling, import_mat, landmarks_of, read_points, specimen_of
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.sets import Specimen
@@ -138,9 +141,14 @@ def run_import_mat(args: argparse.Namespace) -> int:
 
 def run_check(args: argparse.Namespace) -> int:
     """Print what there is to look at; status 1 where a label is doubtful."""
-    specimens = labelled_specimens(args) if args.side is None else [_one_side(args)]
+    found = labellings(args) if args.side is None else [Labelling(_one_side(args))]
     atlas, others = read_atlas(args.atlas)
-    report = {s.name: check_specimen(s, _atlas_for(s, atlas, others)) for s in specimens}
+    n_of = Counter(each.specimen.name for each in found)
+    report = {}
+    for each in found:
+        name = each.specimen.name if n_of[each.specimen.name] == 1 else f"{each.specimen.name} ({each.who})"
+        findings = check_specimen(each.specimen, _atlas_for(each.specimen, atlas, others))
+        report[name] = [replace(finding, specimen=name) for finding in findings]
     save_json(args.json, {name: [f.as_dict() for f in findings] for name, findings in report.items()})
     for name, findings in report.items():
         _say_findings(name, findings)

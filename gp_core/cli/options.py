@@ -14,7 +14,7 @@ from typing import Any
 from gp_core.atlas.atlas import Atlas
 from gp_core.disk import is_protected, is_stream, protected_inputs, read_head, write_text
 from gp_core.errors import GpError
-from gp_core.io import landmark_files, load_specimens, read_lab_names
+from gp_core.io import Labelling, landmark_files, load_labellings, load_specimens, read_lab_names
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import Specimen
 
@@ -29,6 +29,7 @@ __all__ = [
     "keeping_inputs",
     "lab_names",
     "labelled_specimens",
+    "labellings",
     "read_atlas",
     "save_json",
     "say",
@@ -78,6 +79,19 @@ def add_specimens(parser: argparse.ArgumentParser) -> None:
         help="landmark files of labelled animals, or folders of them",
     )
     add_names(parser)
+    add_labelling(parser)
+
+
+def add_labelling(parser: argparse.ArgumentParser) -> None:
+    """Add ``--observer NAME`` and ``--round N``."""
+    parser.add_argument("--observer", metavar="NAME", help="use the labels of this observer alone")
+    parser.add_argument(
+        "--round",
+        type=int,
+        metavar="N",
+        help="use the labels of this round alone, from 1; by default an animal that was labelled several "
+        "times has the mean of its labels",
+    )
 
 
 def add_names(parser: argparse.ArgumentParser) -> None:
@@ -96,7 +110,17 @@ def lab_names(args: argparse.Namespace) -> LabelNames | None:
 
 def labelled_specimens(args: argparse.Namespace) -> list[Specimen]:
     """Return the animals of the command line, under the names that ``--names`` gives."""
-    return load_specimens(args.specimens, names=lab_names(args))
+    return load_specimens(args.specimens, **_which(args))
+
+
+def labellings(args: argparse.Namespace) -> list[Labelling]:
+    """Return the same with each observer's labels, and each round's, apart."""
+    return load_labellings(args.specimens, **_which(args))
+
+
+def _which(args: argparse.Namespace) -> dict[str, Any]:
+    chosen = {name: getattr(args, name, None) for name in ("observer", "round")}
+    return {"names": lab_names(args), **chosen}
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

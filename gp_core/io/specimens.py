@@ -96,34 +96,24 @@ def load_specimens(
     GeometryError
         All points of a file are at one place, or not in millimetres.
     """
-    found = load_labellings(paths, names=names)
-    chosen = [
-        each
-        for each in found
-        if (observer is None or each.observer.casefold() == observer.casefold())
-        and (round is None or each.round == round)
-    ]
-    if not chosen:
-        what = [] if observer is None else [f"by {observer}"]
-        what += [] if round is None else [f"of round {round}"]
-        raise FeatureError(
-            f"no labels {' '.join(what)} are among the files",
-            remedy=f"There are: {'; '.join(sorted({each.who for each in found}))}.",
-        )
     of_animals: dict[str, list[Labelling]] = {}
-    for each in chosen:
+    for each in load_labellings(paths, names=names, observer=observer, round=round):
         of_animals.setdefault(each.specimen.name, []).append(each)
     return [_mean_of(labellings) for labellings in of_animals.values()]
 
 
 def load_labellings(
-    paths: str | PathLike[str] | Iterable[str | PathLike[str]], *, names: LabelNames | None = None
+    paths: str | PathLike[str] | Iterable[str | PathLike[str]],
+    *,
+    names: LabelNames | None = None,
+    observer: str | None = None,
+    round: int | None = None,
 ) -> list[Labelling]:
     """Read landmark files, or folders of them, and keep each observer's labels, and each round's, apart.
 
     Parameters
     ----------
-    paths, names
+    paths, names, observer, round
         As for `load_specimens`. Observer and round are those in the file's ``gpLabeler`` object, else in its
         points' descriptions, else in its name (``GP01_AB_r2_L``).
 
@@ -163,7 +153,25 @@ def load_labellings(
         known = sides.setdefault(key, {})
         known[landmarks.side] = _together(known.get(landmarks.side), _with_true_origin(landmarks), file)
     order = sorted(sides, key=lambda k: (natural_key(k.name), natural_key(k.observer), k.round))
-    return [Labelling(Specimen(key.name, _sharing(sides[key])), key.observer, key.round) for key in order]
+    found = [Labelling(Specimen(key.name, _sharing(sides[key])), key.observer, key.round) for key in order]
+    return _chosen(found, observer, round)
+
+
+def _chosen(found: list[Labelling], observer: str | None, number: int | None) -> list[Labelling]:
+    chosen = [
+        each
+        for each in found
+        if (observer is None or each.observer.casefold() == observer.casefold())
+        and (number is None or each.round == number)
+    ]
+    if not chosen:
+        what = [] if observer is None else [f"by {observer}"]
+        what += [] if number is None else [f"of round {number}"]
+        raise FeatureError(
+            f"no labels {' '.join(what)} are among the files",
+            remedy=f"There are: {'; '.join(dict.fromkeys(each.who for each in found))}.",
+        )
+    return chosen
 
 
 class _Key(NamedTuple):

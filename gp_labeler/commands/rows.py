@@ -184,7 +184,7 @@ def _toggle_lock(desk: Workbench, ui: Ui) -> None:
 def _toggle_check(desk: Workbench, ui: Ui) -> None:
     active, mark = desk.session.active, _mark(desk)
     if active.code is not None and mark is not None:
-        desk.session.do(CheckPoint(active.side, active.code, not mark.checked))
+        desk.session.do(CheckPoint(active.side, active.code, not mark.checked, desk.session.author))
 
 
 def _all_locked(desk: Workbench) -> bool:

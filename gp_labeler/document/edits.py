@@ -226,9 +226,10 @@ class MarkUnseen(_OnPoint):
 
 @dataclass(frozen=True)
 class CheckPoint(_OnPoint):
-    """Say that a placed point was looked at again and is right (or take that back)."""
+    """Say that a placed point was looked at again and is right, and who says so (or take that back)."""
 
     checked: bool = True
+    by: str = ""
 
     @property
     def text(self) -> str:
@@ -244,7 +245,7 @@ class CheckPoint(_OnPoint):
                 word, remedy = "only suggested", "Confirm it first."
             problem = f"{self._point} is {word}, so it cannot be checked"
             raise GpError(problem, landmark=self.code, remedy=remedy)
-        return state.with_landmarks({self.key: replace(landmark, checked=self.checked)})
+        return state.with_landmarks({self.key: replace(landmark, checked=self.checked, checked_by=self.by)})
 
 
 @dataclass(frozen=True)

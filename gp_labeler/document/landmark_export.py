@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
 from gp_core.errors import GpError
 from gp_core.io import landmark_file_name, write_csv, write_fcsv, write_markups, write_suggestions
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_core.validation import check_option
 from gp_labeler.document.specimen_json import provenance_document, volume_document
@@ -32,16 +33,25 @@ def _write_suggestions(path: Path, landmarks: LandmarkSet, state: SpecimenState)
 
 
 def _write_markups(path: Path, landmarks: LandmarkSet, state: SpecimenState) -> None:
-    marks = {f.code: state.landmark(landmarks.side, f.code) for f in FEATURES if not f.computed}
-    provenance = {c: provenance_document(m.provenance) for c, m in marks.items() if m.provenance is not None}
-    placed = {code: how for code, how in provenance.items() if code not in landmarks.suggested}
-    write_markups(path, landmarks, specimen=state.specimen, volume=_volume(state), provenance=placed)
+    write_markups(path, _with_provenance(landmarks, state), specimen=state.specimen, volume=_volume(state))
+
+
+def _with_provenance(landmarks: LandmarkSet, state: SpecimenState) -> LandmarkSet:
+    """Add who placed each point, when and how, and who looked at it again."""
+    known = {}
+    for code in (row.code for row in FEATURES if not row.computed):
+        mark = state.landmark(landmarks.side, code)
+        how = {} if mark.provenance is None else provenance_document(mark.provenance)
+        if how or mark.checked:
+            about = LabelProvenance.from_json(how)
+            known[code] = replace(about, checked=mark.checked, checked_by=mark.checked_by)
+    return landmarks.with_provenance(known)
 
 
 _WRITERS: Mapping[str, Writer] = {
     ".mrk.json": _write_markups,
-    ".fcsv": lambda path, landmarks, _: write_fcsv(path, landmarks),
-    ".csv": lambda path, landmarks, _: write_csv(path, landmarks),
+    ".fcsv": lambda path, landmarks, state: write_fcsv(path, _with_provenance(landmarks, state)),
+    ".csv": lambda path, landmarks, state: write_csv(path, _with_provenance(landmarks, state)),
 }
 FORMATS = tuple(_WRITERS)
 

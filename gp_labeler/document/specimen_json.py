@@ -115,7 +115,8 @@ def _landmark_out(landmark: Landmark) -> Document:
         out["suggestion"] = _suggestion_out(landmark.suggestion)
     if landmark.provenance is not None:
         out["provenance"] = provenance_document(landmark.provenance)
-    return out | {name: True for name in ("unseen", "locked", "checked") if getattr(landmark, name)}
+    out |= {name: True for name in ("unseen", "locked", "checked") if getattr(landmark, name)}
+    return out | ({"checked_by": landmark.checked_by} if landmark.checked_by else {})
 
 
 def _suggestion_out(suggestion: Suggestion) -> Document:
@@ -187,6 +188,7 @@ def _landmark_in(document: Mapping[str, Any], where: str) -> Landmark:
         checked=is_true["checked"] and position is not None,
         provenance=provenance,
         suggestion=_suggestion_in(document, where),
+        checked_by=_typed(document.get("checked_by", ""), str, f"{where}.checked_by"),
     )
 
 

@@ -102,6 +102,7 @@ class Landmark:
     checked: bool = False
     provenance: Provenance | None = None
     suggestion: Suggestion | None = None
+    checked_by: str = ""
 
     def __post_init__(self) -> None:
         suggestion = self.suggestion
@@ -114,6 +115,8 @@ class Landmark:
         if suggestion is not None:  # there is nothing yet to check or to lock
             object.__setattr__(self, "checked", False)
             object.__setattr__(self, "locked", False)
+        if not self.checked:
+            object.__setattr__(self, "checked_by", "")
 
     @property
     def settled(self) -> bool:

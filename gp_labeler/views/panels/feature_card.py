@@ -241,7 +241,7 @@ def _check(workbench: Workbench) -> None:
     session = workbench.session
     active = session.active
     if active.code is not None:
-        session.do(CheckPoint(active.side, active.code))
+        session.do(CheckPoint(active.side, active.code, by=session.author))
 
 
 def _swap_names(workbench: Workbench) -> None:

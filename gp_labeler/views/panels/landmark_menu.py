@@ -55,7 +55,7 @@ def _add_edits(add: Callable[..., None], workbench: Workbench, side: Side, code:
     checked = mark.checked
     add(
         "Take back the check" if checked else "Mark as checked",
-        lambda: session.do(CheckPoint(side, code, not checked)),
+        lambda: session.do(CheckPoint(side, code, not checked, session.author)),
         enabled=placed,
     )
     unseen = MarkUnseen(side, code, labelling.provenance(session, How.UNSEEN))

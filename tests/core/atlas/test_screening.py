@@ -14,6 +14,7 @@ from gp_core.atlas.screening import mean_shared_points, screen_labels
 from gp_core.frames import mirror_x
 from gp_core.landmarks.anatomy import cochlea_frame, with_cochlea_origin
 from gp_core.landmarks.features import CODES
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.registration.procrustes import weighted_procrustes
 from gp_core.study.leave_one_out import held_out_sides
 
@@ -109,6 +110,21 @@ def test_a_label_that_a_person_confirmed_is_believed(animals: list[Specimen]) ->
     wrong = [_changed(animals[0], lambda m: m.with_point("LLI", m["LLI"] + [2, 0, 0]), L), *animals[1:]]
     assert screen_labels(wrong).left_out
     assert not screen_labels(wrong, confirmed={("GP0", L, "LLI")}).left_out
+
+
+def test_a_label_whose_file_says_that_it_was_checked_is_believed_and_still_reported(
+    animals: list[Specimen],
+) -> None:
+    checked = {"LLI": LabelProvenance(checked=True, checked_by="AB")}
+    far_off = _changed(
+        animals[0], lambda m: m.with_point("LLI", m["LLI"] + [2, 0, 0]).with_provenance(checked), L
+    )
+    screened = screen_labels([far_off, *animals[1:]])
+    assert not screened.left_out
+    assert [(f.landmarks, f.checked_by) for f in screened.doubts] == [(("LLI",), "AB")]
+    assert (screened.weights == 1).all()
+    exchanged = _changed(animals[0], lambda m: _swapped("CA", "LLI")(m).with_provenance(checked), L)
+    assert screen_labels([exchanged, *animals[1:]]).left_out, "CA was not looked at again"
 
 
 def test_what_most_animals_have_elsewhere_is_how_it_is_labelled_here(animals: list[Specimen]) -> None:

@@ -12,9 +12,11 @@ from gp_core.errors import FeatureError, GpError
 from gp_core.io import load_specimens, read_landmarks, write_csv
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
+from gp_labeler.document.edits import CheckPoint
 from gp_labeler.document.landmark_export import FORMATS, export_landmarks
 from gp_labeler.document.landmark_import import ImportLandmarks, MisfitError, import_landmarks
 from gp_labeler.document.recent_files import RecentFiles
+from gp_labeler.document.specimen_json import document_of, state_of
 from gp_labeler.document.state import How, SpecimenState
 from gp_labeler.models import labelling
 from gp_labeler.models.session import Session
@@ -100,6 +102,20 @@ def test_an_exported_file_carries_its_origin_but_no_path(session, tmp_path):
         "time": "2026-01-01T00:00:00+00:00",
         "by": "AB",
     }
+
+
+@pytest.mark.parametrize("suffix", FORMATS)
+def test_who_looked_at_a_point_again_goes_with_it(session, tmp_path, suffix):
+    session.do(CheckPoint(L, "CA", by=session.author))
+    session.do(CheckPoint(L, "CB"))
+    export_landmarks(session.state, tmp_path, formats=[suffix])
+    assert dict(read_landmarks(tmp_path / f"GP-014_L{suffix}").checked) == {"CA": "AB", "CB": ""}
+    labelling.place(session, session.landmarks(L)["CA"] + [0.5, 0, 0], side=L, code="CA")
+    export_landmarks(session.state, tmp_path, formats=[suffix], overwrite=True)
+    assert dict(read_landmarks(tmp_path / f"GP-014_L{suffix}").checked) == {"CB": ""}
+    again = state_of(document_of(session.state))
+    assert again.landmark(L, "CB").checked
+    assert again == session.state
 
 
 def test_points_that_cannot_be_of_this_scan_are_refused(session, tmp_path):
