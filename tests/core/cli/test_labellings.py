@@ -44,9 +44,7 @@ def test_check_judges_each_labelling_and_says_who_looked_again(folder: Path, tmp
     assert main(["check", str(folder), "--observer", "ab"]) == 0
 
 
-def test_an_animal_of_two_observers_counts_once_in_a_fit(
-    folder: Path, tmp_path: Path, capsys, caplog
-) -> None:
+def test_an_animal_of_two_observers_is_one_to_a_fit(folder: Path, tmp_path: Path, capsys, caplog) -> None:
     assert main(["fit", str(folder), "-o", str(tmp_path / "atlas.json")]) == 0
     assert "Atlas of 3 animals, 6 sides" in capsys.readouterr().out
     assert "GP1: labelled 2 times, the mean is taken (AB, round 1; CD, round 1)" in caplog.text
