@@ -43,18 +43,18 @@ def main() -> None:
         window = _labelled_head(Path(state))
         rng = np.random.default_rng(0)
         T_tracker_scan = _somewhere(rng)
-        truth = window.workbench.truth
+        truth = window.workspace.scan.truth
         assert truth is not None
         touched = {
             code: T_tracker_scan.apply(truth.side(Side.LEFT)[code][None])[0] + rng.normal(0, 0.15, 3)
             for code in (*PROBE, _AGAIN)
         }
         for code, position in touched.items():
-            touching.record_touch(window.workbench.session, Side.LEFT, code, position)
+            touching.record_touch(window.workspace.document, Side.LEFT, code, position)
         _rest(window)
         told, seen = _touches(window, touched[_AGAIN], rng)
         _print(told, seen, _whole_paints(window))
-        window.workbench.abandon()
+        window.workspace.document.abandon()
         window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
         window.close()
 
@@ -64,15 +64,19 @@ def _labelled_head(state: Path) -> MainWindow:
     window.resize(*_SIZE)
     window.show()
     QTest.qWaitForWindowExposed(window)
-    desk = window.workbench
-    desk.open_demo(0, 0.2)
-    _until(lambda: desk.truth is not None and bool(desk.surfaces) and not desk.jobs.running)
-    assert desk.truth is not None
+    workspace = window.workspace
+    workspace.scan.open_demo(0, 0.2)
+    _until(
+        lambda: (
+            workspace.scan.truth is not None and bool(workspace.bone.surfaces) and not workspace.jobs.running
+        )
+    )
+    assert workspace.scan.truth is not None
     for side in Side:
         for row in FEATURES:
             if not row.computed:
-                place = desk.truth.side(side)[row.code]
-                desk.session.do(PlacePoint(side, row.code, place, Provenance(How.MESH)))
+                place = workspace.scan.truth.side(side)[row.code]
+                workspace.document.do(PlacePoint(side, row.code, place, Provenance(How.MESH)))
     window.set_step("pose")
     _rest(window)
     return window
@@ -92,7 +96,7 @@ def _touches(
     for _ in range(_WARM + _REPEATS):
         there = position + rng.normal(0, 0.15, 3)
         start = time.perf_counter()
-        touching.record_touch(window.workbench.session, Side.LEFT, _AGAIN, there)
+        touching.record_touch(window.workspace.document, Side.LEFT, _AGAIN, there)
         told.append(time.perf_counter() - start)
         _paint(window)
         seen.append(time.perf_counter() - start)
@@ -123,7 +127,7 @@ def _paint(window: MainWindow) -> None:
 
 def _rest(window: MainWindow) -> None:
     scene = window.grid.scene_view.scene
-    _until(lambda: not window.workbench.jobs.running and scene.is_fine)
+    _until(lambda: not window.workspace.jobs.running and scene.is_fine)
     QTest.qWait(300)
 
 

@@ -26,8 +26,8 @@ from qtpy.QtTest import QTest  # noqa: E402
 
 from gp_core.validation import FloatArray  # noqa: E402
 from gp_labeler.imaging.volume import Volume  # noqa: E402
+from gp_labeler.jobs.mesh import MeshFirst, MeshOverview  # noqa: E402
 from gp_labeler.jobs.runner import Job  # noqa: E402
-from gp_labeler.jobs.work import MeshFirst, MeshOverview  # noqa: E402
 from gp_labeler.views.application import make_window  # noqa: E402
 from gp_labeler.views.main_window import MainWindow  # noqa: E402
 
@@ -43,11 +43,11 @@ def main() -> None:
     window.resize(1440, 900)
     window.show()
     QTest.qWaitForWindowExposed(window)
-    window.workbench.open_volume(sphere_field(millions))
-    window.workbench.set_threshold(0.5)
+    window.workspace.scan.begin(sphere_field(millions))
+    window.workspace.scan.set_threshold(0.5)
     rest(window)
-    n = sum(surface.n_triangles for surface in window.workbench.surfaces)
-    quick = sum(surface.n_triangles for surface in window.workbench.quick_surfaces)
+    n = sum(surface.n_triangles for surface in window.workspace.bone.surfaces)
+    quick = sum(surface.n_triangles for surface in window.workspace.bone.quick_surfaces)
     print(f"{n / 1e6:.2f} million triangles, a stand-in of {quick / 1e3:.0f} thousand")
     whole = whole_redraw_seconds(window)
     print(f"the scene drawn whole: {1e3 * whole:.0f} ms\n")
@@ -55,7 +55,7 @@ def main() -> None:
     for title, work in CASES:
         report(title, window, whole, work)
     drawing_alone(window, whole)
-    window.workbench.abandon()
+    window.workspace.document.abandon()
     window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
     window.close()
 
@@ -75,7 +75,7 @@ def sphere_field(millions: float) -> Volume:
 def rest(window: MainWindow) -> None:
     """Wait until all work is done and the bone is drawn finely."""
     view = window.grid.scene_view
-    while window.workbench.jobs.running or not view.scene.is_fine:
+    while window.workspace.jobs.running or not view.scene.is_fine:
         QTest.qWait(20)
     QTest.qWait(50)
 
@@ -181,8 +181,8 @@ def refine(window: MainWindow) -> None:
 
 def cut(window: MainWindow) -> None:
     """Move a cut through the bone."""
-    desk = window.workbench
-    desk.session.set_crosshair(desk.volume.extent.mean(axis=0))  # type: ignore[union-attr]
+    workspace = window.workspace
+    workspace.view.set_crosshair(workspace.scan.volume.extent.mean(axis=0))  # type: ignore[union-attr]
     window.commands.run("view.cut_coronal")
     for _ in range(10):
         window.commands.run("view.cut_deeper")
@@ -193,24 +193,24 @@ def cut(window: MainWindow) -> None:
 
 def mesh(window: MainWindow) -> None:
     """Mesh the scan in the background, as after another threshold."""
-    desk = window.workbench
-    assert desk.volume is not None
-    assert desk.threshold is not None
+    workspace = window.workspace
+    assert workspace.scan.volume is not None
+    assert workspace.scan.threshold is not None
     jobs: tuple[Job[object], ...] = (
-        MeshOverview(desk.volume, desk.threshold),
-        MeshFirst(desk.volume, desk.threshold),
+        MeshOverview(workspace.scan.volume, workspace.scan.threshold),
+        MeshFirst(workspace.scan.volume, workspace.scan.threshold),
     )
     for job in jobs:
-        desk.jobs.submit(job)
-    while desk.jobs.running:
+        workspace.jobs.submit(job)
+    while workspace.jobs.running:
         QTest.qWait(5)
 
 
 def mesh_and_show(window: MainWindow) -> None:
     """Set another threshold: mesh, and show what comes of it."""
-    desk = window.workbench
-    assert desk.threshold is not None
-    desk.set_threshold(desk.threshold + 1.0)
+    workspace = window.workspace
+    assert workspace.scan.threshold is not None
+    workspace.scan.set_threshold(workspace.scan.threshold + 1.0)
     rest(window)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 
 __all__ = ["MENUS", "Action", "Run", "Test", "Ui"]
 
@@ -60,8 +60,8 @@ class Ui(Protocol):
     def toggle_recording(self) -> None: ...  # noqa: D102
 
 
-Run = Callable[[Workbench, Ui], object]
-Test = Callable[[Workbench], bool]
+Run = Callable[[Workspace, Ui], object]
+Test = Callable[[Workspace], bool]
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ class Action:
     title: str
     shortcuts: tuple[str, ...]
     run: Run
-    enabled: Test = lambda desk: True
+    enabled: Test = lambda workspace: True
     checked: Test | None = None
     hint: str = ""
     group: str = ""

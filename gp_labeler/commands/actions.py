@@ -11,7 +11,7 @@ from gp_labeler.commands.atlas_rows import atlas_rows
 from gp_labeler.commands.pose_rows import pose_rows
 from gp_labeler.commands.rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
 from gp_labeler.commands.view_rows import cut_rows
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 
 __all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
 
@@ -46,7 +46,7 @@ def action(id: str) -> Action:
     return ACTIONS[id]
 
 
-def run(id: str, workbench: Workbench, ui: Ui) -> bool:
+def run(id: str, workspace: Workspace, ui: Ui) -> bool:
     """Do an action; where it cannot be done, the user is told why.
 
     Returns
@@ -55,12 +55,12 @@ def run(id: str, workbench: Workbench, ui: Ui) -> bool:
         Whether it was done.
     """
     row = action(id)
-    if not row.enabled(workbench):
+    if not row.enabled(workspace):
         return False
     try:
-        row.run(workbench, ui)
+        row.run(workspace, ui)
     except GpError as error:
-        workbench.say(str(error), "warning")
+        workspace.say(str(error), "warning")
         return False
     return True
 

@@ -5,68 +5,68 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_labeler.commands.action import Action, Run, Test, Ui
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 
 __all__ = ["cut_rows"]
 
 _STEP_MM = 0.5
 
 
-def _has_bone(desk: Workbench) -> bool:
-    return bool(desk.surfaces)
+def _has_bone(workspace: Workspace) -> bool:
+    return bool(workspace.bone.surfaces)
 
 
-def _has_scan(desk: Workbench) -> bool:
-    return desk.volume is not None
+def _has_scan(workspace: Workspace) -> bool:
+    return workspace.scan.volume is not None
 
 
-def _is_cut(desk: Workbench) -> bool:
-    return desk.session.view.state.cut is not None
+def _is_cut(workspace: Workspace) -> bool:
+    return workspace.view.state.cut is not None
 
 
 def _is_cut_by(plane: str) -> Test:
-    def test(desk: Workbench) -> bool:
-        cut = desk.session.view.state.cut
+    def test(workspace: Workspace) -> bool:
+        cut = workspace.view.state.cut
         return cut is not None and cut.plane == plane
 
     return test
 
 
 def _cut_by(plane: str) -> Run:
-    """Cut by a plane, or leave bone whole again where it is cut by it."""
+    """Cut by a plane, or leave bone whole w where it is cut by it."""
 
-    def change(desk: Workbench, ui: Ui) -> None:
-        if _is_cut_by(plane)(desk):
-            desk.session.view.update(cut=None)
+    def change(workspace: Workspace, ui: Ui) -> None:
+        if _is_cut_by(plane)(workspace):
+            workspace.view.update(cut=None)
         else:
             ui.cut(plane)
 
     return change
 
 
-def _flip(desk: Workbench, ui: Ui) -> None:
-    cut = desk.session.view.state.cut
+def _flip(workspace: Workspace, ui: Ui) -> None:
+    cut = workspace.view.state.cut
     if cut is not None:
-        desk.session.view.update(cut=cut.flipped())
+        workspace.view.update(cut=cut.flipped())
 
 
-def _cut_here(desk: Workbench, ui: Ui) -> None:
-    cut = desk.session.view.state.cut
+def _cut_here(workspace: Workspace, ui: Ui) -> None:
+    cut = workspace.view.state.cut
     if cut is not None:
-        desk.session.view.update(cut=cut.through(desk.session.crosshair))
+        workspace.view.update(cut=cut.through(workspace.view.crosshair))
 
 
 def _move(mm: float) -> Run:
-    def change(desk: Workbench, ui: Ui) -> None:
-        cut = desk.session.view.state.cut
+    def change(workspace: Workspace, ui: Ui) -> None:
+        cut = workspace.view.state.cut
         if cut is not None:
-            desk.session.view.update(cut=cut.moved(mm))
+            workspace.view.update(cut=cut.moved(mm))
 
     return change
 
 
-def _toggle_slices(desk: Workbench, ui: Ui) -> None:
-    desk.session.view.update(slices_visible=not desk.session.view.state.slices_visible)
+def _toggle_slices(workspace: Workspace, ui: Ui) -> None:
+    workspace.view.update(slices_visible=not workspace.view.state.slices_visible)
 
 
 # fmt: off
@@ -89,4 +89,4 @@ def cut_rows() -> Iterator[Action]:
     yield row("cut_shallower", "Cut: less deep", ("Shift+[",), _move(-_STEP_MM),
               hint="By half a millimetre")
     yield row("slices_visible", "Slices in the 3D view", ("Shift+D",), _toggle_slices, _has_scan,
-              checked=lambda desk: desk.session.view.state.slices_visible, group="slices")
+              checked=lambda workspace: workspace.view.state.slices_visible, group="slices")

@@ -18,10 +18,9 @@ from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import as_position, point_text, require_free
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_json import provenance_of
 from gp_labeler.document.state import TO_DO, How, Landmark, PointKey, Provenance, SpecimenState, point_key
-from gp_labeler.models.labelling import provenance
-from gp_labeler.models.session import Session
 
 __all__ = ["ImportLandmarks", "MisfitError", "Predicate", "import_landmarks"]
 
@@ -36,7 +35,7 @@ class MisfitError(GpError):
 
 
 def import_landmarks(
-    session: Session,
+    document: SpecimenDocument,
     paths: Iterable[str | PathLike[str]],
     *,
     side: Side | str | None = None,
@@ -52,7 +51,7 @@ def import_landmarks(
 
     Parameters
     ----------
-    session : Session
+    document : SpecimenDocument
         Where to.
     paths : iterable of path
         Any landmark file that `gp_core.io` reads.
@@ -85,7 +84,7 @@ def import_landmarks(
         raise GpError("no landmark file was given")
     read = [(points, one) for points in lists for one in _sides(points, side)]
     sets = tuple(one for _, one in read)
-    off_bone = _misfit(session, sets, near_bone, accept_misfit)
+    off_bone = _misfit(document, sets, near_bone, accept_misfit)
     known = {key: found for points, one in read for key, found in _known(points, one.side).items()}
     source = ", ".join(points.source.name for points in lists)
     asked = {
@@ -94,10 +93,10 @@ def import_landmarks(
         "names": dict(names or {}),
         "accept_misfit": accept_misfit,
     }
-    new = provenance(session, How.IMPORTED, source=source)
+    new = document.provenance(How.IMPORTED, source=source)
     with blaming(source):
-        session.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
-    return (*_doubtful_origin(session, lists), *off_bone, *_suggested(sets))
+        document.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
+    return (*_doubtful_origin(document, lists), *off_bone, *_suggested(sets))
 
 
 def _sides(points: PointList, side: Side | str | None) -> tuple[LandmarkSet, ...]:
@@ -115,7 +114,7 @@ def _suggested(sets: tuple[LandmarkSet, ...]) -> list[str]:
 
 
 def _misfit(
-    session: Session, sets: tuple[LandmarkSet, ...], near_bone: Predicate | None, accepted: bool
+    document: SpecimenDocument, sets: tuple[LandmarkSet, ...], near_bone: Predicate | None, accepted: bool
 ) -> tuple[str, ...]:
     observed = {(s.side, code): s[code] for s in sets for code in s.placed if not feature(code).computed}
     suggested = {
@@ -124,7 +123,7 @@ def _misfit(
     if not (located := suggested | observed):
         return ()
     names, points = [point_text(*key) for key in located], np.array(list(located.values()))
-    contains: Predicate | None = getattr(session.volume, "contains", None)
+    contains: Predicate | None = getattr(document.volume, "contains", None)
     problem, remedy = "", ""
     if contains is not None and not (inside := contains(points)).all():
         problem = f"{_listed(names, ~inside)} lie outside the scan"
@@ -135,7 +134,7 @@ def _misfit(
         problem = f"{_listed(names, off)} lie off the bone"
     if problem and not accepted:
         remedy = remedy or "Are they of another scan? Import them nevertheless only if you know why."
-        raise MisfitError(problem, specimen=session.state.specimen, remedy=remedy)
+        raise MisfitError(problem, specimen=document.state.specimen, remedy=remedy)
     warning = problem or (f"{_listed(names, off)} lie off the bone" if off.any() else "")
     return (warning,) if warning else ()
 
@@ -160,13 +159,13 @@ def _known(points: PointList, side: Side) -> dict[tuple[Side, str], Provenance]:
     return found
 
 
-def _doubtful_origin(session: Session, lists: list[PointList]) -> list[str]:
+def _doubtful_origin(document: SpecimenDocument, lists: list[PointList]) -> list[str]:
     found = []
     for points in lists:
-        header, reference = points.header, session.state.volume
+        header, reference = points.header, document.state.volume
         if header is None:
             continue
-        if header.specimen and header.specimen != session.state.specimen:
+        if header.specimen and header.specimen != document.state.specimen:
             found.append(f"{points.source.name} is of specimen {header.specimen}")
         theirs = (header.volume or {}).get("checksum")
         if reference and reference.checksum and theirs and theirs != reference.checksum:

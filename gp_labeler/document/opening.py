@@ -1,9 +1,10 @@
-"""Beginning a session: new, from a specimen file, or with what a killed program left."""
+"""What a document can be loaded with: a new specimen, a specimen file, or what a killed program left."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -11,15 +12,22 @@ from typing import Any
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
 from gp_core.validation import check_option
+from gp_labeler.document.history import History
 from gp_labeler.document.paths import absolute_path
 from gp_labeler.document.recovery import Recovery, find_recovery, replayed
 from gp_labeler.document.specimen_file import read_document, state_in
 from gp_labeler.document.specimen_json import accepted_ghosts, state_of
 from gp_labeler.document.state import SpecimenState
-from gp_labeler.document.store import Keeper
-from gp_labeler.models.session import Session
+from gp_labeler.document.store import SpecimenStore
 
-__all__ = ["UnsavedEditsError", "new_session", "open_session", "recover_session", "tidy_name"]
+__all__ = [
+    "LoadedSpecimen",
+    "UnsavedEditsError",
+    "new_specimen",
+    "open_specimen",
+    "recover_specimen",
+    "tidy_name",
+]
 
 
 class UnsavedEditsError(GpError):
@@ -28,7 +36,7 @@ class UnsavedEditsError(GpError):
     Parameters
     ----------
     recovery : Recovery
-        These edits: give it to `recover_session`, or open the file with `unsaved="leave"`.
+        These edits: give it to `recover_specimen`, or open the file with `unsaved="leave"`.
     """
 
     def __init__(self, recovery: Recovery) -> None:
@@ -40,17 +48,40 @@ class UnsavedEditsError(GpError):
         )
 
 
-def new_session(directory: Path | None = None, *, specimen: str = "unnamed", **options: Any) -> Session:
-    """Begin with an empty specimen.
+@dataclass(frozen=True)
+class LoadedSpecimen:
+    """A specimen that was read or begun, for `SpecimenDocument.load`.
+
+    Parameters
+    ----------
+    history : History
+        Its state, and what can be undone and redone.
+    store : SpecimenStore
+        Keeps it safe on disk.
+    saved : SpecimenState, optional
+        The state that is saved, if it is not the present one.
+    notices : tuple of str
+        What the user should be told once.
+    copy_of : Path, optional
+        The file that it was opened from as a copy.
+    """
+
+    history: History[SpecimenState]
+    store: SpecimenStore = field(default_factory=SpecimenStore)
+    saved: SpecimenState | None = None
+    notices: tuple[str, ...] = ()
+    copy_of: Path | None = None
+
+
+def new_specimen(directory: Path | None = None, *, specimen: str = "unnamed") -> LoadedSpecimen:
+    """Begin an empty specimen.
 
     Parameters
     ----------
     directory : Path, optional
-        State directory (`places.default_directory()` in the window); None keeps no journal.
+        State directory (`paths.default_directory()` in the window); None keeps no journal.
     specimen : str
-        Its name; anything is made to do as a file name.
-    **options
-        `predict`, `author` and `clock` of `Session`.
+        Its name; characters that cannot stand in a file name are replaced.
 
     Raises
     ------
@@ -58,32 +89,29 @@ def new_session(directory: Path | None = None, *, specimen: str = "unnamed", **o
         The state directory cannot be written.
     """
     state = SpecimenState(tidy_name(specimen))
-    return Session(state, keeper=Keeper.begin(directory, state), **options)
+    return LoadedSpecimen(History(state), SpecimenStore.begin(directory, state))
 
 
-def open_session(
+def open_specimen(
     path: str | PathLike[str],
     directory: Path | None = None,
     *,
     unsaved: str = "ask",
     as_copy: bool = False,
-    **options: Any,
-) -> Session:
-    """Open a specimen file.
+) -> LoadedSpecimen:
+    """Read a specimen file.
 
     Parameters
     ----------
     path : path
         The file.
     directory : Path, optional
-        State directory; see `new_session`.
+        State directory; see `new_specimen`.
     unsaved : str
         What to do about edits that a killed program left: ``ask`` raises, ``recover`` takes them up,
         ``leave`` opens the file as it was saved (they are offered again at the next start).
     as_copy : bool
         Open it beside the window that has it open, as a specimen that is not saved yet.
-    **options
-        `predict`, `author` and `clock` of `Session`.
 
     Raises
     ------
@@ -100,15 +128,15 @@ def open_session(
     if recovery is not None and directory is not None:
         if unsaved == "ask":
             raise UnsavedEditsError(recovery)
-        return recover_session(recovery, directory, **options)
+        return recover_specimen(recovery, directory)
     document = read_document(file)
     state = state_in(document, file)
-    session = Session(state, keeper=Keeper.begin(directory, state, None if as_copy else file), **options)
-    session.notices = _demotions(document)
-    return session
+    store = SpecimenStore.begin(directory, state, None if as_copy else file)
+    notices, copy_of = _demotions(document), file if as_copy else None
+    return LoadedSpecimen(History(state), store, notices=notices, copy_of=copy_of)
 
 
-def recover_session(recovery: Recovery, directory: Path | None, **options: Any) -> Session:
+def recover_specimen(recovery: Recovery, directory: Path | None) -> LoadedSpecimen:
     """Go on where a killed program stopped; undo works back to where it was saved last.
 
     Raises
@@ -116,14 +144,13 @@ def recover_session(recovery: Recovery, directory: Path | None, **options: Any) 
     InUseError
         Another window has just taken it up.
     """
-    keeper = Keeper.resume(directory, recovery)
+    store = SpecimenStore.resume(directory, recovery)
     history = replayed(recovery.content)
     saved = state_of(recovery.content.base)
     if saved.volume is None:
         saved = saved.on_volume(history.state.volume, history.state.import_choices)
-    session = Session(history, keeper=keeper, saved=saved, **options)
-    session.notices = _demotions(recovery.content.document)
-    return session
+    damage = (f"{recovery.content.damage}.",) if recovery.content.damage else ()
+    return LoadedSpecimen(history, store, saved, (*_demotions(recovery.content.document), *damage))
 
 
 def _demotions(document: Mapping[str, Any]) -> tuple[str, ...]:

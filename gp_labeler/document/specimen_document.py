@@ -1,7 +1,9 @@
-"""A specimen that is being edited: undo, redo, the scan it lies on, and everything safe on disk."""
+"""The specimen that is open: its state, undo and redo, the scan it lies on, and everything safe on disk."""
 
 from __future__ import annotations
 
+import getpass
+import os
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -14,14 +16,17 @@ from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.edits import Edit
 from gp_labeler.document.history import History
-from gp_labeler.document.state import SpecimenState, changed_points
-from gp_labeler.document.store import Keeper
+from gp_labeler.document.opening import LoadedSpecimen, new_specimen, open_specimen, recover_specimen
+from gp_labeler.document.recovery import Recovery
+from gp_labeler.document.specimen_file import SUFFIX
+from gp_labeler.document.state import How, Provenance, SpecimenState, changed_points, measured
 from gp_labeler.document.volume_reference import VolumeLike, VolumeReference
 
-__all__ = ["EditedSpecimen", "VolumeChangedError", "utc_now"]
+__all__ = ["SpecimenDocument", "VolumeChangedError", "utc_now"]
 
 
 def utc_now() -> str:
@@ -49,31 +54,37 @@ class VolumeChangedError(GpError):
         )
 
 
-class EditedSpecimen:
-    """One specimen, all edits of it, and what of it is on disk: the part of a `Session` that outlives it.
+class SpecimenDocument:
+    """The specimen that is open, all edits of it, and what of it is on disk.
 
-    Every change is written to the journal first, then it holds, then the signals tell; all on the thread that
-    made the object.
+    One document lives as long as the program: opening a specimen loads it into the document, and `reset`
+    announces that. So a listener connects once. Every edit is journalled, applied, then announced, all on the
+    thread that made the document.
 
     Parameters
     ----------
-    history : History
-        Where it stands.
-    keeper : Keeper
-        What keeps it safe on disk.
-    saved : SpecimenState, optional
-        What is saved, where that is not where it stands.
+    specimen : SpecimenState or LoadedSpecimen, optional
+        To begin with; an empty specimen by default.
+    directory : Path, optional
+        State directory, where journals are kept; by default that of `specimen`, if any.
+    author : str, optional
+        Who labels; by default the name the user is logged in with.
     clock : callable
         Returns the time as ISO 8601 text.
     """
 
+    reset = Signal()
+    """Another specimen was loaded: read everything again."""
+    loaded = Signal(tuple)
+    """After all listeners of `reset`: texts that the user should be told once."""
     landmarks_changed = Signal(frozenset)
     """The points that changed, (Side, code): IN for both sides, CO where it was recomputed."""
     touches_changed = Signal()
     """What was touched with the probe, or where the skull's registration features are on the scan."""
     volume_changed = Signal(object)
-    """The loaded volume."""
+    """The attached volume."""
     threshold_changed = Signal(object)
+    """The threshold that is set, or None; see `ScanModel.threshold` for the one in effect."""
     details_changed = Signal()
     """Specimen name, notes, the reference to the scan, import choices or pose checks."""
     history_changed = Signal()
@@ -85,22 +96,30 @@ class EditedSpecimen:
     """The edit that was made, and whether it continued the gesture before it, as `do` was told."""
     stepped = Signal(str)
     """``undo`` or ``redo``, after it was done."""
+    focus_restored = Signal(object)
+    """The `focus` at the time of an edit that was just undone or redone."""
 
     def __init__(
         self,
-        history: History[SpecimenState],
-        keeper: Keeper,
+        specimen: SpecimenState | LoadedSpecimen | None = None,
         *,
-        saved: SpecimenState | None = None,
+        directory: Path | None = None,
+        author: str | None = None,
         clock: Callable[[], str] = utc_now,
     ) -> None:
+        begun = _loaded(specimen) if specimen is not None else new_specimen(directory)
+        self.directory = begun.store.directory if directory is None else directory
+        self.author = _user() if author is None else author
         self.now = clock
-        self._history = history
-        self._keeper = keeper
-        self._clean = self.state if saved is None else saved
-        self._was_dirty = self.dirty
-        self._volume: VolumeLike | None = None
+        self.focus: object = None
+        """What the user works on, remembered with every edit."""
+        self.measure: Callable[[LandmarkSet], ScanEvidence] | None = None
+        """Tells how far the points of a side lie from the bone of the scan; None without a scan."""
         self._thread = threading.get_ident()
+        self._abandoned: SpecimenState | None = None
+        self._hold(begun)
+
+    # What it holds
 
     @property
     def state(self) -> SpecimenState:
@@ -109,18 +128,35 @@ class EditedSpecimen:
 
     @property
     def volume(self) -> VolumeLike | None:
-        """The loaded volume; None while only `state.volume`, its reference, is known."""
+        """The attached volume; None while only `state.volume`, its reference, is known."""
         return self._volume
 
     @property
     def path(self) -> Path | None:
         """The specimen file; None where it was never saved."""
-        return self._keeper.specimen_file
+        return self._store.specimen_file
+
+    @property
+    def location(self) -> str:
+        """Where it is kept, which tells two of one name apart; empty where it was never saved."""
+        if self.path is not None:
+            return _location(self.path, self.state.specimen)
+        return "" if self._copy_of is None else f"copy of {self._copy_of}"
 
     @property
     def dirty(self) -> bool:
         """Whether there is something to save."""
         return self.state != self._clean
+
+    @property
+    def in_use(self) -> bool:
+        """Whether there is a specimen to work on and to keep: one with a scan, or one that was touched."""
+        return self.state.volume is not None or bool(self.state.touches)
+
+    @property
+    def lacks_scan(self) -> bool:
+        """Whether the specimen was touched, and has no scan yet: the next one that is opened is its own."""
+        return self.in_use and self.state.volume is None
 
     @property
     def undo_text(self) -> str | None:
@@ -137,6 +173,53 @@ class EditedSpecimen:
     def landmarks(self, side: Side | str) -> LandmarkSet:
         """Return one side, in the scan frame."""
         return self.state.side(side)
+
+    # Loading
+
+    def begin(self, specimen: str = "unnamed") -> None:
+        """Begin an empty specimen; see `new_specimen`."""
+        self.load(new_specimen(self.directory, specimen=specimen))
+
+    def open(self, path: str | PathLike[str], *, unsaved: str = "ask", as_copy: bool = False) -> None:
+        """Open a specimen file; see `open_specimen` for arguments and errors."""
+        self.load(open_specimen(path, self.directory, unsaved=unsaved, as_copy=as_copy))
+
+    def recover(self, recovery: Recovery) -> None:
+        """Go on where a killed program stopped; see `recover_specimen`."""
+        self.load(recover_specimen(recovery, self.directory))
+
+    def load(self, specimen: SpecimenState | LoadedSpecimen) -> None:
+        """Hold another specimen from now on, and announce `reset`.
+
+        Unsaved edits of the one before stay in its journal, unless they were given up by `abandon`.
+
+        Parameters
+        ----------
+        specimen : SpecimenState or LoadedSpecimen
+            A plain state is kept in memory only, until it is saved.
+        """
+        self._check_thread()
+        specimen = _loaded(specimen)
+        kept = self.dirty and self.state is not self._abandoned  # edited since: a scan takes seconds to load
+        name = self.state.specimen
+        self.close(discard=not kept)
+        self._hold(specimen)
+        self.reset.emit()
+        told = (f"Unsaved edits of {name} are kept, and offered at the next start",)
+        self.loaded.emit((*(told if kept and self.directory is not None else ()), *specimen.notices))
+
+    def abandon(self) -> None:
+        """Give up the unsaved edits so far, once something else is loaded."""
+        self._abandoned = self.state
+
+    def _hold(self, specimen: LoadedSpecimen) -> None:
+        self._history, self._store = specimen.history, specimen.store
+        self._clean = self.state if specimen.saved is None else specimen.saved
+        self._was_dirty = self.dirty
+        self._volume: VolumeLike | None = None
+        self._abandoned = None
+        copied = specimen.copy_of
+        self._copy_of = None if copied is None else _location(copied, self.state.specimen)
 
     # Edits
 
@@ -165,9 +248,9 @@ class EditedSpecimen:
         if new == old:
             return False
         text = edit.text
-        self._keeper.record("merge" if merge else "edit", text, new, time=self.now())
-        self._history.push(text, new, focus=self._focus(), merge=merge)
-        self._tell(old)
+        self._store.record("merge" if merge else "edit", text, new, time=self.now())
+        self._history.push(text, new, focus=self.focus, merge=merge)
+        self._announce(old)
         self.edited.emit(edit, merge)
         return True
 
@@ -179,20 +262,25 @@ class EditedSpecimen:
         """Do again what was undone last; False where there is nothing."""
         return self._step("redo")
 
+    def provenance(self, how: How, *, source: str = "") -> Provenance:
+        """Return what is to be remembered of a point that is placed now."""
+        volume = self.state.volume
+        return Provenance(how, self.now(), self.author, volume.spacing if volume else None, source)
+
     def _step(self, kind: str) -> bool:
         self._check_thread()
         upcoming = self._history.to_undo if kind == "undo" else self._history.to_redo
         if upcoming is None:
             return False
         old = self.state
-        self._keeper.record(kind, upcoming.text, upcoming.state, time=self.now())
-        (self._history.undo if kind == "undo" else self._history.redo)(focus=self._focus())
-        self._tell(old)
-        self._return_to(upcoming.focus)
+        self._store.record(kind, upcoming.text, upcoming.state, time=self.now())
+        (self._history.undo if kind == "undo" else self._history.redo)(focus=self.focus)
+        self._announce(old)
+        self.focus_restored.emit(upcoming.focus)
         self.stepped.emit(kind)
         return True
 
-    def _tell(self, old: SpecimenState) -> None:
+    def _announce(self, old: SpecimenState) -> None:
         new = self.state
         if changed := changed_points(old, new):
             self.landmarks_changed.emit(changed)
@@ -203,24 +291,17 @@ class EditedSpecimen:
         if _details(new) != _details(old):
             self.details_changed.emit()
         self.history_changed.emit()
-        self._tell_dirty()
+        self._announce_dirty()
 
-    def _tell_dirty(self) -> None:
+    def _announce_dirty(self) -> None:
         if self.dirty != self._was_dirty:
             self._was_dirty = self.dirty
             self.dirty_changed.emit(self._was_dirty)
 
-    def _focus(self) -> object:
-        """Return what is to be remembered with an edit of where the user was."""
-        return None
-
-    def _return_to(self, focus: object) -> None:
-        """Bring the user back there when the edit is undone."""
-
     def _check_thread(self) -> None:
         if threading.get_ident() != self._thread:
             raise RuntimeError(
-                "a session may only be changed on its own thread; deliver results through Jobs"
+                "a document may only be changed on its own thread; deliver results through Jobs"
             )
 
     # The scan
@@ -238,7 +319,7 @@ class EditedSpecimen:
         import_choices: Mapping[str, Any] | None = None,
         accept_changes: bool = False,
     ) -> tuple[str, ...]:
-        """Take a loaded scan. Undo leaves it alone.
+        """Attach a loaded scan. Undo leaves it alone.
 
         Ask for its checksum where it was read, off this thread: a large scan takes a while.
 
@@ -268,7 +349,7 @@ class EditedSpecimen:
         choices = getattr(volume, "choices", {}) if import_choices is None else import_choices
         self._refer_to(reference, choices, f"open {reference.name}")
         self._volume = volume
-        warning = self._keeper.claim_volume(reference.path)
+        warning = self._store.claim_volume(reference.path)
         self.volume_changed.emit(volume)
         return () if warning is None else (warning,)
 
@@ -293,37 +374,56 @@ class EditedSpecimen:
         old, new = self.state, self.state.on_volume(reference, choices)
         if new == old:
             return
-        self._keeper.record("change", text, new, time=self.now())
+        self._store.record("change", text, new, time=self.now())
         self._history.change_all(lambda state: state.on_volume(reference, choices))
         if old.volume is None:  # to have opened a scan is nothing to be asked about
             self._clean = self._clean.on_volume(reference, choices)
-        self._tell(old)
+        self._announce(old)
 
     # Files
 
     @property
     def measured_state(self) -> SpecimenState:
-        """The state as it is saved and exported."""
-        return self.state
+        """The state as it is saved and exported: with distances from bone, where there is a scan."""
+        return measured(self.state, self.measure)
 
     def save(self, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> Path:
-        """Save the specimen; see `Keeper.save` for arguments and errors."""
+        """Save the specimen; see `SpecimenStore.save` for arguments and errors."""
         self._check_thread()
-        file = self._keeper.save(self.measured_state, path, overwrite=overwrite)
+        file = self._store.save(self.measured_state, path, overwrite=overwrite)
         self._clean = self.state
         self.saved.emit(file)
-        self._tell_dirty()
+        self._announce_dirty()
         return file
 
     def close(self, *, discard: bool = False) -> None:
-        """Let go of journal, locks and scan.
+        """Release journal, locks and scan.
 
         Unsaved edits stay in the journal, and are offered at the next start, unless the user wants to
         `discard` them.
         """
-        self._keeper.close(keep_journal=self.dirty and not discard)
-        self._volume = None
+        self._store.close(keep_journal=self.dirty and not discard)
+        self._volume = self.measure = None
+
+
+def _loaded(specimen: SpecimenState | LoadedSpecimen) -> LoadedSpecimen:
+    return LoadedSpecimen(History(specimen)) if isinstance(specimen, SpecimenState) else specimen
 
 
 def _details(state: SpecimenState) -> tuple[object, ...]:
     return state.specimen, state.notes, state.volume, state.import_choices, state.pose_checks
+
+
+def _location(file: Path, specimen: str) -> str:
+    """Return where a specimen file is, without what its name says already."""
+    shown = file.with_name(file.name.removesuffix(SUFFIX))
+    shown = shown.parent if shown.name == specimen else shown
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111 - which has an answer where nobody has a home
+    return str("~" / shown.relative_to(home)) if shown.is_relative_to(home) else str(shown)
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return ""

@@ -24,12 +24,12 @@ from gp_labeler.document.specimen_file import SUFFIX, digest, write_specimen
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import SpecimenState
 
-__all__ = ["Keeper"]
+__all__ = ["SpecimenStore"]
 
 _log = logging.getLogger(__name__)
 
 
-class Keeper:
+class SpecimenStore:
     """Keeps one session safe.
 
     Parameters
@@ -49,7 +49,9 @@ class Keeper:
         self._volume_lock: FileLock | None = None
 
     @classmethod
-    def begin(cls, directory: Path | None, state: SpecimenState, specimen_file: Path | None = None) -> Keeper:
+    def begin(
+        cls, directory: Path | None, state: SpecimenState, specimen_file: Path | None = None
+    ) -> SpecimenStore:
         """Begin to keep a session that stands at `state`.
 
         Raises
@@ -59,30 +61,30 @@ class Keeper:
         GpError
             The state directory cannot be written.
         """
-        keeper = cls(directory, specimen_file)
-        keeper._journal, keeper._lock = keeper._begun(keeper.specimen_file, state, keeper._saved)
-        return keeper
+        store = cls(directory, specimen_file)
+        store._journal, store._lock = store._begun(store.specimen_file, state, store._saved)
+        return store
 
     @classmethod
-    def resume(cls, directory: Path | None, recovery: Recovery) -> Keeper:
+    def resume(cls, directory: Path | None, recovery: Recovery) -> SpecimenStore:
         """Go on with a journal that a killed program left; raises as `begin` does."""
-        keeper = cls(directory, recovery.specimen_file)
-        keeper._saved = recovery.content.saved
+        store = cls(directory, recovery.specimen_file)
+        store._saved = recovery.content.saved
         if directory is None:
-            return keeper
-        file = keeper.specimen_file
+            return store
+        file = store.specimen_file
         is_here = recovery.journal.parent == journal_folder(directory)
         path = recovery.journal if file is None and is_here else journal_path(directory, file)
-        keeper._lock = keeper._locked(path, file)
+        store._lock = store._locked(path, file)
         try:
-            keeper._journal = _resumed(recovery, path)
+            store._journal = _resumed(recovery, path)
         except OSError as error:
-            keeper._lock.release()
+            store._lock.release()
             raise GpError(f"cannot be moved: {error.strerror}", file=recovery.journal) from None
         except GpError:
-            keeper._lock.release()
+            store._lock.release()
             raise
-        return keeper
+        return store
 
     def record(self, kind: str, text: str, state: SpecimenState, *, time: str) -> None:
         """Write an edit down; only then may it show.

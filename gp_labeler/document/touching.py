@@ -1,4 +1,4 @@
-"""What touching means: a few functions on a session, for panels, actions and scripts alike."""
+"""What touching means: a few functions on the document, for panels, actions and scripts alike."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from gp_core.io.file_names import named_side
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.labels import same_label, tidy_label
 from gp_labeler.document.edits import as_position
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.touch_edits import (
     LeaveOutTouch,
     MoveTouches,
@@ -24,7 +25,6 @@ from gp_labeler.document.touch_edits import (
     TakeTouches,
 )
 from gp_labeler.document.touches import Touch, TouchHow, touch_name
-from gp_labeler.models.session import Session
 
 __all__ = [
     "clear_touches",
@@ -40,7 +40,7 @@ __all__ = [
 
 
 def record_touch(
-    session: Session,
+    document: SpecimenDocument,
     side: Side | str,
     name: str,
     position: ArrayLike,
@@ -51,7 +51,7 @@ def record_touch(
 
     Parameters
     ----------
-    session : Session
+    document : SpecimenDocument
     side : Side or str
     name : str
         An external feature, or a skull feature such as ``S1``.
@@ -72,11 +72,11 @@ def record_touch(
         The feature cannot be touched, or the side's other touches are in another frame.
     """
     where = as_position(position, name)
-    touch = Touch(where, how, time=session.now(), by=session.author, **details)
-    return session.do(RecordTouch(Side.parse(side), name, touch))
+    touch = Touch(where, how, time=document.now(), by=document.author, **details)
+    return document.do(RecordTouch(Side.parse(side), name, touch))
 
 
-def load_touches(session: Session, path: str | PathLike[str], side: Side | str) -> tuple[str, ...]:
+def load_touches(document: SpecimenDocument, path: str | PathLike[str], side: Side | str) -> tuple[str, ...]:
     """Take the touches of a file in place of all that side has.
 
     Returns
@@ -90,7 +90,7 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
         As `gp_core.read_touches`.
     """
     touched = read_touches(path, side)
-    about: dict[str, Any] = {"how": TouchHow.FILE, "time": session.now(), "by": session.author}
+    about: dict[str, Any] = {"how": TouchHow.FILE, "time": document.now(), "by": document.author}
     points = {**touched.as_mapping(), **touched.extra}
     source = Path(path).name
     with blaming(path):
@@ -98,7 +98,7 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
     if not taken:
         raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
     with blaming(path):
-        session.do(TakeTouches(Side.parse(side), taken))
+        document.do(TakeTouches(Side.parse(side), taken))
     named, unseen = named_side(source), " ".join(sorted(touched.unseen))
     doubts = [f"Not seen by the tracker: {unseen}"] if unseen else []
     if named not in (None, Side.parse(side)):
@@ -106,27 +106,27 @@ def load_touches(session: Session, path: str | PathLike[str], side: Side | str) 
     return tuple(doubts)
 
 
-def leave_out(session: Session, side: Side | str, name: str, left_out: bool = True) -> bool:
+def leave_out(document: SpecimenDocument, side: Side | str, name: str, left_out: bool = True) -> bool:
     """Let the estimate do without a touch, or take it in again."""
-    return session.do(LeaveOutTouch(Side.parse(side), name, left_out))
+    return document.do(LeaveOutTouch(Side.parse(side), name, left_out))
 
 
-def swap_touches(session: Session, side: Side | str, name: str, other: str) -> bool:
+def swap_touches(document: SpecimenDocument, side: Side | str, name: str, other: str) -> bool:
     """Give each of two touches of a side the other's name; raises `GpError` where one is not touched."""
-    return session.do(SwapTouches(Side.parse(side), touch_name(name), touch_name(other)))
+    return document.do(SwapTouches(Side.parse(side), touch_name(name), touch_name(other)))
 
 
-def move_touches(session: Session, side: Side | str) -> bool:
+def move_touches(document: SpecimenDocument, side: Side | str) -> bool:
     """Give all touches of a side to the other one; raises `GpError` where that was touched too."""
-    return session.do(MoveTouches(Side.parse(side)))
+    return document.do(MoveTouches(Side.parse(side)))
 
 
-def clear_touches(session: Session, side: Side | str, name: str | None = None) -> bool:
+def clear_touches(document: SpecimenDocument, side: Side | str, name: str | None = None) -> bool:
     """Forget one touch of a side, or all of them."""
-    return session.do(RemoveTouches(Side.parse(side), name))
+    return document.do(RemoveTouches(Side.parse(side), name))
 
 
-def load_skull(session: Session, path: str | PathLike[str]) -> tuple[str, ...]:
+def load_skull(document: SpecimenDocument, path: str | PathLike[str]) -> tuple[str, ...]:
     """Take the skull's registration features from a landmark file of the scan; returns their names.
 
     Raises
@@ -142,14 +142,14 @@ def load_skull(session: Session, path: str | PathLike[str]) -> tuple[str, ...]:
             "names no skull feature", file=path, remedy="Name them as the touches do, such as S1 to S8."
         )
     with blaming(path):
-        session.do(SetSkull({name: as_position(point, name) for name, point in skull.items()}))
+        document.do(SetSkull({name: as_position(point, name) for name, point in skull.items()}))
     return tuple(skull)
 
 
-def mark_skull(session: Session, name: str, position: ArrayLike | None) -> bool:
+def mark_skull(document: SpecimenDocument, name: str, position: ArrayLike | None) -> bool:
     """Say where one skull feature is on the scan, (3,) mm, or forget it (None)."""
     name = tidy_label(name)
-    skull = {n: p for n, p in session.state.skull.items() if not same_label(n, name)}
+    skull = {n: p for n, p in document.state.skull.items() if not same_label(n, name)}
     if position is not None:
         skull[name] = as_position(position, name)
-    return session.do(SetSkull(skull))
+    return document.do(SetSkull(skull))

@@ -15,13 +15,14 @@ from gp_core.landmarks.sets import Specimen
 from gp_core.study.leave_one_out import LeaveOneOutReport, Row, leave_one_out
 from gp_labeler.document.animals import Animals, Skipped, read_animals
 from gp_labeler.document.atlas_memory import AtlasSource
+from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
-from gp_labeler.jobs.work import LoadAtlas, load_modules
 
 __all__ = [
     "FEWEST_ANIMALS",
     "FitAtlas",
     "FittedAtlas",
+    "LoadAtlas",
     "ReadAtlas",
     "RecallAtlas",
     "Recalled",
@@ -35,6 +36,19 @@ FEWEST_ANIMALS = 3
 
 _NEEDED = tuple(dict.fromkeys(("CA", "CB", "RWA", "RWP", "LLI", *PROBE)))
 _N_REASONS = 3
+
+
+@dataclass(frozen=True)
+class LoadAtlas:
+    """Make the published atlas ready to say where features should be."""
+
+    title = "Loading the atlas"
+
+    def run(self, progress: Progress) -> Atlas:
+        """Build it from the published table."""
+        load_modules("gp_core.atlas.prediction", "gp_core.atlas.published")
+        progress(0.0)
+        return Atlas.published()
 
 
 @dataclass(frozen=True)

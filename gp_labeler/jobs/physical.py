@@ -13,8 +13,8 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.document.state import SpecimenState
+from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
-from gp_labeler.jobs.work import load_modules
 
 if TYPE_CHECKING:
     from gp_core.study.physical import PhysicalReport

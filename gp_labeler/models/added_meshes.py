@@ -5,18 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 from psygnal import Signal
 
 from gp_core.errors import GpError
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.imaging.mesh_files import read_mesh
-from gp_labeler.jobs.runner import Progress
+from gp_labeler.jobs.mesh import ReadMesh
+from gp_labeler.jobs.runner import Jobs
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.scan import ScanModel
 
-if TYPE_CHECKING:
-    from gp_labeler.models.workspace import Workbench
-
-__all__ = ["AddedMesh", "AddedMeshes", "ReadMesh"]
+__all__ = ["AddedMesh", "AddedMeshesModel"]
 
 
 class _Scene(Protocol):
@@ -48,30 +49,19 @@ class AddedMesh:
     options: dict[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class ReadMesh:
-    """Read a mesh."""
-
-    path: Path
-
-    @property
-    def title(self) -> str:
-        """What the user reads."""
-        return f"Reading {self.path.name}"
-
-    def run(self, progress: Progress) -> Any:
-        """Read."""
-        progress(0.0)
-        return read_mesh(self.path)
-
-
-class AddedMeshes:
+class AddedMeshesModel:
     """The meshes that are shown; another scan takes them away.
 
     Parameters
     ----------
-    desk : Workbench
-        Whose scan they lie in.
+    document : SpecimenDocument
+        Another specimen takes them away.
+    scan : ScanModel
+        The scan they lie in; another one takes them away.
+    jobs : Jobs
+        Where files are read.
+    messages : Messages
+        What the user is told by.
 
     Attributes
     ----------
@@ -81,11 +71,11 @@ class AddedMeshes:
 
     changed = Signal()
 
-    def __init__(self, desk: Workbench) -> None:
-        self._desk = desk
+    def __init__(self, document: SpecimenDocument, scan: ScanModel, jobs: Jobs, messages: Messages) -> None:
+        self._jobs, self._messages = jobs, messages
         self._meshes: dict[str, AddedMesh] = {}
         self.scene: _Scene | None = None
-        for signal in (desk.session_replaced, desk.volume_opened):
+        for signal in (document.reset, scan.opened):
             signal.connect(self._on_scan)
 
     @property
@@ -116,7 +106,7 @@ class AddedMeshes:
 
     def open(self, path: Path) -> None:
         """Read a file in the background, and show it."""
-        self._desk.jobs.submit(ReadMesh(path), lambda read: self._opened(path, read), key="added mesh")
+        self._jobs.submit(ReadMesh(path), lambda read: self._opened(path, read), key="added mesh")
 
     def remove(self, name: str) -> None:
         """Take one away.
@@ -147,7 +137,7 @@ class AddedMeshes:
             self.scene.add_mesh(mesh.dataset, name=mesh.name, **mesh.options)
         self._meshes[mesh.name] = mesh
         self.changed.emit()
-        self._desk.say(f"Mesh shown: {mesh.name}")
+        self._messages.say(f"Mesh shown: {mesh.name}")
         return mesh.name
 
     def _free_name(self, file: Path | None) -> str:
@@ -155,5 +145,5 @@ class AddedMeshes:
         names = (stem, *(f"{stem} {n}" for n in range(2, len(self._meshes) + 2)))
         return next(name for name in names if name not in self._meshes)
 
-    def _on_scan(self, _: object) -> None:
+    def _on_scan(self, *_: object) -> None:
         self.clear()

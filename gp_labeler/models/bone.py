@@ -1,23 +1,26 @@
-"""The bone of the scan that is open: which meshes there are, and when they are made anew."""
+"""The bone of the scan: which meshes there are, and when they are made again."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 import numpy as np
+from psygnal import Signal
 
+from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.validation import FloatArray
-from gp_labeler.imaging.surface import SMALLEST_PART_MM, box_around
-from gp_labeler.imaging.volume import Volume
-from gp_labeler.jobs.work import MeshEars, Meshes, MeshFirst, MeshOverview, ProposeThreshold
-from gp_labeler.models import labelling
+from gp_labeler.document.specimen_document import SpecimenDocument
+from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, box_around
+from gp_labeler.jobs.mesh import MeshEars, Meshes, MeshFirst, MeshOverview, SaveMesh
+from gp_labeler.jobs.runner import Jobs
+from gp_labeler.models.labels import LabelsModel
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.scan import ScanModel
 
-if TYPE_CHECKING:
-    from gp_labeler.models.bone_desk import BoneDesk
-
-__all__ = ["Bone"]
+__all__ = ["BoneModel"]
 
 EAR_HALF_MM = 7.0
 """All features of an ear but those of jaw, zygoma and incisors lie within this of its middle."""
@@ -29,58 +32,118 @@ _NEAR = ("CA", "CB", "RWA", "RWP", "RWL", "RWM", "FPA", "FPP", "OS", "OI", "LLI"
 _MOVED_MM = 2.0
 
 
-class Bone:
-    """Keeps the meshes of a workbench up to date.
+class BoneModel:
+    """Keeps the meshes of the bone in step with scan, threshold and the places of the ears.
 
     Parameters
     ----------
-    desk : BoneDesk
-        Whose scan and landmarks it follows.
+    document : SpecimenDocument
+        Its landmarks say where the ears are.
+    scan : ScanModel
+        What is meshed, and at which threshold.
+    labels : LabelsModel
+        Where suggestions and ghosts are: the ears before they are labelled.
+    jobs : Jobs
+        Where meshes are made.
+    messages : Messages
+        What the user is told by.
     """
 
-    def __init__(self, desk: BoneDesk) -> None:
-        self._desk = desk
-        self.smallest_mm = SMALLEST_PART_MM
-        self.proposed: float | None = None
-        self.meshes = Meshes()
-        self._overview = Meshes()
+    surfaces_changed = Signal()
+
+    def __init__(
+        self,
+        document: SpecimenDocument,
+        scan: ScanModel,
+        labels: LabelsModel,
+        jobs: Jobs,
+        messages: Messages,
+    ) -> None:
+        self._scan, self._labels, self._jobs, self._messages = scan, labels, jobs, messages
+        self._smallest_mm = SMALLEST_PART_MM
+        self._meshes = self._overview = Meshes()
         self._ears: Mapping[Side, FloatArray] = {}
         self._half = EAR_HALF_MM
+        document.reset.connect(self._on_reset)
+        document.landmarks_changed.connect(self._on_landmarks)
+        scan.opened.connect(self._on_scan)
+        scan.threshold_changed.connect(self._on_threshold)
 
-    def forget(self) -> None:
-        """Let go of all meshes, and of the work on them."""
-        for task in self._desk.jobs.running:
-            if task.key.startswith("mesh"):
-                task.cancel()
-        self.proposed = None
-        self.meshes = self._overview = Meshes()
-        self._ears = {}
+    @property
+    def surfaces(self) -> tuple[Surface, ...]:
+        """The bone: parts that do not overlap, the ears at full resolution once that is done."""
+        return self._meshes.parts
 
-    def begin(self, volume: Volume) -> None:
-        """Mesh a scan that was just opened."""
-        self.meshes = self._overview = Meshes()
-        self._ears = {}
-        if self._desk.session.state.threshold is not None:
+    @property
+    def quick_surfaces(self) -> tuple[Surface, ...]:
+        """A coarse mesh to draw while the camera moves; may be empty."""
+        return self._meshes.quick
+
+    @property
+    def smallest_part_mm(self) -> float:
+        """Parts of the bone that are smaller across are left out, mm."""
+        return self._smallest_mm
+
+    def set_smallest_part(self, mm: float) -> None:
+        """Leave out parts of the bone that are smaller across, and mesh again; 0 keeps all."""
+        if not (math.isfinite(mm) and mm >= 0):
+            raise GpError(f"the smallest part must be a length in mm from 0, got {mm:g}")
+        if mm != self._smallest_mm:
+            self._smallest_mm = float(mm)
             self.mesh()
-        else:
-            self._desk.jobs.submit(ProposeThreshold(volume), self._take_proposal, key="mesh threshold")
 
     def mesh(self) -> None:
-        """Mesh the whole scan anew, coarsely first where there is nothing to see yet."""
-        volume, threshold = self._desk.volume, self._desk.threshold
+        """Mesh the whole scan again, coarsely first where there is nothing to see yet."""
+        volume, threshold = self._scan.volume, self._scan.threshold
         if volume is None or threshold is None:
             return
-        if not self.meshes.parts:
-            self._desk.jobs.submit(
-                MeshFirst(volume, threshold, self.smallest_mm), self._take_first, key="mesh first"
-            )
-        self._desk.jobs.submit(
-            MeshOverview(volume, threshold, self.smallest_mm), self._take_overview, key="mesh"
-        )
+        if not self._meshes.parts:
+            first = MeshFirst(volume, threshold, self._smallest_mm)
+            self._jobs.submit(first, self._take_first, key="mesh first")
+        whole = MeshOverview(volume, threshold, self._smallest_mm)
+        self._jobs.submit(whole, self._take_overview, key="mesh")
 
-    def mesh_ears(self, *, half_mm: float | None = None, anew: bool = False) -> None:
+    def mesh_ears(self, half_mm: float | None = None) -> None:
+        """Mesh around the ears at full resolution now, wherever their place is known."""
+        self._mesh_ears(half_mm=half_mm, anew=True)
+
+    def save_mesh(self, path: Path) -> None:
+        """Write the whole bone surface at full resolution, in the background."""
+        volume, threshold = self._scan.volume, self._scan.threshold
+        if volume is not None and threshold is not None:
+            job = SaveMesh(volume, threshold, Path(path), self._smallest_mm)
+            self._jobs.submit(job, lambda file: self._messages.say(f"Wrote {file.name}"))
+
+    def release(self) -> None:
+        """Release all meshes, and stop the work on them."""
+        for task in self._jobs.running:
+            if task.key.startswith("mesh"):
+                task.cancel()
+        self._forget()
+
+    # Inside
+
+    def _forget(self) -> None:
+        self._meshes = self._overview = Meshes()
+        self._ears = {}
+
+    def _on_reset(self) -> None:
+        self.release()
+        self.surfaces_changed.emit()
+
+    def _on_scan(self, _: object) -> None:
+        self._forget()
+        self.mesh()
+
+    def _on_threshold(self, _: float | None) -> None:
+        self.mesh()
+
+    def _on_landmarks(self, _: object) -> None:
+        self._mesh_ears()
+
+    def _mesh_ears(self, *, half_mm: float | None = None, anew: bool = False) -> None:
         """Mesh around each ear at full resolution, once its place is known and where that adds anything."""
-        volume, threshold = self._desk.volume, self._desk.threshold
+        volume, threshold = self._scan.volume, self._scan.threshold
         coarse = any(part.stride > 1 for part in self._overview.parts)
         if volume is None or threshold is None or not coarse:
             return
@@ -90,11 +153,8 @@ class Bone:
             return
         self._ears = middles
         boxes = {side: box_around(place, self._half) for side, place in middles.items()}
-        self._desk.jobs.submit(
-            MeshEars(volume, threshold, self._overview, boxes, min(self.smallest_mm, CUT_PART_MM)),
-            self._take_ears,
-            key="mesh ears",
-        )
+        job = MeshEars(volume, threshold, self._overview, boxes, min(self._smallest_mm, CUT_PART_MM))
+        self._jobs.submit(job, self._show, key="mesh ears")
 
     def _is_news(self, side: Side, place: FloatArray) -> bool:
         before = self._ears.get(side)
@@ -102,17 +162,12 @@ class Bone:
 
     def _ear(self, side: Side) -> FloatArray | None:
         """Return about where the middle of an ear is, (3,) mm: from its labels, suggestions and ghosts."""
-        places = [labelling.place_of(self._desk.session, side, code) for code in _NEAR]
+        places = [self._labels.place_of(side, code) for code in _NEAR]
         known = [place for place in places if place is not None]
         if not known:
             return None
         middle: FloatArray = np.array(known).mean(axis=0)
         return middle
-
-    def _take_proposal(self, threshold: float) -> None:
-        self.proposed = threshold
-        self._desk.threshold_changed.emit(self._desk.threshold)
-        self.mesh()
 
     def _take_first(self, meshes: Meshes) -> None:
         if not self._overview.parts:
@@ -122,11 +177,8 @@ class Bone:
         self._overview = meshes
         self._ears = {}
         self._show(meshes)
-        self.mesh_ears()
-
-    def _take_ears(self, meshes: Meshes) -> None:
-        self._show(meshes)
+        self._mesh_ears()
 
     def _show(self, meshes: Meshes) -> None:
-        self.meshes = meshes
-        self._desk.surfaces_changed.emit()
+        self._meshes = meshes
+        self.surfaces_changed.emit()

@@ -1,4 +1,4 @@
-"""What of a workbench concerns touching and the pose: the estimate, what to touch next, how it is drawn."""
+"""Touching and the pose: what to touch next, the estimate, how it is drawn, and the files it goes to."""
 
 from __future__ import annotations
 
@@ -7,29 +7,36 @@ from dataclasses import dataclass, replace
 from itertools import count
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
 from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.gate import against_writing
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_labeler.document import touching
+from gp_labeler.document.edits import Edit
+from gp_labeler.document.specimen_document import SpecimenDocument
+from gp_labeler.document.specimen_edits import RecordPoseCheck
+from gp_labeler.document.state import PoseCheck
+from gp_labeler.document.touch_edits import RecordTouch
 from gp_labeler.document.touches import TouchHow
-from gp_labeler.jobs.work import WarmFit, WarmJoint
-from gp_labeler.models.estimate import Estimate, verdict_on
-from gp_labeler.models.estimating import Estimating
+from gp_labeler.jobs.pose import WarmFit, WarmJoint
+from gp_labeler.jobs.runner import Jobs
+from gp_labeler.models.atlas import AtlasModel
+from gp_labeler.models.estimate import Estimate, EstimateSettings, verdict_on
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.pose_estimator import PoseEstimator
 from gp_labeler.models.pose_exports import InsertionPath, save_pose, says_its_state
+from gp_labeler.models.view import ViewModel
 
-if TYPE_CHECKING:
-    from gp_labeler.models.workspace import Workbench
-
-__all__ = ["ORDER", "OverlayOptions", "PoseDesk"]
+__all__ = ["ORDER", "OverlayOptions", "PoseModel"]
 
 _FIRST = (*RECOMMENDED, "ZL")
 ORDER = (*_FIRST, *(code for code in EXTERNAL if code not in _FIRST))
@@ -79,13 +86,21 @@ class _Touched:
         return bool(self.here) and not self.there and not now.here and now.there == self.here
 
 
-class PoseDesk:
-    """Keeps the estimate in step with whatever session, atlas and touches a workbench has.
+class PoseModel:
+    """Keeps the estimate in step with document and atlas, and says what to touch next.
 
     Parameters
     ----------
-    desk : Workbench
-        Whose part it is.
+    document : SpecimenDocument
+        Holds the touches.
+    atlas : AtlasModel
+        What estimates are made by.
+    view : ViewModel
+        Brings touched points into sight.
+    jobs : Jobs
+        Where compiled code is made ready.
+    messages : Messages
+        What the user is told by.
     """
 
     changed = Signal()
@@ -97,42 +112,107 @@ class PoseDesk:
     path_changed = Signal(object)
     """The `InsertionPath` that is carried to the estimate now, or None."""
     recorded = Signal(str)
-    """Name of a touch that was recorded just now: time for a sound."""
+    """Name of a touch of this side that was recorded just now: time for a sound."""
 
-    def __init__(self, desk: Workbench) -> None:
-        self._desk = desk
+    def __init__(
+        self,
+        document: SpecimenDocument,
+        atlas: AtlasModel,
+        view: ViewModel,
+        jobs: Jobs,
+        messages: Messages,
+    ) -> None:
+        self._document, self._atlas, self._view = document, atlas, view
+        self._jobs, self._messages = jobs, messages
+        self._estimator = PoseEstimator()
         self._target: str | None = ORDER[0]
         self._overlay = OverlayOptions()
         self._skipped: frozenset[tuple[Side, str]] = frozenset()
         self._gains: tuple[Estimate, tuple[TouchGain, ...]] | None = None
         self._path: InsertionPath | None = None
         self._prepared = False
-        self.estimating = self._begin()
         self._seen = self._touched_now()
-        desk.session_replaced.connect(self._on_session_replaced)
-        desk.atlas_changed.connect(self._on_atlas_changed)
+        self._on_atlas_changed()
+        document.reset.connect(self._on_reset)
+        for signal in (document.touches_changed, document.landmarks_changed):
+            signal.connect(self._on_changed)
+        document.edited.connect(self._on_edited)
+        atlas.changed.connect(self._on_atlas_changed)
 
     # The estimate
 
     @property
+    def settings(self) -> EstimateSettings:
+        """What the user chose."""
+        return self._estimator.settings
+
+    @property
     def side(self) -> Side:
         """Side of the head that is touched."""
-        return self.estimating.settings.side
+        return self.settings.side
 
     @property
     def estimate(self) -> Estimate | None:
-        """The estimate of that side; None with fewer than three touches."""
-        return self.estimating.current
+        """The estimate of that side; None without an atlas or with fewer than three touches."""
+        return self.of_side(self.side)
+
+    def of_side(self, side: Side) -> Estimate | None:
+        """Return the estimate of a side, as `estimate` does for the one that is touched."""
+        return self._estimator.of_side(self._document.state, side)
+
+    @property
+    def waiting_text(self) -> str:
+        """What is still wanting for an estimate, in words; empty where there is one."""
+        return self._estimator.waiting_text(self._document.state)
+
+    @property
+    def joint_ready(self) -> bool:
+        """Whether JRMPC is compiled."""
+        return self._estimator.joint_ready
+
+    def set_joint_ready(self) -> None:
+        """Say that JRMPC is compiled."""
+        self._estimator.set_joint_ready()
+        self._on_changed()
+
+    def set_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
+        """Say how the tracker lies to the scan, where that is known otherwise than from points."""
+        self._estimator.set_registration(side, T_scan_tracker)
+        self._on_changed()
 
     def choose(self, **fields: Any) -> None:
-        """Change `EstimateSettings`; ``jrmpc`` is made ready in the background first."""
-        methods = fields.get("methods", self.estimating.settings.methods)
-        if "jrmpc" in methods and not self.estimating.joint_ready:
-            self._desk.jobs.submit(WarmJoint(), lambda _: self.estimating.set_joint_ready(), key="joint")
+        """Change `settings`; raises `GpError` for a value that is not allowed.
+
+        The method ``jrmpc`` is made ready in the background first.
+        """
+        methods = fields.get("methods", self.settings.methods)
+        if "jrmpc" in methods and not self.joint_ready:
+            self._jobs.submit(WarmJoint(), lambda _: self.set_joint_ready(), key="joint")
         old_side = self.side
-        self.estimating.choose(**fields)
+        if self._estimator.choose(**fields):
+            self._on_changed()
         if self.side is not old_side:
             self._aim(self._first_untouched())
+
+    def without(self, name: str) -> tuple[float, float] | None:
+        """Return by how much the pose moves, mm and degrees, if a touch is left out, or taken in again."""
+        return self._estimator.without(self._document.state, name)
+
+    def judge(self, verdict: str, *, by: str = "", note: str = "") -> PoseCheck:
+        """Keep a person's verdict on the estimate, ``accept`` or ``reject``, in the specimen.
+
+        Raises
+        ------
+        GpError
+            There is no estimate, or the verdict is another word.
+        """
+        estimate, document = self.estimate, self._document
+        if estimate is None or estimate.pose is None:
+            raise GpError("there is no estimate to judge", remedy=self.waiting_text or None)
+        who, now = by or document.author, document.now()
+        check = PoseCheck(estimate.side, verdict, who, now, note, estimate.as_dict())
+        document.do(RecordPoseCheck(check))
+        return check
 
     def gains(self) -> tuple[TouchGain, ...]:
         """Return what one more touch would gain, the best first; empty without an estimate."""
@@ -155,14 +235,14 @@ class PoseDesk:
         """Load what makes estimates quick, in the background, once; the first touch does this too."""
         if not self._prepared:
             self._prepared = True
-            self._desk.jobs.submit(WarmFit(), key="fit")
+            self._jobs.submit(WarmFit(), key="fit")
 
     # Touching
 
     @property
     def names(self) -> tuple[str, ...]:
         """What can be touched: the features in the order they are asked for, then the skull's."""
-        known = self._touched() | self._desk.session.state.skull.keys() | {self._target or ORDER[0]}
+        known = self._touched() | self._document.state.skull.keys() | {self._target or ORDER[0]}
         return (*ORDER, *sorted(known - set(ORDER), key=_by_number))
 
     @property
@@ -193,7 +273,7 @@ class PoseDesk:
             self._aim(self._first_untouched(after=self._target))
 
     def record(self, position: ArrayLike, how: TouchHow, *, name: str | None = None, **details: Any) -> None:
-        """Record a touch of the target, or of a feature named, and go on to the next.
+        """Record a touch of the target, or of a feature named; the next one becomes the target.
 
         Parameters
         ----------
@@ -209,13 +289,21 @@ class PoseDesk:
         GpError
             Nothing is left to touch, or as `touching.record_touch`.
         """
-        wanted = name or self._target
-        if wanted is None:
+        wanted = name or self.require_target()
+        if not touching.record_touch(self._document, self.side, wanted, position, how, **details):
+            self.go_on(wanted)  # the very same touch once more
+
+    def go_on(self, name: str) -> None:
+        """Announce that a feature was touched, and go on to the next where it was the target."""
+        self.recorded.emit(name)
+        if name == self._target:
+            self._aim(self._first_untouched(after=name))
+
+    def require_target(self) -> str:
+        """Return the feature to touch next; raises `GpError` where all are touched."""
+        if self._target is None:
             raise GpError("all features are touched", remedy="Choose one to touch again.")
-        touching.record_touch(self._desk.session, self.side, wanted, position, how, **details)
-        self.recorded.emit(wanted)
-        if wanted == self._target:
-            self._aim(self._first_untouched(after=wanted))
+        return self._target
 
     def change_side(self) -> None:
         """Say that the touches are those of the other side, and go on there.
@@ -226,7 +314,7 @@ class PoseDesk:
             The other side was touched too.
         """
         other = self.side.other
-        touching.move_touches(self._desk.session, self.side)
+        touching.move_touches(self._document, self.side)
         self.choose(side=other)
 
     @property
@@ -239,7 +327,7 @@ class PoseDesk:
         """Give each of these two the other's name; raises `GpError` where none look so."""
         if self.swapped is None:
             raise GpError("no two touches look as if each had the other's name")
-        touching.swap_touches(self._desk.session, self.side, *self.swapped)
+        touching.swap_touches(self._document, self.side, *self.swapped)
 
     def take_likelier(self) -> Hypothesis | None:
         """Read the touches as they are likeliest to be meant; None where that is how they are named.
@@ -254,29 +342,28 @@ class PoseDesk:
         if best is None:
             return None
         if best.exchanged is not None:
-            touching.swap_touches(self._desk.session, self.side, *best.exchanged)
+            touching.swap_touches(self._document, self.side, *best.exchanged)
         else:
             self.change_side()
         return best
 
     def show(self, name: str) -> None:
         """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""
-        estimate, touch = self.estimate, self._desk.session.state.touches.get((self.side, name))
+        estimate, touch = self.estimate, self._document.state.touches.get((self.side, name))
         registered = None if estimate is None else estimate.registered
         if touch is None or (registered is None and touch.frame != "scan"):
             return
         position = np.array(touch.position)
         if registered is not None:
             position = registered.T_scan_touches.apply(position[None])[0]
-        self._desk.session.set_crosshair(position)
-        self._desk.point_shown.emit(position)
+        self._view.show_point(position)
 
     def load(self, path: str | PathLike[str]) -> None:
         """Take the touches of a file for this side in place of those there are."""
-        doubts = touching.load_touches(self._desk.session, path, self.side)
+        doubts = touching.load_touches(self._document, path, self.side)
         self._aim(self._first_untouched())
         taken = f"Took {len(self._touched())} touches from {Path(path).name}"
-        self._desk.say(". ".join((taken, *doubts)), "warning" if doubts else "info")
+        self._messages.say(". ".join((taken, *doubts)), "warning" if doubts else "info")
 
     # What leaves
 
@@ -299,8 +386,8 @@ class PoseDesk:
         if not (accept_warnings or says_its_state(path)):
             self._check_doubt(pose, path)
         file = save_pose(pose, path)
-        self._desk.say(f"Wrote {file.name}, y to the {pose.round_window} round window")
-        self._desk.wrote.emit("pose", file)
+        self._messages.say(f"Wrote {file.name}, y to the {pose.round_window} round window")
+        self._messages.wrote.emit("pose", file)
         return file
 
     def carry(self, path: InsertionPath | None) -> None:
@@ -329,15 +416,15 @@ class PoseDesk:
         self._check_doubt(self._pose(), path)
         assert self.estimate is not None
         file = self._path.save_carried(self.estimate, path)
-        self._desk.say(f"Wrote {file.name}")
-        self._desk.wrote.emit("path", file)
+        self._messages.say(f"Wrote {file.name}")
+        self._messages.wrote.emit("path", file)
         return file
 
     def _check_doubt(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
         """Refuse to write for a robot what is in doubt, unless a person has accepted this very estimate."""
         reasons = against_writing(pose)
         estimate = self.estimate
-        accepted = estimate is not None and verdict_on(estimate, self._desk.session.state) == "accept"
+        accepted = estimate is not None and verdict_on(estimate, self._document.state) == "accept"
         if reasons and not accepted:
             raise GpError(
                 f"not written, as {' and '.join(reason.text for reason in reasons)}",
@@ -348,7 +435,7 @@ class PoseDesk:
     def _pose(self) -> CochleaPose:
         estimate = self.estimate
         if estimate is None or estimate.pose is None:
-            raise GpError("there is no estimate yet", remedy=self.estimating.waiting_text or None)
+            raise GpError("there is no estimate yet", remedy=self.waiting_text or None)
         return estimate.pose
 
     # Drawing
@@ -367,32 +454,26 @@ class PoseDesk:
 
     # Inside
 
-    def _begin(self) -> Estimating:
-        estimating = Estimating(self._desk.session)
-        if self._desk.atlas is not None:
-            estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
-        estimating.changed.connect(self._on_changed)
-        return estimating
-
-    def _on_session_replaced(self, _: object) -> None:
-        old = self.estimating
-        old.close()
-        self.estimating = self._begin()
-        self.estimating.joint_ready = old.joint_ready
-        self.estimating.choose(**vars(old.settings))
-        self._skipped = frozenset()
+    def _on_reset(self) -> None:
+        self._estimator.forget_registrations()
+        self._skipped, self._seen = frozenset(), self._touched_now()
         self._aim(self._first_untouched())
         self.changed.emit()
 
     def _on_atlas_changed(self) -> None:
-        if self._desk.atlas is not None:
-            self.estimating.use_atlas(self._desk.atlas, self._desk.atlas_specimens)
+        if self._atlas.current is not None:
+            self._estimator.use_atlas(self._atlas.current, self._atlas.specimens)
+            self._on_changed()
 
-    def _on_changed(self) -> None:
-        if self._desk.session.state.touches:
+    def _on_changed(self, *_: object) -> None:
+        if self._document.state.touches:
             self.prepare()
         self._follow_touches()
         self.changed.emit()
+
+    def _on_edited(self, edit: Edit, _: bool) -> None:
+        if isinstance(edit, RecordTouch) and edit.side is self.side:
+            self.go_on(edit.name)
 
     def _follow_touches(self) -> None:
         """Ask again for what was undone or cleared, and go on where the target was touched."""
@@ -410,7 +491,7 @@ class PoseDesk:
 
     def _touched(self, side: Side | None = None) -> frozenset[str]:
         wanted = side or self.side
-        return frozenset(name for side, name in self._desk.session.state.touches if side is wanted)
+        return frozenset(name for side, name in self._document.state.touches if side is wanted)
 
     def _touched_now(self) -> _Touched:
         return _Touched(self.side, self._touched(), self._touched(self.side.other))

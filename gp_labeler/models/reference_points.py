@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from psygnal import Signal
@@ -12,11 +12,11 @@ from psygnal import Signal
 from gp_core.errors import GpError
 from gp_core.io import LabelledPoint, read_points
 from gp_core.validation import FloatArray
+from gp_labeler.document.specimen_document import SpecimenDocument
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.scan import ScanModel
 
-if TYPE_CHECKING:
-    from gp_labeler.models.workspace import Workbench
-
-__all__ = ["ReferencePoint", "ReferencePoints"]
+__all__ = ["ReferencePoint", "ReferencePointsModel"]
 
 _MOST = 500
 """More names would hide the scan, and each point is tested for bone in front of it in every frame."""
@@ -29,22 +29,26 @@ class ReferencePoint(NamedTuple):
     position: FloatArray
 
 
-class ReferencePoints:
+class ReferencePointsModel:
     """The reference points that are shown; another scan clears them.
 
     Parameters
     ----------
-    desk : Workbench
-        Whose scan they are compared in.
+    document : SpecimenDocument
+        Another specimen clears them.
+    scan : ScanModel
+        What they are compared in; another scan clears them.
+    messages : Messages
+        What the user is told by.
     """
 
     changed = Signal()
 
-    def __init__(self, desk: Workbench) -> None:
-        self._desk = desk
+    def __init__(self, document: SpecimenDocument, scan: ScanModel, messages: Messages) -> None:
+        self._scan, self._messages = scan, messages
         self._points: tuple[ReferencePoint, ...] = ()
         self._files: tuple[Path, ...] = ()
-        for signal in (desk.session_replaced, desk.volume_opened):
+        for signal in (document.reset, scan.opened):
             signal.connect(self._on_scan)
 
     @property
@@ -83,18 +87,18 @@ class ReferencePoints:
             self._points, self._files = (), ()
             self.changed.emit()
 
-    def _on_scan(self, _: object) -> None:
+    def _on_scan(self, *_: object) -> None:
         self.clear()
 
     def _report(self) -> None:
         """Say how many are shown, and how many lie where there is no scan."""
-        places, volume = np.array([point.position for point in self._points]), self._desk.volume
+        places, volume = np.array([point.position for point in self._points]), self._scan.volume
         n, inside = len(places), 0 if volume is None else int(volume.contains(places).sum())
         if inside == n:
-            self._desk.say(f"Reference points shown: {n}")
+            self._messages.say(f"Reference points shown: {n}")
         else:
             text = f"{n - inside} of {n} reference points lie outside the scan and are not shown"
-            self._desk.say(text, "warning")
+            self._messages.say(text, "warning")
 
 
 def _read(path: str | PathLike[str]) -> list[ReferencePoint]:

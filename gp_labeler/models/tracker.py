@@ -1,4 +1,4 @@
-"""What of a workbench concerns the tracked probe: link, tip, touches recorded from it, the pose sent back.
+"""The tracked probe: its link and tip, touches recorded from it, and the pose that is sent back.
 
 Nothing here waits: whoever shows it calls `poll` 30 times a second while it is `on`.
 """
@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,9 +17,12 @@ from gp_core.landmarks.features import Side
 from gp_core.pose.gate import PoseGate
 from gp_core.registration.pivot import PivotCalibration
 from gp_core.validation import FloatArray
+from gp_labeler.document import touching
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.touches import Touch, TouchHow
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.pose import PoseModel
 from gp_labeler.models.pose_sending import PoseSending
-from gp_labeler.models.session import Session
 from gp_labeler.tracker import (
     FrameCheck,
     Limits,
@@ -35,23 +37,24 @@ from gp_labeler.tracker import (
     TrackerLink,
 )
 
-if TYPE_CHECKING:
-    from gp_labeler.models.workspace import Workbench
-
-__all__ = ["TrackerDesk"]
+__all__ = ["TrackerModel"]
 
 _TRAIL = 90
 _IN = " in "
 """Between probe and reference in the source of a touch."""
 
 
-class TrackerDesk:
-    """Keeps the tracked probe of a workbench.
+class TrackerModel:
+    """Follows a tracked probe, records touches with it, and sends the pose back.
 
     Parameters
     ----------
-    desk : Workbench
-        Whose part it is; touches go to its `pose`.
+    document : SpecimenDocument
+        Where touches are recorded.
+    pose : PoseModel
+        Says which feature is touched next, and holds the pose that is sent.
+    messages : Messages
+        What the user is told by.
     """
 
     changed = Signal()
@@ -63,8 +66,8 @@ class TrackerDesk:
     touched = Signal(object)
     """The `RecordedTouch` that was taken over."""
 
-    def __init__(self, desk: Workbench) -> None:
-        self._desk = desk
+    def __init__(self, document: SpecimenDocument, pose: PoseModel, messages: Messages) -> None:
+        self._document, self._pose, self._messages = document, pose, messages
         self._link: TrackerLink | None = None
         self._limits = Limits()
         self._recorder = TouchRecorder(Probe())
@@ -81,9 +84,9 @@ class TrackerDesk:
         self._aim = self._aim_now()
         self._sending.changed.connect(self.changed.emit)
         self._sending.held_back.connect(self._say_held)
-        desk.pose.changed.connect(self._on_pose_changed)
-        desk.details_changed.connect(self._on_pose_changed)
-        desk.session_replaced.connect(self._on_session_replaced)
+        pose.changed.connect(self._update_sending)
+        document.details_changed.connect(self._update_sending)
+        document.reset.connect(self._on_reset)
 
     # The link
 
@@ -289,7 +292,7 @@ class TrackerDesk:
         return f"The reference moved, or a touch was wrong, at {_clock_time(last.time)}: {apart}."
 
     def _tracked(self) -> dict[str, Touch]:
-        side, touches = self._desk.pose.side, self._desk.session.state.touches
+        side, touches = self._pose.side, self._document.state.touches
         return {
             name: touch
             for (of, name), touch in touches.items()
@@ -331,28 +334,28 @@ class TrackerDesk:
 
     def close(self) -> None:
         """End everything."""
-        self._desk.pose.changed.disconnect(self._on_pose_changed)
-        self._desk.details_changed.disconnect(self._on_pose_changed)
-        self._desk.session_replaced.disconnect(self._on_session_replaced)
         self.stop_sending()
         self.disconnect()
 
     # Inside
 
-    def _aim_now(self) -> tuple[Session, Side, str | None]:
+    def _aim_now(self) -> tuple[Side, str | None]:
         """Return what a press is for now."""
-        return self._desk.session, self._desk.pose.side, self._desk.pose.target
+        return self._pose.side, self._pose.target
 
     def _keep_aim(self) -> None:
         """Drop what was begun for another feature, side or specimen: it is not a touch of this one."""
         before, self._aim = self._aim, self._aim_now()
-        self._recorder.dwell = self._dwell and self._aim[2] is not None
+        self._recorder.dwell = self._dwell and self._aim[1] is not None
         if before == self._aim:
             return
+        self._drop_press(before[1])
+
+    def _drop_press(self, name: str | None) -> None:
         was_recording = self._recorder.recording
         self._recorder.cancel()
         if was_recording:
-            self.refused.emit(f"{before[2] or 'Nothing'} is no longer asked for. Touch again.")
+            self.refused.emit(f"{name or 'Nothing'} is no longer asked for. Touch again.")
 
     def _take(self, outcome: RecordedTouch | RefusedTouch) -> None:
         if isinstance(outcome, RefusedTouch):
@@ -360,9 +363,12 @@ class TrackerDesk:
             return
         try:
             self._check_frame()
-            key = (self._desk.pose.side, self._desk.pose.target or "")
-            before = self._desk.session.state.touches.get(key)
-            self._desk.pose.record(
+            side, name = self._pose.side, self._pose.require_target()
+            before = self._document.state.touches.get((side, name))
+            is_new = touching.record_touch(
+                self._document,
+                side,
+                name,
                 outcome.position,
                 TouchHow.TRACKED,
                 source=self._source(),
@@ -372,7 +378,9 @@ class TrackerDesk:
         except GpError as error:
             self.refused.emit(f"{str(error)[:1].upper()}{str(error)[1:]}")
             return
-        self._compare(key[1], outcome, before)
+        if not is_new:
+            self._pose.go_on(name)
+        self._compare(name, outcome, before)
         self.touched.emit(outcome)
 
     def _compare(self, name: str, outcome: RecordedTouch, before: Touch | None) -> None:
@@ -382,13 +390,13 @@ class TrackerDesk:
             name, outcome.position, self._segment(outcome.segment), was, outcome.time
         )
         if repeated is not None and not repeated.agrees:
-            self._desk.say(
+            self._messages.say(
                 f"{name} is {repeated.distance_mm:.1f} mm from where it was touched before: "
                 "the reference moved, or one of the two touches was wrong",
                 "warning",
             )
         elif self.doubtful:
-            self._desk.say(self.frame_words, "warning")
+            self._messages.say(self.frame_words, "warning")
         self._update_sending()
         self.changed.emit()
 
@@ -403,8 +411,8 @@ class TrackerDesk:
 
     def _check_frame(self) -> None:
         """Refuse a touch whose frame is not that of the side's other tracked ones, which are called alike."""
-        side, mine = self._desk.pose.side, self._source().partition(_IN)[2]
-        for (of, name), touch in self._desk.session.state.touches.items():
+        side, mine = self._pose.side, self._source().partition(_IN)[2]
+        for (of, name), touch in self._document.state.touches.items():
             theirs = touch.source.partition(_IN)[2]
             if of is side and touch.how is TouchHow.TRACKED and theirs != mine:
                 raise GpError(
@@ -433,19 +441,18 @@ class TrackerDesk:
         self._latest = self._tip = None
         self._trail.clear()
 
-    def _on_session_replaced(self, _: object) -> None:
+    def _on_reset(self) -> None:
+        """Drop what was begun for another specimen: it is not a touch of this one."""
+        self._drop_press(self._aim[1])
         self._frame.forget()
         self._update_sending()
 
-    def _on_pose_changed(self, *_: object) -> None:
-        self._update_sending()
-
     def _say_held(self, why: str) -> None:
-        self._desk.say(f"The pose is held back from the robot: {why}", "warning")
+        self._messages.say(f"The pose is held back from the robot: {why}", "warning")
 
-    def _update_sending(self) -> None:
+    def _update_sending(self, *_: object) -> None:
         if self._sending.on:
-            pose, state = self._desk.pose, self._desk.session.state
+            pose, state = self._pose, self._document.state
             self._sending.update(pose.estimate, state, self.doubtful, self._reference_age())
 
     def _reference_age(self) -> float | None:

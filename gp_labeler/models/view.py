@@ -1,4 +1,4 @@
-"""How the user looks at the specimen: nothing of it is saved with it, and undo leaves it alone."""
+"""How the user looks at the specimen, and where: nothing of it is saved with it, and undo leaves it alone."""
 
 from __future__ import annotations
 
@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike
 from psygnal import Signal
 
 from gp_core.errors import GpError
-from gp_core.validation import check_option
+from gp_core.validation import FloatArray, check_option
+from gp_labeler.document.edits import as_position
+from gp_labeler.document.specimen_document import SpecimenDocument
 
-__all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "View", "ViewState"]
+__all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "ViewModel", "ViewState"]
 
 LAYOUTS = ("four-up", "3d", "axial", "sagittal", "coronal")
 
@@ -118,17 +120,32 @@ class ViewState:
                 raise GpError(f"{name} must be above 0, got {value}")
 
 
-class View:
-    """The holder of the current `ViewState`."""
+_OF_ONE_SPECIMEN = ("level", "width", "cut", "camera")
+
+
+class ViewModel:
+    """The `ViewState`, and the crosshair that all views share.
+
+    Parameters
+    ----------
+    document : SpecimenDocument
+        Another specimen begins with its own grey window, cut, camera and crosshair.
+    """
 
     changed = Signal(frozenset)
-    """Emitted with the names of the fields that changed."""
+    """Names of the fields of `state` that changed."""
+    crosshair_changed = Signal(object)
+    """The crosshair, (3,) mm in the scan frame."""
+    point_shown = Signal(object)
+    """(3,) scan position that every view shall bring into sight, mm."""
 
-    def __init__(self, state: ViewState | None = None) -> None:
-        self.state = state or ViewState()
+    def __init__(self, document: SpecimenDocument) -> None:
+        self.state = ViewState()
+        self._crosshair = _read_only([0.0, 0.0, 0.0])
+        document.reset.connect(self._on_reset)
 
     def update(self, **changes: Any) -> None:
-        """Change some fields.
+        """Change some fields of the state.
 
         Raises
         ------
@@ -142,3 +159,31 @@ class View:
         changed = frozenset(name for name in changes if getattr(new, name) != getattr(old, name))
         if changed:
             self.changed.emit(changed)
+
+    @property
+    def crosshair(self) -> FloatArray:
+        """(3,) mm, scan frame."""
+        return self._crosshair
+
+    def set_crosshair(self, position: ArrayLike) -> None:
+        """Move the crosshair to a (3,) position, mm, scan frame."""
+        crosshair = _read_only(as_position(position, "crosshair"))
+        if not np.array_equal(crosshair, self._crosshair):
+            self._crosshair = crosshair
+            self.crosshair_changed.emit(crosshair)
+
+    def show_point(self, position: ArrayLike) -> None:
+        """Move the crosshair to a (3,) position, and bring it into sight in every view; mm, scan frame."""
+        self.set_crosshair(position)
+        self.point_shown.emit(self._crosshair)
+
+    def _on_reset(self) -> None:
+        """Keep how the user likes to look at things; whoever listens to `reset` reads the rest again."""
+        self.state = replace(self.state, **{name: getattr(ViewState, name) for name in _OF_ONE_SPECIMEN})
+        self._crosshair = _read_only([0.0, 0.0, 0.0])
+
+
+def _read_only(position: ArrayLike) -> FloatArray:
+    array = np.array(position, dtype=np.float64)
+    array.setflags(write=False)
+    return array

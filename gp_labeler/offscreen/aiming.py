@@ -77,7 +77,7 @@ def _slices_to(rig: Rig, plane: Plane, aim: FloatArray) -> int:
     """Return how many slices lie between the one shown and the one nearest to the aim."""
     source = rig.window.grid.slice_views[plane].source
     assert source is not None
-    here, there = (source.snap(plane, p[plane.axis]) for p in (rig.desk.session.crosshair, aim))
+    here, there = (source.snap(plane, p[plane.axis]) for p in (rig.workspace.view.crosshair, aim))
     return round((there - here) / source.step(plane))
 
 
@@ -89,7 +89,7 @@ def _notches(mm_per_pixel: float, rig: Rig) -> int:
 def _on_slice(rig: Rig, plane: Plane, aim: FloatArray) -> FloatArray:
     """Return the position over `aim` on the slice that is shown: panning does not scroll."""
     there = np.array(aim)
-    there[plane.axis] = rig.desk.session.crosshair[plane.axis]
+    there[plane.axis] = rig.workspace.view.crosshair[plane.axis]
     return there
 
 

@@ -76,7 +76,7 @@ class Report:
 
     def take_stock(self, rig: Rig) -> None:
         """Note what the window holds now."""
-        self.specimen = rig.desk.session.state.specimen
+        self.specimen = rig.workspace.document.state.specimen
         self.features, self.suggested = feature_rows(rig), suggested_rows(rig)
         self.poses = pose_rows(rig)
         self.files = [_relative(file, rig.output) for file in rig.files]
@@ -120,10 +120,10 @@ def feature_rows(rig: Rig) -> list[dict[str, Any]]:
     """Return a row for each placed or computed feature: where it is and, of a phantom, where it should be."""
     rows = []
     for side in Side:
-        landmarks = rig.desk.session.landmarks(side)
+        landmarks = rig.workspace.document.landmarks(side)
         for code in (code for code in CODES if code in landmarks):
             row: dict[str, Any] = {"side": side.value, "feature": code, "placed": landmarks[code].tolist()}
-            if rig.desk.truth is not None:
+            if rig.workspace.scan.truth is not None:
                 truth = rig.truth(side, code)
                 off = float(np.linalg.norm(landmarks[code] - truth))
                 row |= {"true": truth.tolist(), "error_mm": off, "error_voxels": off / rig.voxel}
@@ -142,7 +142,7 @@ def suggested_rows(rig: Rig) -> list[dict[str, Any]]:
             "source": suggestion.source,
         }
         for side in Side
-        for code, suggestion in rig.desk.session.landmarks(side).suggested.items()
+        for code, suggestion in rig.workspace.document.landmarks(side).suggested.items()
     ]
 
 

@@ -37,7 +37,7 @@ VIEWS = ("3d", *(plane.value for plane in Plane))
 _SIZE = (1440, 900)
 _PATIENCE_SECONDS = 600.0
 _PAUSE_SECONDS = 0.002
-_IN_PASSING = ("judging",)
+_IN_PASSING = ("checking",)
 """Work whose result changes only how things look: nobody waits for it between clicks."""
 
 
@@ -65,13 +65,13 @@ class Rig:
         self.prompts = ScriptPrompts()
         self.window = make_window(None)
         self.window.ui.prompts = self.prompts  # type: ignore[assignment]
-        self.desk = self.window.workbench
+        self.workspace = self.window.workspace
         self.messages: list[tuple[str, str]] = []
         self.faults: list[BaseException] = []
         self.spacing: Any = None  # of the next scan
         self.poses: dict[Side, Estimated] = {}
         self.files: list[Path] = []
-        self.desk.message.connect(self._hear)
+        self.workspace.messages.said.connect(self._hear)
         self.window.resize(*_SIZE)
         self.window.show()
         QTest.qWaitForWindowExposed(self.window)
@@ -117,11 +117,11 @@ class Rig:
             Whether to wait also for what changes only how points look.
         """
         end = time.monotonic() + _PATIENCE_SECONDS
-        while any(in_passing or not task.key.startswith(_IN_PASSING) for task in self.desk.jobs.running):
+        while any(in_passing or not task.key.startswith(_IN_PASSING) for task in self.workspace.jobs.running):
             self.app.processEvents()
             time.sleep(_PAUSE_SECONDS)  # QTest.qWait would keep Python's lock from the work it waits for
             if time.monotonic() > end:
-                titles = ", ".join(task.job.title for task in self.desk.jobs.running)
+                titles = ", ".join(task.job.title for task in self.workspace.jobs.running)
                 raise GpError(f"still not finished after {_PATIENCE_SECONDS:g} s: {titles}")
         self.app.processEvents()
 
@@ -136,24 +136,24 @@ class Rig:
         GpError
             No scan is open.
         """
-        if self.desk.volume is None:
+        if self.workspace.scan.volume is None:
             raise GpError("no scan is open", remedy="Let a step open one first.")
-        return min(self.desk.volume.spacing)
+        return min(self.workspace.scan.volume.spacing)
 
     def truth(self, side: Side, code: str) -> FloatArray:
         """Return where a feature of the phantom really is, (3,) mm, scan frame."""
-        if self.desk.truth is None:
+        if self.workspace.scan.truth is None:
             raise GpError("the truth is known of a phantom only", landmark=code)
-        return self.desk.truth.side(side)[code]
+        return self.workspace.scan.truth.side(side)[code]
 
     def placed(self, side: Side, code: str) -> FloatArray | None:
         """Return where a feature is placed or computed, (3,) mm, scan frame."""
-        landmarks = self.desk.session.landmarks(side)
+        landmarks = self.workspace.document.landmarks(side)
         return landmarks[code] if feature(code).code in landmarks else None
 
     def shown_at(self, side: Side, code: str) -> FloatArray | None:
         """Return where a feature is placed, computed or suggested, (3,) mm, scan frame."""
-        suggestion = self.desk.session.landmarks(side).suggested.get(feature(code).code)
+        suggestion = self.workspace.document.landmarks(side).suggested.get(feature(code).code)
         return self.placed(side, code) if suggestion is None else np.array(suggestion.position)
 
     # The views
@@ -167,16 +167,16 @@ class Rig:
         """Return a view by its name, and see to it that it is on the screen."""
         if name not in VIEWS:
             raise GpError(f"view must be one of {', '.join(VIEWS)}, got {name!r}")
-        layout = self.desk.session.view.state.layout
+        layout = self.workspace.view.state.layout
         if layout not in ("four-up", name):
-            self.desk.session.view.update(layout=name)
+            self.workspace.view.update(layout=name)
             self.app.processEvents()
         return self.scene if name == "3d" else self.window.grid.slice_views[Plane(name)]
 
     def bring(self, position: FloatArray) -> None:
         """Bring a (3,) scan position into sight in every view, as a click on a row does."""
-        self.desk.session.set_crosshair(position)
-        self.desk.point_shown.emit(np.asarray(position, dtype=np.float64))
+        self.workspace.view.set_crosshair(position)
+        self.workspace.view.point_shown.emit(np.asarray(position, dtype=np.float64))
 
     def choose(self, side: Side, code: str) -> None:
         """Choose a point by a click on its cell in the table.
@@ -192,7 +192,7 @@ class Rig:
         cell = table.model.index(index_of(code), 1 + list(Side).index(side))
         middle = table.view.visualRect(cell).center()
         click(table.view.viewport(), middle.x(), middle.y())
-        if self.desk.session.active != Active(side, code):
+        if self.workspace.labels.active != Active(side, code):
             raise GpError(f"{code} {side.word} cannot be chosen", landmark=code)
 
     # Life
@@ -226,6 +226,6 @@ class Rig:
         """Close the window and everything it holds; edits that no step saved are dropped."""
         self.prompts.prepare(answers=("Do not save",))
         self.window.close()
-        self.desk.message.disconnect(self._hear, missing_ok=True)
+        self.workspace.messages.said.disconnect(self._hear, missing_ok=True)
         self.window.deleteLater()
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete.value)

@@ -90,10 +90,10 @@ def do_step(rig: Rig, number: int, step: Step) -> StepRecord:
 
 def _rescue(rig: Rig) -> None:
     """Save what was labelled before a step failed."""
-    session = rig.desk.session
-    if session.dirty:
+    document = rig.workspace.document
+    if document.dirty:
         with suppress(GpError):
-            rig.wrote(session.save(rig.output / f"{session.state.specimen}{SUFFIX}", overwrite=True))
+            rig.wrote(document.save(rig.output / f"{document.state.specimen}{SUFFIX}", overwrite=True))
 
 
 def _make(folder: Path) -> None:

@@ -18,7 +18,7 @@ from gp_core.errors import GpError
 from gp_labeler.document.paths import default_directory
 from gp_labeler.document.recovery import find_recoveries, unreadable_journals
 from gp_labeler.installation import check_display
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.plain_numbers import use_plain_numbers
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
@@ -75,12 +75,12 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
     make_application()
     importlib.import_module("scipy.ndimage")  # the scene needs it; no job may be importing SciPy meanwhile
     dispatcher = QtDispatcher()
-    workbench = Workbench(directory, dispatcher)
+    workspace = Workspace(directory, dispatcher)
     memory = WindowState(None if directory is None else directory / "window.json")
-    window = MainWindow(workbench, memory)
+    window = MainWindow(workspace, memory)
     dispatcher.setParent(window)
     if atlas:
-        workbench.load_atlas()
+        workspace.atlas.load()
     return window
 
 
@@ -121,7 +121,7 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
     def begin() -> None:
         places = list(dict.fromkeys(place for place in (wanted, directory) if place is not None))
         for words in (words for place in places for words in unreadable_journals(place)):
-            window.workbench.say(words, "warning")
+            window.workspace.say(words, "warning")
         window.ui.take_recoveries(tuple(found for place in places for found in find_recoveries(place)))
         if demo:
             window.ui.open_demo()
@@ -149,6 +149,6 @@ def _report(
 ) -> None:
     """Tell of a fault of the program; the work goes on, every edit is in the journal."""
     _log.error("%s", "".join(traceback.format_exception(kind, error, trace)))
-    window.workbench.say(
+    window.workspace.say(
         f"Something went wrong in the program ({kind.__name__}: {error}). Save your work.", "error"
     )

@@ -26,7 +26,7 @@ class AtlasUi(UiPart):
         """Ask for an atlas file, and take it."""
         for path in self.prompts.open_files("Open an atlas", self._folder, _ATLASES):
             self._remember_folder(path)
-            self._desk.open_atlas(path)
+            self._workspace.atlas.open(path)
 
     def ask_fit_atlas(self, *, folder: bool = False) -> None:
         """Ask for the files of labelled animals, or a folder of them, and fit an atlas."""
@@ -39,28 +39,32 @@ class AtlasUi(UiPart):
         if paths:
             self._remember_folder(paths[0])
             self._window.set_step("atlas")
-            self._desk.fit_atlas(paths)
+            self._workspace.atlas.fit(paths)
 
     def show_finding(self, finding: Finding) -> None:
         """Open the animal of a finding, and go to its first point."""
-        desk, name, side = self._desk, finding.specimen, finding.side
-        if desk.session.state.specimen != name:
-            file = None if desk.animals is None else desk.animals.specimen_file(name, side)
+        workspace, name, side = self._workspace, finding.specimen, finding.side
+        if workspace.document.state.specimen != name:
+            file = (
+                None if workspace.atlas.animals is None else workspace.atlas.animals.specimen_file(name, side)
+            )
             if file is None:
-                desk.say(f"{name} has no specimen file: open its scan and import its landmarks", "warning")
+                workspace.say(
+                    f"{name} has no specimen file: open its scan and import its landmarks", "warning"
+                )
                 return
             self.open_path(file)
-            if desk.session.state.specimen != name:
+            if workspace.document.state.specimen != name:
                 return
         self._window.set_step("label")
         code = next((code for code in finding.landmarks if not feature(code).computed), None)
         if code is not None:
-            attempt(desk, lambda: desk.go_to(side, code))
+            attempt(workspace, lambda: workspace.labels.go_to(side, code))
 
     def ask_save_atlas(self) -> None:
         """Ask where, and write the atlas in use."""
         path = self.prompts.save_file("Save the atlas", str(Path(self._folder) / "atlas.json"), _ATLASES)
         if path is not None:
-            self._desk.save_atlas(path)
+            self._workspace.atlas.save(path)
             self._remember_folder(path)
-            self._desk.say(f"Wrote {path.name}")
+            self._workspace.say(f"Wrote {path.name}")

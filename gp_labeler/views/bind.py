@@ -38,7 +38,7 @@ _AXES = (("L", "R"), ("P", "A"), ("S", "I"))
 
 
 class Teller(Protocol):
-    """What errors are told to: a `Workbench`."""
+    """What errors are told to: a `Workspace`."""
 
     def say(self, text: str, level: str = "info") -> None:
         """Tell the user."""

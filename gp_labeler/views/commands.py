@@ -11,7 +11,7 @@ from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
 from gp_labeler.commands.actions import ACTIONS, MENUS, Action, Ui, run
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.shortcuts_sheet import keys_text
 
@@ -41,7 +41,7 @@ class Commands(QObject):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What they act on.
     ui : Ui
         What they ask.
@@ -52,27 +52,27 @@ class Commands(QObject):
     done = Signal(str)
     """Id of the action that was done."""
 
-    def __init__(self, workbench: Workbench, ui: Ui, window: QWidget, views: QWidget) -> None:
+    def __init__(self, workspace: Workspace, ui: Ui, window: QWidget, views: QWidget) -> None:
         super().__init__(window)
-        self._desk, self._ui = workbench, ui
+        self._workspace, self._ui = workspace, ui
         self.actions = {row.id: self._made(row, window, views) for row in ACTIONS.values()}
         for signal in (
-            workbench.session_replaced,
-            workbench.active_changed,
-            workbench.ghosts_changed,
-            workbench.history_changed,  # after every edit
-            workbench.view_changed,
-            workbench.volume_opened,
-            workbench.surfaces_changed,
-            workbench.tool_changed,
-            workbench.replacing_changed,
-            workbench.atlas_changed,
-            workbench.pose.changed,
-            workbench.pose.target_changed,
-            workbench.pose.overlay_changed,
-            workbench.tracker.changed,
-            workbench.references.changed,
-            workbench.meshes.changed,
+            workspace.document.reset,
+            workspace.labels.active_changed,
+            workspace.labels.ghosts_changed,
+            workspace.document.history_changed,  # after every edit
+            workspace.view.changed,
+            workspace.scan.opened,
+            workspace.bone.surfaces_changed,
+            workspace.interaction.tool_changed,
+            workspace.interaction.replacing_changed,
+            workspace.atlas.changed,
+            workspace.pose.changed,
+            workspace.pose.target_changed,
+            workspace.pose.overlay_changed,
+            workspace.tracker.changed,
+            workspace.references.changed,
+            workspace.meshes.changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()
@@ -93,20 +93,20 @@ class Commands(QObject):
                     shown = menu.addMenu(_FOLDED[group]) if group in _FOLDED else menu
                     shown.setToolTipsVisible(True)
                 shown.addAction(self.actions[row.id])
-                if row.id == "file.demo" and self._desk.recent is not None:
+                if row.id == "file.demo" and self._workspace.recent is not None:
                     self._add_recent(menu)
 
     def refresh(self, *_: object) -> None:
         """Bring what can be done, and what is on, up to date."""
         for row in ACTIONS.values():
             made = self.actions[row.id]
-            made.setEnabled(row.enabled(self._desk))
+            made.setEnabled(row.enabled(self._workspace))
             if row.checked is not None:
-                made.setChecked(row.checked(self._desk))
-        session = self._desk.session
+                made.setChecked(row.checked(self._workspace))
+        document = self._workspace.document
         for id, word, what in (
-            ("edit.undo", "Undo", session.undo_text),
-            ("edit.redo", "Redo", session.redo_text),
+            ("edit.undo", "Undo", document.undo_text),
+            ("edit.redo", "Redo", document.redo_text),
         ):
             self.actions[id].setText(f"{word} {what}" if what else word)
 
@@ -128,7 +128,7 @@ class Commands(QObject):
 
     def run(self, id: str, *_: object) -> bool:
         """Do an action; return whether it could be done."""
-        was_done = run(id, self._desk, self._ui)
+        was_done = run(id, self._workspace, self._ui)
         self.refresh()
         if was_done:
             self.done.emit(id)
@@ -140,7 +140,7 @@ class Commands(QObject):
 
     def _fill_recent(self, menu: QMenu) -> None:
         menu.clear()
-        files = self._desk.recent.all() if self._desk.recent is not None else ()
+        files = self._workspace.recent.all() if self._workspace.recent is not None else ()
         for path in files:
             entry = menu.addAction(_short(path))
             entry.setEnabled(path.exists())

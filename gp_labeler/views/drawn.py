@@ -13,7 +13,7 @@ from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
 from gp_labeler.models.ghosts import CHI2_95
 from gp_labeler.models.workflow import PointState
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import Ghost
 from gp_labeler.scene.marks import REFERENCE, Mark
@@ -42,16 +42,16 @@ def point_of(key: str) -> tuple[Side, str]:
     return Side(side), code
 
 
-def drawn_marks(workbench: Workbench) -> list[Mark]:
+def drawn_marks(workspace: Workspace) -> list[Mark]:
     """Return the placed and suggested points of both sides; a shared one once, on the side worked on.
 
     Under an estimate they stand without their names, but for the active one: forty names would hide it.
     """
-    session, drag, marks = workbench.session, workbench.drag, []
-    named = not workbench.pose.overlay.visible
-    active = session.active
+    drag, marks, document, labels = workspace.interaction.drag, [], workspace.document, workspace.labels
+    named = not workspace.pose.overlay.visible
+    active = labels.active
     for side in (active.side.other, active.side):
-        landmarks, states = session.landmarks(side), session.point_states(side, wait=False)
+        landmarks, states = document.landmarks(side), labels.point_states(side, wait=False)
         for code in CODES:
             where = _shown_at(landmarks, code)
             if where is None or (feature(code).shared and side is not active.side):
@@ -65,9 +65,9 @@ def drawn_marks(workbench: Workbench) -> list[Mark]:
     return marks
 
 
-def drawn_references(workbench: Workbench) -> list[Mark]:
+def drawn_references(workspace: Workspace) -> list[Mark]:
     """Return the reference points inside the scan: no landmarks, so they are never picked."""
-    points, volume = workbench.references.points, workbench.volume
+    points, volume = workspace.references.points, workspace.scan.volume
     if not points or volume is None:
         return []
     inside = volume.contains(np.array([point.position for point in points]))
@@ -85,20 +85,20 @@ def _shown_at(landmarks: LandmarkSet, code: str) -> FloatArray | None:
     return None if suggestion is None else np.array(suggestion.position)
 
 
-def drawn_ghosts(workbench: Workbench) -> list[Ghost]:
+def drawn_ghosts(workspace: Workspace) -> list[Ghost]:
     """Return where the active point is expected: to do, suggested, or doubted where it was placed."""
-    session = workbench.session
-    side, code = session.active.side, session.active.code
-    if code is None or not session.view.state.ghosts_visible:
+    document, labels = workspace.document, workspace.labels
+    side, code = labels.active.side, labels.active.code
+    if code is None or not workspace.view.state.ghosts_visible:
         return []
-    ghost = session.ghosts(side).get(code)
-    doubt = session.near_doubts(side).get(code)
-    if doubt is not None and session.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
+    ghost = labels.ghosts(side).get(code)
+    doubt = labels.near_doubts(side).get(code)
+    if doubt is not None and labels.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
         away = doubt.departure_of(code)
         if away is None or away.distance > HEAD_MM:  # such a place would mean nothing
             return []
         return [Ghost(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]
-    suggestion = session.landmarks(side).suggested.get(code)
+    suggestion = document.landmarks(side).suggested.get(code)
     if suggestion is not None and suggestion.radius_95 is not None:
         return [_region(key_of(side, code), suggestion, suggestion.radius_95)]
     if ghost is None:
@@ -112,12 +112,12 @@ def _region(key: str, suggestion: Suggestion, radius_95: float) -> Ghost:
     return Ghost(key, np.array(suggestion.position), covariance, "", active=True)
 
 
-def drawn_segments(workbench: Workbench, colours: SceneColours) -> list[Segment]:
+def drawn_segments(workspace: Workspace, colours: SceneColours) -> list[Segment]:
     """Return the modiolar axis, the line across the round window and the one that joins them, each side."""
-    session = workbench.session
-    if not session.view.state.axis_visible:
+    document = workspace.document
+    if not workspace.view.state.axis_visible:
         return []
-    return [line for side in Side for line in _lines(session.landmarks(side), colours.states["computed"])]
+    return [line for side in Side for line in _lines(document.landmarks(side), colours.states["computed"])]
 
 
 def _lines(landmarks: LandmarkSet, colour: str) -> list[Segment]:

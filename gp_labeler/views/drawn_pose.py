@@ -1,4 +1,4 @@
-"""What of a workbench's estimate is drawn over bone and slices, before a view makes pixels of it."""
+"""What of a workspace's estimate is drawn over bone and slices, before a view makes pixels of it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from gp_labeler.document.touches import Touches
 from gp_labeler.models.estimate import Estimate
 from gp_labeler.models.pose import OverlayOptions
 from gp_labeler.models.pose_exports import InsertionPath
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.pose_data import (
     METHOD_ROLES,
     PARTS,
@@ -26,17 +26,17 @@ __all__ = ["pose_scene"]
 _METHOD_WORDS = {"robust": "robust", "jrmpc": "JRMPC"}
 
 
-def pose_scene(desk: Workbench, *, tip: DrawnTip | None = None) -> PoseScene:
+def pose_scene(workspace: Workspace, *, tip: DrawnTip | None = None) -> PoseScene:
     """Return what is drawn of the current estimate; nothing of it where it cannot be laid into the scan.
 
     Parameters
     ----------
-    desk : Workbench
+    workspace : Workspace
         With the estimate, and the options of what to draw.
     tip : DrawnTip, optional
         The tracked probe.
     """
-    options, estimate = desk.pose.overlay, desk.pose.estimate
+    options, estimate = workspace.pose.overlay, workspace.pose.estimate
     parts, opacity = _parts(options), options.opacity
     if not options.visible:
         return PoseScene(parts=parts, opacity=opacity)
@@ -45,11 +45,11 @@ def pose_scene(desk: Workbench, *, tip: DrawnTip | None = None) -> PoseScene:
     return PoseScene(
         poses=_poses(estimate),
         truths=_truths(estimate),
-        touches=_touches(estimate, desk.session.state.touches),
+        touches=_touches(estimate, workspace.document.state.touches),
         features=_features(estimate),
         vectors=_vectors(estimate),
         tip=tip,
-        paths=_paths(desk.pose.path, estimate),
+        paths=_paths(workspace.pose.path, estimate),
         parts=parts,
         opacity=opacity,
     )

@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
 from gp_core.landmarks.features import CODES, RECOMMENDED, Side, feature
 from gp_core.pose.quality import pose_quality
 from gp_labeler.models.pose import ORDER
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels, styled, text_scale
@@ -49,7 +49,7 @@ class GuideWindow(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose touches; with a tracked probe.
     parent : QWidget
         The main window, whose look it takes.
@@ -58,9 +58,9 @@ class GuideWindow(QWidget):
     settings_asked = Signal()
     closed = Signal()
 
-    def __init__(self, workbench: Workbench, parent: QWidget) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget) -> None:
         super().__init__(parent, Qt.WindowType.Window)
-        self._desk, self._refusal = workbench, ""
+        self._workspace, self._refusal = workspace, ""
         self._last: tuple[Side, str] | None = None
         self._scale, self._text_scale = 0.0, 0.0
         self.setWindowTitle("Guided touching")
@@ -75,7 +75,7 @@ class GuideWindow(QWidget):
 
     def refresh(self, *_: object) -> None:
         """Show what is to be touched, and what is known of the cochlea."""
-        pose = self._desk.pose
+        pose = self._workspace.pose
         target, touched = pose.target, pose.names_touched
         row = feature(target) if target in CODES else None
         self.counter.setText(f"{pose.side.word.capitalize()} ear · {_progress(touched)}")
@@ -93,10 +93,10 @@ class GuideWindow(QWidget):
         self._show_tracker()
 
     def _show_result(self) -> None:
-        pose = self._desk.pose
+        pose = self._workspace.pose
         estimate = pose.estimate.pose if pose.estimate is not None else None
         if estimate is None:
-            self.result.setText(pose.estimating.waiting_text or "No estimate")
+            self.result.setText(pose.waiting_text or "No estimate")
             for label in (self.trust, self.reason, self.warning):
                 label.hide()
             return
@@ -111,11 +111,11 @@ class GuideWindow(QWidget):
         self.warning.setVisible(bool(estimate.warnings))
 
     def _show_tracker(self, *_: object) -> None:
-        tracker = self._desk.tracker
-        self.state.setText(tracker_words(self._desk))
-        set_role(self.state, f"large-{tracker_role(self._desk)}")
+        tracker = self._workspace.tracker
+        self.state.setText(tracker_words(self._workspace))
+        set_role(self.state, f"large-{tracker_role(self._workspace)}")
         self.connect_button.setVisible(not tracker.on)
-        self.record.setEnabled(tracker.on or self._desk.pose.target is None)
+        self.record.setEnabled(tracker.on or self._workspace.pose.target is None)
         self.progress.setValue(round(100 * tracker.progress))
         self.told.setText(self._refusal)
         self.told.setVisible(bool(self._refusal))
@@ -125,7 +125,7 @@ class GuideWindow(QWidget):
     @property
     def _to_redo(self) -> str | None:
         """What was recorded last here; else, or from a touched one, the one before in the order asked for."""
-        pose, touched = self._desk.pose, self._desk.pose.names_touched
+        pose, touched = self._workspace.pose, self._workspace.pose.names_touched
         asked, again = ORDER, pose.target in touched
         if self._last is not None and not again:
             side, name = self._last
@@ -136,19 +136,19 @@ class GuideWindow(QWidget):
         return next((name for name in reversed(asked) if name in touched), None)
 
     def _press(self) -> None:
-        if self._desk.pose.target is None:
+        if self._workspace.pose.target is None:
             self.close()
             return
         self._refusal = ""
-        attempt(self._desk, self._desk.tracker.press)
+        attempt(self._workspace, self._workspace.tracker.press)
         self._show_tracker()
 
     def _redo(self) -> None:
         if self._to_redo is not None:
-            self._desk.pose.aim(self._to_redo)
+            self._workspace.pose.aim(self._to_redo)
 
     def _on_recorded(self, name: str) -> None:
-        self._last, self._refusal = (self._desk.pose.side, name), ""
+        self._last, self._refusal = (self._workspace.pose.side, name), ""
         self.refresh()
 
     def _on_refused(self, reason: str) -> None:
@@ -158,7 +158,7 @@ class GuideWindow(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         if event.isAutoRepeat():
             return
-        for keys, call in ((_RECORD, self._press), (_REDO, self._redo), (_SKIP, self._desk.pose.skip)):
+        for keys, call in ((_RECORD, self._press), (_REDO, self._redo), (_SKIP, self._workspace.pose.skip)):
             if event.key() in keys:
                 call()
                 return
@@ -189,7 +189,7 @@ class GuideWindow(QWidget):
         self.record = _big("Record", _RECORD_HINT, self._press)
         self.record.setProperty("role", "huge-primary")
         self.redo = _big("Redo", "Backspace or Page up: touch the last one again", self._redo)
-        self.skip = _big("Skip", "S or Right: it comes again at the end", self._desk.pose.skip)
+        self.skip = _big("Skip", "S or Right: it comes again at the end", self._workspace.pose.skip)
         self.connect_button = _big("Connect…", "Choose the tracker", self.settings_asked.emit)
         self.leave = _big("Close", "Escape", self.close)
 
@@ -255,7 +255,7 @@ class GuideWindow(QWidget):
         whole.addLayout(buttons)
 
     def _listen(self) -> None:
-        pose, tracker = self._desk.pose, self._desk.tracker
+        pose, tracker = self._workspace.pose, self._workspace.tracker
         for signal in (pose.changed, pose.target_changed):
             follow(self, signal, self.refresh)
         follow(self, pose.recorded, self._on_recorded)

@@ -10,8 +10,7 @@ from gp_core.landmarks.features import feature
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import How, Landmark
 from gp_labeler.document.touches import TouchHow
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.views.drawn import point_of
 from gp_labeler.views.panels.landmark_menu import landmark_menu
@@ -26,12 +25,12 @@ class Hand:
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What it works on.
     """
 
-    def __init__(self, workbench: Workbench) -> None:
-        self._desk = workbench
+    def __init__(self, workspace: Workspace) -> None:
+        self._workspace = workspace
         self._mark: str | None = None
         self._start = (0.0, 0.0)
         self._placed = False
@@ -53,24 +52,24 @@ class Hand:
             return False
         if max(abs(x - self._start[0]), abs(y - self._start[1])) >= CLICK_PIXELS and self.is_click:
             self.is_click = False
-            self._desk.begin_drag(*point_of(self._mark))
-        return self._desk.drag is not None
+            self._workspace.interaction.begin_drag(*point_of(self._mark))
+        return self._workspace.interaction.drag is not None
 
     def release(self) -> str | None:
         """Take a release; return the mark it all began on."""
         mark, self._mark = self._mark, None
-        if self._desk.drag is not None:
-            self._guarded(self._desk.end_drag)
+        if self._workspace.interaction.drag is not None:
+            self._guarded(self._workspace.interaction.end_drag)
         return mark
 
     def cancel(self) -> None:
         """Let a dragged point go back to where it was, and the crosshair with it."""
-        self._mark, drag = None, self._desk.drag
-        self._desk.end_drag(keep=False)
+        self._mark, drag = None, self._workspace.interaction.drag
+        self._workspace.interaction.end_drag(keep=False)
         if drag is not None:
-            where = labelling.place_of(self._desk.session, drag.side, drag.code)
+            where = self._workspace.labels.place_of(drag.side, drag.code)
             if where is not None:
-                self._desk.session.set_crosshair(where)
+                self._workspace.view.set_crosshair(where)
 
     def click(self, position: FloatArray | None, how: How, mark: str | None) -> None:
         """Take a click at a scan position (None: it missed) and on a mark (None: on none).
@@ -78,25 +77,25 @@ class Hand:
         A point that is to do is placed, one that shall be re-placed moves here; else a mark is chosen, or the
         crosshair comes here. A click never moves a placed or suggested point just because its row is chosen.
         """
-        desk = self._desk
-        if desk.replacing:
+        workspace = self._workspace
+        if workspace.interaction.replacing:
             if position is not None:
                 self._guarded(lambda: self._place(position, how))
-                desk.arm_replacing(False)
+                workspace.interaction.arm_replacing(False)
             return
-        if desk.tool == "touch":
+        if workspace.interaction.tool == "touch":
             if position is not None:
                 self._guarded(lambda: self._touch(position))
             return
-        places = desk.tool == "place" and self._is_to_place()
+        places = workspace.interaction.tool == "place" and self._is_to_place()
         if mark is not None and not (places and self._is_to_do()):
-            desk.go_to(*point_of(mark))
+            workspace.labels.go_to(*point_of(mark))
         elif position is None:
             return
         elif places:
             self._guarded(lambda: self._place(position, how))
         else:
-            desk.session.set_crosshair(position)
+            workspace.view.set_crosshair(position)
 
     def _is_to_place(self) -> bool:
         """Whether a point is chosen that is neither placed nor suggested anywhere."""
@@ -109,28 +108,30 @@ class Hand:
         return mark is not None and mark.shown_position is None and not mark.unseen
 
     def _chosen(self) -> Landmark | None:
-        active, state = self._desk.session.active, self._desk.session.state
+        active, state = self._workspace.labels.active, self._workspace.document.state
         return None if active.code is None else state.landmark(active.side, active.code)
 
     def take_back(self) -> None:
         """Take back the point that the first click of a double click placed."""
         if self._placed:
             self._placed = False
-            self._desk.session.undo()
+            self._workspace.document.undo()
 
     def open_menu(self, view: QWidget, mark: str | None, where: QPoint) -> None:
         """Offer what can be done with the point of a mark, at a position on the screen."""
         if mark is not None:
-            landmark_menu(self._desk, *point_of(mark), view).popup(where)
+            landmark_menu(self._workspace, *point_of(mark), view).popup(where)
 
     def cursor(self, on_target: bool, mark: str | None) -> Qt.CursorShape:
         """Return the pointer that says what a click would do: a cross where it places, moves or touches."""
-        writes = self._desk.tool == "touch" or (self._desk.tool == "place" and self._is_to_place())
-        if self._desk.replacing:
+        writes = self._workspace.interaction.tool == "touch" or (
+            self._workspace.interaction.tool == "place" and self._is_to_place()
+        )
+        if self._workspace.interaction.replacing:
             return Qt.CursorShape.CrossCursor if on_target else Qt.CursorShape.ForbiddenCursor
         if mark is not None and self._can_drag(mark):
             return Qt.CursorShape.OpenHandCursor
-        if self._desk.tool == "grey":
+        if self._workspace.interaction.tool == "grey":
             return Qt.CursorShape.SizeAllCursor
         return Qt.CursorShape.CrossCursor if on_target and writes else Qt.CursorShape.ArrowCursor
 
@@ -140,36 +141,36 @@ class Hand:
             view.setFocus(Qt.FocusReason.MouseFocusReason)
 
     def _place(self, position: FloatArray, how: How) -> bool:
-        self._desk.session.set_crosshair(position)
-        self._placed = labelling.place(self._desk.session, position, how)
+        self._workspace.view.set_crosshair(position)
+        self._placed = self._workspace.labels.place(position, how)
         return self._placed
 
     def _touch(self, position: FloatArray) -> None:
-        self._desk.session.set_crosshair(position)
-        self._desk.pose.record(position, TouchHow.SCAN)
+        self._workspace.view.set_crosshair(position)
+        self._workspace.pose.record(position, TouchHow.SCAN)
         self._placed = True
 
     def _can_drag(self, mark: str) -> bool:
-        return self._desk.tool != "touch" and not feature(point_of(mark)[1]).computed
+        return self._workspace.interaction.tool != "touch" and not feature(point_of(mark)[1]).computed
 
     def _guarded(self, edit: object) -> None:
         try:
             edit()  # type: ignore[operator]
         except GpError as error:
-            self._desk.say(str(error), "warning")
+            self._workspace.say(str(error), "warning")
 
 
-def nudge(workbench: Workbench, offset: FloatArray) -> None:
+def nudge(workspace: Workspace, offset: FloatArray) -> None:
     """Move the chosen point, or the one placed last, by a (3,) offset, mm; without one, the crosshair."""
-    session = workbench.session
-    if workbench.nudged_point() is None:
-        session.set_crosshair(session.crosshair + offset)
+    document = workspace.document
+    if workspace.interaction.nudged_point() is None:
+        workspace.view.set_crosshair(workspace.view.crosshair + offset)
         return
     try:
-        moved = workbench.nudge(offset)
+        moved = workspace.interaction.nudge(offset)
     except GpError as error:
-        workbench.say(str(error), "warning")
+        workspace.say(str(error), "warning")
         return
     if moved is not None:
         side, code = moved
-        session.set_crosshair(session.landmarks(side)[code])
+        workspace.view.set_crosshair(document.landmarks(side)[code])

@@ -21,9 +21,9 @@ from qtpy.QtWidgets import (
 )
 
 from gp_labeler.document.animals import may_hold_labels
-from gp_labeler.models.view import View as SessionView
+from gp_labeler.models.view import ViewModel as SessionView
 from gp_labeler.models.view import ViewState
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
@@ -73,11 +73,11 @@ _LIKED = (
 
 
 class MainWindow(QMainWindow):
-    """One window on one workbench, which it closes with itself.
+    """One window on one workspace, which it closes with itself.
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What it shows and edits.
     memory : WindowState, optional
         What it remembers; by default nothing.
@@ -86,27 +86,27 @@ class MainWindow(QMainWindow):
     """
 
     def __init__(
-        self, workbench: Workbench, memory: WindowState | None = None, prompts: Prompts | None = None
+        self, workspace: Workspace, memory: WindowState | None = None, prompts: Prompts | None = None
     ) -> None:
         super().__init__()
-        self.workbench, self.memory = workbench, memory or WindowState()
-        self.ui = WindowUi(self, workbench, prompts or Prompts(self))
+        self.workspace, self.memory = workspace, memory or WindowState()
+        self.ui = WindowUi(self, workspace, prompts or Prompts(self))
         self.setAcceptDrops(True)
-        self._recall_view(workbench.session.view)
+        self._recall_view(workspace.view)
         self.theme_name = self.memory.get("theme", str, "dark")
         self.text_size = nearest_text_size(self.memory.get("text_size", int, 100))
         self._restyle()
-        self.grid = ViewGrid(workbench)
-        self.pose_display = PoseDisplay(workbench, self.grid)
+        self.grid = ViewGrid(workspace)
+        self.pose_display = PoseDisplay(workspace, self.grid)
         for view in self.grid.slice_views.values():
-            ReferenceLayer(workbench, view)
-        self.tracker_display = TrackerDisplay(workbench, self.pose_display)
+            ReferenceLayer(workspace, view)
+        self.tracker_display = TrackerDisplay(workspace, self.pose_display)
         self.tracker_display.audible = self.memory.get("audible", bool, False)
-        self.commands = Commands(workbench, self.ui, self, self.grid)
+        self.commands = Commands(workspace, self.ui, self, self.grid)
         self.commands.fill(self.menuBar())
-        self.rail, self.panels = Rail(workbench), PanelStack()
-        self.pages, self.welcome = QStackedWidget(), Welcome(workbench)
-        self.status = StatusLine(workbench)
+        self.rail, self.panels = Rail(workspace), PanelStack()
+        self.pages, self.welcome = QStackedWidget(), Welcome(workspace)
+        self.status = StatusLine(workspace)
         self._dock()
         self._listen()
         self._recall_place()
@@ -137,11 +137,11 @@ class MainWindow(QMainWindow):
         """Show the panel of a step: ``scan``, ``label``, ``atlas`` or ``pose``."""
         self.rail.set_step(step)
         if step == "label":
-            self.workbench.begin_labelling()
+            self.workspace.begin_labelling()
         elif step == "pose":
-            self.workbench.begin_judging()
+            self.workspace.begin_judging()
         else:
-            self.workbench.begin_looking()
+            self.workspace.begin_looking()
         self.panels.setCurrentWidget(self.steps[step])
         self._arrange()
 
@@ -154,10 +154,10 @@ class MainWindow(QMainWindow):
         return self._pose.verdict.judge(verdict)
 
     def _dock(self) -> None:
-        self._scan, self._label = ScanPanel(self.workbench), LabelPanel(self.workbench)
-        self._atlas = AtlasPanel(self.workbench)
-        self._pose = PosePanel(self.workbench, self.commands.actions)
-        probe = TrackerCard(self.workbench)
+        self._scan, self._label = ScanPanel(self.workspace), LabelPanel(self.workspace)
+        self._atlas = AtlasPanel(self.workspace)
+        self._pose = PosePanel(self.workspace, self.commands.actions)
+        probe = TrackerCard(self.workspace)
         probe.settings_asked.connect(self.ui.show_tracker)
         self._pose.add_card(probe)
         self.steps: dict[str, QWidget] = {
@@ -168,25 +168,25 @@ class MainWindow(QMainWindow):
         }
         for panel in self.steps.values():
             self.panels.addWidget(panel)
-        desk = QWidget()
-        middle = _tight(QHBoxLayout(desk), spacing=_GAP)
+        work = QWidget()
+        middle = _tight(QHBoxLayout(work), spacing=_GAP)
         middle.addWidget(self.grid, 1)
         middle.addWidget(self.panels)
         self.pages.addWidget(self.welcome)
-        self.pages.addWidget(desk)
+        self.pages.addWidget(work)
         sides = _tight(QHBoxLayout(), spacing=_GAP)
         sides.addWidget(self.rail)
         sides.addWidget(self.pages, 1)
         centre = QWidget()
         whole = _tight(QVBoxLayout(centre))
-        whole.addWidget(TopBar(self.workbench, self.commands.actions))
+        whole.addWidget(TopBar(self.workspace, self.commands.actions))
         whole.addLayout(sides, 1)
         whole.addWidget(self.status)
         self.setCentralWidget(centre)
         self._show_page()
 
     def _listen(self) -> None:
-        desk = self.workbench
+        workspace = self.workspace
         self.grid.hovered.connect(self.status.show_position)
         self.rail.step_chosen.connect(self.set_step)
         self.rail.keys_asked.connect(self.ui.show_shortcuts)
@@ -216,19 +216,24 @@ class MainWindow(QMainWindow):
             asked.connect(partial(self.commands.run, action))
         self._pose.new_asked.connect(partial(self.commands.run, "file.new"))
         self._pose.atlas_asked.connect(partial(self.rail.buttons["atlas"].click))
-        follow(self, desk.volume_opened, self._show_page)
-        follow(self, desk.session_replaced, self._show_page)
-        follow(self, desk.import_asked, self._on_import_asked)
-        follow(self, desk.scan_differs, self._on_scan_differs)
+        follow(self, workspace.scan.opened, self._show_page)
+        follow(self, workspace.document.reset, self._show_page)
+        follow(self, workspace.scan.import_asked, self._on_import_asked)
+        follow(self, workspace.scan.differs, self._on_scan_differs)
         for signal in (
-            *(desk.session_replaced, desk.details_changed, desk.dirty_changed, desk.touches_changed),
-            desk.saved,
+            *(
+                workspace.document.reset,
+                workspace.document.details_changed,
+                workspace.document.dirty_changed,
+                workspace.document.touches_changed,
+            ),
+            workspace.document.saved,
         ):
             follow(self, signal, self._show_title)
 
     def _show_page(self, *_: object) -> None:
         """Show the first page until there is something to work on."""
-        state = self.workbench.session.state
+        state = self.workspace.document.state
         is_open = state.volume is not None
         if is_open and self.pages.currentIndex() == 0:
             self.set_step("label")
@@ -240,7 +245,7 @@ class MainWindow(QMainWindow):
 
     def _arrange(self) -> None:
         """Show the views beside a scan, a panel alone where its step needs none, else the first page."""
-        is_open, step = self.workbench.session.state.volume is not None, self.rail.step
+        is_open, step = self.workspace.document.state.volume is not None, self.rail.step
         alone = not is_open and step in _ALONE
         self.grid.setVisible(not alone)
         for panel in (self._atlas, self._pose):
@@ -259,10 +264,14 @@ class MainWindow(QMainWindow):
         self.ui.take_other_scan(error, volume)  # type: ignore[arg-type]
 
     def _show_title(self, *_: object) -> None:
-        desk, session = self.workbench, self.workbench.session
-        named = (session.state.specimen, desk.place, "gp-labeler") if desk.in_use else ("gp-labeler",)
+        workspace, document = self.workspace, self.workspace.document
+        named = (
+            (document.state.specimen, workspace.document.location, "gp-labeler")
+            if workspace.document.in_use
+            else ("gp-labeler",)
+        )
         self.setWindowTitle(" – ".join((f"{named[0]}[*]", *filter(None, named[1:]))))  # noqa: RUF001
-        self.setWindowModified(session.dirty)
+        self.setWindowModified(document.dirty)
 
     # What is remembered
 
@@ -277,7 +286,7 @@ class MainWindow(QMainWindow):
             self.resize(QSize(1440, 900).boundedTo(self.screen().availableSize()))
 
     def _remember(self) -> None:
-        view = self.workbench.session.view.state
+        view = self.workspace.view.state
         self.memory.set(
             geometry=bytes(self.saveGeometry().toBase64().data()).decode(),
             theme=self.theme_name,
@@ -293,7 +302,7 @@ class MainWindow(QMainWindow):
             event.ignore()
             return
         self._remember()
-        self.workbench.close(discard=self.ui.discarded)
+        self.workspace.close(discard=self.ui.discarded)
         self.grid.release()
         event.accept()
 
@@ -306,7 +315,7 @@ class MainWindow(QMainWindow):
         if not paths:
             return
         if self.rail.step == "atlas" and all(map(may_hold_labels, paths)):
-            self.workbench.fit_atlas(paths)
+            self.workspace.atlas.fit(paths)
         elif self.rail.step == "pose" and holds_touches(paths[0]):
             self.take_touches(paths[0])
         else:

@@ -1,4 +1,4 @@
-"""Keeps the drawn estimate in every view in step with the workbench."""
+"""Keeps the drawn estimate in every view in step with the workspace."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from qtpy.QtCore import QObject
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import DrawnTip, PoseScene
 from gp_labeler.views.bind import follow
@@ -22,20 +22,20 @@ class PoseDisplay(QObject):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose estimate.
     grid : ViewGrid
         The views, which own it.
     """
 
-    def __init__(self, workbench: Workbench, grid: ViewGrid) -> None:
+    def __init__(self, workspace: Workspace, grid: ViewGrid) -> None:
         super().__init__(grid)
-        self._desk, self._grid = workbench, grid
+        self._workspace, self._grid = workspace, grid
         self._overlays = [PoseOverlay(grid.slice_views[plane]) for plane in Plane]
         self._tip: DrawnTip | None = None
         self._drawn = PoseScene()
-        follow(self, workbench.pose.changed, self.show)
-        follow(self, workbench.pose.overlay_changed, self.show)
+        follow(self, workspace.pose.changed, self.show)
+        follow(self, workspace.pose.overlay_changed, self.show)
         self.show()
 
     def set_tip(self, tip: DrawnTip | None) -> None:
@@ -43,13 +43,13 @@ class PoseDisplay(QObject):
         if tip is None and self._tip is None:
             return
         self._tip = tip
-        self._drawn = replace(self._drawn, tip=tip if self._desk.pose.overlay.visible else None)
+        self._drawn = replace(self._drawn, tip=tip if self._workspace.pose.overlay.visible else None)
         self._grid.scene_view.scene.pose.show_tip(self._drawn.tip)
         self._paint()
 
     def show(self, *_: object) -> None:
         """Draw everything as it is now."""
-        self._drawn = pose_scene(self._desk, tip=self._tip)
+        self._drawn = pose_scene(self._workspace, tip=self._tip)
         self._grid.scene_view.scene.pose.show(self._drawn)
         self._paint()
 

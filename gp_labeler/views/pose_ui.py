@@ -44,8 +44,8 @@ class PoseUi(UiPart):
         """Ask for a landmark file that says where the skull features are on the scan."""
         for path in self.prompts.open_files("Skull features on the scan", self._folder, _POINTS):
             self._remember_folder(path)
-            names = touching.load_skull(self._desk.session, path)
-            self._desk.say(f"Took {' '.join(names)} from {path.name}")
+            names = touching.load_skull(self._workspace.document, path)
+            self._workspace.say(f"Took {' '.join(names)} from {path.name}")
 
     def judge_pose(self, verdict: str) -> None:
         """Keep a verdict on the estimate, with the initials and the note of the panel."""
@@ -57,11 +57,11 @@ class PoseUi(UiPart):
         path = self.prompts.save_file("Export the pose", self._proposed("pose.json"), kinds)
         if path is not None:
             self._remember_folder(path)
-            self._desk.pose.export(path)
+            self._workspace.pose.export(path)
 
     def ask_report(self) -> None:
         """Ask where, and write the one-page report."""
-        reported_estimate(self._desk)
+        reported_estimate(self._workspace)
         kinds = "PDF (*.pdf);;HTML (*.html)"
         path = self.prompts.save_file("Save the report", self._proposed("report.pdf"), kinds)
         if path is None:
@@ -72,8 +72,8 @@ class PoseUi(UiPart):
             save_report(report_of(self._window), path)
         finally:
             QGuiApplication.restoreOverrideCursor()
-        self._desk.say(f"Wrote {path.name}")
-        self._desk.wrote.emit("report", path)
+        self._workspace.say(f"Wrote {path.name}")
+        self._workspace.messages.wrote.emit("report", path)
 
     def ask_path(self) -> None:
         """Ask for an insertion path with its units and side, and carry it to the estimate."""
@@ -84,8 +84,8 @@ class PoseUi(UiPart):
                 self._remember_folder(path)
                 carried = self._read_path(path, Side.parse(side[0].upper()), units)
                 if carried is not None:
-                    self._desk.pose.carry(carried)
-                    self._desk.say(f"Carried {path.name}, {len(carried.points)} points")
+                    self._workspace.pose.carry(carried)
+                    self._workspace.say(f"Carried {path.name}, {len(carried.points)} points")
 
     def _read_path(self, file: Path, side: Side, units: str) -> InsertionPath | None:
         """Read a path; ask what its axes are, and whether all of it is path, where that is not clear."""
@@ -108,24 +108,24 @@ class PoseUi(UiPart):
             "Save the path for the robot", self._proposed("path.csv"), "CSV (*.csv)"
         )
         if file is not None:
-            self._desk.pose.save_path(file)
+            self._workspace.pose.save_path(file)
 
     def show_tracker(self) -> None:
         """Show the settings of the tracked probe."""
-        dialog = TrackerDialog(self._desk, self._window.memory, self._window)
+        dialog = TrackerDialog(self._workspace, self._window.memory, self._window)
         dialog.audible.setChecked(self._window.tracker_display.audible)
         dialog.audible.toggled.connect(self._set_audible)
         dialog.show()
 
     def show_guide(self) -> None:
         """Lead through the features to touch, on the whole screen."""
-        guide = GuideWindow(self._desk, self._window)
+        guide = GuideWindow(self._workspace, self._window)
         guide.settings_asked.connect(self.show_tracker)
         guide.showFullScreen()
 
     def show_physical(self) -> None:
         """Hold touches against the scan of the same skull."""
-        PhysicalDialog(self._desk, self.prompts, self._window).open()
+        PhysicalDialog(self._workspace, self.prompts, self._window).open()
 
     def look_along_axis(self) -> None:
         """Look at the estimated cochlea along its axis, the apex first."""
@@ -136,13 +136,13 @@ class PoseUi(UiPart):
         self._look_at_pose(through_round_window)
 
     def _look_at_pose(self, placement: Callable[[DrawnPose], Placement]) -> None:
-        estimate = self._desk.pose.estimate
+        estimate = self._workspace.pose.estimate
         if estimate is None or estimate.pose is None or estimate.registered is None:
             raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")
         view = self._window.grid.scene_view
         pose = DrawnPose.of(estimate.pose, estimate.registered.T_scan_touches, label="")
-        self._desk.session.set_crosshair(pose.origin)
-        self._desk.point_shown.emit(pose.origin)
+        self._workspace.view.set_crosshair(pose.origin)
+        self._workspace.view.point_shown.emit(pose.origin)
         place_camera(view.scene.camera, placement(pose))
         view.redraw()
         for slices in self._window.grid.slice_views.values():
@@ -153,5 +153,5 @@ class PoseUi(UiPart):
         self._window.memory.set(audible=audible)
 
     def _proposed(self, name: str) -> str:
-        state, side = self._desk.session.state, self._desk.pose.side
+        state, side = self._workspace.document.state, self._workspace.pose.side
         return str(Path(self._folder) / f"{state.specimen}_{side.value}_{name}")

@@ -10,7 +10,7 @@ from gp_core.errors import GpError
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.landmark_import import MisfitError, import_landmarks
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.prompts import Prompts
 
 __all__ = ["ask_about", "export_asking", "import_asking"]
@@ -55,22 +55,22 @@ def ask_about(plan: ImportPlan, prompts: Prompts) -> ImportPlan | None:
     return plan
 
 
-def import_asking(workbench: Workbench, files: Sequence[Path], prompts: Prompts, **how: Any) -> None:
+def import_asking(workspace: Workspace, files: Sequence[Path], prompts: Prompts, **how: Any) -> None:
     """Take over landmark files; asks where they cannot belong to the scan."""
     try:
-        notes = import_landmarks(workbench.session, files, near_bone=workbench.near_bone, **how)
+        notes = import_landmarks(workspace.document, files, near_bone=workspace.scan.near_bone, **how)
     except MisfitError as error:
         answers = ["Import nevertheless"]
         if prompts.choose("Do they belong here?", error.problem, answers, detail=error.remedy or ""):
-            import_asking(workbench, files, prompts, accept_misfit=True)
+            import_asking(workspace, files, prompts, accept_misfit=True)
         return
     words = ". ".join(notes) or f"Imported {', '.join(file.name for file in files)}"
-    workbench.say(words, "warning" if notes else "info")
+    workspace.say(words, "warning" if notes else "info")
 
 
-def export_asking(workbench: Workbench, folder: Path, prompts: Prompts) -> None:
+def export_asking(workspace: Workspace, folder: Path, prompts: Prompts) -> None:
     """Write the landmarks of both sides into a folder; asks before files are replaced."""
-    state = workbench.session.measured_state
+    state = workspace.document.measured_state
     try:
         report = export_landmarks(state, folder)
     except GpError as error:
@@ -79,5 +79,5 @@ def export_asking(workbench: Workbench, folder: Path, prompts: Prompts) -> None:
         if not prompts.choose("Replace?", str(error), ["Replace"], kind="warning"):
             return
         report = export_landmarks(state, folder, overwrite=True)
-    workbench.say(report.text.replace("\n", "  "), "info" if report.is_complete else "warning")
-    workbench.exported.emit(report)
+    workspace.say(report.text.replace("\n", "  "), "info" if report.is_complete else "warning")
+    workspace.messages.wrote.emit("landmarks", report)

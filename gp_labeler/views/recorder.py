@@ -21,8 +21,8 @@ from gp_labeler.document.specimen_file import SUFFIX, write_specimen
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.mesh import SaveMesh
 from gp_labeler.jobs.runner import Task
-from gp_labeler.jobs.work import SaveMesh
 from gp_labeler.models.added_meshes import AddedMesh
 from gp_labeler.models.pose import OverlayOptions
 from gp_labeler.models.pose_exports import InsertionPath
@@ -75,29 +75,27 @@ class Recorder(QObject):
 
     def __init__(self, window: MainWindow) -> None:
         super().__init__(window)
-        self._window, desk = window, window.workbench
+        self._window, workspace = window, window.workspace
         self.tables: list[Table] = []
         self._starts: list[tuple[Table, SpecimenState]] = []
-        self._replayed = History(desk.session.state)
+        self._replayed = History(workspace.document.state)
         self._meshes: dict[str, AddedMesh] = {}
         self._begin()
         self._take_as_here()
         for signal, slot in (
-            (desk.volume_opened, self._on_volume),
-            (desk.edited, self._on_edited),
-            (desk.stepped, self._on_stepped),
-            (desk.saved, self._on_saved),
-            (desk.exported, self._on_exported),
-            (desk.pictured, self._on_pictured),
-            (desk.wrote, self._on_wrote),
-            (desk.jobs.done, self._on_job),
-            (desk.atlas_changed, self._on_atlas),
-            (desk.pose.path_changed, self._on_path),
-            (desk.references.changed, self._on_references),
-            (desk.meshes.changed, self._on_meshes),
-            (desk.view_changed, self._on_view_changed),
-            (desk.tool_changed, self._on_tool),
-            (desk.pose.overlay_changed, self._on_overlay),
+            (workspace.scan.opened, self._on_volume),
+            (workspace.document.edited, self._on_edited),
+            (workspace.document.stepped, self._on_stepped),
+            (workspace.document.saved, self._on_saved),
+            (workspace.messages.wrote, self._on_wrote),
+            (workspace.jobs.done, self._on_job),
+            (workspace.atlas.changed, self._on_atlas),
+            (workspace.pose.path_changed, self._on_path),
+            (workspace.references.changed, self._on_references),
+            (workspace.meshes.changed, self._on_meshes),
+            (workspace.view.changed, self._on_view_changed),
+            (workspace.interaction.tool_changed, self._on_tool),
+            (workspace.pose.overlay_changed, self._on_overlay),
         ):
             follow(self, signal, slot)
         window.commands.done.connect(self._on_command)
@@ -121,9 +119,9 @@ class Recorder(QObject):
 
     def _begin(self) -> None:
         """Write how to come to where the specimen stands now."""
-        desk = self._window.workbench
-        self._replayed = History(desk.session.state)
-        state, volume = desk.session.state, desk.volume
+        workspace = self._window.workspace
+        self._replayed = History(workspace.document.state)
+        state, volume = workspace.document.state, workspace.scan.volume
         fresh = SpecimenState() if volume is None else SpecimenState(tidy_name(volume.name))
         is_fresh = replace(state, volume=None, import_choices={}) == fresh
         if volume is None and is_fresh and not self.tables:
@@ -137,7 +135,7 @@ class Recorder(QObject):
 
     def _show_as_here(self) -> None:
         """Write how this person's window differs from one that nobody has used yet."""
-        window, state = self._window, self._window.workbench.session.view.state
+        window, state = self._window, self._window.workspace.view.state
         differing = {name for name in vars(state) if getattr(state, name) != getattr(ViewState, name)}
         theme = None if window.theme_name == "dark" else window.theme_name
         text_size = None if window.text_size == 100 else window.text_size
@@ -146,11 +144,11 @@ class Recorder(QObject):
 
     def _take_as_here(self) -> None:
         """Write which atlas is in use, and which insertion path is carried."""
-        desk = self._window.workbench
-        if desk.atlas is not None and not desk.is_published_atlas:
+        workspace = self._window.workspace
+        if workspace.atlas.current is not None and not workspace.atlas.is_published:
             self._on_atlas()
-        self._on_path(desk.pose.path)
-        if desk.references.points:
+        self._on_path(workspace.pose.path)
+        if workspace.references.points:
             self._on_references()
         self._on_meshes()
 
@@ -160,7 +158,7 @@ class Recorder(QObject):
     # What is done
 
     def _on_edited(self, edit: Edit, merge: bool) -> None:
-        now, before = self._window.workbench.session.state, self._replayed.state
+        now, before = self._window.workspace.document.state, self._replayed.state
         if _untimed(now) == _untimed(before):
             return
         tables = steps_of(edit, before, merge=merge)
@@ -177,8 +175,8 @@ class Recorder(QObject):
 
     def _estimated(self, files: list[str]) -> list[Table]:
         """Return the steps that lead to the estimate as it is set up here, and write it into files."""
-        pose = self._window.workbench.pose
-        settings, side = pose.estimating.settings, pose.side.value
+        pose = self._window.workspace.pose
+        settings, side = pose.settings, pose.side.value
         window = None if settings.round_window == "touched" else settings.round_window
         how = step(
             "estimate",
@@ -193,7 +191,7 @@ class Recorder(QObject):
         return [*register, {**how, "path": files}]
 
     def _on_stepped(self, kind: str) -> None:
-        now, replayed = _untimed(self._window.workbench.session.state), self._replayed
+        now, replayed = _untimed(self._window.workspace.document.state), self._replayed
         if now == _untimed(replayed.state):
             return
         upcoming = replayed.to_undo if kind == "undo" else replayed.to_redo
@@ -209,7 +207,7 @@ class Recorder(QObject):
         elif id.startswith(LOOKS):
             self.tables.append(step("action", id=id))
         elif id == "view.zoom_to_point":
-            active = self._window.workbench.session.active
+            active = self._window.workspace.labels.active
             if active.code is not None:
                 self.tables.append(step("choose", feature=active.code, side=active.side.value))
             self.tables.append(step("action", id=id))
@@ -222,7 +220,7 @@ class Recorder(QObject):
         self.tables.append(step("action", id="pose.touch" if tool == "touch" else f"tool.{tool}"))
 
     def _on_overlay(self, options: OverlayOptions) -> None:
-        estimate = self._window.workbench.pose.estimate
+        estimate = self._window.workspace.pose.estimate
         if not options.visible:
             self.tables.append({"do": "overlay", "visible": False})
         elif estimate is not None and estimate.in_scan() is not None:
@@ -239,7 +237,7 @@ class Recorder(QObject):
 
     def _seen(self, changed: frozenset[str] | set[str]) -> Table:
         """Return keys of a step ``view`` for these fields."""
-        state = self._window.workbench.session.view.state
+        state = self._window.workspace.view.state
         seen = {key: getattr(state, name) for name, key in _VIEW_KEYS.items() if name in changed}
         if {"level", "width"} & changed:
             is_set = state.level is not None and state.width is not None
@@ -259,24 +257,27 @@ class Recorder(QObject):
         suggested = any("_suggested." in name for name in names)
         self.tables.append(step("export", formats=formats, suggested=suggested))
 
-    def _on_pictured(self, file: Path) -> None:
-        self.tables.append(step("screenshot", path=file.name))
-
-    def _on_wrote(self, what: str, file: Path) -> None:
+    def _on_wrote(self, what: str, file: Any) -> None:
+        if what == "landmarks":
+            self._on_exported(file)
+            return
+        if what == "picture":
+            self.tables.append(step("screenshot", path=file.name))
+            return
         if what == "atlas":
             self.tables.append(step("action", id="atlas.save", files=[file.name]))
             return
         self.tables += self._estimated([file.name] if what == "pose" else [])
         if what == "report":
-            side = self._window.workbench.pose.side.value
+            side = self._window.workspace.pose.side.value
             self.tables.append(step("report", side=side, path=file.name))
         elif what == "path":
             self.tables.append(step("path", save=file.name))
 
     def _on_atlas(self) -> None:
-        desk = self._window.workbench
-        source = desk.atlas_source
-        if desk.is_published_atlas:
+        workspace = self._window.workspace
+        source = workspace.atlas.source
+        if workspace.atlas.is_published:
             self.tables.append(step("atlas", path="published"))
         elif source is not None and source.file is not None:
             self.tables.append(step("atlas", path=str(source.file.absolute())))
@@ -291,12 +292,12 @@ class Recorder(QObject):
             self.tables.append(step("path", path=str(path.source.absolute()), **about))
 
     def _on_references(self) -> None:
-        files = self._window.workbench.references.files
+        files = self._window.workspace.references.files
         self.tables.append({"do": "reference", "files": [str(file.absolute()) for file in files]})
 
     def _on_meshes(self) -> None:
         """Record the meshes that were added from files, and those that were removed."""
-        shown = {mesh.name: mesh for mesh in self._window.workbench.meshes.meshes if mesh.file}
+        shown = {mesh.name: mesh for mesh in self._window.workspace.meshes.meshes if mesh.file}
         for name in self._meshes.keys() - shown.keys():
             self.tables.append(step("remove_mesh", name=name))
         for name, mesh in shown.items():

@@ -9,7 +9,7 @@ from qtpy.QtCore import QObject
 from qtpy.QtGui import QPainter
 
 from gp_core.validation import FloatArray
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.slice_view import SliceView as Shown
@@ -33,17 +33,17 @@ class ReferenceLayer(QObject):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose reference points.
     view : SliceView
         The view, which owns it.
     """
 
-    def __init__(self, workbench: Workbench, view: SliceView) -> None:
+    def __init__(self, workspace: Workspace, view: SliceView) -> None:
         super().__init__(view)
-        self._desk, self._view = workbench, view
+        self._workspace, self._view = workspace, view
         view.layers.append(self)
-        follow(self, workbench.references.changed, self._repaint)
+        follow(self, workspace.references.changed, self._repaint)
 
     def _repaint(self) -> None:
         self._view.update()
@@ -71,7 +71,7 @@ class ReferenceLayer(QObject):
 
     def _near(self, shown: Shown) -> list[tuple[Mark, FloatArray, float]]:
         """Return the points near the slice, their pixels, and how far off it they are: 0 on it, 1 at most."""
-        marks = drawn_references(self._desk)
+        marks = drawn_references(self._workspace)
         if not marks or self._view.source is None:
             return []
         positions = np.array([mark.position for mark in marks])

@@ -20,7 +20,7 @@ from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.pictures import picture, picture_bytes
 
 if TYPE_CHECKING:
-    from gp_labeler.models.workspace import Workbench
+    from gp_labeler.models.workspace import Workspace
     from gp_labeler.views.main_window import MainWindow
 
 __all__ = ["report_of", "report_pictures", "reported_estimate", "save_report"]
@@ -40,15 +40,15 @@ _MARGINS_MM = (14.0, 12.0, 14.0, 12.0)
 
 def report_of(window: MainWindow) -> PoseReport:
     """Make the report of the estimate a window shows; raises `GpError` where there is none."""
-    session, estimate = window.workbench.session, reported_estimate(window.workbench)
-    return PoseReport(session.state, estimate, report_pictures(window), session.now())
+    estimate, document = reported_estimate(window.workspace), window.workspace.document
+    return PoseReport(document.state, estimate, report_pictures(window), document.now())
 
 
-def reported_estimate(workbench: Workbench) -> Estimate:
+def reported_estimate(workspace: Workspace) -> Estimate:
     """Return the estimate a report would be of; raises `GpError` where there is none."""
-    pose = workbench.pose
+    pose = workspace.pose
     if pose.estimate is None or pose.estimate.pose is None:
-        raise GpError("there is no estimate to report", remedy=pose.estimating.waiting_text or None)
+        raise GpError("there is no estimate to report", remedy=pose.waiting_text or None)
     return pose.estimate
 
 
@@ -57,10 +57,10 @@ def report_pictures(window: MainWindow) -> dict[str, bytes]:
 
     The window looks as before afterwards.
     """
-    poses = pose_scene(window.workbench).poses
-    if not poses or window.workbench.volume is None:
+    poses = pose_scene(window.workspace).poses
+    if not poses or window.workspace.scan.volume is None:
         return {}
-    view, scene_view = window.workbench.session.view, window.grid.scene_view
+    view, scene_view = window.workspace.view, window.grid.scene_view
     before = {name: getattr(view.state, name) for name in _BARE}
     looked = scene_view.scene.camera.state()
     view.update(**_BARE)
@@ -122,14 +122,14 @@ def _bone_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
 
 
 def _slice_pictures(window: MainWindow, pose: DrawnPose) -> dict[str, bytes]:
-    session, found = window.workbench.session, {}
-    crosshair, views = session.crosshair, window.grid.slice_views
+    found = {}
+    crosshair, views = window.workspace.view.crosshair, window.grid.slice_views
     before = {plane: views[plane].shown for plane in Plane}
-    session.set_crosshair(pose.origin)
+    window.workspace.view.set_crosshair(pose.origin)
     for plane in Plane:
         views[plane].zoom_to(pose.origin, _SLICE_MM)
         found[plane.value.capitalize()] = picture_bytes(picture(window, plane.value, _PICTURE_SIZE))
-    session.set_crosshair(crosshair)
+    window.workspace.view.set_crosshair(crosshair)
     for plane in Plane:
         views[plane].shown = before[plane]
         views[plane].update()

@@ -24,8 +24,9 @@ from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import How
+from gp_labeler.models.interaction import PointDrag
 from gp_labeler.models.view import Cut
-from gp_labeler.models.workspace import Drag, Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.cut import CutPlane
 from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize
@@ -68,7 +69,7 @@ class SceneView(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What is shown.
     parent : QWidget, optional
         Qt's parent.
@@ -78,16 +79,16 @@ class SceneView(QWidget):
     """(3,) scan position where a click would land, or None."""
     maximise_asked = Signal()
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setMinimumSize(120, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
-        self._desk = workbench
+        self._workspace = workspace
         self.scene = Scene3D(RenderTarget.offscreen())
-        workbench.meshes.scene = self.scene
-        self._hand = Hand(workbench)
+        workspace.meshes.scene = self.scene
+        self._hand = Hand(workspace)
         self._frame: QImage | None = None
         self._finished = False
         self._stale, self._points_old, self._fitted = True, True, False
@@ -155,8 +156,8 @@ class SceneView(QWidget):
             axis = Plane(plane).normal
             normal = axis if axis @ into >= 0 else -axis
         x, y, z = normal.tolist()
-        cut = Cut(plane, (0.0, 0.0, 0.0), (x, y, z)).through(self._desk.session.crosshair)
-        self._desk.session.view.update(cut=cut)
+        cut = Cut(plane, (0.0, 0.0, 0.0), (x, y, z)).through(self._workspace.view.crosshair)
+        self._workspace.view.update(cut=cut)
 
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
@@ -183,24 +184,33 @@ class SceneView(QWidget):
         return point.x(), point.y()
 
     def _listen(self) -> None:
-        desk = self._desk
-        follow(self, desk.surfaces_changed, self._show_bone)
-        follow(self, desk.session_replaced, self._on_session_replaced)
-        for signal in (desk.landmarks_changed, desk.active_changed, desk.ghosts_changed, desk.doubts_changed):
+        workspace = self._workspace
+        follow(self, workspace.bone.surfaces_changed, self._show_bone)
+        follow(self, workspace.document.reset, self._on_reset)
+        for signal in (
+            workspace.document.landmarks_changed,
+            workspace.labels.active_changed,
+            workspace.labels.ghosts_changed,
+            workspace.labels.doubts_changed,
+        ):
             follow(self, signal, self._show_points)
-        for signal in (desk.replacing_changed, desk.tool_changed, desk.active_changed):
+        for signal in (
+            workspace.interaction.replacing_changed,
+            workspace.interaction.tool_changed,
+            workspace.labels.active_changed,
+        ):
             follow(self, signal, self._show_cursor)
-        for signal in (desk.pose.overlay_changed, desk.references.changed):
+        for signal in (workspace.pose.overlay_changed, workspace.references.changed):
             follow(self, signal, self._show_points)
-        follow(self, desk.meshes.changed, self.redraw)
-        follow(self, desk.crosshair_changed, self._on_crosshair)
-        follow(self, desk.point_shown, self.go_to)
-        follow(self, desk.dragged, self._on_dragged)
-        follow(self, desk.view_changed, self._on_view_changed)
+        follow(self, workspace.meshes.changed, self.redraw)
+        follow(self, workspace.view.crosshair_changed, self._on_crosshair)
+        follow(self, workspace.view.point_shown, self.go_to)
+        follow(self, workspace.interaction.dragged, self._on_dragged)
+        follow(self, workspace.view.changed, self._on_view_changed)
 
     def _show_slices(self, *_: object) -> None:
         """Show the slices through the crosshair, or none, when the next frame is drawn."""
-        if self._desk.session.view.state.slices_visible or self.scene.slices.images:
+        if self._workspace.view.state.slices_visible or self.scene.slices.images:
             self._slices_old = True
             self.redraw()
 
@@ -208,18 +218,18 @@ class SceneView(QWidget):
         if not self._slices_old:
             return
         self._slices_old = False
-        volume, shown = self._desk.volume, self._desk.session.view.state.slices_visible
+        volume, shown = self._workspace.scan.volume, self._workspace.view.state.slices_visible
         if volume is None or not shown:
             self._source = None
         elif self._source is None or self._source.volume is not volume:
             self._source = SliceSource(volume)
-        source, middle = self._source, self._desk.session.crosshair
+        source, middle = self._source, self._workspace.view.crosshair
         images = [source.image(plane, float(middle[plane.axis])) for plane in Plane] if source else []
-        self.scene.slices.show(images, greys_of(self._desk))
+        self.scene.slices.show(images, greys_of(self._workspace))
 
     def _on_crosshair(self, position: FloatArray) -> None:
         self._show_slices()
-        volume = self._desk.volume
+        volume = self._workspace.scan.volume
         inside = volume is not None and bool(volume.contains(position[None])[0])
         if self._fitted and inside and not self._shows(position, 1.0):
             self.go_to(position)
@@ -231,22 +241,22 @@ class SceneView(QWidget):
         off = np.abs(self.scene.display_of(position[None])[0] - size / 2)
         return bool((off < part * size / 2).all())
 
-    def _on_session_replaced(self, _: object) -> None:
+    def _on_reset(self) -> None:
         self._fitted = False
         self._source = None
         self._on_view_changed(frozenset({"mesh_opacity", "cut", "slices_visible"}))
         self._show_points()
 
     def _show_bone(self) -> None:
-        self.scene.bone.show(self._desk.surfaces, self._desk.quick_surfaces)
-        if self._desk.surfaces and not self._fitted:
+        self.scene.bone.show(self._workspace.bone.surfaces, self._workspace.bone.quick_surfaces)
+        if self._workspace.bone.surfaces and not self._fitted:
             self._fitted = True
             self.scene.fit()
         self.redraw()
 
     def _show_points(self, *_: object) -> None:
         """Show points, lines and ghosts as they are when the next frame is drawn, however many changes on."""
-        view = self._desk.session.view.state
+        view = self._workspace.view.state
         self.scene.marks.size = GlyphSize() if view.glyph_mm is None else GlyphSize(view.glyph_mm, "mm")
         self.scene.labels.visible = view.labels_visible
         self.scene.marks.show_hidden = view.hidden_visible
@@ -257,12 +267,12 @@ class SceneView(QWidget):
         if not self._points_old:
             return
         self._points_old = False
-        drag = self._desk.drag
+        drag = self._workspace.interaction.drag
         dragged = "" if drag is None else key_of(drag.side, drag.code)
-        marks = drawn_references(self._desk) + drawn_marks(self._desk)
+        marks = drawn_references(self._workspace) + drawn_marks(self._workspace)
         self.scene.marks.show([mark for mark in marks if mark.key != dragged])
-        self.scene.ghosts.show(drawn_ghosts(self._desk))
-        self.scene.lines.show(drawn_segments(self._desk, theme_of(self).scene))
+        self.scene.ghosts.show(drawn_ghosts(self._workspace))
+        self.scene.lines.show(drawn_segments(self._workspace, theme_of(self).scene))
 
     def _mark_at(self, x: float, y: float) -> str | None:
         self._take_points()
@@ -270,9 +280,9 @@ class SceneView(QWidget):
 
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if "mesh_opacity" in changed:
-            self.scene.bone.opacity = self._desk.session.view.state.mesh_opacity
+            self.scene.bone.opacity = self._workspace.view.state.mesh_opacity
         if "cut" in changed:
-            cut = self._desk.session.view.state.cut
+            cut = self._workspace.view.state.cut
             self.scene.bone.cut = None if cut is None else CutPlane(cut.origin, cut.normal)
             self.redraw(quick=True)
         if changed & {"slices_visible", "level", "width"}:
@@ -280,7 +290,7 @@ class SceneView(QWidget):
         if changed - {"level", "width", "layout", "camera", "cut", "slices_visible"}:
             self._show_points()
 
-    def _on_dragged(self, drag: Drag | None) -> None:
+    def _on_dragged(self, drag: PointDrag | None) -> None:
         if (drag is None) == self._dragging:  # the point leaves the picture, and is painted over it instead
             self._dragging = drag is not None
             self._show_points()
@@ -300,10 +310,10 @@ class SceneView(QWidget):
         if self._frame is not None:
             painter.drawImage(QPointF(0, 0), self._frame)
             self._painted = self._frame
-        if self._desk.volume is not None:
-            paint_crosshair(painter, self, self.scene, self._desk.session.crosshair)
-        paint_cut(painter, self, self._desk.session.view.state.cut)
-        drag = self._desk.drag
+        if self._workspace.scan.volume is not None:
+            paint_crosshair(painter, self, self.scene, self._workspace.view.crosshair)
+        paint_cut(painter, self, self._workspace.view.state.cut)
+        drag = self._workspace.interaction.drag
         paint_pointer(
             painter, self, self.scene, self._hover if drag is None else drag.position, drag is not None
         )
@@ -404,7 +414,7 @@ class SceneView(QWidget):
             self.maximise_asked.emit()
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
-        view, volume = self._desk.session.view, self._desk.volume
+        view, volume = self._workspace.view, self._workspace.scan.volume
         if Modifier.ALT in modifiers_of(event):
             if view.state.cut is not None and volume is not None:
                 view.update(cut=view.state.cut.moved(notches_of(event) * min(volume.spacing)))
@@ -414,10 +424,10 @@ class SceneView(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         arrow = _ARROWS.get(Qt.Key(event.key()))
-        if event.key() == Qt.Key.Key_Escape and self._desk.drag is not None:
+        if event.key() == Qt.Key.Key_Escape and self._workspace.interaction.drag is not None:
             self._hand.cancel()
-        elif event.key() == Qt.Key.Key_Escape and self._desk.replacing:
-            self._desk.arm_replacing(False)
+        elif event.key() == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
+            self._workspace.interaction.arm_replacing(False)
         elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
             self.scene.camera.rotate(*arrow)
             self.redraw(quick=True)
@@ -444,21 +454,21 @@ class SceneView(QWidget):
         return self.scene.pick_slice(x, y), How.SLICE
 
     def _drag_to(self, x: float, y: float) -> None:
-        drag = self._desk.drag
+        drag = self._workspace.interaction.drag
         hit = self.scene.pick(x, y)
         if drag is None:
             return
         if hit is not None:
-            self._desk.drag_to(hit.point, How.MESH)
+            self._workspace.interaction.drag_to(hit.point, How.MESH)
         elif drag.how is not How.MESH:  # a point that is on no surface slides in the plane of the screen
             view = self.scene.camera.viewpoint()
             depth = view.display(drag.position[None])[0, 2]
-            self._desk.drag_to(view.scan([[x, y, depth]])[0], drag.how)
+            self._workspace.interaction.drag_to(view.scan([[x, y, depth]])[0], drag.how)
 
     def _look_at(self, x: float, y: float, held: Modifier) -> None:
         point = self._point_at(x, y)
         if point is not None and Modifier.SHIFT in held:
-            self._desk.session.set_crosshair(point)
+            self._workspace.view.set_crosshair(point)
         self._on_target = point is not None
         self._show_cursor()
 

@@ -9,7 +9,7 @@ from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.validation import FloatArray
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import Ghost, ellipse
 from gp_labeler.scene.label_layout import lines_within, place_labels
@@ -59,10 +59,10 @@ class _Points(NamedTuple):
     lines: list[Segment]
 
     @classmethod
-    def of(cls, desk: Workbench) -> _Points:
-        marks = drawn_marks(desk)
+    def of(cls, workspace: Workspace) -> _Points:
+        marks = drawn_marks(workspace)
         positions = np.array([mark.position for mark in marks]).reshape(-1, 3)
-        return cls(marks, positions, drawn_ghosts(desk), drawn_segments(desk, DARK))
+        return cls(marks, positions, drawn_ghosts(workspace), drawn_segments(workspace, DARK))
 
 
 class SlicePainter:
@@ -70,14 +70,14 @@ class SlicePainter:
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What is shown.
     view : SliceView
         Where.
     """
 
-    def __init__(self, workbench: Workbench, view: SliceView) -> None:
-        self._desk, self._view = workbench, view
+    def __init__(self, workspace: Workspace, view: SliceView) -> None:
+        self._workspace, self._view = workspace, view
         self._preview: float | None = None
         self._slice: SliceImage | None = None
         self._where: tuple[SliceSource | None, float] = (None, 0.0)
@@ -85,7 +85,7 @@ class SlicePainter:
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
         self._points: _Points | None = None
-        follow(view, workbench.threshold_previewed, self._on_preview)
+        follow(view, workspace.scan.threshold_previewed, self._on_preview)
 
     def forget(self) -> None:
         """Let go of the pictures."""
@@ -113,14 +113,14 @@ class SlicePainter:
         self._paint_letters(painter, view.shown, ratio)
         self._paint_scale_bar(painter, view.shown, ratio)
         if self._points is None:
-            self._points = _Points.of(self._desk)
+            self._points = _Points.of(self._workspace)
         points, reach = self._points, reach_of(view.source, view.plane)
         paint_lines(painter, points.lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
         for layer in view.layers:
             layer.paint(painter, view.shown, ratio)
         names = self._paint_ghosts(painter, points.ghosts, view.shown, ratio)
         names += self._paint_marks(painter, points, view.source, view.shown, ratio)
-        if self._desk.session.view.state.labels_visible:
+        if self._workspace.view.state.labels_visible:
             names += [name for layer in view.layers for name in layer.names(view.shown, ratio)]
             _draw_names(painter, names, view.shown.size, ratio, self._text)
 
@@ -134,8 +134,8 @@ class SlicePainter:
 
     def _paint_ground(self, painter: QPainter, source: SliceSource, shown: Shown, ratio: float) -> None:
         """Paint the slice and the edge of bone, from what is kept while nothing of them changes."""
-        view, desk = self._view.window_level(), self._desk
-        looks = (view, self._preview, desk.threshold, desk.session.view.state.outline_visible)
+        view, workspace = self._view.window_level(), self._workspace
+        looks = (view, self._preview, workspace.scan.threshold, workspace.view.state.outline_visible)
         kept = self._ground
         if kept is None or kept[0] is not shown or kept[1] is not source or kept[2] != looks:
             picture = QPixmap(*shown.size)
@@ -165,8 +165,8 @@ class SlicePainter:
         return self._where[0] is not source or self._where[1] != position
 
     def _paint_outline(self, painter: QPainter, shown: Shown, ratio: float) -> None:
-        threshold = self._desk.threshold if self._preview is None else self._preview
-        if threshold is None or self._slice is None or not self._desk.session.view.state.outline_visible:
+        threshold = self._workspace.scan.threshold if self._preview is None else self._preview
+        if threshold is None or self._slice is None or not self._workspace.view.state.outline_visible:
             return
         if self._outline is None or self._outline[0] != threshold:
             self._outline = (threshold, segments_path(self._slice.outline(threshold)))
@@ -183,7 +183,7 @@ class SlicePainter:
 
     def _paint_crosshair(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
         """Paint the other two slices as dashed lines in their colours."""
-        x, y = shown.scan_to_pixel(self._desk.session.crosshair[None])[0] + 0.5
+        x, y = shown.scan_to_pixel(self._workspace.view.crosshair[None])[0] + 0.5
         width, height = shown.size
         for plane in Plane:
             if plane is shown.plane:
@@ -251,7 +251,7 @@ class SlicePainter:
         in_slice = off <= 0.75 * source.step(shown.plane)
         for n in np.flatnonzero(near):
             fade = 1.0 if in_slice[n] else 1.0 - 0.65 * off[n] / reach_of(source, shown.plane)
-            radius = _radius(marks[n], self._desk.session.view.state.glyph_mm, shown, ratio)
+            radius = _radius(marks[n], self._workspace.view.state.glyph_mm, shown, ratio)
             _draw_mark(painter, marks[n], pixels[n], radius, bool(in_slice[n]), float(fade), ratio)
         close = shown.mm_per_pixel * _CLOSE_PIXELS * ratio < 1.0
         named = [n for n in np.flatnonzero(near) if close or in_slice[n] or marks[n].active]

@@ -11,7 +11,7 @@ from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import How
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.bone_edge import BoneEdge
 from gp_labeler.scene.gestures import Button, Modifier, SliceControl
 from gp_labeler.scene.planes import Plane
@@ -46,7 +46,7 @@ class SliceView(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What is shown.
     plane : Plane
         Which way it is cut.
@@ -60,21 +60,21 @@ class SliceView(QWidget):
     """The position of the slice along its axis, mm."""
     maximise_asked = Signal()
 
-    def __init__(self, workbench: Workbench, plane: Plane, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, plane: Plane, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setMinimumSize(120, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.plane = plane
-        self._desk = workbench
+        self._workspace = workspace
         self.source: SliceSource | None = None
         self.shown: Shown | None = None
         self._whole: Shown | None = None
         self._painted: Shown | None = None  # what is on the screen, if all of it is up to date
         self.layers: list[SliceLayer] = []
-        self._control, self._hand = SliceControl(), Hand(workbench)
-        self._painter = SlicePainter(workbench, self)
+        self._control, self._hand = SliceControl(), Hand(workspace)
+        self._painter = SlicePainter(workspace, self)
         self._greying: tuple[float, float] | None = None
         self._pointer: tuple[float, float] | None = None
         self._grip = np.zeros(3)
@@ -131,26 +131,30 @@ class SliceView(QWidget):
 
     def window_level(self) -> WindowLevel:
         """Return the grey scale: what the user set, else what suits the volume."""
-        return greys_of(self._desk)
+        return greys_of(self._workspace)
 
     def _listen(self) -> None:
-        desk = self._desk
-        follow(self, desk.volume_opened, self._on_volume)
-        follow(self, desk.session_replaced, self._on_session_replaced)
-        follow(self, desk.crosshair_changed, self._on_crosshair)
-        follow(self, desk.point_shown, self.go_to)
-        for signal in (desk.replacing_changed, desk.tool_changed, desk.active_changed):
+        workspace = self._workspace
+        follow(self, workspace.scan.opened, self._on_volume)
+        follow(self, workspace.document.reset, self._on_reset)
+        follow(self, workspace.view.crosshair_changed, self._on_crosshair)
+        follow(self, workspace.view.point_shown, self.go_to)
+        for signal in (
+            workspace.interaction.replacing_changed,
+            workspace.interaction.tool_changed,
+            workspace.labels.active_changed,
+        ):
             follow(self, signal, self._show_cursor)
         for signal in (
-            desk.landmarks_changed,
-            desk.active_changed,
-            desk.ghosts_changed,
-            desk.doubts_changed,
-            desk.threshold_changed,
-            desk.threshold_previewed,
-            desk.view_changed,
-            desk.dragged,
-            desk.pose.overlay_changed,
+            workspace.document.landmarks_changed,
+            workspace.labels.active_changed,
+            workspace.labels.ghosts_changed,
+            workspace.labels.doubts_changed,
+            workspace.scan.threshold_changed,
+            workspace.scan.threshold_previewed,
+            workspace.view.changed,
+            workspace.interaction.dragged,
+            workspace.pose.overlay_changed,
         ):
             follow(self, signal, self._repaint)
 
@@ -169,12 +173,12 @@ class SliceView(QWidget):
     def _on_volume(self, volume: Volume) -> None:
         self.source = SliceSource(volume)
         self.reset()
-        self._on_crosshair(self._desk.session.crosshair)
+        self._on_crosshair(self._workspace.view.crosshair)
 
-    def _on_session_replaced(self, _: object) -> None:
+    def _on_reset(self) -> None:
         self._painter.forget()  # also where it is not painted: else it would keep the scan before
         self.update()
-        if self._desk.volume is None:
+        if self._workspace.scan.volume is None:
             self.source = self.shown = self._edge = None
             if self._pointer is not None:
                 self.hovered.emit(None)
@@ -186,14 +190,14 @@ class SliceView(QWidget):
             self.moved.emit(there.position)
 
     def _position(self) -> float:
-        return float(self._desk.session.crosshair[self.plane.axis])
+        return float(self._workspace.view.crosshair[self.plane.axis])
 
     def move_to(self, position: float) -> None:
         """Show the slice nearest to a position along the plane's axis, mm; the crosshair goes with it."""
         if self.source is not None:
-            crosshair = np.array(self._desk.session.crosshair)
+            crosshair = np.array(self._workspace.view.crosshair)
             crosshair[self.plane.axis] = self.source.snap(self.plane, position)
-            self._desk.session.set_crosshair(crosshair)
+            self._workspace.view.set_crosshair(crosshair)
 
     def _resized(self, shown: Shown) -> Shown:
         """Return the view at the widget's size: the whole slice if it was whole, else the same, larger."""
@@ -229,10 +233,10 @@ class SliceView(QWidget):
         if mark is not None and self._hand.holds:
             self._edge = self._edge_for(mark)
             self._grip = self._position_of(mark) - self.shown.pixel_to_scan([[x, y]])[0]
-        elif self._desk.tool == "grey":
+        elif self._workspace.interaction.tool == "grey":
             self._greying = (x, y)
-        elif self._desk.tool == "look":
-            self._desk.session.set_crosshair(self.shown.pixel_to_scan([[x, y]])[0])
+        elif self._workspace.interaction.tool == "look":
+            self._workspace.view.set_crosshair(self.shown.pixel_to_scan([[x, y]])[0])
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if self.shown is None:
@@ -242,7 +246,7 @@ class SliceView(QWidget):
         self.hovered.emit(here)
         if event.buttons() == Qt.MouseButton.NoButton:
             if Modifier.SHIFT in modifiers_of(event):
-                self._desk.session.set_crosshair(here)
+                self._workspace.view.set_crosshair(here)
             self._show_cursor()
             return
         view = self._control.move(self.shown, x, y)
@@ -252,8 +256,8 @@ class SliceView(QWidget):
             self._drag_to(here, free=bool(modifiers_of(event) & _FREES))
         elif self._greying is not None:
             self._change_greys(x, y)
-        elif self._desk.tool == "look" and event.buttons() == Qt.MouseButton.LeftButton:
-            self._desk.session.set_crosshair(here)
+        elif self._workspace.interaction.tool == "look" and event.buttons() == Qt.MouseButton.LeftButton:
+            self._workspace.view.set_crosshair(here)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if self.shown is None:
@@ -267,7 +271,12 @@ class SliceView(QWidget):
             self._hand.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         plain = event.button() == Qt.MouseButton.LeftButton and not modifiers_of(event)
         here = self.shown.pixel_to_scan([[x, y]])[0]
-        if clicked and plain and not dragged and (self._desk.tool != "grey" or mark or self._desk.replacing):
+        if (
+            clicked
+            and plain
+            and not dragged
+            and (self._workspace.interaction.tool != "grey" or mark or self._workspace.interaction.replacing)
+        ):
             self._hand.click(here if self._is_inside(here) else None, How.SLICE, mark)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
@@ -290,10 +299,10 @@ class SliceView(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         key = Qt.Key(event.key())
         plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
-        if key == Qt.Key.Key_Escape and self._desk.drag is not None:
+        if key == Qt.Key.Key_Escape and self._workspace.interaction.drag is not None:
             self._hand.cancel()
-        elif key == Qt.Key.Key_Escape and self._desk.replacing:
-            self._desk.arm_replacing(False)
+        elif key == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
+            self._workspace.interaction.arm_replacing(False)
         elif key in _ARROWS and plain and self.source is not None:
             self._nudge(*_ARROWS[key])
         elif key in _STEPS and plain:
@@ -320,47 +329,51 @@ class SliceView(QWidget):
         """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""
         assert self.source is not None
         step = np.array([self.source.step(plane) for plane in sorted(Plane, key=lambda p: p.axis)])
-        nudge(self._desk, step * (right * self.plane.right + down * self.plane.down))
+        nudge(self._workspace, step * (right * self.plane.right + down * self.plane.down))
 
     def _edge_for(self, mark: str) -> BoneEdge | None:
         """Return the edge of bone, on which a point stays that was placed on bone; None for other points."""
-        provenance = self._desk.session.state.landmark(*point_of(mark)).provenance
+        provenance = self._workspace.document.state.landmark(*point_of(mark)).provenance
         on_bone = provenance is not None and provenance.how is How.MESH
-        threshold = self._desk.threshold
+        threshold = self._workspace.scan.threshold
         if not on_bone or self.source is None or threshold is None:
             return None
         return BoneEdge(self.source, self.plane, threshold)
 
     def _drag_to(self, here: FloatArray, *, free: bool) -> None:
-        drag, to = self._desk.drag, here + self._grip
+        drag, to = self._workspace.interaction.drag, here + self._grip
         if drag is not None:
             to[self.plane.axis] = drag.position[self.plane.axis]  # the slice follows it: depth stays its own
         if self._edge is not None and self.shown is not None and not free:
             within = _NEAR_EDGE_PIXELS * self.devicePixelRatioF() * self.shown.mm_per_pixel
             edge = self._edge.nearest(to, within)
             if edge is not None:  # far from bone it stays where it was, as in the 3D view
-                self._desk.drag_to(edge, How.MESH)
-        elif self._desk.volume is not None and bool(self._desk.volume.contains(to[None])[0]):
-            self._desk.drag_to(to, How.SLICE)
+                self._workspace.interaction.drag_to(edge, How.MESH)
+        elif self._workspace.scan.volume is not None and bool(
+            self._workspace.scan.volume.contains(to[None])[0]
+        ):
+            self._workspace.interaction.drag_to(to, How.SLICE)
 
     def _change_greys(self, x: float, y: float) -> None:
         assert self._greying is not None
         ratio = self.devicePixelRatioF()
-        drag_greys(self._desk, (x - self._greying[0]) / ratio, (y - self._greying[1]) / ratio)
+        drag_greys(self._workspace, (x - self._greying[0]) / ratio, (y - self._greying[1]) / ratio)
         self._greying = (x, y)
 
     def _is_inside(self, position: FloatArray) -> bool:
-        return self._desk.volume is not None and bool(self._desk.volume.contains(position[None])[0])
+        return self._workspace.scan.volume is not None and bool(
+            self._workspace.scan.volume.contains(position[None])[0]
+        )
 
     def _position_of(self, key: str | None) -> FloatArray:
-        marks = {mark.key: mark.position for mark in drawn_marks(self._desk)}
+        marks = {mark.key: mark.position for mark in drawn_marks(self._workspace)}
         return marks[key or ""]
 
     def _mark_at(self, x: float, y: float) -> str | None:
         """Return the key of the nearest mark that is drawn within 8 logical pixels."""
         if self.shown is None or self.source is None:
             return None
-        marks = drawn_marks(self._desk)
+        marks = drawn_marks(self._workspace)
         if not marks:
             return None
         positions = np.array([mark.position for mark in marks])

@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QTool
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import point_text
 from gp_labeler.jobs.runner import Task
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import LETTERS
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
@@ -46,18 +46,18 @@ class StatusLine(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What it tells of.
     """
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._desk = workbench
+        self._workspace = workspace
         self._role = "hint"
         self.where, self.next_click = QLabel(), QLabel()
         self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
-        self.work = _Work(workbench)
+        self.work = _Work(workspace)
         self.work.changed.connect(self._make_room)
         row = QHBoxLayout(self)
         row.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
@@ -69,23 +69,23 @@ class StatusLine(QWidget):
         self._message_timer = QTimer(self, singleShot=True)
         self._message_timer.timeout.connect(self._say_next)
         for signal in (
-            workbench.landmarks_changed,
-            workbench.active_changed,
-            workbench.session_replaced,
-            workbench.tool_changed,
-            workbench.volume_opened,
-            workbench.replacing_changed,
-            workbench.dragged,
-            workbench.pose.target_changed,
+            workspace.document.landmarks_changed,
+            workspace.labels.active_changed,
+            workspace.document.reset,
+            workspace.interaction.tool_changed,
+            workspace.scan.opened,
+            workspace.interaction.replacing_changed,
+            workspace.interaction.dragged,
+            workspace.pose.target_changed,
         ):
             follow(self, signal, self._on_changed)
-        follow(self, workbench.message, self.say)
+        follow(self, workspace.messages.said, self.say)
         fit(self, self._make_room)
         self._say_next()
 
     def show_position(self, position: FloatArray | None) -> None:
         """Tell what lies at a (3,) scan position."""
-        volume = self._desk.volume
+        volume = self._workspace.scan.volume
         if position is None or volume is None:
             self.where.setText("")
             return
@@ -112,26 +112,32 @@ class StatusLine(QWidget):
         self._say_next()
 
     def _say_next(self) -> None:
-        desk = self._desk
-        if desk.drag is not None:
-            point = point_text(desk.drag.side, desk.drag.code)
+        workspace = self._workspace
+        if workspace.interaction.drag is not None:
+            point = point_text(workspace.interaction.drag.side, workspace.interaction.drag.code)
             self._show(f"Let go to leave {point} here, or press Esc to take it back", "next")
-        elif desk.volume is None:
-            its_own = "File > Find scan says where the scan is now" if desk.session.volume_is_lost else ""
+        elif workspace.scan.volume is None:
+            its_own = (
+                "File > Find scan says where the scan is now" if workspace.document.volume_is_lost else ""
+            )
             self._show(self.without_scan or its_own or "Open a scan, or try the demo", "hint")
-        elif desk.replacing and desk.session.active.code is not None:
-            point = point_text(desk.session.active.side, desk.session.active.code)
+        elif workspace.interaction.replacing and workspace.labels.active.code is not None:
+            point = point_text(workspace.labels.active.side, workspace.labels.active.code)
             self._show(f"The next click moves {point} there · Esc leaves it where it is", "next")
-        elif desk.tool == "touch":
-            target = desk.pose.target
-            where = f"where {point_text(desk.pose.side, target)} is" if target else "in vain: all are touched"
+        elif workspace.interaction.tool == "touch":
+            target = workspace.pose.target
+            where = (
+                f"where {point_text(workspace.pose.side, target)} is"
+                if target
+                else "in vain: all are touched"
+            )
             self._show(f"Click on bone or a slice {where}", "next")
-        elif desk.tool == "look":
+        elif workspace.interaction.tool == "look":
             self._show("Drag over a slice to move the crosshair", "hint")
-        elif desk.tool == "grey":
+        elif workspace.interaction.tool == "grey":
             self._show("Drag over a slice: sideways for contrast, up and down for brightness", "hint")
         else:
-            self._show(desk.session.click_text, "next")
+            self._show(workspace.labels.click_text, "next")
 
     def _show(self, text: str, role: str) -> None:
         self.next_click.setText(text)
@@ -156,7 +162,7 @@ class StatusLine(QWidget):
         need = text_width(self, text.text()) + 4
         place, work = text_width(self, _WIDEST_PLACE), self.work.needed_width
         beside = work + _MARGIN if self.work.is_busy else 0
-        has_place = self._desk.volume is not None and whole - beside - place - _MARGIN >= need
+        has_place = self._workspace.scan.volume is not None and whole - beside - place - _MARGIN >= need
         self.where.setVisible(has_place)
         self.where.setFixedWidth(place)
         if self.work.is_busy and whole - beside < min(need, pixels(self, _LEAST_WORDS)):
@@ -188,9 +194,9 @@ class _Work(QWidget):
     changed = Signal()
     """There is work to show, other work, or none any more."""
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         super().__init__()
-        self._desk, self._was_busy = workbench, False
+        self._workspace, self._was_busy = workspace, False
         self.text, self.bar, self.stop = QLabel(), QProgressBar(), QToolButton()
         self.text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.bar.setTextVisible(False)
@@ -207,7 +213,7 @@ class _Work(QWidget):
         self._timer = QTimer(self, interval=_SHOWN_AFTER_MS, singleShot=True)
         self._timer.timeout.connect(self._refresh)
         self.stop.clicked.connect(self._stop)
-        jobs = workbench.jobs
+        jobs = workspace.jobs
         for signal in (jobs.started, jobs.progressed, jobs.done, jobs.failed, jobs.cancelled):
             follow(self, signal, self._on_task)
         self.stop.setIcon(icon("close", theme_of(self).muted, size=12))
@@ -229,7 +235,9 @@ class _Work(QWidget):
 
     @property
     def _task(self) -> Task[Any] | None:
-        shown = [t for t in self._desk.jobs.running if not t.progress.cancelled() and "judging" not in t.key]
+        shown = [
+            t for t in self._workspace.jobs.running if not t.progress.cancelled() and "judging" not in t.key
+        ]
         return shown[0] if shown else None
 
     def _on_task(self, _: Task[Any]) -> None:

@@ -8,7 +8,7 @@ from qtpy.QtCore import QEvent, QSize, Qt
 from qtpy.QtGui import QAction, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow, set_role, size_text, spacing_text
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
@@ -34,17 +34,17 @@ class TopBar(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What it tells of.
     actions : mapping of str to QAction
         What its buttons do.
     """
 
     def __init__(
-        self, workbench: Workbench, actions: Mapping[str, QAction], parent: QWidget | None = None
+        self, workspace: Workspace, actions: Mapping[str, QAction], parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self._desk, self._actions = workbench, actions
+        self._workspace, self._actions = workspace, actions
         self.name, self.about, self.saved = ElidedLabel("", "heading"), QLabel(), QLabel()
         self.name.setSizePolicy(QSizePolicy.Policy.Maximum, QSizePolicy.Policy.Preferred)
         self.name.setMinimumWidth(_SHORTEST_NAME)
@@ -54,12 +54,12 @@ class TopBar(QWidget):
         self._working: list[tuple[QToolButton, str]] = []  # mean nothing before a scan is open
         self._lay_out()
         for signal in (
-            workbench.session_replaced,
-            workbench.volume_opened,
-            workbench.details_changed,
-            workbench.dirty_changed,
-            workbench.saved,
-            workbench.history_changed,
+            workspace.document.reset,
+            workspace.scan.opened,
+            workspace.document.details_changed,
+            workspace.document.dirty_changed,
+            workspace.document.saved,
+            workspace.document.history_changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()
@@ -67,21 +67,21 @@ class TopBar(QWidget):
 
     def refresh(self, *_: object) -> None:
         """Show the specimen as it stands."""
-        session, volume = self._desk.session, self._desk.volume
-        self.name.set_words(session.state.specimen if self._desk.in_use else "gp-labeler")
+        volume, document = self._workspace.scan.volume, self._workspace.document
+        self.name.set_words(document.state.specimen if self._workspace.document.in_use else "gp-labeler")
         about = (
             "" if volume is None else f"{size_text(volume.size)}  ·  {spacing_text(volume.spacing)}  ·  LPS"
         )
         self.about.setText(about)
-        place = self._desk.place if self._desk.in_use else ""
+        place = self._workspace.document.location if self._workspace.document.in_use else ""
         self.name.setToolTip(place or self.name.toolTip())
-        set_role(self.saved, "warning" if session.dirty or session.path is None else "good")
-        kept = _SAVED if session.path is not None else _COPY if place else ""
-        self.saved.setText(_UNSAVED if session.dirty else kept)
+        set_role(self.saved, "warning" if document.dirty or document.path is None else "good")
+        kept = _SAVED if document.path is not None else _COPY if place else ""
+        self.saved.setText(_UNSAVED if document.dirty else kept)
         self.saved.setToolTip("Every edit is kept in a journal at once; Ctrl+S writes the specimen file")
         for button, id in self._working:
-            is_edit = id.startswith("edit.") and self._desk.in_use
-            button.setVisible(session.state.volume is not None or is_edit)
+            is_edit = id.startswith("edit.") and self._workspace.document.in_use
+            button.setVisible(document.state.volume is not None or is_edit)
         self._make_room()
 
     def take_theme(self) -> None:

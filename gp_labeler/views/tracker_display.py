@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtCore import QObject, QTimer
 from qtpy.QtWidgets import QApplication
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.pose_data import DrawnTip
 from gp_labeler.views.bind import follow
 from gp_labeler.views.pose_display import PoseDisplay
@@ -20,19 +20,19 @@ class TrackerDisplay(QObject):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose tracker.
     display : PoseDisplay
         Draws the tip; owns this.
     """
 
-    def __init__(self, workbench: Workbench, display: PoseDisplay) -> None:
+    def __init__(self, workspace: Workspace, display: PoseDisplay) -> None:
         super().__init__(display)
-        self._desk, self._display = workbench, display
+        self._workspace, self._display = workspace, display
         self.audible = False
         self._timer = QTimer(self, interval=_PERIOD_MS)
-        self._timer.timeout.connect(workbench.tracker.poll)
-        tracker = workbench.tracker
+        self._timer.timeout.connect(workspace.tracker.poll)
+        tracker = workspace.tracker
         follow(self, tracker.changed, self._on_changed)
         follow(self, tracker.moved, self._on_moved)
         follow(self, tracker.touched, self._on_touched)
@@ -40,14 +40,14 @@ class TrackerDisplay(QObject):
         self._on_changed()
 
     def _on_changed(self) -> None:
-        if self._desk.tracker.on != self._timer.isActive():
-            (self._timer.start if self._desk.tracker.on else self._timer.stop)()
+        if self._workspace.tracker.on != self._timer.isActive():
+            (self._timer.start if self._workspace.tracker.on else self._timer.stop)()
 
     def _on_moved(self) -> None:
         self._display.set_tip(self._tip())
 
     def _tip(self) -> DrawnTip | None:
-        tracker, estimate = self._desk.tracker, self._desk.pose.estimate
+        tracker, estimate = self._workspace.tracker, self._workspace.pose.estimate
         if tracker.tip is None or estimate is None or estimate.registered is None:
             return None
         T_scan_tracker = estimate.registered.T_scan_touches
@@ -67,7 +67,7 @@ class TrackerDisplay(QObject):
             QApplication.beep()
 
     def _on_refused(self, reason: str) -> None:
-        self._desk.say(reason, "warning")
+        self._workspace.say(reason, "warning")
         if self.audible:
             QApplication.beep()
             QTimer.singleShot(180, QApplication.beep)

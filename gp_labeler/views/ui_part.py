@@ -1,11 +1,11 @@
-"""What the parts of `WindowUi` share: window, workbench, who asks, and where files were opened last."""
+"""What the parts of `WindowUi` share: window, workspace, who asks, and where files were opened last."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.prompts import Prompts
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ class UiPart:
     """One family of answers that a main window gives to actions."""
 
     _window: MainWindow
-    _desk: Workbench
+    _workspace: Workspace
     prompts: Prompts
 
     def open_path(self, path: Path) -> None:

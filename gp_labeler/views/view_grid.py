@@ -7,7 +7,7 @@ from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
 
 from gp_core.validation import FloatArray
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane, position_text
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
@@ -150,18 +150,18 @@ class ViewGrid(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         What is shown; its session says in which layout.
     """
 
     hovered = Signal(object)
     """(3,) scan position under the pointer in any view, or None."""
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._desk = workbench
-        self.scene_view = SceneView(workbench)
-        self.slice_views = {plane: SliceView(workbench, plane) for plane in Plane}
+        self._workspace = workspace
+        self.scene_view = SceneView(workspace)
+        self.slice_views = {plane: SliceView(workspace, plane) for plane in Plane}
         self.frames = {"3d": ViewFrame("3d", self.scene_view)}
         self.frames |= {p.value: ViewFrame(p.value, self.slice_views[p]) for p in Plane}
         self._rows = [self._row("3d", "axial"), self._row("sagittal", "coronal")]
@@ -176,7 +176,7 @@ class ViewGrid(QWidget):
         self.setMinimumWidth(2 * self.scene_view.minimumWidth() + _GAP)
         self._listen()
         self._lay_out()
-        workbench.sight = self
+        workspace.interaction.visible_area = self
 
     @property
     def views(self) -> tuple[SceneView | SliceView, ...]:
@@ -197,14 +197,14 @@ class ViewGrid(QWidget):
 
     def bring_close(self, position: FloatArray) -> None:
         """Show a (3,) scan position in every view so closely that it can be judged."""
-        volume = self._desk.volume
+        volume = self._workspace.scan.volume
         if volume is None:
             return
         for view in self.views:
             side = min(view.width(), view.height())
             view.zoom_to(position, min(CLOSE_MM, side * min(volume.spacing) / (2 * JUDGED_PIXELS)))
         if not self._close_views(position):  # such as what bone hides in the 3D view, shown alone
-            self._desk.session.view.update(layout="four-up")
+            self._workspace.view.update(layout="four-up")
 
     def release(self) -> None:
         """Let go of scene and voxels."""
@@ -213,7 +213,7 @@ class ViewGrid(QWidget):
 
     def _close_views(self, position: FloatArray) -> list[SceneView | SliceView]:
         """Return the visible views that show a position closely enough to judge it, once they are painted."""
-        volume = self._desk.volume
+        volume = self._workspace.scan.volume
         if volume is None:
             return []
         voxel = min(volume.spacing)
@@ -236,25 +236,25 @@ class ViewGrid(QWidget):
             frame.view.hovered.connect(self.hovered)
         for plane, view in self.slice_views.items():
             view.moved.connect(lambda mm, p=plane: self._say_where(p, mm))
-        follow(self, self._desk.view_changed, self._on_view_changed)
-        follow(self, self._desk.threshold_changed, self._say_threshold)
-        follow(self, self._desk.session_replaced, self._on_session_replaced)
+        follow(self, self._workspace.view.changed, self._on_view_changed)
+        follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
+        follow(self, self._workspace.document.reset, self._on_reset)
 
     def _maximise(self, name: str) -> None:
-        view = self._desk.session.view
+        view = self._workspace.view
         view.update(layout="four-up" if view.state.layout == name else name)
 
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if "layout" in changed:
             self._lay_out()
 
-    def _on_session_replaced(self, _: object) -> None:
+    def _on_reset(self) -> None:
         self._lay_out()
         for frame in self.frames.values():
             frame.header.say_where("")
 
     def _lay_out(self) -> None:
-        layout = self._desk.session.view.state.layout
+        layout = self._workspace.view.state.layout
         for name, frame in self.frames.items():
             frame.setVisible(layout in ("four-up", name))
         for row, names in zip(self._rows, (("3d", "axial"), ("sagittal", "coronal")), strict=True):

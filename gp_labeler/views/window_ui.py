@@ -16,7 +16,7 @@ from gp_labeler.imaging.mesh_files import MESH_SUFFIXES
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.atlas import is_atlas_file
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.panels.export_dialog import ExportDialog
@@ -51,39 +51,41 @@ class WindowUi(AtlasUi, PoseUi):
     ----------
     window : MainWindow
         The window.
-    workbench : Workbench
+    workspace : Workspace
         What it works on.
     prompts : Prompts
         Who asks the user.
     """
 
-    def __init__(self, window: MainWindow, workbench: Workbench, prompts: Prompts) -> None:
-        self._window, self._desk, self.prompts = window, workbench, prompts
+    def __init__(self, window: MainWindow, workspace: Workspace, prompts: Prompts) -> None:
+        self._window, self._workspace, self.prompts = window, workspace, prompts
 
     # Files
 
     def open_path(self, path: Path) -> None:
         """Open a scan or specimen, once unsaved edits are settled; an atlas at once."""
-        goes_on = is_atlas_file(path) or (self._desk.lacks_scan and not path.name.endswith(SUFFIX))
+        goes_on = is_atlas_file(path) or (
+            self._workspace.document.lacks_scan and not path.name.endswith(SUFFIX)
+        )
         if not goes_on and not self.settle():
             return
         self._remember_folder(path)
         try:
-            self._desk.open(path)
+            self._workspace.open(path)
         except UnsavedEditsError as error:
             self._open_unsaved(path, error)
         except InUseError as error:
             if self.prompts.choose(
                 "Open elsewhere", error.problem, ["Open a copy"], detail=error.remedy or ""
             ):
-                self._desk.open_specimen(path, as_copy=True)
+                self._workspace.open_specimen(path, as_copy=True)
         except GpError as error:
-            self._desk.say(str(error), "error")
+            self._workspace.say(str(error), "error")
 
     def begin(self) -> None:
         """Begin a new specimen without a scan, once unsaved edits are settled."""
         if self.settle():
-            self._desk.begin()
+            self._workspace.document.begin()
             self._window.set_step("pose")
 
     def ask_open_file(self) -> None:
@@ -100,44 +102,44 @@ class WindowUi(AtlasUi, PoseUi):
     def ask_find_scan(self) -> None:
         """Ask where the scan of this specimen is now."""
         for path in self.prompts.open_files("Where is the scan now?", self._folder, _SCANS):
-            self._desk.find_scan(path)
+            self._workspace.scan.find(path)
 
     def open_demo(self) -> None:
         """Open the phantom, once unsaved edits are settled."""
         if self.settle():
-            self._desk.open_demo()
+            self._workspace.scan.open_demo()
 
     def save(self, *, ask: bool = False) -> bool:
         """Save the specimen, asking where it has no file yet; return whether it is saved."""
-        session = self._desk.session
+        document = self._workspace.document
         path: Path | None = None
-        if ask or session.path is None:
-            suggestion = Path(self._folder) / f"{session.state.specimen}{SUFFIX}"
+        if ask or document.path is None:
+            suggestion = Path(self._folder) / f"{document.state.specimen}{SUFFIX}"
             path = self.prompts.save_file("Save the specimen", str(suggestion), f"Specimens (*{SUFFIX})")
             if path is None:
                 return False
         try:
-            saved = session.save(path, overwrite=path is not None)
+            saved = document.save(path, overwrite=path is not None)
         except GpError as error:
-            self._desk.say(str(error), "error")
+            self._workspace.say(str(error), "error")
             return False
         self._remember_folder(saved)
-        if self._desk.recent is not None:
-            self._desk.recent.add(saved)
-        self._desk.say(f"Saved {saved.name}")
+        if self._workspace.recent is not None:
+            self._workspace.recent.add(saved)
+        self._workspace.say(f"Saved {saved.name}")
         return True
 
     def settle(self) -> bool:
         """Settle what is not saved before something else is opened; return whether to go on."""
-        session = self._desk.session
-        if not session.dirty:
+        document = self._workspace.document
+        if not document.dirty:
             return True
-        text = f"Save the changes to {session.state.specimen}?"
+        text = f"Save the changes to {document.state.specimen}?"
         detail = "Without saving, they are lost when this specimen is closed."
         answer = self.prompts.choose("Not saved", text, ["Save", "Do not save"], detail=detail)
         self.discarded = answer == "Do not save"
         if self.discarded:
-            self._desk.abandon()
+            self._workspace.document.abandon()
         return self.discarded or (answer == "Save" and self.save())
 
     discarded = False
@@ -148,60 +150,62 @@ class WindowUi(AtlasUi, PoseUi):
         if files:
             self._remember_folder(files[0])
             if self._has_dialogs:
-                desk = self._desk
-                LandmarkImportDialog(desk, files, desk.near_bone, self.prompts, self._window).open()
+                workspace = self._workspace
+                LandmarkImportDialog(
+                    workspace, files, workspace.scan.near_bone, self.prompts, self._window
+                ).open()
             else:
-                import_asking(self._desk, files, self.prompts)
+                import_asking(self._workspace, files, self.prompts)
 
     def ask_references(self) -> None:
         """Ask for landmark lists, and show their points as reference points."""
         files = self.prompts.open_files("Show reference points", self._folder, _POINTS, many=True)
         if files:
             self._remember_folder(files[0])
-            self._desk.references.show(*files)
+            self._workspace.references.show(*files)
 
     def ask_add_mesh(self) -> None:
         """Ask for mesh files, and draw them with the bone."""
         wanted = f"Meshes ({' '.join('*' + suffix for suffix in MESH_SUFFIXES)})"
         for path in self.prompts.open_files("Add a mesh", self._folder, wanted, many=True):
             self._remember_folder(path)
-            self._desk.meshes.open(path)
+            self._workspace.meshes.open(path)
 
     def ask_export(self) -> None:
         """Ask for a folder, and write the landmarks of both sides into it."""
         if self._has_dialogs:
-            ExportDialog(self._desk, self._folder, parent=self._window).open()
+            ExportDialog(self._workspace, self._folder, parent=self._window).open()
             return
         folder = self.prompts.folder("Export landmarks into this folder", self._folder)
         if folder is not None:
-            export_asking(self._desk, folder, self.prompts)
+            export_asking(self._workspace, folder, self.prompts)
 
     def ask_save_mesh(self) -> None:
         """Ask where, and write the bone surface."""
-        name = f"{self._desk.session.state.specimen}.ply"
+        name = f"{self._workspace.document.state.specimen}.ply"
         path = self.prompts.save_file("Save the bone surface", str(Path(self._folder) / name), _MESHES)
-        if path is not None and self._desk.surfaces:
-            self._desk.save_mesh(path)
+        if path is not None and self._workspace.bone.surfaces:
+            self._workspace.bone.save_mesh(path)
 
     def ask_screenshot(self) -> None:
         """Ask where, and write a picture of the window."""
-        name = f"{self._desk.session.state.specimen}.png"
+        name = f"{self._workspace.document.state.specimen}.png"
         path = self.prompts.save_file(
             "Save a picture of the window", str(Path(self._folder) / name), "PNG (*.png)"
         )
         if path is None:
             return
         write_picture(grab(self._window), path)
-        self._desk.say(f"Wrote {path.name}")
-        self._desk.pictured.emit(path)
+        self._workspace.say(f"Wrote {path.name}")
+        self._workspace.messages.wrote.emit("picture", path)
 
-    # Questions of the workbench
+    # Questions of the workspace
 
     def take_recoveries(self, recoveries: tuple[Recovery, ...]) -> None:
         """Offer what programs that were killed left unsaved."""
         if recoveries and self._has_dialogs:
             dialog = RecoverDialog(recoveries, self._window)
-            dialog.recover_asked.connect(self._desk.recover)
+            dialog.recover_asked.connect(self._workspace.document.recover)
             dialog.open()
             return
         for recovery in recoveries:
@@ -212,7 +216,7 @@ class WindowUi(AtlasUi, PoseUi):
                 detail="The program ended before this was saved. Nothing of it is lost.",
             )
             if answer == "Recover":
-                self._desk.recover(recovery)
+                self._workspace.document.recover(recovery)
                 return
             if answer == "Delete it":
                 recovery.discard()
@@ -220,11 +224,11 @@ class WindowUi(AtlasUi, PoseUi):
     def take_plan(self, plan: ImportPlan) -> None:
         """Ask what a scan's files do not say, then read it."""
         if self._has_dialogs:
-            ImportDialog(self._desk, plan, parent=self._window).open()
+            ImportDialog(self._workspace, plan, parent=self._window).open()
             return
         answered = ask_about(plan, self.prompts)
         if answered is not None:
-            self._desk.read_scan(answered)
+            self._workspace.scan.read(answered)
 
     def take_other_scan(self, error: VolumeChangedError, volume: Volume) -> None:
         """Ask whether to go on with a scan that is not the one that was labelled."""
@@ -232,11 +236,11 @@ class WindowUi(AtlasUi, PoseUi):
         if self.prompts.choose(
             "Another scan?", error.problem, ["Use it nevertheless"], detail=detail, kind="warning"
         ):
-            self._desk.accept_scan(volume)
+            self._workspace.scan.accept(volume)
 
     def ask_swap(self) -> None:
         """Ask with which other point of the side the active one shall be exchanged."""
-        active = self._desk.session.active
+        active = self._workspace.labels.active
         if active.code is None:
             return
         others = [f for f in FEATURES if not (f.computed or f.shared or f.code == active.code)]
@@ -245,7 +249,7 @@ class WindowUi(AtlasUi, PoseUi):
         text = f"Exchange {active.code} {active.side.word} with"
         chosen = self.prompts.item("Exchange", text, [f"{f.code}  {f.name}" for f in others])
         if chosen:
-            self._desk.swap(active.side, active.code, chosen.split()[0])
+            self._workspace.labels.swap(active.side, active.code, chosen.split()[0])
 
     # The screen
 
@@ -259,11 +263,11 @@ class WindowUi(AtlasUi, PoseUi):
 
     def zoom_to_point(self) -> None:
         """Look closely at the chosen point, or at where it is expected."""
-        desk, active = self._desk, self._desk.session.active
+        workspace, active = self._workspace, self._workspace.labels.active
         if active.code is not None:
-            desk.go_to(active.side, active.code)
+            workspace.labels.go_to(active.side, active.code)
         for view in self._window.grid.views:
-            view.zoom_to(desk.session.crosshair, CLOSE_MM)
+            view.zoom_to(workspace.view.crosshair, CLOSE_MM)
 
     def look_from(self, letter: str) -> None:
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
@@ -297,14 +301,14 @@ class WindowUi(AtlasUi, PoseUi):
         recorder = self._window.findChild(Recorder)
         if recorder is None:
             Recorder(self._window)
-            self._desk.say("Recording. Choose Help > Record script once more to end it.")
+            self._workspace.say("Recording. Choose Help > Record script once more to end it.")
             return
         path = self.prompts.save_file(
             "Save the script", str(Path(self._folder) / "script.toml"), "Scripts (*.toml *.json)"
         )
         if path is not None:
             recorder.save(path)
-            self._desk.say(f"Wrote {path.name}, {len(recorder.tables)} steps")
+            self._workspace.say(f"Wrote {path.name}, {len(recorder.tables)} steps")
         recorder.setParent(None)
         recorder.deleteLater()
 
@@ -328,4 +332,6 @@ class WindowUi(AtlasUi, PoseUi):
             "Unsaved work was found", error.recovery.text, ["Recover these edits", "Open as saved"]
         )
         if answer:
-            self._desk.open_specimen(path, unsaved="recover" if answer.startswith("Recover") else "leave")
+            self._workspace.open_specimen(
+                path, unsaved="recover" if answer.startswith("Recover") else "leave"
+            )

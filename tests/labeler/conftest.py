@@ -80,6 +80,6 @@ def one_window(qapp) -> Iterator[object]:
 def window(qtbot, make_window, ball):
     """A window with the ball open and meshed."""
     window = make_window()
-    window.workbench.open_volume(ball)
+    window.workspace.scan.begin(ball)
     settle(qtbot, window)
     return window

@@ -28,6 +28,8 @@ from gp_labeler.document.edits import (
     SwapSides,
 )
 from gp_labeler.document.landmark_import import ImportLandmarks
+from gp_labeler.document.opening import new_specimen
+from gp_labeler.document.specimen_document import SpecimenDocument, utc_now
 from gp_labeler.document.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import How, PoseCheck, Provenance, SpecimenState
@@ -41,6 +43,13 @@ from gp_labeler.document.touch_edits import (
     TakeTouches,
 )
 from gp_labeler.document.touches import Touch, TouchHow
+from gp_labeler.jobs.runner import Jobs
+from gp_labeler.models.atlas import AtlasModel
+from gp_labeler.models.labels import LabelsModel
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.pose import PoseModel
+from gp_labeler.models.scan import ScanModel
+from gp_labeler.models.view import ViewModel
 
 PLACEABLE = tuple(f.code for f in FEATURES if not f.computed)
 quick = settings(
@@ -61,6 +70,47 @@ class FakeVolume:
 
     def contains(self, points):
         return (np.abs(points) < 50).all(axis=1)
+
+
+class IdleJobs(Jobs):
+    """Does none of the work it is given: what comes of it is asked for by the tests."""
+
+    def submit(self, job, done=None, *, key="", after=0.0):
+        return None
+
+
+class Editing:
+    """A document with the models of its labels and its pose, and nothing in the background."""
+
+    def __init__(
+        self,
+        specimen=None,
+        *,
+        directory=None,
+        predict=None,
+        check=None,
+        author="",
+        clock=utc_now,
+        atlas=None,
+        animals=(),
+    ) -> None:
+        self.document = document = SpecimenDocument(directory=directory, author=author, clock=clock)
+        jobs, self.messages = IdleJobs(), Messages()
+        self.view = ViewModel(document)
+        scan = ScanModel(document, self.view, jobs, self.messages)
+        self.atlas = AtlasModel(document, jobs, self.messages)
+        self.labels = LabelsModel(document, self.view, scan, self.atlas, jobs, self.messages)
+        self.pose = PoseModel(document, self.atlas, self.view, jobs, self.messages)
+        if atlas is not None:
+            self.atlas.use(atlas, animals)
+        if predict or check:
+            self.labels.expect(predict, check)
+        self.notices = getattr(specimen, "notices", ())
+        begun = new_specimen(directory) if specimen is None else specimen
+        document.load(new_specimen(directory, specimen=begun) if isinstance(begun, str) else begun)
+
+    def close(self) -> None:
+        self.document.close()
 
 
 def shape(side: Side = Side.LEFT) -> LandmarkSet:

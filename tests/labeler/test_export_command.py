@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from document_cases import Editing
 
 from gp_core.cli import main as core
 from gp_core.io import load_specimens
@@ -12,15 +13,13 @@ from gp_labeler.__main__ import main
 from gp_labeler.document.specimen_file import read_specimen, write_specimen
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.models import labelling
-from gp_labeler.models.session import Session
 
 
 def _specimen(folder):
-    session = Session()
-    labelling.place(session, (1, 2, 3), side="L", code="CA")
-    labelling.suggest(session, (4, 5, 6), side="L", code="OS", radius_95=0.5, source="atlas")
-    write_specimen(folder / "GP1.gpspecimen.json", session.state)
+    editing = Editing()
+    editing.labels.place((1, 2, 3), side="L", code="CA")
+    editing.labels.suggest((4, 5, 6), side="L", code="OS", radius_95=0.5, source="atlas")
+    write_specimen(folder / "GP1.gpspecimen.json", editing.document.state)
     return str(folder / "GP1.gpspecimen.json")
 
 
@@ -48,20 +47,20 @@ def test_distances_from_bone_reach_check_by_way_of_the_specimen_file(tmp_path, c
     bone = np.zeros((40, 40, 40), np.int16)
     bone[:, :, :10] = 1000
     volume = Volume(bone, np.diag([0.5, 0.5, 0.5, 1.0]), name="block")
-    session = Session()
-    session.set_measure(partial(scan_evidence, volume, 500.0))
-    labelling.place(session, (12.65, 10, 10), side="L", code="IN")
-    labelling.place(session, (4.5, 10, 10), side="L", code="ZL")
-    file = session.save(tmp_path / "GP1.gpspecimen.json")
+    editing = Editing()
+    editing.document.measure = partial(scan_evidence, volume, 500.0)
+    editing.labels.place((12.65, 10, 10), side="L", code="IN")
+    editing.labels.place((4.5, 10, 10), side="L", code="ZL")
+    file = editing.document.save(tmp_path / "GP1.gpspecimen.json")
     assert main(["export", str(file), "-o", str(tmp_path / "out")]) == 0
     assert core(["check", str(tmp_path / "out")]) == 1
     told = capsys.readouterr().out
     assert "IN is 7.9 mm from bone" in told
     assert "ZL is" not in told
 
-    again = Session(read_specimen(file))  # without the scan
-    labelling.place(again, (12.65, 10, 11), side="L", code="IN")
-    file = again.save(tmp_path / "GP2.gpspecimen.json")
+    again = Editing(read_specimen(file))  # without the scan
+    again.labels.place((12.65, 10, 11), side="L", code="IN")
+    file = again.document.save(tmp_path / "GP2.gpspecimen.json")
     assert main(["export", str(file), "-o", str(tmp_path / "moved")]) == 0
     (animal,) = load_specimens(tmp_path / "moved")
     assert set(animal.side("L").scan_evidence.bone_distances) == {"ZL"}

@@ -21,8 +21,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import Progress, QueueDispatcher
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 
 Refs = dict[str, weakref.ref]
 
@@ -64,11 +63,11 @@ def no_collector() -> Iterator[None]:
 
 
 @pytest.fixture
-def desk() -> Iterator[tuple[Workbench, Callable[[], None]]]:
+def workspace() -> Iterator[tuple[Workspace, Callable[[], None]]]:
     dispatcher = QueueDispatcher()
-    desk = Workbench(None, dispatcher)
-    yield desk, lambda: dispatcher.deliver_until_idle(desk.jobs, timeout=60)
-    desk.close()
+    workspace = Workspace(None, dispatcher)
+    yield workspace, lambda: dispatcher.deliver_until_idle(workspace.jobs, timeout=60)
+    workspace.close()
 
 
 def _new_ball(n: int, direction: np.ndarray | None = None) -> Volume:
@@ -78,14 +77,14 @@ def _new_ball(n: int, direction: np.ndarray | None = None) -> Volume:
     return Volume.from_parts(array, ball.spacing, ball.origin, direction, name=f"ball{n}")
 
 
-def _remembered(desk: Workbench) -> Refs:
+def _remembered(workspace: Workspace) -> Refs:
     """Return weak references to the voxels and meshes that are open."""
-    assert desk.volume is not None
-    array = desk.volume.array
-    refs: Refs = {"volume": weakref.ref(desk.volume), "array": weakref.ref(array)}
+    assert workspace.scan.volume is not None
+    array = workspace.scan.volume.array
+    refs: Refs = {"volume": weakref.ref(workspace.scan.volume), "array": weakref.ref(array)}
     if array.base is not None:
         refs["voxels"] = weakref.ref(array.base)
-    for n, surface in enumerate((*desk.surfaces, *desk.quick_surfaces)):
+    for n, surface in enumerate((*workspace.bone.surfaces, *workspace.bone.quick_surfaces)):
         refs |= {f"surface {n}": weakref.ref(surface), f"mesh {n}": weakref.ref(surface.mesh)}
         refs[f"locator {n}"] = weakref.ref(surface._locator)
     return refs
@@ -95,47 +94,45 @@ def _alive(refs: Refs) -> list[str]:
     return [name for name, ref in refs.items() if ref() is not None]
 
 
-def _work_on(desk: Workbench, wait: Callable[[], None]) -> Refs:
+def _work_on(workspace: Workspace, wait: Callable[[], None]) -> Refs:
     """Mesh, place points, change the threshold, to one without a surface too; end jobs in every way."""
     wait()
-    refs = _remembered(desk)
+    refs = _remembered(workspace)
     for n, code in enumerate(("CA", "RWP", "OS", "CB")):
-        labelling.place(
-            desk.session, MIDDLE + np.array([n, 1, 0.3 * n]), How.SLICE, side=Side.LEFT, code=code
-        )
+        workspace.labels.place(MIDDLE + np.array([n, 1, 0.3 * n]), How.SLICE, side=Side.LEFT, code=code)
     for threshold in (1100.0, 1e9, 1000.0):
-        desk.set_threshold(threshold)
+        workspace.scan.set_threshold(threshold)
         wait()
-    desk.jobs.submit(_Fails(desk.volume))
-    waiting = desk.jobs.submit(_Waits(desk.volume))
+    workspace.jobs.submit(_Fails(workspace.scan.volume))
+    waiting = workspace.jobs.submit(_Waits(workspace.scan.volume))
     waiting.cancel()
     del waiting
     wait()
-    desk.abandon()
-    return refs | {f"later {name}": ref for name, ref in _remembered(desk).items()}
+    workspace.document.abandon()
+    return refs | {f"later {name}": ref for name, ref in _remembered(workspace).items()}
 
 
 @pytest.mark.usefixtures("no_collector")
-def test_opening_another_scan_frees_the_one_before(desk) -> None:
-    desk, wait = desk
-    desk.open_volume(_new_ball(1))
-    first = _work_on(desk, wait)
-    desk.open_volume(_new_ball(2))
+def test_opening_another_scan_frees_the_one_before(workspace) -> None:
+    workspace, wait = workspace
+    workspace.scan.begin(_new_ball(1))
+    first = _work_on(workspace, wait)
+    workspace.scan.begin(_new_ball(2))
     wait()
     assert _alive(first) == []
-    second = _work_on(desk, wait)
-    desk.begin()
+    second = _work_on(workspace, wait)
+    workspace.document.begin()
     wait()
     assert _alive(second) == []
 
 
 @pytest.mark.usefixtures("no_collector")
-def test_a_scan_read_from_a_file_is_freed(desk, tmp_path: Path) -> None:
-    desk, wait = desk
-    desk.open_scan(write_ball(tmp_path / "ball.nrrd"))
+def test_a_scan_read_from_a_file_is_freed(workspace, tmp_path: Path) -> None:
+    workspace, wait = workspace
+    workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
     wait()
-    refs = _work_on(desk, wait)
-    desk.open_scan(tmp_path / "ball.nrrd")
+    refs = _work_on(workspace, wait)
+    workspace.scan.open(tmp_path / "ball.nrrd")
     wait()
     assert _alive(refs) == []
 
@@ -143,10 +140,10 @@ def test_a_scan_read_from_a_file_is_freed(desk, tmp_path: Path) -> None:
 @pytest.mark.usefixtures("no_collector")
 def test_closing_frees_the_scan() -> None:
     dispatcher = QueueDispatcher()
-    desk = Workbench(None, dispatcher)
-    desk.open_volume(_new_ball(3))
-    refs = _work_on(desk, lambda: dispatcher.deliver_until_idle(desk.jobs, timeout=60))
-    desk.close(discard=True)
+    workspace = Workspace(None, dispatcher)
+    workspace.scan.begin(_new_ball(3))
+    refs = _work_on(workspace, lambda: dispatcher.deliver_until_idle(workspace.jobs, timeout=60))
+    workspace.close(discard=True)
     assert _alive(refs) == []
 
 
@@ -155,17 +152,17 @@ def test_the_window_frees_the_scan_before(layout: str, qtbot, make_window, no_co
     from scipy.spatial.transform import Rotation
 
     window = make_window()
-    desk, wait = window.workbench, lambda: settle(qtbot, window)
+    workspace, wait = window.workspace, lambda: settle(qtbot, window)
     oblique = Rotation.from_euler("xyz", [10, 20, 5], degrees=True).as_matrix()
-    desk.open_volume(_new_ball(1))
-    first = _work_on(desk, wait)
+    workspace.scan.begin(_new_ball(1))
+    first = _work_on(workspace, wait)
     window.grab()
     if layout == "hidden":
         window.hide()
-    desk.open_volume(_new_ball(2, oblique))
+    workspace.scan.begin(_new_ball(2, oblique))
     wait()
     assert _alive(first) == []
-    second = _work_on(desk, wait)
-    desk.begin()
+    second = _work_on(workspace, wait)
+    workspace.document.begin()
     wait()
     assert _alive(second) == []

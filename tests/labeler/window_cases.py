@@ -109,8 +109,8 @@ def close(window) -> None:
 
 def settle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
     """Wait until all work is done, and all is drawn."""
-    desk = window.workbench
-    qtbot.waitUntil(lambda: not desk.jobs.running, timeout=int(1000 * seconds))
+    workspace = window.workspace
+    qtbot.waitUntil(lambda: not workspace.jobs.running, timeout=int(1000 * seconds))
     qtbot.wait(10)
     view = window.grid.scene_view  # drawn in an event of its own, which a busy machine may put off
     qtbot.waitUntil(lambda: not (view.is_stale and view.isVisible()), timeout=int(1000 * seconds))

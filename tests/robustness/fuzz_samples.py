@@ -130,25 +130,27 @@ def _recordings(folder: Path, poses: np.ndarray) -> None:
 
 
 def _sessions(folder: Path) -> dict[str, list[Path]]:
-    from gp_labeler.document.opening import new_session
+    from gp_labeler.document.opening import new_specimen
     from gp_labeler.document.specimen_edits import SetNotes, SetThreshold
     from gp_labeler.document.touching import load_skull, load_touches, record_touch
 
     folder.mkdir()
-    session = new_session(folder / "state", specimen="GP-014")
+    from gp_labeler.document.specimen_document import SpecimenDocument
+
+    document = SpecimenDocument(new_specimen(folder / "state", specimen="GP-014"))
     for value in range(5):
-        session.do(SetThreshold(value))
-    session.do(SetNotes("notes"))
-    load_touches(session, folder.parent / "landmarks" / "touches.dat", SIDE)
-    load_skull(session, folder.parent / "landmarks" / "one_L.csv")
-    record_touch(session, "R", "OS", (1, 2, 3))
-    saved = session.save(folder / "GP-014")
-    session.do(SetNotes("more"))
-    session.undo()
-    session.do(SetThreshold(9))
+        document.do(SetThreshold(value))
+    document.do(SetNotes("notes"))
+    load_touches(document, folder.parent / "landmarks" / "touches.dat", SIDE)
+    load_skull(document, folder.parent / "landmarks" / "one_L.csv")
+    record_touch(document, "R", "OS", (1, 2, 3))
+    saved = document.save(folder / "GP-014")
+    document.do(SetNotes("more"))
+    document.undo()
+    document.do(SetThreshold(9))
     (journal,) = (folder / "state" / "journals").glob("*.jsonl")
     shutil.copy(journal, folder / "journal.jsonl")
-    session.close(discard=True)
+    document.close(discard=True)
     (folder / "script.toml").write_text(
         'specimens = ["a"]\n[[step]]\ndo = "open"\npath = "{specimen}.nrrd"\n[[step]]\ndo = "place"\n'
         'feature = "CA"\nside = "L"\nat = [1.0, 2, 3]\n[[step]]\ndo = "save"\n'

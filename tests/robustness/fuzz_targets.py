@@ -28,13 +28,13 @@ from gp_labeler.document.animals import read_animals
 from gp_labeler.document.atlas_memory import AtlasMemory
 from gp_labeler.document.journal import read_journal
 from gp_labeler.document.landmark_import import import_landmarks
-from gp_labeler.document.opening import recover_session
+from gp_labeler.document.opening import recover_specimen
 from gp_labeler.document.recent_files import RecentFiles
 from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.touching import load_skull, load_touches
 from gp_labeler.imaging.readers import inspect_volume, read_volume
-from gp_labeler.models.session import Session
 from gp_labeler.offscreen.script import read_script
 from gp_labeler.views.window_state import WindowState
 
@@ -215,7 +215,7 @@ def _journal(path: Path) -> None:
         (state / "journals" / "unsaved-a.jsonl").write_bytes(path.read_bytes())
     for recovery in find_recoveries(state):
         assert "\n" not in recovery.text
-        recover_session(recovery, state).close(discard=True)
+        SpecimenDocument(recover_specimen(recovery, state)).close(discard=True)
     read_journal(path)
 
 
@@ -249,10 +249,10 @@ def _all() -> Iterator[Target]:
         ("landmarks", read_points),
         ("landmarks", load_specimens),
         ("landmarks", lambda p: gp_core.read_landmarks(p, side="L", unknown="extra")),
-        ("landmarks", lambda p: import_landmarks(Session(), [p], side="L")),
-        ("landmarks", lambda p: load_skull(Session(), p)),
+        ("landmarks", lambda p: import_landmarks(SpecimenDocument(), [p], side="L")),
+        ("landmarks", lambda p: load_skull(SpecimenDocument(), p)),
         ("touches", lambda p: gp_core.read_touches(p, "L", unknown="extra")),
-        ("touches", lambda p: load_touches(Session(), p, "L")),
+        ("touches", lambda p: load_touches(SpecimenDocument(), p, "L")),
         ("animals", load_specimens),
         ("animals", lambda p: read_animals([p])),
         ("atlas", Atlas.load),

@@ -28,8 +28,9 @@ from gp_core import Atlas, load_specimens
 from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_core.io import read_landmarks, write_csv, write_markups
-from gp_labeler.document.opening import new_session, open_session, recover_session
+from gp_labeler.document.opening import new_specimen, open_specimen, recover_specimen
 from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import SetNotes
 from gp_labeler.document.specimen_file import read_specimen
 
@@ -101,14 +102,14 @@ def _edited(state: Path, rng: np.random.Generator, *, saved: Path | None = None)
     """Edit until the kill comes; then all that was confirmed must be offered, and can be gone on with."""
 
     def work(pipe: int) -> None:
-        session = new_session(state, specimen="GP-014")
+        document = SpecimenDocument(new_specimen(state, specimen="GP-014"))
         if saved is not None:
-            session.save(saved)
+            document.save(saved)
         for n in range(10_000):
-            session.do(SetNotes(f"{n} " + "x" * int(rng.integers(2000))))
+            document.do(SetNotes(f"{n} " + "x" * int(rng.integers(2000))))
             os.write(pipe, b"%d\n" % n)
             if saved is not None and n % 7 == 6:
-                session.save()
+                document.save()
 
     said = _killed(work, rng)
     confirmed = int(said[-1]) if said else -1
@@ -120,25 +121,25 @@ def _edited(state: Path, rng: np.random.Generator, *, saved: Path | None = None)
     assert last >= confirmed, f"edit {confirmed} was confirmed, {last} is left"
     for recovery in found:
         assert not recovery.content.damage, recovery.content.damage
-        session = recover_session(recovery, state)
-        session.do(SetNotes("goes on"))
-        session.close(discard=True)
+        document = SpecimenDocument(recover_specimen(recovery, state))
+        document.do(SetNotes("goes on"))
+        document.close(discard=True)
     drafts = [file.name for file in state.rglob("*.tmp*")]
     assert not drafts, f"drafts are left: {drafts}"
     return confirmed + 1
 
 
 def session_killed(folder: Path, rng: np.random.Generator) -> int:
-    """A session that was never saved."""
+    """A document that was never saved."""
     return _edited(folder / "state", rng)
 
 
 def saving_killed(folder: Path, rng: np.random.Generator) -> int:
-    """A session that is saved now and then."""
+    """A document that is saved now and then."""
     saved = folder / "GP-014.gpspecimen.json"
     found = _edited(folder / "state", rng, saved=saved)
     if saved.exists():
-        open_session(saved, folder / "state", unsaved="leave").close()
+        SpecimenDocument(open_specimen(saved, folder / "state", unsaved="leave")).close()
     return found
 
 
@@ -214,17 +215,17 @@ def _small_disk(folder: Path) -> Iterator[Path]:
 
 
 def full_disk_killed(folder: Path, rng: np.random.Generator) -> int:
-    """A session on a disk that fills up, and is killed there; all edits are found, on the full disk too."""
+    """A document on a disk that fills up, and is killed there; all edits are found, on the full disk too."""
     with _small_disk(folder) as disk:
         state = disk / "state"
 
         def work(pipe: int) -> None:
-            session = new_session(state, specimen="GP-014")
+            document = SpecimenDocument(new_specimen(state, specimen="GP-014"))
             with (disk / "rest").open("wb", buffering=0) as rest, contextlib.suppress(OSError):
                 for _ in range(int(rng.integers(300, 600))):
                     rest.write(bytes(4096))
             for n in range(10_000):
-                session.do(SetNotes(f"{n} " + "x" * int(rng.integers(20_000))))
+                document.do(SetNotes(f"{n} " + "x" * int(rng.integers(20_000))))
                 os.write(pipe, b"%d\n" % n)
 
         said = _killed(work, rng)
@@ -233,7 +234,7 @@ def full_disk_killed(folder: Path, rng: np.random.Generator) -> int:
         last = max((int(recovery.state.notes.split()[0]) for recovery in found), default=-1)
         assert confirmed <= last <= confirmed + 1, f"edit {confirmed} was confirmed, {last} is left"
         for recovery in found:
-            recover_session(recovery, folder / "elsewhere").close(discard=True)
+            SpecimenDocument(recover_specimen(recovery, folder / "elsewhere")).close(discard=True)
         return confirmed + 1
 
 
@@ -243,9 +244,9 @@ def read_only_killed(folder: Path, rng: np.random.Generator) -> int:
         state = disk / "state"
 
         def work(pipe: int) -> None:
-            session = new_session(state, specimen="GP-014")
+            document = SpecimenDocument(new_specimen(state, specimen="GP-014"))
             for n in range(30):
-                session.do(SetNotes(f"{n} note"))
+                document.do(SetNotes(f"{n} note"))
                 os.write(pipe, b"%d\n" % n)
             time.sleep(60)
 
@@ -257,9 +258,9 @@ def read_only_killed(folder: Path, rng: np.random.Generator) -> int:
         assert len(found) == 1 or confirmed < 0
         for recovery in found:
             assert int(recovery.state.notes.split()[0] or -1) >= confirmed
-            session = recover_session(recovery, folder / "elsewhere")
-            session.save(folder / "saved")
-            session.close()
+            document = SpecimenDocument(recover_specimen(recovery, folder / "elsewhere"))
+            document.save(folder / "saved")
+            document.close()
         return confirmed + 1
 
 
@@ -291,7 +292,7 @@ def study_killed(folder: Path, rng: np.random.Generator) -> int:
 
 
 def _group(leader: int) -> list[int]:
-    """Return the living processes of a session."""
+    """Return the living processes of a document."""
     found = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
@@ -309,10 +310,10 @@ def window_killed(folder: Path, rng: np.random.Generator) -> int:
         "import sys; from pathlib import Path; from gp_labeler.views.application import make_window\n"
         "from gp_labeler.document.specimen_edits import SetNotes\n"
         "from gp_labeler.document.touching import record_touch\n"
-        "window = make_window(Path(sys.argv[1])); window.show(); session = window.workbench.session\n"
-        "record_touch(session, 'L', 'OS', (1, 2, 3))\n"
+        "window = make_window(Path(sys.argv[1])); window.show(); document = window.workspace.document\n"
+        "record_touch(document, 'L', 'OS', (1, 2, 3))\n"
         "for n in range(10000):\n"
-        "    session.do(SetNotes(f'{n} note')); print(n, flush=True); window.grab()\n"
+        "    document.do(SetNotes(f'{n} note')); print(n, flush=True); window.grab()\n"
     )
     process = subprocess.Popen(
         [sys.executable, "-c", code, str(state)],
@@ -332,7 +333,7 @@ def window_killed(folder: Path, rng: np.random.Generator) -> int:
 
 
 KILLS: dict[str, Callable[[Path, np.random.Generator], int]] = {
-    "session": session_killed,
+    "document": session_killed,
     "saving": saving_killed,
     "export": export_killed,
     "mesh": mesh_killed,

@@ -68,17 +68,19 @@ class UseAtlas(Step):
     keep_doubtful: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        desk = rig.desk
+        workspace = rig.workspace
         if (self.path is None) == (not self.specimens):
             raise GpError("atlas needs path or specimens, one of them")
         if self.specimens:
-            desk.fit_atlas([rig.to_read(each) for each in self.specimens], keep_doubtful=self.keep_doubtful)
+            workspace.atlas.fit(
+                [rig.to_read(each) for each in self.specimens], keep_doubtful=self.keep_doubtful
+            )
         elif self.path == "published":
-            desk.use_published_atlas()
+            workspace.atlas.use_published()
         else:
-            desk.open_atlas(rig.to_read(self.path or ""))
+            workspace.atlas.open(rig.to_read(self.path or ""))
         rig.settle()
-        return f"{len(desk.atlas_specimens)} animals" if desk.atlas_specimens else self.path or ""
+        return f"{len(workspace.atlas.specimens)} animals" if workspace.atlas.specimens else self.path or ""
 
 
 @dataclass(frozen=True)
@@ -98,11 +100,11 @@ class Check(Step):
     strict: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        state = rig.desk.session.state
+        state = rig.workspace.document.state
         sides = {side: state.side(side) for side in Side if state.side(side).placed}
-        measure = rig.desk.scan_evidence
+        measure = rig.workspace.scan.evidence
         scan = None if measure is None else {side: measure(landmarks) for side, landmarks in sides.items()}
-        atlas = rig.desk.atlas or Atlas.published()
+        atlas = rig.workspace.atlas.current or Atlas.published()
         findings = check_specimen(Specimen(state.specimen, sides), atlas, scan=scan)
         doubtful = [finding for finding in findings if finding.is_doubt]
         if self.path is not None:

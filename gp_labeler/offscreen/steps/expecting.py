@@ -70,7 +70,7 @@ class Expect(Step):
         side = self.side or Side.LEFT
         there = rig.placed(side, code)
         if there is None:
-            is_suggested = code in rig.desk.session.landmarks(side).suggested
+            is_suggested = code in rig.workspace.document.landmarks(side).suggested
             word = "only suggested" if is_suggested else "not placed"
             raise GpError(f"{code} {side.word} is {word}", landmark=code)
         if self.near is None:
@@ -85,7 +85,7 @@ class Expect(Step):
 
     def _count(self, rig: Rig, state: str, wanted: int) -> str:
         sides = list(Side) if self.side is None else [self.side]
-        found = [rig.desk.session.progress(side) for side in sides]
+        found = [rig.workspace.labels.progress(side) for side in sides]
         counted = sum(getattr(each, f"n_{state}") for each in found)
         if counted != wanted:
             n_suggested = sum(each.n_suggested for each in found)

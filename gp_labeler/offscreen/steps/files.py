@@ -46,16 +46,16 @@ class Import(Step):
     def run(self, rig: Rig) -> None:  # noqa: D102
         _ = rig.voxel  # a scan must be there
         notes = import_landmarks(
-            rig.desk.session,
+            rig.workspace.document,
             [rig.to_read(file) for file in self.files],
             side=self.side,
             names=self.names,
-            near_bone=rig.desk.near_bone,
+            near_bone=rig.workspace.scan.near_bone,
             accept_misfit=self.accept_misfit,
             replace_placed=not self.keep,
         )
         for note in notes:
-            rig.desk.say(note, "warning")
+            rig.workspace.say(note, "warning")
         rig.settle(in_passing=False)
 
 
@@ -75,9 +75,9 @@ class Reference(Step):
     def run(self, rig: Rig) -> None:  # noqa: D102
         if self.files:
             _ = rig.voxel  # a scan must be there
-            rig.desk.references.show(*[rig.to_read(file) for file in self.files])
+            rig.workspace.references.show(*[rig.to_read(file) for file in self.files])
         else:
-            rig.desk.references.clear()
+            rig.workspace.references.clear()
         rig.settle(in_passing=False)
 
 
@@ -102,7 +102,7 @@ class AddMesh(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         _ = rig.voxel  # a scan must be there
-        name = rig.desk.meshes.add(rig.to_read(self.file), name=self.name, **self.options)
+        name = rig.workspace.meshes.add(rig.to_read(self.file), name=self.name, **self.options)
         rig.settle(in_passing=False)
         return name
 
@@ -122,9 +122,9 @@ class RemoveMesh(Step):
 
     def run(self, rig: Rig) -> None:  # noqa: D102
         if self.name is None:
-            rig.desk.meshes.clear()
+            rig.workspace.meshes.clear()
         else:
-            rig.desk.meshes.remove(self.name)
+            rig.workspace.meshes.remove(self.name)
         rig.settle(in_passing=False)
 
 
@@ -151,7 +151,7 @@ class Export(Step):
     suggested: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        state, folder = rig.desk.session.measured_state, rig.to_write(self.folder)
+        state, folder = rig.workspace.document.measured_state, rig.to_write(self.folder)
         report = export_landmarks(
             state, folder, formats=self.formats, overwrite=True, suggested=self.suggested
         )
@@ -175,9 +175,9 @@ class Save(Step):
     path: str | None = None
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        session = rig.desk.session
-        file = rig.to_write(self.path or f"{session.state.specimen}{SUFFIX}")
-        return rig.wrote(session.save(file, overwrite=True))
+        document = rig.workspace.document
+        file = rig.to_write(self.path or f"{document.state.specimen}{SUFFIX}")
+        return rig.wrote(document.save(file, overwrite=True))
 
 
 @dataclass(frozen=True)
@@ -203,6 +203,6 @@ class Details(Step):
         if self.name is None and self.notes is None:
             raise GpError("specimen needs name or notes")
         if self.name is not None:
-            rig.desk.session.do(RenameSpecimen(self.name))
+            rig.workspace.document.do(RenameSpecimen(self.name))
         if self.notes is not None:
-            rig.desk.session.do(SetNotes(self.notes), merge=self.more)
+            rig.workspace.document.do(SetNotes(self.notes), merge=self.more)

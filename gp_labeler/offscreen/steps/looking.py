@@ -112,7 +112,7 @@ class Look(Step):
 
     def run(self, rig: Rig) -> None:  # noqa: D102
         self._set_window(rig)
-        rig.desk.session.view.update(**self._shown())
+        rig.workspace.view.update(**self._shown())
         if self.reset:
             rig.window.grid.reset()
         if isinstance(self.camera, str):
@@ -152,33 +152,33 @@ class Look(Step):
             _check(self.panel, "panel", tuple(rig.window.steps))
             rig.window.set_step(self.panel)
         if self.layout is not None:
-            rig.desk.session.view.update(layout=self.layout)
+            rig.workspace.view.update(layout=self.layout)
         rig.app.processEvents()  # sizes are known from here on
 
     def _go(self, rig: Rig) -> None:
         if isinstance(self.go_to, str):
             code, _, side = self.go_to.partition(" ")
-            rig.desk.go_to(Side.parse(side or "L"), code)
+            rig.workspace.labels.go_to(Side.parse(side or "L"), code)
         elif self.go_to is not None:
             rig.bring(np.array(self.go_to))
-        crosshair = np.array(rig.desk.session.crosshair)
+        crosshair = np.array(rig.workspace.view.crosshair)
         for plane in Plane:
             position = getattr(self, plane.value)
             if position is not None:
                 crosshair[plane.axis] = position
-        rig.desk.session.set_crosshair(crosshair)
+        rig.workspace.view.set_crosshair(crosshair)
 
     def _magnify(self, rig: Rig, factor: float) -> None:
         if factor <= 0:
             raise GpError(f"zoom must be above 0, got {factor:g}")
         camera = rig.scene.scene.camera
         if self.go_to is not None:
-            camera.focus_on(rig.desk.session.crosshair)
+            camera.focus_on(rig.workspace.view.crosshair)
         camera.zoom(factor)
         rig.scene.redraw()
         for view in rig.window.grid.slice_views.values():
             if view.shown is not None:
-                view.shown = view.shown.centred(rig.desk.session.crosshair).zoomed(factor)
+                view.shown = view.shown.centred(rig.workspace.view.crosshair).zoomed(factor)
                 view.update()
 
 
@@ -264,8 +264,8 @@ class Act(Step):
     files: tuple[str, ...] = ()
 
     def run(self, rig: Rig) -> None:  # noqa: D102
-        if not action(self.id).enabled(rig.desk):
-            raise GpError(f"{self.id} cannot be done now: {rig.desk.session.click_text}")
+        if not action(self.id).enabled(rig.workspace):
+            raise GpError(f"{self.id} cannot be done now: {rig.workspace.labels.click_text}")
         saves = [rig.to_write(file) for file in self.files]
         rig.prompts.prepare([rig.to_read(file) for file in self.files], self.answers, saves)
         since = len(rig.messages)
@@ -291,7 +291,7 @@ class Undo(Step):
     def run(self, rig: Rig) -> str:  # noqa: D102
         undone = []
         for _ in range(self.times):
-            text = rig.desk.session.undo_text
+            text = rig.workspace.document.undo_text
             if text is None:
                 raise GpError("there is nothing to undo")
             undone.append(text)

@@ -14,7 +14,6 @@ from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import PlacePoint, SuggestPoints
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
 from gp_labeler.offscreen.aiming import aim_at_bone, scroll_to
 from gp_labeler.offscreen.events import click, drag, press_keys
 from gp_labeler.offscreen.rig import VIEWS, Rig
@@ -63,13 +62,13 @@ class Place(Step):
         if (self.at is None) == (self.pixel is None):
             raise GpError("place needs at or pixel, one of them", landmark=code)
         _ = rig.voxel
-        before, since = rig.desk.session.state, len(rig.messages)
+        before, since = rig.workspace.document.state, len(rig.messages)
         rig.choose(self.side, code)
         if self.at != "ghost" and rig.shown_at(self.side, code) is not None:
-            rig.desk.arm_replacing()  # a click alone leaves a point where it is
+            rig.workspace.interaction.arm_replacing()  # a click alone leaves a point where it is
         name = self._hit(rig, code)
         rig.settle(in_passing=False)
-        if rig.desk.session.state is before:
+        if rig.workspace.document.state is before:
             why = " ".join(text for text, _ in rig.messages[since:]) or "nothing was hit"
             raise GpError(f"{code} {self.side.word} was not placed: {why}", landmark=code)
         return self._result(rig, code, name)
@@ -97,7 +96,7 @@ class Place(Step):
             if self.at != "truth":
                 raise GpError(f"at must be truth, ghost, crosshair or a position, got {self.at!r}")
             return rig.truth(self.side, code)
-        aim, volume = np.array(self.at, dtype=np.float64), rig.desk.volume
+        aim, volume = np.array(self.at, dtype=np.float64), rig.workspace.scan.volume
         if volume is not None and not volume.contains(aim[None])[0]:
             low, high = volume.extent
             reach = ", ".join(f"{a:.4g} to {b:.4g}" for a, b in zip(low, high, strict=True))
@@ -166,13 +165,13 @@ class Put(Step):
         _ = rig.voxel  # a scan must be there
         code, how = feature(self.feature).code, _how(self.how)
         rig.choose(self.side, code)
-        session = rig.desk.session
+        document, labels = rig.workspace.document, rig.workspace.labels
         if self.nudge:
             how = How.NUDGED if how is How.GHOST else how
-            found = labelling.provenance(session, how)
-            session.do(PlacePoint(self.side, code, self.at, found, verb="nudge"), merge=True)
+            found = document.provenance(how)
+            document.do(PlacePoint(self.side, code, self.at, found, verb="nudge"), merge=True)
         else:
-            labelling.place(session, self.at, how, side=self.side, code=code)
+            labels.place(self.at, how, side=self.side, code=code)
         rig.settle(in_passing=False)
 
 
@@ -208,15 +207,15 @@ class Suggest(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         _ = rig.voxel  # a scan must be there
-        session = rig.desk.session
+        document, labels = rig.workspace.document, rig.workspace.labels
         radii = {feature(code).code: radius for code, radius in self.radii.items()}
         suggestions = {
             code: Suggestion(at, radii.get(feature(code).code), self.source)
             for code, at in self.points.items()
         }
-        session.do(SuggestPoints(self.side, suggestions, labelling.provenance(session, How.GHOST)))
+        document.do(SuggestPoints(self.side, suggestions, document.provenance(How.GHOST)))
         rig.settle(in_passing=False)
-        return f"{session.progress(self.side).n_suggested} suggested"
+        return f"{labels.progress(self.side).n_suggested} suggested"
 
 
 @dataclass(frozen=True)
@@ -249,7 +248,7 @@ class Confirm(Step):
         if off is not None and self.within is not None and off > self.within:
             return self._refuse(rig, code, off)
         for _ in range(_MOST_LOOKS):
-            if rig.desk.session.state.landmark(self.side, code).settled:
+            if rig.workspace.document.state.landmark(self.side, code).settled:
                 break
             rig.window.commands.run("point.confirm")
             rig.settle(in_passing=False)
@@ -259,7 +258,7 @@ class Confirm(Step):
 
     def _off(self, rig: Rig, code: str) -> float:
         """Return how far it is suggested from its true place, mm."""
-        where = labelling.place_of(rig.desk.session, self.side, code)
+        where = rig.workspace.labels.place_of(self.side, code)
         if where is None:
             raise GpError(f"{code} {self.side.word} has no suggestion to confirm", landmark=code)
         return float(np.linalg.norm(where - rig.truth(self.side, code)))

@@ -131,11 +131,11 @@ class Estimate(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         self._take_atlas(rig)
-        there = any(side is self.side for side, _ in rig.desk.session.state.touches)
+        there = any(side is self.side for side, _ in rig.workspace.document.state.touches)
         points = self.touches if self.touches is not None or there else "simulated"
         if points is not None:
             Touches(self.side, points, features=self.features, noise=self.noise, seed=self.seed).run(rig)
-        rig.desk.pose.choose(
+        rig.workspace.pose.choose(
             side=self.side,
             methods=self.method,
             probe_noise=self.probe_noise,
@@ -143,8 +143,8 @@ class Estimate(Step):
             round_window=self.round_window,
         )
         estimate = current_estimate(rig, self.side)
-        if self.take_best and (taken := rig.desk.pose.take_likelier()) is not None:
-            rig.desk.say(f"Taken as {taken.label}, which is likelier than what was given", "warning")
+        if self.take_best and (taken := rig.workspace.pose.take_likelier()) is not None:
+            rig.workspace.say(f"Taken as {taken.label}, which is likelier than what was given", "warning")
             estimate = current_estimate(rig, taken.side)
         for method in self.method:
             if method not in estimate.poses:
@@ -153,11 +153,11 @@ class Estimate(Step):
         assert pose is not None
         for method in self.method:
             for warning in estimate.poses[method].warnings:
-                rig.desk.say(f"{method}: {warning}", "warning")
+                rig.workspace.say(f"{method}: {warning}", "warning")
         side = estimate.side
         rig.poses[side] = Estimated(estimate, pose, _truth(rig, side))
         files = [
-            rig.desk.pose.export(rig.to_write(path), accept_warnings=self.accept_warnings)
+            rig.workspace.pose.export(rig.to_write(path), accept_warnings=self.accept_warnings)
             for path in self.path
         ]
         return _told(rig.poses[side], rig.wrote(*files))
@@ -165,10 +165,12 @@ class Estimate(Step):
     def _take_atlas(self, rig: Rig) -> None:
         if self.specimens:
             animals = load_specimens([rig.to_read(each) for each in self.specimens])
-            rig.desk.use_atlas(fit_atlas(animals), animals)
+            rig.workspace.atlas.use(fit_atlas(animals), animals)
         elif self.atlas is not None:
             is_published = self.atlas == "published"
-            rig.desk.use_atlas(Atlas.published() if is_published else Atlas.load(rig.to_read(self.atlas)))
+            rig.workspace.atlas.use(
+                Atlas.published() if is_published else Atlas.load(rig.to_read(self.atlas))
+            )
 
 
 def _told(estimated: Estimated, files: str) -> str:
@@ -180,7 +182,7 @@ def _told(estimated: Estimated, files: str) -> str:
 
 
 def _truth(rig: Rig, side: Side) -> tuple[FloatArray, FloatArray] | None:
-    if rig.desk.truth is None:
+    if rig.workspace.scan.truth is None:
         return None
     ca, cb, co = (rig.truth(side, code) for code in ("CA", "CB", "CO"))
     return co, modiolar_axis(ca, cb)
@@ -215,7 +217,7 @@ class CarryPath(Step):
     save: str | None = None
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        pose = rig.desk.pose
+        pose = rig.workspace.pose
         if self.path is None and self.save is None:
             raise GpError("path needs path, or save")
         if self.path is not None:
@@ -251,10 +253,10 @@ class Overlay(Step):
     opacity: float | None = None
 
     def run(self, rig: Rig) -> None:  # noqa: D102
-        desk, options = rig.desk, self._options()
+        workspace, options = rig.workspace, self._options()
         if self.visible:
             self._find(rig)
-        desk.pose.draw(visible=self.visible, **options)
+        workspace.pose.draw(visible=self.visible, **options)
         rig.app.processEvents()
 
     def _options(self) -> dict[str, Any]:
@@ -268,7 +270,7 @@ class Overlay(Step):
 
     def _find(self, rig: Rig) -> None:
         """Choose what is drawn, and bring it into sight."""
-        placed = current_estimate(rig, self.side or rig.desk.pose.side).in_scan()
+        placed = current_estimate(rig, self.side or rig.workspace.pose.side).in_scan()
         if placed is None:
             raise GpError(
                 "nothing says where the touches lie in the scan",
@@ -302,7 +304,7 @@ class Verdict(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         current_estimate(rig, self.side)
-        check = rig.desk.pose.estimating.judge(self.verdict, by=self.by, note=self.note)
+        check = rig.workspace.pose.judge(self.verdict, by=self.by, note=self.note)
         return f"{check.verdict} by {check.by}"
 
 
@@ -327,7 +329,7 @@ class Report(Step):
         current_estimate(rig, self.side)
         for view in rig.window.grid.views:
             leave(view)
-        pose, was_drawn = rig.desk.pose, rig.desk.pose.overlay.visible
+        pose, was_drawn = rig.workspace.pose, rig.workspace.pose.overlay.visible
         pose.draw(visible=True)  # its pictures show it
         file = save_report(report_of(rig.window), rig.to_write(self.path))
         pose.draw(visible=was_drawn)

@@ -66,20 +66,22 @@ class Open(Step):
     def run(self, rig: Rig) -> str:  # noqa: D102
         if [self.path is not None, self.phantom is not None, self.empty].count(True) != 1:
             raise GpError("open needs a path, phantom = a seed, or empty = true: one of them")
-        if rig.desk.session.dirty and not self.discard:
+        if rig.workspace.document.dirty and not self.discard:
             raise GpError(
                 "what is open has edits that are not saved",
                 remedy="Let a save step come first, or give discard = true.",
             )
-        rig.desk.abandon()
+        rig.workspace.document.abandon()
         if self.empty:
             return self._begin(rig)
         if self.phantom is not None:
-            rig.desk.open_demo(self.phantom, self.spacing if isinstance(self.spacing, float) else 0.2)
+            rig.workspace.scan.open_demo(
+                self.phantom, self.spacing if isinstance(self.spacing, float) else 0.2
+            )
         else:
             self._open(rig, rig.to_read(self.path or ""))
         rig.settle()
-        volume = rig.desk.volume
+        volume = rig.workspace.scan.volume
         if volume is None:
             raise GpError(rig.trouble(0) or "no scan was opened")
         if self.labels is not None:
@@ -88,25 +90,25 @@ class Open(Step):
 
     def _begin(self, rig: Rig) -> str:
         if self.labels is None:
-            rig.desk.begin()
+            rig.workspace.document.begin()
         else:
-            rig.desk.open_specimen(rig.to_read(self.labels))
+            rig.workspace.open_specimen(rig.to_read(self.labels))
         rig.settle()
-        return f"{rig.desk.session.state.specimen}, without a scan"
+        return f"{rig.workspace.document.state.specimen}, without a scan"
 
     def _open(self, rig: Rig, path: Path) -> None:
         if not path.exists():
             raise GpError("does not exist", file=path)
         if path.name.endswith(SUFFIX):
-            rig.desk.open_specimen(path)
+            rig.workspace.open_specimen(path)
             return
         plan = inspect_volume(path, **self._options(rig))
         if plan.errors:
             text = " ".join(f"{problem.text}. {problem.remedy} [{problem.code}]" for problem in plan.errors)
             raise GpError(text, file=path)
         for problem in plan.problems:
-            rig.desk.say(problem.text, "warning")
-        rig.desk.read_scan(plan)
+            rig.workspace.say(problem.text, "warning")
+        rig.workspace.scan.read(plan)
 
     def _options(self, rig: Rig) -> dict[str, Any]:
         spacing = rig.spacing if self.spacing is None else self.spacing
@@ -117,19 +119,19 @@ class Open(Step):
 
 def _take_labels(rig: Rig, file: Path) -> None:
     """Lay what a specimen file holds onto the scan that is open, wherever that scan was then."""
-    desk, truth, since = rig.desk, rig.desk.truth, len(rig.messages)
-    volume = desk.volume
+    workspace, truth, since = rig.workspace, rig.workspace.scan.truth, len(rig.messages)
+    volume = workspace.scan.volume
     assert volume is not None
-    desk.open_specimen(file)
-    for task in desk.jobs.running:
+    workspace.open_specimen(file)
+    for task in workspace.jobs.running:
         if task.key == "open":
             task.cancel()  # the scan need not be read once more
     del rig.messages[since:]
-    reference = desk.session.state.volume
+    reference = workspace.document.state.volume
     if reference is not None and (differences := reference.differences(VolumeReference.of(volume))):
         raise GpError(f"belongs to another scan: {'; '.join(differences)}", file=file)
-    desk.accept_scan(volume)
-    desk.truth = truth
+    workspace.scan.accept(volume)
+    workspace.scan.truth = truth
     rig.settle()
 
 
@@ -167,7 +169,7 @@ class Threshold(Step):
 
     def run(self, rig: Rig) -> None:  # noqa: D102
         _ = rig.voxel  # a scan must be there
-        rig.desk.set_threshold(self.value)
+        rig.workspace.scan.set_threshold(self.value)
         rig.settle()
 
 
@@ -189,10 +191,10 @@ class Mesh(Step):
 
     def run(self, rig: Rig) -> str:  # noqa: D102
         _ = rig.voxel
-        rig.desk.mesh_ears(self.half_mm)
+        rig.workspace.bone.mesh_ears(self.half_mm)
         if self.save is not None:
             file = rig.to_write(self.save)
-            rig.desk.save_mesh(file)
+            rig.workspace.bone.save_mesh(file)
             rig.wrote(file)
         rig.settle()
-        return f"{sum(part.n_triangles for part in rig.desk.surfaces)} triangles"
+        return f"{sum(part.n_triangles for part in rig.workspace.bone.surfaces)} triangles"

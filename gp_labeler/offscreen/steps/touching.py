@@ -84,14 +84,14 @@ class Touches(Step):
     clear: bool = False
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        session = rig.desk.session
+        document = rig.workspace.document
         edits = (self.leave_out, self.take_in, self.forget, self.swap, self.other_side, self.clear)
         if self.points is None and not any(edits):
             raise GpError("touches needs points, leave_out, take_in, forget, swap, other_side or clear")
         if len(self.swap) not in (0, 2):
             raise GpError(f"touches: swap must be two names, got {' '.join(self.swap)}")
         if self.clear:
-            touching.clear_touches(session, self.side)
+            touching.clear_touches(document, self.side)
         if isinstance(self.points, Mapping):
             self._type(rig, self.points)
         elif self.points is not None:
@@ -99,17 +99,17 @@ class Touches(Step):
                 rig, self.side, self.points, features=self.features, noise=self.noise, seed=self.seed
             )
         if self.swap:
-            touching.swap_touches(session, self.side, *self.swap)
+            touching.swap_touches(document, self.side, *self.swap)
         for name in self.forget:
-            touching.clear_touches(session, self.side, touch_name(name))
+            touching.clear_touches(document, self.side, touch_name(name))
         for names, left_out in ((self.leave_out, True), (self.take_in, False)):
             for name in names:
-                touching.leave_out(session, self.side, touch_name(name), left_out)
+                touching.leave_out(document, self.side, touch_name(name), left_out)
         side = self.side.other if self.other_side else self.side
         if self.other_side:
-            touching.move_touches(session, self.side)
-        rig.desk.pose.choose(side=side)
-        there = [name for of, name in session.state.touches if of is side]
+            touching.move_touches(document, self.side)
+        rig.workspace.pose.choose(side=side)
+        there = [name for of, name in document.state.touches if of is side]
         return f"{len(there)} touched: {' '.join(there)}" if there else "nothing touched"
 
     def _type(self, rig: Rig, points: Points) -> None:
@@ -117,30 +117,30 @@ class Touches(Step):
         allowed = [how.value for how in TouchHow]
         if self.how not in allowed:
             raise GpError(f"how must be one of {', '.join(allowed)}, got {self.how!r}")
-        session = rig.desk.session
+        document = rig.workspace.document
         touches = {
             name: Touch(
-                position, TouchHow(self.how), session.now(), session.author, self.source, self.n_samples,
+                position, TouchHow(self.how), document.now(), document.author, self.source, self.n_samples,
                 self.spread_mm,
             )
             for name, position in points.items()
         }  # fmt: skip
         if not self.add:
-            session.do(TakeTouches(self.side, touches))
+            document.do(TakeTouches(self.side, touches))
             return
         for name, touch in touches.items():
-            session.do(RecordTouch(self.side, name, touch))
+            document.do(RecordTouch(self.side, name, touch))
 
 
 def take_touches(
     rig: Rig, side: Side, points: str, *, features: tuple[str, ...], noise: float, seed: int
 ) -> None:
     """Take the touches of a file, or ``simulated`` ones; the arguments are those of `Touches`."""
-    session = rig.desk.session
+    document = rig.workspace.document
     if points != "simulated":
-        for text in touching.load_touches(session, rig.to_read(points), side):
-            rig.desk.say(text, "warning")
-        rig.desk.pose.estimating.know_registration(side, None)
+        for text in touching.load_touches(document, rig.to_read(points), side):
+            rig.workspace.say(text, "warning")
+        rig.workspace.pose.set_registration(side, None)
         return
     rng = np.random.default_rng(seed)
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
@@ -151,18 +151,18 @@ def take_touches(
     for name in map(touch_name, features):
         x, y, z = T_tracker_scan.apply(_there(rig, side, name)[None])[0] + rng.normal(0, noise, 3)
         where = (float(x), float(y), float(z))
-        touches[name] = Touch(where, TouchHow.SIMULATED, session.now(), session.author)
-    session.do(TakeTouches(side, touches))
-    rig.desk.pose.estimating.know_registration(side, T_tracker_scan.inverse())
+        touches[name] = Touch(where, TouchHow.SIMULATED, document.now(), document.author)
+    document.do(TakeTouches(side, touches))
+    rig.workspace.pose.set_registration(side, T_tracker_scan.inverse())
 
 
 def _there(rig: Rig, side: Side, name: str) -> FloatArray:
     """Return where a simulated probe touches, (3,) mm, scan frame."""
     if name not in CODES:
-        if name not in rig.desk.session.state.skull:
+        if name not in rig.workspace.document.state.skull:
             raise GpError(f"nothing says where {name} is on the scan", landmark=name)
-        return np.array(rig.desk.session.state.skull[name])
-    there = rig.truth(side, name) if rig.desk.truth else rig.placed(side, name)
+        return np.array(rig.workspace.document.state.skull[name])
+    there = rig.truth(side, name) if rig.workspace.scan.truth else rig.placed(side, name)
     if there is None:
         raise GpError(f"{name} {side.word} is not placed, so it cannot be touched", landmark=name)
     return there
@@ -182,12 +182,12 @@ class Skull(Step):
     points: str | Points
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        session = rig.desk.session
+        document = rig.workspace.document
         if isinstance(self.points, Mapping):
-            session.do(SetSkull(self.points))
+            document.do(SetSkull(self.points))
         else:
-            touching.load_skull(session, rig.to_read(self.points))
-        return f"{len(session.state.skull)} skull features"
+            touching.load_skull(document, rig.to_read(self.points))
+        return f"{len(document.state.skull)} skull features"
 
 
 @dataclass(frozen=True)
@@ -215,9 +215,9 @@ class Register(Step):
     path: str | None = None
 
     def run(self, rig: Rig) -> str:  # noqa: D102
-        pose = rig.desk.pose
+        pose = rig.workspace.pose
         pose.choose(side=self.side, registration=self.by)
-        pose.estimating.know_registration(self.side, None)
+        pose.set_registration(self.side, None)
         estimate = current_estimate(rig, self.side)
         registered = estimate.registered
         if registered is None:
@@ -228,7 +228,7 @@ class Register(Step):
             write_text(file, json.dumps(found.as_dict(), indent=1) + "\n")
             rig.wrote(file)
         for text in () if found is None else found.warnings:
-            rig.desk.say(text, "warning")
+            rig.workspace.say(text, "warning")
         fre = registered.fre_mm
         if self.within is not None and fre is not None and fre > self.within:
             raise GpError(f"fiducial registration error {fre:.3f} mm, allowed are {self.within:g}")
@@ -238,10 +238,10 @@ class Register(Step):
 def current_estimate(rig: Rig, side: Side) -> Estimate:
     """Return the estimate of a side as it stands; raises `GpError` where there is none."""
     rig.settle()  # the atlas may still be loading
-    rig.desk.pose.choose(side=side)
-    estimate = rig.desk.pose.estimate
+    rig.workspace.pose.choose(side=side)
+    estimate = rig.workspace.pose.estimate
     if estimate is None:
-        waiting = rig.desk.pose.estimating.waiting_text or "there is no estimate"
+        waiting = rig.workspace.pose.waiting_text or "there is no estimate"
         raise GpError(f"{side.word}: {waiting}", remedy="Let a touches step come first.")
     return estimate
 

@@ -1,1 +1,1 @@
-"""Panels beside the views, and dialogs: each shows one thing of a `Workbench`, and passes on clicks."""
+"""Panels beside the views, and dialogs: each shows one thing of a `Workspace`, and passes on clicks."""

@@ -20,7 +20,7 @@ from gp_core.atlas.label_check import Finding
 from gp_labeler.document.animals import Animals
 from gp_labeler.jobs.atlas import FEWEST_ANIMALS, FitAtlas
 from gp_labeler.jobs.runner import Task
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.atlas_table import AtlasTable
@@ -40,7 +40,7 @@ class AtlasPanel(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose atlas it shows and changes.
     actions : object, optional
         Not needed here; all panels are made alike.
@@ -51,12 +51,12 @@ class AtlasPanel(QWidget):
     animal_asked = Signal(object)
     """A `Finding` whose animal the user wants to see."""
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
-        self.which, self.own = AtlasCard(workbench), OwnCard(workbench)
-        self.trial, self.labels = TrialCard(workbench), LabelsCard(workbench)
+        self.which, self.own = AtlasCard(workspace), OwnCard(workspace)
+        self.trial, self.labels = TrialCard(workspace), LabelsCard(workspace)
         for asking in (self.which, self.own, self.trial):
             asking.asked.connect(self.asked)
         self.own.animal_asked.connect(self.animal_asked)
@@ -118,9 +118,9 @@ class _AskingCard(Card):
 class AtlasCard(_AskingCard):
     """Which atlas is in use."""
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         super().__init__("Atlas in use")
-        self._desk = workbench
+        self._workspace = workspace
         self.name, self.facts = ElidedLabel("", "title"), Facts()
         self.add(self.name)
         self.add(self.facts)
@@ -132,29 +132,33 @@ class AtlasCard(_AskingCard):
         self.notices = Notices()
         self.add(self.notices)
         self.add(row)
-        for signal in (workbench.atlas_changed, workbench.atlas_details_changed, workbench.session_replaced):
+        for signal in (workspace.atlas.changed, workspace.atlas.details_changed, workspace.document.reset):
             follow(self, signal, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show which it is."""
-        desk, atlas = self._desk, self._desk.atlas
-        self.name.set_words(_title(desk))
-        self.published.setEnabled(not desk.is_published_atlas or bool(desk.atlas_problem))
+        workspace, atlas = self._workspace, self._workspace.atlas.current
+        self.name.set_words(_title(workspace))
+        self.published.setEnabled(not workspace.atlas.is_published or bool(workspace.atlas.problem))
         remedy = "Choose another, or press Published and it is forgotten."
-        self.notices.show_notices([("warning", desk.atlas_problem, remedy)] if desk.atlas_problem else [])
+        self.notices.show_notices(
+            [("warning", workspace.atlas.problem, remedy)] if workspace.atlas.problem else []
+        )
         self.save.setEnabled(atlas is not None)
         if atlas is None:
             self.facts.show_facts({})
             return
-        facts = {"Source": _source(desk)}
-        if _made_from(desk) != atlas.name:
-            facts["Made from"] = _made_from(desk)
+        facts = {"Source": _source(workspace)}
+        if _made_from(workspace) != atlas.name:
+            facts["Made from"] = _made_from(workspace)
         facts["Features"] = f"{len(atlas.codes)} of 19"
-        if desk.atlas_file is not None:
-            facts["File"] = desk.atlas_file.name
-        if desk.is_held_out:
-            facts["Here"] = f"{desk.session.state.specimen} is one of them, and is held against the others"
+        if workspace.atlas.file is not None:
+            facts["File"] = workspace.atlas.file.name
+        if workspace.atlas.is_held_out:
+            facts["Here"] = (
+                f"{workspace.document.state.specimen} is one of them, and is held against the others"
+            )
         self.facts.show_facts(facts)
 
 
@@ -165,24 +169,24 @@ _BUTTONS = {
 }
 
 
-def _title(desk: Workbench) -> str:
-    atlas = desk.atlas
+def _title(workspace: Workspace) -> str:
+    atlas = workspace.atlas.current
     if atlas is None:
         return "It is being loaded…"
-    return "The published atlas" if desk.is_published_atlas else atlas.name
+    return "The published atlas" if workspace.atlas.is_published else atlas.name
 
 
-def _source(desk: Workbench) -> str:
-    if desk.is_published_atlas:
+def _source(workspace: Workspace) -> str:
+    if workspace.atlas.is_published:
         return "Distances published by Usevitch et al. 2021"
-    return "Fitted here" if desk.animals is not None else "An atlas file"
+    return "Fitted here" if workspace.atlas.animals is not None else "An atlas file"
 
 
-def _made_from(desk: Workbench) -> str:
-    atlas = desk.atlas
+def _made_from(workspace: Workspace) -> str:
+    atlas = workspace.atlas.current
     assert atlas is not None
     sides = f"{atlas.n_samples} side{'' if atlas.n_samples == 1 else 's'}"
-    if desk.is_published_atlas:
+    if workspace.atlas.is_published:
         return f"11 animals, {sides}"
     n = len(atlas.specimens)
     return f"{n} animal{'' if n == 1 else 's'}, {sides}" if n else sides
@@ -194,9 +198,9 @@ class OwnCard(_AskingCard):
     animal_asked = Signal(object)
     """A `Finding` whose animal the user wants to see."""
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         super().__init__("Fit to labelled animals")
-        self._desk = workbench
+        self._workspace = workspace
         hint = "Specimens saved here, or landmarks exported from here or from 3D Slicer."
         self.add(text_label(hint, "hint", wrap=True))
         row = QHBoxLayout()
@@ -217,20 +221,22 @@ class OwnCard(_AskingCard):
         self.findings = FindingList()
         self.findings.chosen.connect(self.animal_asked)
         self.add(self.findings)
-        for signal in (workbench.atlas_changed, workbench.atlas_details_changed):
+        for signal in (workspace.atlas.changed, workspace.atlas.details_changed):
             follow(self, signal, self.refresh)
-        for signal in (workbench.jobs.started, workbench.jobs.progressed):
+        for signal in (workspace.jobs.started, workspace.jobs.progressed):
             follow(self, signal, self._on_progress)
-        for signal in (workbench.jobs.done, workbench.jobs.failed, workbench.jobs.cancelled):
+        for signal in (workspace.jobs.done, workspace.jobs.failed, workspace.jobs.cancelled):
             follow(self, signal, self._on_end)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show what was read."""
-        animals = self._desk.animals
+        animals = self._workspace.atlas.animals
         with blocked(self.keep_doubtful):
-            self.keep_doubtful.setChecked(self._desk.keep_doubtful)
-        self.findings.show_rows([] if animals is None else _findings(animals, self._desk.keeps_doubtful))
+            self.keep_doubtful.setChecked(self._workspace.atlas.keep_doubtful)
+        self.findings.show_rows(
+            [] if animals is None else _findings(animals, self._workspace.atlas.keeps_doubtful)
+        )
 
     def _add_progress(self) -> None:
         self.progress, self.stop = QProgressBar(), QPushButton("Stop")
@@ -253,13 +259,13 @@ class OwnCard(_AskingCard):
             self.progress.setValue(round(100 * task.fraction))
 
     def _on_end(self, _: Task[Any]) -> None:
-        self._work.setVisible(any(isinstance(task.job, FitAtlas) for task in self._desk.jobs.running))
+        self._work.setVisible(any(isinstance(task.job, FitAtlas) for task in self._workspace.jobs.running))
 
     def _keep_doubtful(self, keep: bool) -> None:
-        self._desk.set_keep_doubtful(keep)
+        self._workspace.atlas.set_keep_doubtful(keep)
 
     def _stop(self) -> None:
-        for task in self._desk.jobs.running:
+        for task in self._workspace.jobs.running:
             if isinstance(task.job, FitAtlas):
                 task.cancel()
 
@@ -290,19 +296,19 @@ def _findings(animals: Animals, kept: bool) -> list[FindingRow]:
 class LabelsCard(Card):
     """How much each feature varies, and how well the labels of this specimen fit."""
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         super().__init__("Features")
-        self._desk = workbench
+        self._workspace = workspace
         self.verdict = text_label("", "hint", wrap=True)
-        self.table = AtlasTable(workbench)
+        self.table = AtlasTable(workspace)
         self.add(self.verdict)
         self.add(self.table)
         for signal in (
-            workbench.atlas_changed,
-            workbench.judged,
-            workbench.doubts_changed,
-            workbench.landmarks_changed,
-            workbench.session_replaced,
+            workspace.atlas.changed,
+            workspace.labels.checked,
+            workspace.labels.doubts_changed,
+            workspace.document.landmarks_changed,
+            workspace.document.reset,
         ):
             follow(self, signal, self.refresh)
         self.refresh()
@@ -326,9 +332,9 @@ class LabelsCard(Card):
 class TrialCard(_AskingCard):
     """Leave-one-out: how well each animal's cochlea is found from the others."""
 
-    def __init__(self, workbench: Workbench) -> None:
+    def __init__(self, workspace: Workspace) -> None:
         super().__init__("Leave-one-out")
-        self._desk = workbench
+        self._workspace = workspace
         self.words = text_label("", "hint", wrap=True)
         self.add(self.words)
         self._table = QWidget()
@@ -344,13 +350,13 @@ class TrialCard(_AskingCard):
             row, "atlas.try", "Run leave-one-out", "On the animals the atlas is fitted to"
         )
         self.add(row)
-        for signal in (workbench.atlas_changed, workbench.atlas_details_changed):
+        for signal in (workspace.atlas.changed, workspace.atlas.details_changed):
             follow(self, signal, self.refresh)
         for signal in (
-            workbench.jobs.started,
-            workbench.jobs.done,
-            workbench.jobs.failed,
-            workbench.jobs.cancelled,
+            workspace.jobs.started,
+            workspace.jobs.done,
+            workspace.jobs.failed,
+            workspace.jobs.cancelled,
         ):
             follow(self, signal, self._on_jobs)
         self.refresh()
@@ -358,7 +364,7 @@ class TrialCard(_AskingCard):
     @property
     def figures(self) -> list[list[str]]:
         """What the table shows, a list for each method."""
-        trial = self._desk.trial
+        trial = self._workspace.atlas.trial
         if trial is None:
             return []
         return [
@@ -368,7 +374,7 @@ class TrialCard(_AskingCard):
 
     def refresh(self, *_: object) -> None:
         """Show the errors, or what it takes to find them."""
-        trial = self._desk.trial
+        trial = self._workspace.atlas.trial
         emptied(self._grid)
         skipped = () if trial is None else trial.skipped
         self.findings.show_rows([FindingRow(f"Left out: {each.text}") for each in skipped])
@@ -386,8 +392,8 @@ class TrialCard(_AskingCard):
             self._grid.setColumnStretch(column, 1)
 
     def _sentence(self) -> str:
-        desk, trial = self._desk, self._desk.trial
-        if not desk.can_try_atlas:
+        workspace, trial = self._workspace, self._workspace.atlas.trial
+        if not workspace.atlas.can_try:
             least = f"Fit to {FEWEST_ANIMALS} labelled animals or more"
             return f"{least} to see how well each is found from the rest."
         if trial is None:
@@ -399,8 +405,8 @@ class TrialCard(_AskingCard):
         )
 
     def _on_jobs(self, *_: object) -> None:
-        running = any(task.key == "atlas trial" for task in self._desk.jobs.running)
-        self.run.setEnabled(self._desk.can_try_atlas and not running)
+        running = any(task.key == "atlas trial" for task in self._workspace.jobs.running)
+        self.run.setEnabled(self._workspace.atlas.can_try and not running)
         self.run.setText("Running…" if running else "Run leave-one-out")
 
 

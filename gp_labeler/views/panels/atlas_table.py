@@ -22,7 +22,7 @@ from gp_core.atlas.label_check import Departure
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
 from gp_labeler.models.workflow import PointState
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
@@ -50,13 +50,13 @@ class AtlasModel(QAbstractTableModel):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose atlas and labels it shows.
     """
 
-    def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._desk = workbench
+        self._workspace = workspace
         self.codes: tuple[str, ...] = ()
         self._sd: dict[str, float] = {}
         self._away: dict[Side, Mapping[str, Departure]] = {}
@@ -64,7 +64,7 @@ class AtlasModel(QAbstractTableModel):
 
     def refresh_atlas(self) -> None:
         """Ask for the atlas anew."""
-        atlas = self._desk.atlas
+        atlas = self._workspace.atlas.current
         self.beginResetModel()
         self.codes = () if atlas is None else atlas.codes
         spread = () if atlas is None else np.sqrt(atlas.variances(atlas.codes)).tolist()
@@ -74,7 +74,7 @@ class AtlasModel(QAbstractTableModel):
 
     def refresh_labels(self) -> None:
         """Ask how well the labels fit."""
-        self._away = {side: self._desk.departures(side) or {} for side in _SIDES}
+        self._away = {side: self._workspace.labels.departures(side) or {} for side in _SIDES}
         if self.codes:
             self.dataChanged.emit(self.index(0, 2), self.index(len(self.codes) - 1, 3))
 
@@ -91,11 +91,11 @@ class AtlasModel(QAbstractTableModel):
     @property
     def others_doubted(self) -> tuple[str, ...]:
         """Points that are doubted for another reason than their distance, such as ``IN`` or ``MN left``."""
-        session = self._desk.session
+        labels = self._workspace.labels
         found = {
             code if feature(code).shared else point_text(side, code): None
             for side in _SIDES
-            for code, state in session.point_states(side, wait=False).items()
+            for code, state in labels.point_states(side, wait=False).items()
             if state is PointState.DOUBTFUL
             and not (code in self._away[side] and self._away[side][code].is_doubtful)
         }
@@ -159,14 +159,14 @@ class AtlasTable(QTableView):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose atlas and labels it shows.
     """
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._desk = workbench
-        self.rows = AtlasModel(workbench, self)
+        self._workspace = workspace
+        self.rows = AtlasModel(workspace, self)
         self.setModel(self.rows)
         self.setItemDelegate(_Cells(self))
         self.setAccessibleName("Features of the atlas")
@@ -178,8 +178,12 @@ class AtlasTable(QTableView):
             policy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self._arrange()
         self.clicked.connect(self._go_to)
-        follow(self, workbench.atlas_changed, self._on_atlas)
-        for signal in (workbench.judged, workbench.landmarks_changed, workbench.session_replaced):
+        follow(self, workspace.atlas.changed, self._on_atlas)
+        for signal in (
+            workspace.labels.checked,
+            workspace.document.landmarks_changed,
+            workspace.document.reset,
+        ):
             follow(self, signal, self._on_labels)
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
@@ -230,7 +234,7 @@ class AtlasTable(QTableView):
     def _go_to(self, index: QModelIndex) -> None:
         if index.column() >= 2:
             side, code = _SIDES[index.column() - 2], self.rows.codes[index.row()]
-            attempt(self._desk, lambda: self._desk.go_to(side, code))
+            attempt(self._workspace, lambda: self._workspace.labels.go_to(side, code))
 
 
 class _Cells(QStyledItemDelegate):

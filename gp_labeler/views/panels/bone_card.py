@@ -5,8 +5,8 @@ from __future__ import annotations
 from qtpy.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gp_labeler.imaging.histogram import histogram_of
-from gp_labeler.jobs.work import ProposeThreshold
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.jobs.scan import ProposeThreshold
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.histogram_slider import HistogramSlider
 from gp_labeler.views.panels.number_field import NumberField
@@ -20,13 +20,13 @@ class BoneCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose threshold it sets.
     """
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Bone begins at", parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self.slider = HistogramSlider()
         self.slider.previewed.connect(self._on_previewed)
         self.slider.chosen.connect(self._choose)
@@ -57,26 +57,26 @@ class BoneCard(Card):
                 "Thin bone should be just closed. The slices show it while you drag.", "hint", wrap=True
             )
         )
-        follow(self, workbench.volume_opened, self._on_volume)
-        follow(self, workbench.session_replaced, self._on_volume)
-        follow(self, workbench.threshold_changed, self.refresh)
+        follow(self, workspace.scan.opened, self._on_volume)
+        follow(self, workspace.document.reset, self._on_volume)
+        follow(self, workspace.scan.threshold_changed, self.refresh)
         self._on_volume()
 
     def refresh(self, *_: object) -> None:
         """Show the threshold in effect."""
-        threshold = self._workbench.threshold
+        threshold = self._workspace.scan.threshold
         for widget in (self.box, self.propose, self.smallest):
-            widget.setEnabled(self._workbench.volume is not None)
+            widget.setEnabled(self._workspace.scan.volume is not None)
         self.slider.set_value(threshold)
         self.box.set_value(threshold)
-        self.smallest.set_value(self._workbench.smallest_part_mm)
+        self.smallest.set_value(self._workspace.bone.smallest_part_mm)
 
     def _choose_smallest(self, mm: float) -> None:
-        attempt(self._workbench, lambda: self._workbench.set_smallest_part(mm))
+        attempt(self._workspace, lambda: self._workspace.bone.set_smallest_part(mm))
         self.refresh()
 
     def _on_volume(self, *_: object) -> None:
-        volume = self._workbench.volume
+        volume = self._workspace.scan.volume
         histogram = None if volume is None else histogram_of(volume)
         self.slider.set_histogram(histogram)
         if histogram is not None:
@@ -85,13 +85,13 @@ class BoneCard(Card):
 
     def _on_previewed(self, value: float) -> None:
         self.box.set_value(value)
-        self._workbench.preview_threshold(value)
+        self._workspace.scan.preview_threshold(value)
 
     def _choose(self, value: float) -> None:
-        if self._workbench.volume is not None:
-            attempt(self._workbench, lambda: self._workbench.set_threshold(value))
+        if self._workspace.scan.volume is not None:
+            attempt(self._workspace, lambda: self._workspace.scan.set_threshold(value))
 
     def _propose(self) -> None:
-        volume = self._workbench.volume
+        volume = self._workspace.scan.volume
         if volume is not None:
-            self._workbench.jobs.submit(ProposeThreshold(volume), self._choose, key="propose threshold")
+            self._workspace.jobs.submit(ProposeThreshold(volume), self._choose, key="propose threshold")

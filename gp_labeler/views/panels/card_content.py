@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
-from gp_labeler.models.session import Session
+from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.workflow import OPENING, PointState
 from gp_labeler.views.bind import mm_text, suggestion_text
 from gp_labeler.views.panels.parts import breakable
@@ -60,40 +60,43 @@ class CardContent:
     can_unsee: bool = True
 
 
-def content_of(session: Session, *, has_scan: bool, atlas: str = "") -> CardContent:
+def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardContent:
     """Return what the card says now.
 
     Parameters
     ----------
-    session : Session
-        What the user is doing.
+    labels : LabelsModel
+        What is placed, and what comes next.
     has_scan : bool
         Whether there is a scan to place anything on.
     atlas : str
         Which atlas is behind ghosts and doubts, such as ``the atlas of 8 animals``; empty for the published
         one.
     """
-    active = session.active
+    active = labels.active
     if not has_scan:
-        return _without_scan() if session.state.volume is None else _without_its_scan(session)
+        return _without_scan() if labels.document.state.volume is None else _without_its_scan(labels)
     if active.code is None:
-        return _between(session)
+        return _between(labels)
     side, row = active.side, feature(active.code)
-    state, mark = session.point_states(side, wait=False)[row.code], session.state.landmark(side, row.code)
-    status, role = _status(session, side, row.code, state)
+    state, mark = (
+        labels.point_states(side, wait=False)[row.code],
+        labels.document.state.landmark(side, row.code),
+    )
+    status, role = _status(labels, side, row.code, state)
     if atlas and role in ("ghost", "danger"):
         status = f"{status} By {atlas}."
-    action, words = ("unlock", "Unlock") if mark.locked else _next_action(session, side, row.code, state)
+    action, words = ("unlock", "Unlock") if mark.locked else _next_action(labels, side, row.code, state)
     aside, hint = _SHARED if row.shared else _EXTERNAL if row.external else ("", "")
     return CardContent(
-        eyebrow=f"{_VERBS[state]} · {side.word} · {session.progress(side).text}",
+        eyebrow=f"{_VERBS[state]} · {side.word} · {labels.progress(side).text}",
         code=row.code,
         name=row.name,
         aside=aside,
         aside_hint=hint,
         definition=row.definition,
         where=f"{row.where} Best seen in {_VIEWS[row.view]}.",
-        status=f"{_settled_words(session, side, row.code)} Locked against change." if mark.locked else status,
+        status=f"{_settled_words(labels, side, row.code)} Locked against change." if mark.locked else status,
         status_role="hint" if mark.locked else role,
         state="locked" if mark.locked else state.value,
         action=action,
@@ -126,9 +129,9 @@ _ACTIONS = {
 }
 
 
-def _next_action(session: Session, side: Side, code: str, state: PointState) -> tuple[str, str]:
+def _next_action(labels: LabelsModel, side: Side, code: str, state: PointState) -> tuple[str, str]:
     """Return id and words of the one next action: for a doubt that has a remedy, that remedy."""
-    doubt = session.near_doubts(side).get(code) if state is PointState.DOUBTFUL else None
+    doubt = labels.near_doubts(side).get(code) if state is PointState.DOUBTFUL else None
     if doubt is not None and doubt.kind == "other side":
         return "swap_sides", "Exchange left and right"
     if doubt is not None and doubt.kind == "exchanged":
@@ -136,32 +139,32 @@ def _next_action(session: Session, side: Side, code: str, state: PointState) -> 
     return _ACTIONS[state]
 
 
-def _status(session: Session, side: Side, code: str, state: PointState) -> tuple[str, str]:
+def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tuple[str, str]:
     """Return one sentence on how far the point is, and its look."""
     if state is PointState.GHOST:
-        ghost = session.ghosts(side)[code]
+        ghost = labels.ghosts(side)[code]
         who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
     if state is PointState.SUGGESTED:
-        said = suggestion_text(session.landmarks(side).suggested[code])
+        said = suggestion_text(labels.document.landmarks(side).suggested[code])
         source = f" ({said})" if said else ""
         return f"Not confirmed{source}. It counts once you confirm or correct it.", "ghost"
-    doubt = session.near_doubts(side).get(code)
+    doubt = labels.near_doubts(side).get(code)
     if state is PointState.DOUBTFUL and doubt is not None:
         words = doubt.text
         return f"{words[:1].upper()}{words[1:]}.", "danger"
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"
     if state is PointState.PLACED:
-        return f"{_settled_words(session, side, code)} Drag, nudge or re-place it to correct it.", "hint"
+        return f"{_settled_words(labels, side, code)} Drag, nudge or re-place it to correct it.", "hint"
     if state is PointState.UNSEEN:
         return "Looked for, not seen. Click to place it after all.", "hint"
-    return _first_ones(session, side), "hint"
+    return _first_ones(labels, side), "hint"
 
 
-def _settled_words(session: Session, side: Side, code: str) -> str:
+def _settled_words(labels: LabelsModel, side: Side, code: str) -> str:
     """Return how a point came to be where it is, such as ``Placed on bone.``."""
-    mark = session.state.landmark(side, code)
+    mark = labels.document.state.landmark(side, code)
     if mark.unseen:
         return "Looked for, not seen."
     how = mark.provenance.how.value if mark.provenance else ""
@@ -174,9 +177,9 @@ def _settled_words(session: Session, side: Side, code: str) -> str:
     return words.get(how, f"{how.capitalize()}." if how else "Placed.")
 
 
-def _first_ones(session: Session, side: Side) -> str:
-    missing = [code for code in OPENING if code not in session.landmarks(side)]
-    n_short = 3 - len(session.landmarks(side).placed)
+def _first_ones(labels: LabelsModel, side: Side) -> str:
+    missing = [code for code in OPENING if code not in labels.document.landmarks(side)]
+    n_short = 3 - len(labels.document.landmarks(side).placed)
     if n_short <= 0:
         return "Click on bone or a slice to place it."
     if len(missing) == n_short:
@@ -197,12 +200,12 @@ def _without_scan() -> CardContent:
     )
 
 
-def _without_its_scan(session: Session) -> CardContent:
-    reference = session.state.volume
+def _without_its_scan(labels: LabelsModel) -> CardContent:
+    reference = labels.document.state.volume
     assert reference is not None
-    lost, there = session.volume_is_lost, breakable(str(reference.path))
+    lost, there = labels.document.volume_is_lost, breakable(str(reference.path))
     return CardContent(
-        session.state.specimen,
+        labels.document.state.specimen,
         name="Its scan is not found" if lost else "Its scan is not open yet",
         definition=f"It was at {there}. The labels are kept: say where the scan is now." if lost else "",
         action="find",
@@ -212,15 +215,15 @@ def _without_its_scan(session: Session) -> CardContent:
     )
 
 
-def _between(session: Session) -> CardContent:
+def _between(labels: LabelsModel) -> CardContent:
     """Say what comes when no feature is active."""
     to_do = [
         point_text(side, row.code)
         for side in Side
         for row in FEATURES
-        if not row.computed and not session.state.landmark(side, row.code).settled
+        if not row.computed and not labels.document.state.landmark(side, row.code).settled
     ]
-    totals = " · ".join(f"{side.word} {session.progress(side).text}" for side in Side)
+    totals = " · ".join(f"{side.word} {labels.progress(side).text}" for side in Side)
     if to_do:
         return CardContent(
             totals,
@@ -232,7 +235,7 @@ def _between(session: Session) -> CardContent:
             can_unsee=False,
         )
     doubtful = sum(
-        s is PointState.DOUBTFUL for side in Side for s in session.point_states(side, wait=False).values()
+        s is PointState.DOUBTFUL for side in Side for s in labels.point_states(side, wait=False).values()
     )
     many = "One point" if doubtful == 1 else f"{doubtful} points"
     doubts = f"{many} should be looked at again: see the red triangles. " if doubtful else ""

@@ -9,7 +9,7 @@ from qtpy.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QToolButton, Q
 
 from gp_labeler.commands.actions import action
 from gp_labeler.models.view import CUTS
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import text_label
 from gp_labeler.views.scene_overlay import cut_text
@@ -22,16 +22,16 @@ class CutRow(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose bone is cut.
     """
 
     action_asked = Signal(str)
     """Id of the action to be done."""
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         planes = QHBoxLayout()
         planes.setSpacing(4)
         planes.addWidget(text_label("Cut open", "hint"))
@@ -58,16 +58,16 @@ class CutRow(QWidget):
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addLayout(planes)
         whole.addWidget(self._more)
-        for signal in (workbench.view_changed, workbench.surfaces_changed, workbench.session_replaced):
+        for signal in (workspace.view.changed, workspace.bone.surfaces_changed, workspace.document.reset):
             follow(self, signal, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show the cut as it is."""
-        cut = self._workbench.session.view.state.cut
+        cut = self._workspace.view.state.cut
         for plane, button in self.planes.items():
             button.setChecked(cut is not None and cut.plane == plane)
-            button.setEnabled(bool(self._workbench.surfaces))
+            button.setEnabled(bool(self._workspace.bone.surfaces))
         self._more.setVisible(cut is not None)
         if cut is not None:
             self.where.setText(cut_text(cut))

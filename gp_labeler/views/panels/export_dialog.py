@@ -23,7 +23,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
 from gp_labeler.document.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
 from gp_labeler.models.workflow import PointState
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
@@ -51,7 +51,7 @@ class ExportDialog(QDialog):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose specimen is written.
     folder : path
         Where to propose.
@@ -62,19 +62,19 @@ class ExportDialog(QDialog):
 
     def __init__(
         self,
-        workbench: Workbench,
+        workspace: Workspace,
         folder: str | Path,
         actions: object = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self.setWindowTitle("Export landmarks")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(True)
         self._make_widgets(str(folder))
         self._lay_out()
-        follow(self, workbench.doubts_changed, self.refresh)
+        follow(self, workspace.labels.doubts_changed, self.refresh)
         self.refresh()
         open_at(self, 560, 520)
 
@@ -87,7 +87,7 @@ class ExportDialog(QDialog):
         self.files.setText(
             breakable("   ".join(names)) if names else "Nothing is placed yet, or no format is chosen."
         )
-        n_suggested = sum(m.suggestion is not None for m in self._workbench.session.state.landmarks.values())
+        n_suggested = sum(m.suggestion is not None for m in self._workspace.document.state.landmarks.values())
         self.suggested.setVisible(bool(n_suggested))
         self.replace.setVisible(bool(there))
         self.replace.setText(f"Replace {len(there)} file{'s' if len(there) > 1 else ''} of that name")
@@ -128,7 +128,7 @@ class ExportDialog(QDialog):
         self._form = QVBoxLayout(content)
         self._form.setContentsMargins(20, 16, 20, 12)
         self._form.setSpacing(8)
-        self._form.addWidget(ElidedLabel(f"Landmarks of {self._workbench.session.state.specimen}", "title"))
+        self._form.addWidget(ElidedLabel(f"Landmarks of {self._workspace.document.state.specimen}", "title"))
         self._form.addLayout(self._findings)
         self._form.addSpacing(4)
         self._form.addWidget(text_label("Folder", "heading"))
@@ -156,15 +156,15 @@ class ExportDialog(QDialog):
 
     def _missing(self) -> list[tuple[str, str]]:
         """Return a finding for each side, with its level."""
-        session, found = self._workbench.session, []
+        found, document, labels = [], self._workspace.document, self._workspace.labels
         for side in Side:
-            landmarks = session.landmarks(side)
+            landmarks = document.landmarks(side)
             if not landmarks.placed:
                 writes = bool(landmarks.suggested) and self.suggested.isChecked()
                 but = "; only its suggestions will be written" if writes else " and will not be written"
                 found.append(("warning", f"The {side.word} side is not labelled{but}."))
                 continue
-            statuses = {code: landmarks.status(code) for code in session.point_states(side, wait=False)}
+            statuses = {code: landmarks.status(code) for code in labels.point_states(side, wait=False)}
             to_do = [code for code, status in statuses.items() if status is Status.TO_DO and code != "CO"]
             unseen = [code for code, status in statuses.items() if status is Status.UNSEEN]
             suggested = list(landmarks.suggested)
@@ -179,7 +179,7 @@ class ExportDialog(QDialog):
             ]
             lacks_co = statuses.get("CO") is Status.TO_DO
             parts += [CO_IS_COMPUTED] if lacks_co else []
-            words = f"The {side.word} side has {session.progress(side).text}" + "".join(
+            words = f"The {side.word} side has {labels.progress(side).text}" + "".join(
                 f"; {p}" for p in parts
             )
             found.append(
@@ -190,11 +190,11 @@ class ExportDialog(QDialog):
 
     def _doubts(self, side: Side) -> list[tuple[str, str]]:
         """Return what is doubted of a side: one notice for each kind of mistake."""
-        session = self._workbench.session
-        states = session.point_states(side, wait=False)
+        labels = self._workspace.labels
+        states = labels.point_states(side, wait=False)
         doubts = {
             code: doubt
-            for code, doubt in session.near_doubts(side).items()
+            for code, doubt in labels.near_doubts(side).items()
             if states[code] is PointState.DOUBTFUL
         }
         far = [code for code, doubt in doubts.items() if doubt.kind == "far"]
@@ -213,7 +213,7 @@ class ExportDialog(QDialog):
         return [suffix for suffix, box in self.formats.items() if box.isChecked()]
 
     def _names(self) -> list[str]:
-        state = self._workbench.session.state
+        state = self._workspace.document.state
         return list(export_names(state, self._suffixes(), suggested=self.suggested.isChecked()))
 
     def _there(self) -> list[Path]:
@@ -227,7 +227,7 @@ class ExportDialog(QDialog):
 
     def _export(self) -> None:
         """Write the files; on failure say why and stay."""
-        state, folder = self._workbench.session.measured_state, self.folder.text()
+        state, folder = self._workspace.document.measured_state, self.folder.text()
         try:
             report = export_landmarks(
                 state,
@@ -240,7 +240,7 @@ class ExportDialog(QDialog):
             self._result.setText(breakable(str(error)))
             return
         level = "info" if report.is_complete else "warning"
-        self._workbench.say(report.text.replace("\n", "  "), level)
+        self._workspace.say(report.text.replace("\n", "  "), level)
         self.exported.emit(folder)
-        self._workbench.exported.emit(report)
+        self._workspace.messages.wrote.emit("landmarks", report)
         self.accept()

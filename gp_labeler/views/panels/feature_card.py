@@ -21,8 +21,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.document.edits import CheckPoint, SwapSides
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
@@ -44,7 +43,7 @@ class FeatureCard(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose session it shows and edits.
     actions : object, optional
         Not needed here; all panels are made alike.
@@ -55,9 +54,9 @@ class FeatureCard(QWidget):
     export_asked = Signal()
     confirm_asked = Signal()
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self._content = CardContent("")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "card")
@@ -73,9 +72,9 @@ class FeatureCard(QWidget):
 
     def refresh(self, *_: object) -> None:
         """Show the active feature as it stands."""
-        session = self._workbench.session
+        labels = self._workspace.labels
         self._content = now = content_of(
-            session, has_scan=self._workbench.volume is not None, atlas=self._workbench.atlas_words
+            labels, has_scan=self._workspace.scan.volume is not None, atlas=self._workspace.atlas.text
         )
         self._eyebrow.setText(now.eyebrow)
         self._title.setText(f"{now.code}  {now.name}" if now.code else now.name)
@@ -87,7 +86,7 @@ class FeatureCard(QWidget):
         set_role(self._status, now.status_role)
         self._chip.setVisible(bool(now.status))
         self._show_chip()
-        self.picture.show_feature(now.code or None, session.active.side)
+        self.picture.show_feature(now.code or None, labels.active.side)
         self.picture.setVisible(bool(now.code))
         self._refresh_buttons(now)
 
@@ -103,11 +102,11 @@ class FeatureCard(QWidget):
         self.primary.clicked.connect(self._on_primary)
         self.skip = QPushButton()
         self.skip.setToolTip("Go on to the next feature; one that is to do comes again after the others")
-        self.skip.clicked.connect(lambda: self._do(lambda: labelling.skip(self._workbench.session)))
+        self.skip.clicked.connect(lambda: self._do(lambda: self._workspace.labels.skip()))
         self.unseen = QPushButton(_with_key("Unseen", "point.unseen"))
         self.unseen.setAccessibleName("Unseen")
         self.unseen.setToolTip("It was looked for and cannot be seen in this scan")
-        self.unseen.clicked.connect(lambda: self._do(lambda: labelling.mark_unseen(self._workbench.session)))
+        self.unseen.clicked.connect(lambda: self._do(lambda: self._workspace.labels.mark_unseen()))
         self.sides = {side: self._side_button(side) for side in Side}
         fit(self, self._fit)
 
@@ -166,14 +165,14 @@ class FeatureCard(QWidget):
         layout.addLayout(buttons)
 
     def _listen(self) -> None:
-        desk = self._workbench
+        workspace = self._workspace
         for signal in (
-            desk.session_replaced,
-            desk.active_changed,
-            desk.landmarks_changed,
-            desk.ghosts_changed,
-            desk.doubts_changed,
-            desk.volume_opened,
+            workspace.document.reset,
+            workspace.labels.active_changed,
+            workspace.document.landmarks_changed,
+            workspace.labels.ghosts_changed,
+            workspace.labels.doubts_changed,
+            workspace.scan.opened,
         ):
             follow(self, signal, self.refresh)
 
@@ -185,7 +184,7 @@ class FeatureCard(QWidget):
         self.skip.setVisible(bool(now.code) and now.can_skip)
         self.unseen.setVisible(bool(now.code))
         self.unseen.setEnabled(now.can_unsee)
-        active = self._workbench.session.active
+        active = self._workspace.labels.active
         for side, button in self.sides.items():
             button.setVisible(bool(now.code))
             with blocked(button):
@@ -210,15 +209,15 @@ class FeatureCard(QWidget):
         elif action == "confirm":
             self.confirm_asked.emit()
         else:
-            self._do(lambda: _EDITS[action](self._workbench))
+            self._do(lambda: _EDITS[action](self._workspace))
 
     def _go_to_side(self, side: Side) -> None:
-        code = self._workbench.session.active.code
+        code = self._workspace.labels.active.code
         if code is not None:
-            self._do(lambda: self._workbench.go_to(side, code))
+            self._do(lambda: self._workspace.labels.go_to(side, code))
 
     def _do(self, edit: Callable[[], object]) -> None:
-        attempt(self._workbench, edit)
+        attempt(self._workspace, edit)
         self.refresh()
 
     def changeEvent(self, event: QEvent) -> None:  # noqa: D102, N802 - Qt's name
@@ -237,33 +236,33 @@ class FeatureCard(QWidget):
         super().resizeEvent(event)
 
 
-def _check(workbench: Workbench) -> None:
-    session = workbench.session
-    active = session.active
+def _check(workspace: Workspace) -> None:
+    document, labels = workspace.document, workspace.labels
+    active = labels.active
     if active.code is not None:
-        session.do(CheckPoint(active.side, active.code, by=session.author))
+        document.do(CheckPoint(active.side, active.code, by=document.author))
 
 
-def _swap_names(workbench: Workbench) -> None:
+def _swap_names(workspace: Workspace) -> None:
     """Exchange the active point with the one that seems to have its name."""
-    session = workbench.session
-    side, code = session.active.side, session.active.code
-    doubt = session.near_doubts(side).get(code or "")
+    labels = workspace.labels
+    side, code = labels.active.side, labels.active.code
+    doubt = labels.near_doubts(side).get(code or "")
     if doubt is not None and doubt.kind == "exchanged":
-        workbench.swap(side, *doubt.landmarks)
+        workspace.labels.swap(side, *doubt.landmarks)
 
 
-def _place_at_crosshair(workbench: Workbench) -> None:
-    labelling.place(workbench.session, workbench.session.crosshair, How.SLICE)
+def _place_at_crosshair(workspace: Workspace) -> None:
+    workspace.labels.place(workspace.view.crosshair, How.SLICE)
 
 
-_EDITS: Mapping[str, Callable[[Workbench], object]] = {
-    "ghost": lambda desk: labelling.accept_ghost(desk.session),
+_EDITS: Mapping[str, Callable[[Workspace], object]] = {
+    "ghost": lambda workspace: workspace.labels.accept_ghost(),
     "crosshair": _place_at_crosshair,
     "check": _check,
-    "unlock": lambda desk: labelling.lock(desk.session, False),
-    "next": lambda desk: labelling.skip(desk.session),
-    "swap_sides": lambda desk: desk.session.do(SwapSides()),
+    "unlock": lambda workspace: workspace.labels.lock(False),
+    "next": lambda workspace: workspace.labels.skip(),
+    "swap_sides": lambda workspace: workspace.document.do(SwapSides()),
     "swap_names": _swap_names,
 }
 

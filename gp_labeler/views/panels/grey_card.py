@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.imaging.histogram import window_presets
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
@@ -26,13 +26,13 @@ class GreyCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose view it sets.
     """
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Greys of the slices", parent)
-        self._workbench = workbench
+        self._workspace = workspace
         row = QHBoxLayout()
         row.setSpacing(4)
         self.presets = {name: self._button(name, row) for name in _HINTS}
@@ -48,15 +48,15 @@ class GreyCard(Card):
             grid.setColumnStretch(2 * column + 1, 1)
             box.value_chosen.connect(self._on_typed)
         self.add(grid)
-        for signal in (workbench.view_changed, workbench.volume_opened, workbench.session_replaced):
+        for signal in (workspace.view.changed, workspace.scan.opened, workspace.document.reset):
             follow(self, signal, self.refresh)
-        follow(self, workbench.threshold_changed, self.refresh)
+        follow(self, workspace.scan.threshold_changed, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show the window in effect."""
-        volume, view = self._workbench.volume, self._workbench.session.view.state
-        presets = {} if volume is None else window_presets(volume, self._workbench.threshold)
+        volume, view = self._workspace.scan.volume, self._workspace.view.state
+        presets = {} if volume is None else window_presets(volume, self._workspace.scan.threshold)
         auto = view.level is None or view.width is None
         shown = presets.get("Full", (0.0, 1.0)) if auto else (view.level or 0.0, view.width or 1.0)
         for name, button in self.presets.items():
@@ -78,17 +78,17 @@ class GreyCard(Card):
         return button
 
     def _choose(self, name: str) -> None:
-        volume, view = self._workbench.volume, self._workbench.session.view
+        volume, view = self._workspace.scan.volume, self._workspace.view
         if volume is None:
             return
         level, width = None, None
         if name != "Auto":
-            level, width = window_presets(volume, self._workbench.threshold)[name]
+            level, width = window_presets(volume, self._workspace.scan.threshold)[name]
         view.update(level=level, width=width)
         self.refresh()
 
     def _on_typed(self, _: float) -> None:
-        view = self._workbench.session.view
+        view = self._workspace.view
         level, width = self.level.value, self.width_box.value
-        attempt(self._workbench, lambda: view.update(level=level, width=width))
+        attempt(self._workspace, lambda: view.update(level=level, width=width))
         self.refresh()

@@ -20,8 +20,8 @@ from qtpy.QtWidgets import (
 from gp_labeler.imaging.preview import PreviewPlane
 from gp_labeler.imaging.readers import ImportPlan, Problem
 from gp_labeler.jobs.runner import Task
-from gp_labeler.jobs.work import InspectScan
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.jobs.scan import InspectScan
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.panels.import_words import MB, PreviewScan, bare, facts_of, remedy, sentence, why_not
 from gp_labeler.views.panels.parts import (
@@ -48,17 +48,17 @@ class ImportDialog(QDialog):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Reads the scan.
     plan : ImportPlan
         What was found.
     """
 
     def __init__(
-        self, workbench: Workbench, plan: ImportPlan, actions: object = None, parent: QWidget | None = None
+        self, workspace: Workspace, plan: ImportPlan, actions: object = None, parent: QWidget | None = None
     ) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self._plan = plan
         self._accepts: dict[str, QCheckBox] = {}
         self.setWindowTitle("Open scan")
@@ -68,7 +68,7 @@ class ImportDialog(QDialog):
         self._lay_out()
         self._show_plan(plan)
         self._start_preview()
-        follow(self, workbench.jobs.failed, self._on_failed)
+        follow(self, workspace.jobs.failed, self._on_failed)
         open_at(self, 720, 480 if plan.sides_known else 700)
 
     @property
@@ -234,7 +234,7 @@ class ImportDialog(QDialog):
         options: dict[str, Any] = self._plan.options.as_json() | {"series": chosen}
         options.pop("spacing", None)
         options.pop("accept", None)
-        self._workbench.jobs.submit(InspectScan(self._plan.path, options), self._take_plan, key="import look")
+        self._workspace.jobs.submit(InspectScan(self._plan.path, options), self._take_plan, key="import look")
 
     def _take_plan(self, plan: ImportPlan) -> None:
         self._show_plan(plan)
@@ -249,7 +249,7 @@ class ImportDialog(QDialog):
             return
         for picture in self.pictures:
             picture.show_plane(None)
-        self._workbench.jobs.submit(PreviewScan(self._plan), self._show_preview, key="import preview")
+        self._workspace.jobs.submit(PreviewScan(self._plan), self._show_preview, key="import preview")
 
     def _show_preview(self, planes: tuple[PreviewPlane, PreviewPlane]) -> None:
         for picture, plane in zip(self.pictures, planes, strict=True):
@@ -266,7 +266,7 @@ class ImportDialog(QDialog):
         """Read the scan as answered."""
         if self.load.isEnabled():
             self._stop()
-            self._workbench.read_scan(self._plan)
+            self._workspace.scan.read(self._plan)
             super().accept()
 
     def reject(self) -> None:
@@ -279,6 +279,6 @@ class ImportDialog(QDialog):
         super().closeEvent(event)
 
     def _stop(self) -> None:
-        for task in self._workbench.jobs.running:
+        for task in self._workspace.jobs.running:
             if task.key in ("import preview", "import look"):
                 task.cancel()

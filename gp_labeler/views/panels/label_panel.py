@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QVBoxLayout, QWidget
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.feature_card import FeatureCard
 from gp_labeler.views.panels.landmark_table import LandmarkTable
@@ -22,18 +22,18 @@ class LabelPanel(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose session they show and edit.
     actions : object, optional
         Handed on.
     """
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
-        self.card = FeatureCard(workbench, actions)
-        self.table = LandmarkTable(workbench, actions)
+        self.card = FeatureCard(workspace, actions)
+        self.table = LandmarkTable(workspace, actions)
         content = QWidget()
         content.setProperty("role", "panel")
         column = QVBoxLayout(content)

@@ -24,7 +24,7 @@ from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.lab_names import LabNamesMemory
 from gp_labeler.document.landmark_import import MisfitError, Predicate, import_landmarks
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
@@ -39,7 +39,7 @@ class LandmarkImportDialog(QDialog):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose session takes the points.
     files : sequence of path
         The files.
@@ -51,19 +51,19 @@ class LandmarkImportDialog(QDialog):
 
     def __init__(
         self,
-        workbench: Workbench,
+        workspace: Workspace,
         files: Sequence[str | Path],
         near_bone: Predicate | None = None,
         prompts: Prompts | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._workbench, self._near_bone = workbench, near_bone
+        self._workspace, self._near_bone = workspace, near_bone
         self._prompts = prompts or Prompts(self)
         self._table: dict[str, str] = {}
         self._files = [Path(file) for file in files]
         self._misfit = ""
-        self._memory = LabNamesMemory(workbench.directory)
+        self._memory = LabNamesMemory(workspace.directory)
         self.setWindowTitle("Import landmarks")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.setModal(True)
@@ -198,17 +198,17 @@ class LandmarkImportDialog(QDialog):
     def _show_references(self) -> None:
         """Leave the specimen as it is, and only show where their points are."""
         try:
-            self._workbench.references.show(*self._files)
+            self._workspace.references.show(*self._files)
         except GpError as error:
             self._show([("error", str(error))])
         else:
             self.accept()
 
     def _import(self) -> None:
-        session = self._workbench.session
+        document = self._workspace.document
         try:
             notes = import_landmarks(
-                session,
+                document,
                 self._files,
                 side=self.side.currentData(),
                 names=self._codes(),
@@ -227,9 +227,9 @@ class LandmarkImportDialog(QDialog):
 
     def _report(self, notes: Sequence[str]) -> None:
         """Close where all is well; else say what should be known first."""
-        done = " and ".join(f"{side.word} {self._workbench.session.progress(side).text}" for side in Side)
+        done = " and ".join(f"{side.word} {self._workspace.labels.progress(side).text}" for side in Side)
         if not notes:
-            self._workbench.say(f"Imported landmarks: {done}")
+            self._workspace.say(f"Imported landmarks: {done}")
             self.accept()
             return
         self._misfit = ""

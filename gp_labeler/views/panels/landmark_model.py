@@ -8,7 +8,7 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentMo
 
 from gp_core.landmarks.features import CODES, Side, feature, index_of
 from gp_labeler.models.workflow import PointState
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow, mm_text, suggestion_text
 
 __all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkModel"]
@@ -41,35 +41,35 @@ class LandmarkModel(QAbstractTableModel):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose session it shows.
     """
 
     headings_changed = Signal()
     """Words of the header; for `headerDataChanged` Qt would lay out and draw the whole table anew."""
 
-    def __init__(self, workbench: Workbench, parent: QObject | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QObject | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self._cells: dict[tuple[int, int], _Cell] = {}
         self._headings: tuple[str, ...] = ()
         for signal in (
-            workbench.session_replaced,
-            workbench.landmarks_changed,
-            workbench.ghosts_changed,
-            workbench.doubts_changed,
-            workbench.active_changed,
+            workspace.document.reset,
+            workspace.document.landmarks_changed,
+            workspace.labels.ghosts_changed,
+            workspace.labels.doubts_changed,
+            workspace.labels.active_changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Ask the session anew, and tell of what changed."""
-        session, cells, headings = self._workbench.session, self._cells, self._headings
+        cells, headings, labels = self._cells, self._headings, self._workspace.labels
         self._cells = {
             (index_of(code), column): self._cell(code, side, state)
             for column, side in enumerate(SIDES, 1)
-            for code, state in session.point_states(side, wait=False).items()
+            for code, state in labels.point_states(side, wait=False).items()
         }
         self._headings = ("Feature", *(self._heading(side) for side in SIDES))
         for where, cell in self._cells.items():
@@ -91,7 +91,7 @@ class LandmarkModel(QAbstractTableModel):
         if orientation is not Qt.Orientation.Horizontal:
             return None
         if role == Qt.ItemDataRole.ToolTipRole and section:
-            return self._workbench.session.progress(SIDES[section - 1]).text
+            return self._workspace.labels.progress(SIDES[section - 1]).text
         return self._headings[section] if role == Qt.ItemDataRole.DisplayRole else None
 
     def data(self, index: Index, role: int = int(Qt.ItemDataRole.DisplayRole)) -> Any:  # noqa: D102
@@ -122,22 +122,22 @@ class LandmarkModel(QAbstractTableModel):
         return None
 
     def _heading(self, side: Side) -> str:
-        progress = self._workbench.session.progress(side)
+        progress = self._workspace.labels.progress(side)
         if progress.n_suggested:  # both counts and the total would not fit
             return f"{side.word.capitalize()} {progress.n_placed} {_SUGGESTED}{progress.n_suggested}"
         return f"{side.word.capitalize()} {progress.n_placed}/{progress.n_total}"
 
     def _cell(self, code: str, side: Side, state: PointState) -> _Cell:
-        session, row = self._workbench.session, feature(code)
-        active = session.active
+        row, document, labels = feature(code), self._workspace.document, self._workspace.labels
+        active = labels.active
         is_active = active.code == code and (active.side is side or row.shared)
-        is_locked = not row.computed and session.state.landmark(side, code).locked
+        is_locked = not row.computed and document.state.landmark(side, code).locked
         return _Cell(state, is_active, is_locked, self._word(code, side, state, is_active))
 
     def _word(self, code: str, side: Side, state: PointState, is_active: bool) -> str:
         if is_active and state in (PointState.TO_DO, PointState.GHOST):
             return "place"
-        if state is PointState.DOUBTFUL and (doubt := self._workbench.session.near_doubts(side).get(code)):
+        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.near_doubts(side).get(code)):
             return doubt.word
         if feature(code).computed and state is PointState.TO_DO:
             return "by itself"
@@ -147,13 +147,11 @@ class LandmarkModel(QAbstractTableModel):
         text = f"{code} {side.word}: {state.value}"
         if feature(code).computed and state is PointState.TO_DO:
             return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
-        if state is PointState.DOUBTFUL and (doubt := self._workbench.session.near_doubts(side).get(code)):
+        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.near_doubts(side).get(code)):
             text += f", {doubt.text}"
         if state is PointState.SUGGESTED:
-            said = suggestion_text(self._workbench.session.landmarks(side).suggested[code])
+            said = suggestion_text(self._workspace.document.landmarks(side).suggested[code])
             text += f", not confirmed{f' ({said})' if said else ''}"
         if state is PointState.GHOST:
-            text += (
-                f", expected within {mm_text(self._workbench.session.ghosts(side)[code].radius_95)} (95 %)"
-            )
+            text += f", expected within {mm_text(self._workspace.labels.ghosts(side)[code].radius_95)} (95 %)"
         return text

@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.document.edits import ClearPoint
 from gp_labeler.models.workflow import PointState
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
@@ -50,16 +50,16 @@ class LandmarkTable(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose session it shows and edits.
     actions : object, optional
         Not needed here; all panels are made alike.
     """
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
-        self.model = LandmarkModel(workbench, self)
+        self._workspace = workspace
+        self.model = LandmarkModel(workspace, self)
         self.view = _TableView(self.model, self)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -68,13 +68,13 @@ class LandmarkTable(QWidget):
         self.view.selectionModel().currentChanged.connect(self._on_current)
         self.view.clicked.connect(self._on_clicked)
         self.view.customContextMenuRequested.connect(self._open_menu)
-        follow(self, workbench.active_changed, self._show_active)
-        follow(self, workbench.session_replaced, self._show_active)
+        follow(self, workspace.labels.active_changed, self._show_active)
+        follow(self, workspace.document.reset, self._show_active)
         self._show_active()
 
     def target_of(self, index: QModelIndex) -> tuple[Side, str]:
         """Return which point a cell is about; a feature's name means the side being worked on."""
-        side = self._workbench.session.active.side if index.column() == 0 else SIDES[index.column() - 1]
+        side = self._workspace.labels.active.side if index.column() == 0 else SIDES[index.column() - 1]
         return side, FEATURES[index.row()].code
 
     def _on_current(self, current: QModelIndex, previous: QModelIndex) -> None:
@@ -86,11 +86,11 @@ class LandmarkTable(QWidget):
 
     def _go_to(self, index: QModelIndex) -> None:
         side, code = self.target_of(index)
-        attempt(self._workbench, lambda: self._workbench.go_to(side, code))
+        attempt(self._workspace, lambda: self._workspace.labels.go_to(side, code))
 
     def _show_active(self, *_: object) -> None:
         """Bring the cursor of the table to the active point."""
-        active = self._workbench.session.active
+        active = self._workspace.labels.active
         index = QModelIndex() if active.code is None else self._index(active.side, active.code)
         before = self.view.currentIndex()
         if before == index:
@@ -108,7 +108,7 @@ class LandmarkTable(QWidget):
     def _open_menu(self, position: QPoint) -> None:
         index = self.view.indexAt(position)
         if index.isValid():
-            menu = landmark_menu(self._workbench, *self.target_of(index), self)
+            menu = landmark_menu(self._workspace, *self.target_of(index), self)
             menu.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
             menu.popup(self.view.viewport().mapToGlobal(position))
 
@@ -116,7 +116,7 @@ class LandmarkTable(QWidget):
         """Clear the point of the current cell."""
         side, code = self.target_of(self.view.currentIndex())
         if self.view.currentIndex().isValid() and not feature(code).computed:
-            attempt(self._workbench, lambda: self._workbench.session.do(ClearPoint(side, code)))
+            attempt(self._workspace, lambda: self._workspace.document.do(ClearPoint(side, code)))
 
 
 class _TableView(QTableView):

@@ -8,7 +8,7 @@ from qtpy.QtCore import Qt, Signal
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QSlider, QWidget
 
 from gp_labeler.jobs.runner import Task
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow, mm_text
 from gp_labeler.views.fonts import fit, pixels, text_width
 from gp_labeler.views.panels.cut_row import CutRow
@@ -29,7 +29,7 @@ class MeshCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose mesh it is about.
     """
 
@@ -37,9 +37,9 @@ class MeshCard(Card):
     action_asked = Signal(str)
     """Id of an action to be done."""
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Bone surface", parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self.state = text_label("", "hint", wrap=True)
         self.add(self.state)
         self.opacity = QSlider(Qt.Orientation.Horizontal)
@@ -57,7 +57,7 @@ class MeshCard(Card):
         checks = FlowLayout(spacing=8)
         self.checks = {name: self._check(name, checks) for name in _SHOWN}
         self.add(checks)
-        self.cut = CutRow(workbench)
+        self.cut = CutRow(workspace)
         self.cut.action_asked.connect(self.action_asked)
         self.add(self.cut)
         self._add_buttons()
@@ -66,7 +66,7 @@ class MeshCard(Card):
 
     def refresh(self, *_: object) -> None:
         """Show the mesh as it stands."""
-        view, surfaces = self._workbench.session.view.state, self._workbench.surfaces
+        view, surfaces = self._workspace.view.state, self._workspace.bone.surfaces
         with blocked(self.opacity, *self.checks.values()):
             self.opacity.setValue(round(100 * view.mesh_opacity))
             for name, check in self.checks.items():
@@ -77,9 +77,9 @@ class MeshCard(Card):
         self.save.setEnabled(bool(surfaces))
 
     def _words(self) -> str:
-        surfaces = self._workbench.surfaces
+        surfaces = self._workspace.bone.surfaces
         if not surfaces:
-            return "There is no surface yet." if self._workbench.volume is None else "It is being made…"
+            return "There is no surface yet." if self._workspace.scan.volume is None else "It is being made…"
         n = sum(surface.n_triangles for surface in surfaces)
         finest, coarsest = (f(s.voxel_mm for s in surfaces) for f in (min, max))
         voxels = mm_text(coarsest) if finest == coarsest else f"{mm_text(coarsest)}, ears {mm_text(finest)}"
@@ -123,23 +123,28 @@ class MeshCard(Card):
         self.add(self._work)
 
     def _listen(self) -> None:
-        desk = self._workbench
-        for signal in (desk.surfaces_changed, desk.view_changed, desk.volume_opened, desk.session_replaced):
+        workspace = self._workspace
+        for signal in (
+            workspace.bone.surfaces_changed,
+            workspace.view.changed,
+            workspace.scan.opened,
+            workspace.document.reset,
+        ):
             follow(self, signal, self.refresh)
-        for signal in (desk.jobs.started, desk.jobs.progressed):
+        for signal in (workspace.jobs.started, workspace.jobs.progressed):
             follow(self, signal, self._on_progress)
-        for signal in (desk.jobs.done, desk.jobs.failed, desk.jobs.cancelled):
+        for signal in (workspace.jobs.done, workspace.jobs.failed, workspace.jobs.cancelled):
             follow(self, signal, self._on_end)
 
     def _update(self, **changes: Any) -> None:
-        self._workbench.session.view.update(**changes)
+        self._workspace.view.update(**changes)
 
     def _mesh_ears(self) -> None:
-        session = self._workbench.session
-        self._workbench.mesh_ears()
-        if not any(task.key == "mesh ears" for task in self._workbench.jobs.running):
-            where = session.active.side.word
-            self._workbench.say(
+        labels = self._workspace.labels
+        self._workspace.bone.mesh_ears()
+        if not any(task.key == "mesh ears" for task in self._workspace.jobs.running):
+            where = labels.active.side.word
+            self._workspace.say(
                 f"Place a feature first (such as CA {where}): it tells where the ear is.", "warning"
             )
 
@@ -150,10 +155,10 @@ class MeshCard(Card):
             self.progress.setValue(round(100 * task.fraction))
 
     def _on_end(self, _: Task[Any]) -> None:
-        self._work.setVisible(any(task.key.startswith("mesh") for task in self._workbench.jobs.running))
+        self._work.setVisible(any(task.key.startswith("mesh") for task in self._workspace.jobs.running))
         self.refresh()
 
     def _stop(self) -> None:
-        for task in self._workbench.jobs.running:
+        for task in self._workspace.jobs.running:
             if task.key.startswith("mesh"):
                 task.cancel()

@@ -6,7 +6,7 @@ from qtpy.QtCore import QEvent, QObject, QTimer
 from qtpy.QtWidgets import QPlainTextEdit, QWidget
 
 from gp_labeler.document.specimen_edits import SetNotes
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.panels.parts import Card
 
@@ -20,13 +20,13 @@ class NotesPanel(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose specimen the notes are on.
     """
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__("Notes", parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self._continues = False
         self.text = QPlainTextEdit()
         self.text.setAccessibleName("Notes on the specimen")
@@ -40,13 +40,13 @@ class NotesPanel(Card):
         self._timer.setSingleShot(True)
         self._timer.setInterval(_PAUSE_MS)
         self._timer.timeout.connect(self.keep)
-        follow(self, workbench.details_changed, self.refresh)
-        follow(self, workbench.session_replaced, self.refresh)
+        follow(self, workspace.document.details_changed, self.refresh)
+        follow(self, workspace.document.reset, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show the notes as they are kept."""
-        notes = self._workbench.session.state.notes
+        notes = self._workspace.document.state.notes
         if notes != self.text.toPlainText() and not self._timer.isActive():
             with blocked(self.text):
                 self.text.setPlainText(notes)
@@ -55,10 +55,10 @@ class NotesPanel(Card):
         """Make what was typed an edit of the specimen."""
         self._timer.stop()
         notes = self.text.toPlainText()
-        if notes == self._workbench.session.state.notes:
+        if notes == self._workspace.document.state.notes:
             return
         merge, self._continues = self._continues, True
-        attempt(self._workbench, lambda: self._workbench.session.do(SetNotes(notes), merge=merge))
+        attempt(self._workspace, lambda: self._workspace.document.do(SetNotes(notes), merge=merge))
 
     def _on_typed(self) -> None:
         self._timer.start()

@@ -21,7 +21,7 @@ from qtpy.QtWidgets import (
 from gp_core.disk import write_bytes, write_text
 from gp_labeler.jobs.physical import PhysicalResult, PhysicalTest
 from gp_labeler.jobs.runner import Task
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
@@ -38,20 +38,20 @@ class PhysicalDialog(QDialog):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose touches and labels; the side is the one of its Pose panel.
     prompts : Prompts
         Asks where to save.
     """
 
-    def __init__(self, workbench: Workbench, prompts: Prompts, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, prompts: Prompts, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._desk, self._prompts = workbench, prompts
+        self._workspace, self._prompts = workspace, prompts
         self.result_found: PhysicalResult | None = None
-        side = workbench.pose.side
+        side = workspace.pose.side
         self.setWindowTitle("Test against the scan")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
-        self.title = ElidedLabel(f"{workbench.session.state.specimen}, {side.word} ear", "title")
+        self.title = ElidedLabel(f"{workspace.document.state.specimen}, {side.word} ear", "title")
         self.busy = QProgressBar()
         self.busy.setRange(0, 0)
         self.busy.setTextVisible(False)
@@ -66,13 +66,15 @@ class PhysicalDialog(QDialog):
         open_at(self, _FIGURE_WIDTH + 72, 640)
 
     def _start(self) -> Task[PhysicalResult] | None:
-        desk = self._desk
-        if desk.atlas is None:
+        workspace = self._workspace
+        if workspace.atlas.current is None:
             self._fail("The atlas is not loaded yet. Try again in a moment.")
             return None
-        test = PhysicalTest.of(desk.session.state, desk.pose.side, desk.atlas, desk.atlas_specimens)
-        desk.jobs.failed.connect(self._on_failed)
-        return desk.jobs.submit(test, self._show, key="physical test")
+        test = PhysicalTest.of(
+            workspace.document.state, workspace.pose.side, workspace.atlas.current, workspace.atlas.specimens
+        )
+        workspace.jobs.failed.connect(self._on_failed)
+        return workspace.jobs.submit(test, self._show, key="physical test")
 
     def _show(self, result: PhysicalResult) -> None:
         self.result_found = result
@@ -119,17 +121,17 @@ class PhysicalDialog(QDialog):
     def _save_figure(self) -> None:
         path = self._prompts.save_file("Save the figure", "physical.png", "PNG (*.png)")
         if path is not None and self.result_found is not None:
-            attempt(self._desk, lambda: _write(path, self.result_found))
+            attempt(self._workspace, lambda: _write(path, self.result_found))
 
     def _save_json(self) -> None:
         path = self._prompts.save_file("Save the numbers", "physical.json", "JSON (*.json)")
         if path is not None and self.result_found is not None:
             text = json.dumps(self.result_found.report.as_dict(), indent=1) + "\n"
-            attempt(self._desk, lambda: write_text(path, text))
+            attempt(self._workspace, lambda: write_text(path, text))
 
     def done(self, code: int) -> None:
         """Close, and end the work with it."""
-        self._desk.jobs.failed.disconnect(self._on_failed, missing_ok=True)
+        self._workspace.jobs.failed.disconnect(self._on_failed, missing_ok=True)
         if self._task is not None:
             self._task.cancel()
         super().done(code)

@@ -7,7 +7,7 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import RenameSpecimen
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.number_field import NumberField
@@ -30,16 +30,16 @@ class HeadCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose estimate it sets.
     """
 
     atlas_asked = Signal()
     new_asked = Signal()
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Estimate", parent)
-        self._desk = workbench
+        self._workspace = workspace
         hints = {side.value: f"The {side.word} ear was touched" for side in Side}
         self.specimen, self.new = QLineEdit(), link("New", "Begin another specimen without a scan")
         self.specimen.setAccessibleName("Name of the specimen")
@@ -72,14 +72,14 @@ class HeadCard(Card):
         self.to_atlas.clicked.connect(self.atlas_asked)
         self.specimen.editingFinished.connect(self._rename)
         self.new.clicked.connect(self.new_asked)
-        for signal in (workbench.details_changed, workbench.session_replaced, workbench.volume_opened):
+        for signal in (workspace.document.details_changed, workspace.document.reset, workspace.scan.opened):
             follow(self, signal, self.refresh)
-        for signal in (workbench.atlas_changed, workbench.atlas_details_changed):
+        for signal in (workspace.atlas.changed, workspace.atlas.details_changed):
             follow(self, signal, self.refresh)
 
     def refresh(self, *_: object) -> None:
         """Show the settings in effect."""
-        settings, estimate = self._desk.pose.estimating.settings, self._desk.pose.estimate
+        settings, estimate = self._workspace.pose.settings, self._workspace.pose.estimate
         self.side.set_value(settings.side.value)
         self.method.set_value(next(name for name, methods in _METHODS.items() if methods == settings.methods))
         self.noise.set_value(settings.probe_noise)
@@ -87,13 +87,13 @@ class HeadCard(Card):
         pose = None if estimate is None else estimate.poses.get("robust")
         is_found = settings.probe_noise is None and pose is not None and pose.probe_noise is not None
         self.found.setText(f"mm, found {pose.probe_noise:.2f}" if is_found and pose is not None else "mm")
-        state = self._desk.session.state
+        state = self._workspace.document.state
         self._named.setVisible(state.volume is None)
         if not self.specimen.hasFocus() or not self.specimen.isModified():
             self.specimen.setText(state.specimen)
-        atlas = self._desk.atlas
+        atlas = self._workspace.atlas.current
         self.atlas.set_words("being loaded" if atlas is None else atlas.name)
-        problem = self._desk.atlas_problem
+        problem = self._workspace.atlas.problem
         self.problem.setText(breakable(f"{problem} The published one is in use.") if problem else "")
         self.problem.setVisible(bool(problem))
 
@@ -130,8 +130,8 @@ class HeadCard(Card):
     def _rename(self) -> None:
         name = self.specimen.text().strip()
         self.specimen.setModified(False)
-        if name != self._desk.session.state.specimen:
-            attempt(self._desk, lambda: self._desk.session.do(RenameSpecimen(name)))
+        if name != self._workspace.document.state.specimen:
+            attempt(self._workspace, lambda: self._workspace.document.do(RenameSpecimen(name)))
             self.refresh()
 
     def _on_edited(self, text: str) -> None:
@@ -139,7 +139,7 @@ class HeadCard(Card):
             self._choose(probe_noise=None)
 
     def _choose(self, **fields: object) -> None:
-        attempt(self._desk, lambda: self._desk.pose.choose(**fields))
+        attempt(self._workspace, lambda: self._workspace.pose.choose(**fields))
         self.refresh()
 
 

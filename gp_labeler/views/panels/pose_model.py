@@ -11,7 +11,7 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentMo
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
 from gp_labeler.document.touches import Touch, TouchHow, frame_of
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.pose_words import fine_mm, parse_position, touch_text, triple
 
 __all__ = ["CLEAR", "MISFIT", "NAME", "ROW_ROLE", "USE", "XYZ", "TouchModel", "TouchRow"]
@@ -56,25 +56,25 @@ class TouchModel(QAbstractTableModel):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose touches it shows and edits.
     tell : callable
         Is told of a `GpError` that an edit came to, and of None where one was made.
     """
 
     def __init__(
-        self, workbench: Workbench, tell: Callable[[GpError | None], object], parent: QObject | None = None
+        self, workspace: Workspace, tell: Callable[[GpError | None], object], parent: QObject | None = None
     ) -> None:
         super().__init__(parent)
-        self._desk, self._tell = workbench, tell
+        self._workspace, self._tell = workspace, tell
         self.rows: tuple[TouchRow, ...] = ()
         self.n_skull = 0
         self.skull_shown = False
         self.refresh()
 
     def refresh(self) -> None:
-        """Ask the workbench anew."""
-        known = [self._row(name) for name in self._desk.pose.names]
+        """Ask the workspace anew."""
+        known = [self._row(name) for name in self._workspace.pose.names]
         self.n_skull = sum(row.is_skull for row in known)
         rows = tuple(row for row in known if not row.is_skull or self._is_worth_a_row(row))
         if [row.name for row in rows] != [row.name for row in self.rows]:
@@ -107,10 +107,10 @@ class TouchModel(QAbstractTableModel):
 
     def record(self, name: str, text: str) -> bool:
         """Take a typed position; return whether it could be taken."""
-        pose = self._desk.pose
+        pose = self._workspace.pose
         try:
             position = parse_position(text, name)
-            on_scan = frame_of(self._desk.session.state.touches, pose.side) == "scan"
+            on_scan = frame_of(self._workspace.document.state.touches, pose.side) == "scan"
             pose.record(position, TouchHow.SCAN if on_scan else TouchHow.TYPED, name=name)
         except GpError as error:
             self._tell(error)
@@ -122,8 +122,8 @@ class TouchModel(QAbstractTableModel):
         return self.skull_shown or skull.target or skull.suspect
 
     def _row(self, name: str) -> TouchRow:
-        pose = self._desk.pose
-        touch = self._desk.session.state.touches.get((pose.side, name))
+        pose = self._workspace.pose
+        touch = self._workspace.document.state.touches.get((pose.side, name))
         misfit, suspect = self._misfit(name)
         target = pose.target == name
         state = "active" if target else "to do"
@@ -132,7 +132,7 @@ class TouchModel(QAbstractTableModel):
         return TouchRow(name, touch, state, misfit, suspect, target)
 
     def _misfit(self, name: str) -> tuple[float | None, bool]:
-        estimate = self._desk.pose.estimate
+        estimate = self._workspace.pose.estimate
         if estimate is None:
             return None, False
         if name in CODES:
@@ -197,7 +197,7 @@ class TouchModel(QAbstractTableModel):
             )
         if row.touch is not None and column == CLEAR:
             return f"Clear {row.name}"
-        return touch_text(row.name, row.touch, self._desk.pose.estimate)
+        return touch_text(row.name, row.touch, self._workspace.pose.estimate)
 
 
 _HEADING_HINTS = (

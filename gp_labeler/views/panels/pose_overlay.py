@@ -8,7 +8,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QAction
 from qtpy.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.flow import FlowLayout
@@ -36,17 +36,17 @@ class OverlayCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose overlay it sets.
     actions : mapping of str to QAction
         Of the cameras: ``pose.along_axis`` and ``pose.through_window``, where they are.
     """
 
     def __init__(
-        self, workbench: Workbench, actions: Mapping[str, QAction], parent: QWidget | None = None
+        self, workspace: Workspace, actions: Mapping[str, QAction], parent: QWidget | None = None
     ) -> None:
         super().__init__("Overlay", parent)
-        self._desk = workbench
+        self._workspace = workspace
         self.visible = self._box("visible", "Show", "Draw the estimate over bone and slices")
         self.parts = {name: self._box(name, *words) for name, words in _PARTS.items()}
         self.opacity = QSlider(Qt.Orientation.Horizontal)
@@ -55,13 +55,13 @@ class OverlayCard(Card):
         self.percent = text_label("", "hint")
         self.cameras = {name: link(word) for name, word in _CAMERAS.items()}
         self._lay_out(actions)
-        self.opacity.valueChanged.connect(lambda percent: self._desk.pose.draw(opacity=percent / 100))
-        follow(self, workbench.pose.overlay_changed, self.refresh)
+        self.opacity.valueChanged.connect(lambda percent: self._workspace.pose.draw(opacity=percent / 100))
+        follow(self, workspace.pose.overlay_changed, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show what is drawn."""
-        options = self._desk.pose.overlay
+        options = self._workspace.pose.overlay
         for name, box in {"visible": self.visible, **self.parts}.items():
             with blocked(box):
                 box.setChecked(getattr(options, name))
@@ -73,7 +73,7 @@ class OverlayCard(Card):
     def _box(self, name: str, word: str, hint: str) -> QCheckBox:
         box = QCheckBox(word)
         box.setToolTip(hint)
-        box.toggled.connect(lambda on: self._desk.pose.draw(**{name: on}))
+        box.toggled.connect(lambda on: self._workspace.pose.draw(**{name: on}))
         return box
 
     def _lay_out(self, actions: Mapping[str, QAction]) -> None:

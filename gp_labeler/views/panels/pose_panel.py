@@ -17,7 +17,7 @@ from qtpy.QtGui import (
 )
 from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.parts import Card, scrolled
@@ -46,7 +46,7 @@ class PosePanel(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose touches and estimate it shows and edits.
     actions : mapping of str to QAction, optional
         What some of its buttons do.
@@ -63,19 +63,19 @@ class PosePanel(QWidget):
 
     def __init__(
         self,
-        workbench: Workbench,
+        workspace: Workspace,
         actions: Mapping[str, QAction] | None = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._desk = workbench
+        self._workspace = workspace
         self._stale, self._is_alone = True, False
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.setAcceptDrops(True)
-        self.head, self.touches = HeadCard(workbench), TouchesCard(workbench)
-        self.result, self.in_scan = ResultCard(workbench), InScanCard(workbench)
-        self.overlay, self.verdict = OverlayCard(workbench, actions or {}), VerdictCard(workbench)
+        self.head, self.touches = HeadCard(workspace), TouchesCard(workspace)
+        self.result, self.in_scan = ResultCard(workspace), InScanCard(workspace)
+        self.overlay, self.verdict = OverlayCard(workspace, actions or {}), VerdictCard(workspace)
         self.report, self.export = QPushButton("Report…"), QPushButton("Export…")
         self.report.setToolTip("One page with touches, estimate, errors and pictures")
         self.export.setToolTip("The pose as JSON, Slicer transform, 4x4 table or markups")
@@ -90,7 +90,9 @@ class PosePanel(QWidget):
             return
         for card in (self.head, self.touches, self.result, self.in_scan, self.verdict):
             card.refresh()
-        is_there = self._desk.pose.estimate is not None and self._desk.pose.estimate.pose is not None
+        is_there = (
+            self._workspace.pose.estimate is not None and self._workspace.pose.estimate.pose is not None
+        )
         for button in (self.report, self.export):
             button.setEnabled(is_there)
 
@@ -156,7 +158,7 @@ class PosePanel(QWidget):
         self.in_scan.skull_file_asked.connect(self.skull_file_asked)
         self.report.clicked.connect(self.report_asked)
         self.export.clicked.connect(self.export_asked)
-        pose = self._desk.pose
+        pose = self._workspace.pose
         for signal in (pose.changed, pose.target_changed):
             follow(self, signal, self.refresh)
 
@@ -175,8 +177,8 @@ class PosePanel(QWidget):
     def hideEvent(self, event: QHideEvent) -> None:  # noqa: D102, N802 - Qt's name
         super().hideEvent(event)
         self._stale = True
-        if self._desk.tool == "touch" and not event.spontaneous():
-            self._desk.set_tool("look")
+        if self._workspace.interaction.tool == "touch" and not event.spontaneous():
+            self._workspace.interaction.set_tool("look")
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
         self._share_columns()

@@ -13,7 +13,7 @@ from gp_core.pose.quality import pose_quality
 from gp_labeler.document import touching
 from gp_labeler.document.touches import TouchHow
 from gp_labeler.models.estimate import Estimate
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt
 from gp_labeler.views.fonts import HEADING, TITLE, styled
 from gp_labeler.views.panels.flow import FlowLayout
@@ -41,13 +41,13 @@ class ResultCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose estimate it shows.
     """
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Cochlea", parent)
-        self._desk = workbench
+        self._workspace = workspace
         self.verdict, self.notices = Verdict(), Notices()
         self.waiting = text_label("", "title", wrap=True)
         self.one, self.two = _OnePose(), _TwoPoses()
@@ -62,18 +62,16 @@ class ResultCard(Card):
             row.addWidget(button)
         self.add(row)
         self.next.clicked.connect(self._aim)
-        self.swap.clicked.connect(lambda: attempt(workbench, workbench.pose.swap_names))
-        self.other_side.clicked.connect(lambda: attempt(workbench, workbench.pose.change_side))
+        self.swap.clicked.connect(lambda: attempt(workspace, workspace.pose.swap_names))
+        self.other_side.clicked.connect(lambda: attempt(workspace, workspace.pose.change_side))
 
     def refresh(self, *_: object) -> None:
         """Show the estimate as it stands."""
-        desk = self._desk.pose
-        estimate, pose = desk.estimate, None if desk.estimate is None else desk.estimate.pose
+        model = self._workspace.pose
+        estimate, pose = model.estimate, None if model.estimate is None else model.estimate.pose
         self.heading.setText(_heading(estimate))
         self.waiting.setVisible(pose is None)
-        self.waiting.setText(
-            "" if estimate is not None and pose is None else _waiting(desk.estimating.waiting_text)
-        )
+        self.waiting.setText("" if estimate is not None and pose is None else _waiting(model.waiting_text))
         both = estimate is not None and len(estimate.poses) > 1
         self.one.setVisible(pose is not None and not both)
         self.two.setVisible(both)
@@ -85,10 +83,10 @@ class ResultCard(Card):
         if pose is not None:
             trust = pose_quality(pose)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
-        wrong = pose is not None and (pose.side_state == "wrong" or bool(_misnamed(self._desk)))
+        wrong = pose is not None and (pose.side_state == "wrong" or bool(_misnamed(self._workspace)))
         self._offer_readings(pose, wrong=wrong)
-        self.notices.show_notices([] if estimate is None else [*_notices(self._desk, estimate)])
-        self._show_gain(wanted=not wrong and desk.swapped is None)
+        self.notices.show_notices([] if estimate is None else [*_notices(self._workspace, estimate)])
+        self._show_gain(wanted=not wrong and model.swapped is None)
 
     def set_large(self, large: bool) -> None:
         """Show the estimate in large type, where there is room."""
@@ -96,27 +94,27 @@ class ResultCard(Card):
 
     def _offer_readings(self, pose: CochleaPose | None, *, wrong: bool) -> None:
         """Offer the other side and the exchange of two names, where they are not ruled out."""
-        desk = self._desk.pose
+        model = self._workspace.pose
         undecided = pose is not None and pose.side_state == "undecided"
         self.other_side.setVisible(wrong or undecided)
-        side = f"the {desk.side.other.word} side"
-        likely = _likely(pose, desk.swapped)
+        side = f"the {model.side.other.word} side"
+        likely = _likely(pose, model.swapped)
         self.other_side.setText(f"They are of {side}" if wrong else f"Take as {side}  ({likely[0]})")
-        self.swap.setVisible(desk.swapped is not None)
-        names = f"Exchange {' and '.join(desk.swapped or ())}"
+        self.swap.setVisible(model.swapped is not None)
+        names = f"Exchange {' and '.join(model.swapped or ())}"
         sure = pose is None or pose.names_state != "undecided"
         self.swap.setText(names if sure else f"{names}  ({likely[1]})")
 
     def _show_gain(self, *, wanted: bool) -> None:
-        gains = self._desk.pose.gains() if wanted else ()
+        gains = self._workspace.pose.gains() if wanted else ()
         self.next.setVisible(bool(gains))
         if gains:
             self.next.setText(gain_text(gains[0]))
 
     def _aim(self) -> None:
-        gains = self._desk.pose.gains()
+        gains = self._workspace.pose.gains()
         if gains:
-            self._desk.pose.aim(gains[0].code)
+            self._workspace.pose.aim(gains[0].code)
 
 
 class _OnePose(QWidget):
@@ -212,21 +210,21 @@ def _waiting(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _misnamed(desk: Workbench) -> list[str]:
+def _misnamed(workspace: Workspace) -> list[str]:
     """Return the files that touches of this side are from, and whose names tell the other one."""
-    side = desk.pose.side
-    touches = [touch for (of, _), touch in desk.session.state.touches.items() if of is side]
+    side = workspace.pose.side
+    touches = [touch for (of, _), touch in workspace.document.state.touches.items() if of is side]
     files = {touch.source for touch in touches if touch.how is TouchHow.FILE}
     return sorted(file for file in files if touching.named_side(file) is side.other)
 
 
-def _notices(desk: Workbench, estimate: Estimate) -> Iterator[tuple[str, ...]]:
+def _notices(workspace: Workspace, estimate: Estimate) -> Iterator[tuple[str, ...]]:
     for method in estimate.settings.methods:
         if method in estimate.problems:
             yield ("error", f"{METHOD_WORDS[method]}: {estimate.problems[method]}")
-    if "jrmpc" in desk.pose.estimating.settings.methods and not desk.pose.estimating.joint_ready:
+    if "jrmpc" in workspace.pose.settings.methods and not workspace.pose.joint_ready:
         yield ("info", "JRMPC is being made ready; that takes some seconds once.")
-    for file in _misnamed(desk):
+    for file in _misnamed(workspace):
         yield ("warning", f"By its name {file} is of the {estimate.side.other.word} side.", "Check the side.")
     said: set[str] = set()
     for pose in estimate.poses.values():

@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gp_labeler.document import touching
 from gp_labeler.models.estimate import Estimate
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import NONE, attempt, follow, position_text
 from gp_labeler.views.fonts import HEADING, styled
 from gp_labeler.views.panels.parts import Card, text_label
@@ -40,15 +40,15 @@ class InScanCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose estimate it shows.
     """
 
     skull_file_asked = Signal()
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("In the scan", parent)
-        self._desk = workbench
+        self._workspace = workspace
         self.way = Segments(_WAYS, _HINTS)
         self.facts = {name: numbers() for name in ("Laid in", "CO", "FRE", "TRE at CO", "From the labels")}
         styled(self.facts["From the labels"], HEADING, bold=True)
@@ -60,12 +60,12 @@ class InScanCard(Card):
         self.way.chosen.connect(self._choose)
         self.file.clicked.connect(self.skull_file_asked)
         self.mark.clicked.connect(self._mark)
-        follow(self, workbench.volume_opened, self.refresh)
+        follow(self, workspace.scan.opened, self.refresh)
 
     def refresh(self, *_: object) -> None:
         """Show the registration as it stands."""
-        estimate, has_scan = self._desk.pose.estimate, self._desk.volume is not None
-        self.way.set_value(self._desk.pose.estimating.settings.registration)
+        estimate, has_scan = self._workspace.pose.estimate, self._workspace.scan.volume is not None
+        self.way.set_value(self._workspace.pose.settings.registration)
         known = estimate is not None and (has_scan or estimate.registered is not None)
         self.way.setVisible(known and self._frame() != "scan")
         self._table.setVisible(known)
@@ -80,13 +80,15 @@ class InScanCard(Card):
 
     def take_file(self, path: Path) -> bool:
         """Take the skull features of a file; return whether it could be read."""
-        return attempt(self._desk, lambda: touching.load_skull(self._desk.session, path))
+        return attempt(self._workspace, lambda: touching.load_skull(self._workspace.document, path))
 
     @property
     def unmarked(self) -> str:
         """The skull feature to mark next: one touched and not marked, else the next number."""
-        state = self._desk.session.state
-        touched = [name for name in self._desk.pose.names if (self._desk.pose.side, name) in state.touches]
+        state = self._workspace.document.state
+        touched = [
+            name for name in self._workspace.pose.names if (self._workspace.pose.side, name) in state.touches
+        ]
         numbered = (f"S{n}" for n in range(1, 100))
         names = [name for name in touched if name.startswith("S")]
         return next(name for name in (*names, *numbered) if name not in state.skull)
@@ -116,20 +118,23 @@ class InScanCard(Card):
         self.add(row_of_skull)
 
     def _show_skull(self) -> None:
-        n = len(self._desk.session.state.skull)
+        n = len(self._workspace.document.state.skull)
         self.skull.setText(f"Skull features on the scan: {n or 'none'}")
         self.mark.setText(f"Mark skull point {self.unmarked} at the crosshair")
-        self.mark.setEnabled(self._desk.volume is not None)
+        self.mark.setEnabled(self._workspace.scan.volume is not None)
 
     def _frame(self) -> str:
-        return self._desk.session.state.touched(self._desk.pose.side).frame
+        return self._workspace.document.state.touched(self._workspace.pose.side).frame
 
     def _choose(self, way: str) -> None:
-        attempt(self._desk, lambda: self._desk.pose.choose(registration=way))
+        attempt(self._workspace, lambda: self._workspace.pose.choose(registration=way))
 
     def _mark(self) -> None:
-        session = self._desk.session
-        attempt(self._desk, lambda: touching.mark_skull(session, self.unmarked, session.crosshair))
+        document = self._workspace.document
+        attempt(
+            self._workspace,
+            lambda: touching.mark_skull(document, self.unmarked, self._workspace.view.crosshair),
+        )
 
 
 _CAPTIONS = {

@@ -11,7 +11,7 @@ from qtpy.QtWidgets import QHBoxLayout, QMenu, QSizePolicy, QToolButton, QWidget
 from gp_core.errors import GpError
 from gp_labeler.document import touching
 from gp_labeler.document.touches import Touch
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow, set_role
 from gp_labeler.views.panels.parts import Card, ElidedLabel
 from gp_labeler.views.panels.pose_model import TouchModel
@@ -39,7 +39,7 @@ class TouchesCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose touches it shows and edits.
     """
 
@@ -47,11 +47,11 @@ class TouchesCard(Card):
     tracker_asked = Signal()
     guide_asked = Signal()
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Touches", parent)
-        self._desk = workbench
+        self._workspace = workspace
         self._looked_at = ""
-        self.model = TouchModel(workbench, self.tell, self)
+        self.model = TouchModel(workspace, self.tell, self)
         self.table = TouchTable(self.model)
         self.notices, self.change = Notices(), ElidedLabel("", "hint")
         self.change.setAccessibleName("What leaving a point out changes")
@@ -70,8 +70,8 @@ class TouchesCard(Card):
     def refresh(self, *_: object) -> None:
         """Show the touches as they stand."""
         self.model.refresh()
-        side = self._desk.pose.side
-        touched = [touch for (of, _), touch in self._desk.session.state.touches.items() if of is side]
+        side = self._workspace.pose.side
+        touched = [touch for (of, _), touch in self._workspace.document.state.touches.items() if of is side]
         out = sum(touch.left_out for touch in touched)
         words = f"Touches  {len(touched)}" + (f", {out} left out" if out else "")
         self.heading.setText(words if touched else "Touches")
@@ -81,13 +81,13 @@ class TouchesCard(Card):
         self.more.setAccessibleName(f"{'Hide' if shown else 'Show'} {n} skull features")
         self.more.setVisible(n > 0)
         self._timer.start()
-        self.skull.setText(f"+ skull point {self._desk.pose.next_skull}")
+        self.skull.setText(f"+ skull point {self._workspace.pose.next_skull}")
 
     def tell(self, error: GpError | None) -> None:
         """Say what could not be done, until something can; None takes it away."""
         notices: list[tuple[str, ...]] = []
         if error is not None:
-            self._desk.say(str(error), "error")
+            self._workspace.say(str(error), "error")
             plain = str(error).removesuffix(error.remedy or "").rstrip()
             notices = [("error", _short_path(plain, error.file), error.remedy or "")]
         self.notices.show_notices(notices)
@@ -102,7 +102,7 @@ class TouchesCard(Card):
 
     def take_file(self, path: Path) -> bool:
         """Take the touches of a file; return whether it could be read."""
-        return self._do(lambda: self._desk.pose.load(path))
+        return self._do(lambda: self._workspace.pose.load(path))
 
     def _way(self, name: str) -> QToolButton:
         button = QToolButton()
@@ -139,10 +139,12 @@ class TouchesCard(Card):
         self.add(foot)
 
     def _connect(self) -> None:
-        table, pose = self.table, self._desk.pose
+        table, pose = self.table, self._workspace.pose
         self.ways["file"].clicked.connect(self.file_asked)
         self.ways["type"].clicked.connect(self._type_next)
-        self.ways["scan"].clicked.connect(lambda on: self._desk.set_tool("touch" if on else "look"))
+        self.ways["scan"].clicked.connect(
+            lambda on: self._workspace.interaction.set_tool("touch" if on else "look")
+        )
         self.ways["tracker"].clicked.connect(self.tracker_asked)
         self.guide.clicked.connect(self.guide_asked)
         self.clear.clicked.connect(lambda: self._do(lambda: self._clear(None)))
@@ -155,23 +157,23 @@ class TouchesCard(Card):
         table.menu_asked.connect(self._open_menu)
         table.typed.connect(lambda _: QTimer.singleShot(0, self, self._type_next))
         table.pasted.connect(self._on_pasted)
-        follow(self, self._desk.tool_changed, self._show_tool)
-        follow(self, self._desk.volume_opened, self._show_tool)
-        follow(self, self._desk.session_replaced, self._show_tool)
+        follow(self, self._workspace.interaction.tool_changed, self._show_tool)
+        follow(self, self._workspace.scan.opened, self._show_tool)
+        follow(self, self._workspace.document.reset, self._show_tool)
         self._show_tool()
 
     def _show_tool(self, *_: object) -> None:
         button = self.ways["scan"]
-        button.setEnabled(self._desk.volume is not None)
+        button.setEnabled(self._workspace.scan.volume is not None)
         with blocked(button):
-            button.setChecked(self._desk.tool == "touch")
+            button.setChecked(self._workspace.interaction.tool == "touch")
 
     def _toggle_skull(self) -> None:
         self.model.show_skull(not self.model.skull_shown)
         self.refresh()
 
     def _type_next(self) -> None:
-        target = self._desk.pose.target
+        target = self._workspace.pose.target
         if target is not None:
             self.table.setFocus()
             self.table.edit_position(target)
@@ -179,15 +181,15 @@ class TouchesCard(Card):
     def _on_chosen(self, name: str) -> None:
         """Aim at what is not touched yet; show what is."""
         if self._touch(name) is None:
-            self._desk.pose.aim(name)
+            self._workspace.pose.aim(name)
         else:
-            self._do(lambda: self._desk.pose.show(name))
+            self._do(lambda: self._workspace.pose.show(name))
 
     def _on_pasted(self, name: str, text: str) -> None:
         """Take a position for the row; of several lines, each names its point."""
         lines = [line.strip() for line in text.splitlines() if line.strip()]
         if len(lines) == 1 and not lines[0][0].isalpha():
-            self.model.record(name or self._desk.pose.target or "", lines[0])
+            self.model.record(name or self._workspace.pose.target or "", lines[0])
             return
         for n, line in enumerate(lines):
             code, *rest = line.replace(",", " ").replace("\t", " ").replace(";", " ").split()
@@ -198,16 +200,18 @@ class TouchesCard(Card):
     def _toggle_use(self, name: str) -> None:
         touch = self._touch(name)
         if touch is not None:
-            pose = self._desk.pose
-            self._do(lambda: touching.leave_out(self._desk.session, pose.side, name, not touch.left_out))
+            pose = self._workspace.pose
+            self._do(
+                lambda: touching.leave_out(self._workspace.document, pose.side, name, not touch.left_out)
+            )
 
     def _clear(self, name: str | None) -> None:
-        touching.clear_touches(self._desk.session, self._desk.pose.side, name)
+        touching.clear_touches(self._workspace.document, self._workspace.pose.side, name)
         if name is not None:
-            self._desk.pose.aim(name)
+            self._workspace.pose.aim(name)
 
     def _open_menu(self, name: str, where: QPoint) -> None:
-        pose, touch, menu = self._desk.pose, self._touch(name), QMenu(self)
+        pose, touch, menu = self._workspace.pose, self._touch(name), QMenu(self)
         menu.setAttribute(_DELETE)
         menu.addAction("Touch next" if touch is None else "Touch again", lambda: pose.aim(name))
         menu.addAction("Type position…", lambda: self.table.edit_position(name))
@@ -225,15 +229,15 @@ class TouchesCard(Card):
     def _show_change(self) -> None:
         name, touch = self._looked_at, self._touch(self._looked_at)
         words = "" if self._any_touch() else "Drop a file of touches here"
-        if touch is not None and self._desk.pose.estimate is not None:
-            words = change_text(name, touch, self._desk.pose.estimating.without(name))
+        if touch is not None and self._workspace.pose.estimate is not None:
+            words = change_text(name, touch, self._workspace.pose.without(name))
         self.change.set_words(words)
 
     def _any_touch(self) -> bool:
-        return any(side is self._desk.pose.side for side, _ in self._desk.session.state.touches)
+        return any(side is self._workspace.pose.side for side, _ in self._workspace.document.state.touches)
 
     def _touch(self, name: str) -> Touch | None:
-        return self._desk.session.state.touches.get((self._desk.pose.side, name))
+        return self._workspace.document.state.touches.get((self._workspace.pose.side, name))
 
     def _do(self, edit: Callable[[], object]) -> bool:
         try:

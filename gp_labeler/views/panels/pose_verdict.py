@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWidget
 
 from gp_labeler.document.state import PoseCheck
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
@@ -25,13 +25,13 @@ class VerdictCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose estimate is judged.
     """
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Verdict", parent)
-        self._desk = workbench
+        self._workspace = workspace
         self.initials, self.note = QLineEdit(), QLineEdit()
         self.initials.setPlaceholderText("Initials")
         self.initials.setAccessibleName("Initials of who judges")
@@ -55,18 +55,18 @@ class VerdictCard(Card):
         self.add(self._said)
         self.accept.clicked.connect(lambda: self.judge("accept"))
         self.reject.clicked.connect(lambda: self.judge("reject"))
-        follow(self, workbench.details_changed, self.refresh)
-        follow(self, workbench.session_replaced, self._on_session)
+        follow(self, workspace.document.details_changed, self.refresh)
+        follow(self, workspace.document.reset, self._on_session)
         self._on_session()
 
     def refresh(self, *_: object) -> None:
         """Show what was said of this side, the latest first."""
-        desk = self._desk.pose
-        is_there = desk.estimate is not None and desk.estimate.pose is not None
+        model = self._workspace.pose
+        is_there = model.estimate is not None and model.estimate.pose is not None
         for button in (self.accept, self.reject):
             button.setEnabled(is_there)
-        checks = tuple(c for c in self._desk.session.state.pose_checks if c.side is desk.side)[::-1]
-        estimate = desk.estimate
+        checks = tuple(c for c in self._workspace.document.state.pose_checks if c.side is model.side)[::-1]
+        estimate = model.estimate
         moved = tuple(estimate.moved_since(c.pose) if estimate else None for c in checks[:_N_SHOWN])
         if (checks, moved) == self._shown:
             return
@@ -80,14 +80,14 @@ class VerdictCard(Card):
     def judge(self, verdict: str) -> bool:
         """Keep a verdict with the initials and the note that stand here."""
         by, note = self.initials.text().strip(), self.note.text().strip()
-        done = attempt(self._desk, lambda: self._desk.pose.estimating.judge(verdict, by=by, note=note))
+        done = attempt(self._workspace, lambda: self._workspace.pose.judge(verdict, by=by, note=note))
         if done:
             self.note.clear()
-            self._desk.say(f"{_WORDS[verdict][1]}; it is kept in the specimen")
+            self._workspace.say(f"{_WORDS[verdict][1]}; it is kept in the specimen")
         return done
 
     def _on_session(self, *_: object) -> None:
-        self.initials.setText(self._desk.session.author)
+        self.initials.setText(self._workspace.document.author)
         self.note.clear()
         self.refresh()
 

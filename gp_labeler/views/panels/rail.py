@@ -9,7 +9,7 @@ from qtpy.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
 from qtpy.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayout, QWidget
 
 from gp_core.landmarks.features import Side
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
@@ -49,7 +49,7 @@ class Rail(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose progress it shows.
     actions : object, optional
         Not needed here; all panels are made alike.
@@ -60,12 +60,12 @@ class Rail(QWidget):
 
     def __init__(
         self,
-        workbench: Workbench,
+        workspace: Workspace,
         actions: object = None,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "rail")
         self._group = QButtonGroup(self)
@@ -82,7 +82,7 @@ class Rail(QWidget):
         layout.addWidget(self.keys_button)
         self.buttons["scan"].setChecked(True)
         fit(self, lambda: self.setFixedWidth(self.keys_button.sizeHint().width()))
-        for signal in (workbench.volume_opened, workbench.session_replaced, workbench.landmarks_changed):
+        for signal in (workspace.scan.opened, workspace.document.reset, workspace.document.landmarks_changed):
             follow(self, signal, self._refresh)
         self._refresh()
 
@@ -108,11 +108,11 @@ class Rail(QWidget):
         return button
 
     def _refresh(self, *_: object) -> None:
-        session = self._workbench.session
-        done = [session.progress(side) for side in Side]
+        document, labels = self._workspace.document, self._workspace.labels
+        done = [labels.progress(side) for side in Side]
         for id in _NEEDS_SCAN:
-            self.buttons[id].setEnabled(session.state.volume is not None)
-        self.buttons["scan"].set_done(self._workbench.volume is not None)
+            self.buttons[id].setEnabled(document.state.volume is not None)
+        self.buttons["scan"].set_done(self._workspace.scan.volume is not None)
         self.buttons["label"].set_done(all(p.n_placed + p.n_unseen >= p.n_total for p in done))
 
 

@@ -6,7 +6,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
 from gp_labeler.views.panels.bone_card import BoneCard
 from gp_labeler.views.panels.grey_card import GreyCard
@@ -25,15 +25,15 @@ class ScanPanel(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose scan it shows.
     actions : object, optional
         Not needed here; all panels are made alike.
     """
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.facts = Facts()
@@ -44,27 +44,27 @@ class ScanPanel(QWidget):
         about.add(self._empty)
         about.add(self.facts)
         about.add(self._notes)
-        self.grey, self.bone, self.mesh = GreyCard(workbench), BoneCard(workbench), MeshCard(workbench)
+        self.grey, self.bone, self.mesh = GreyCard(workspace), BoneCard(workspace), MeshCard(workspace)
         content = QWidget()
         content.setProperty("role", "panel")
         column = QVBoxLayout(content)
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
-        self.notes = NotesPanel(workbench)
+        self.notes = NotesPanel(workspace)
         for card in (about, self.bone, self.grey, self.mesh, self.notes):
             column.addWidget(card)
         column.addStretch(1)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
         layout.addWidget(scrolled(content))
-        follow(self, workbench.volume_opened, self._refresh)
-        follow(self, workbench.session_replaced, self._refresh)
+        follow(self, workspace.scan.opened, self._refresh)
+        follow(self, workspace.document.reset, self._refresh)
         self._refresh()
 
     def _refresh(self, *_: object) -> None:
-        volume = self._workbench.volume
+        volume = self._workspace.scan.volume
         self._empty.setVisible(volume is None)
-        lost = self._workbench.session.volume_is_lost
+        lost = self._workspace.document.volume_is_lost
         self._empty.setText(
             "Its scan is not found: File > Find scan says where it is now." if lost else _NONE
         )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QWidget
 
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import LinkPhase
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.panels.parts import Card, text_label
@@ -13,17 +13,17 @@ from gp_labeler.views.panels.parts import Card, text_label
 __all__ = ["TrackerCard", "tracker_role", "tracker_words"]
 
 
-def tracker_role(desk: Workbench) -> str:
+def tracker_role(workspace: Workspace) -> str:
     """Return the look of the tracker's words: whether all is well, to be looked at, or wrong."""
-    tracker = desk.tracker
+    tracker = workspace.tracker
     if tracker.phase is LinkPhase.CONNECTED:
         return "good" if tracker.visible else "warning"
     return "danger" if tracker.phase in (LinkPhase.LOST, LinkPhase.SILENT) else "hint"
 
 
-def tracker_words(desk: Workbench) -> str:
+def tracker_words(workspace: Workspace) -> str:
     """Say how the tracker stands, and what is wrong with its newest reading."""
-    tracker = desk.tracker
+    tracker = workspace.tracker
     trouble = tracker.trouble if tracker.phase is LinkPhase.CONNECTED and not tracker.visible else ""
     return f"{trouble[:1].upper()}{trouble[1:]}." if trouble else tracker.words
 
@@ -33,15 +33,15 @@ class TrackerCard(Card):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose tracker.
     """
 
     settings_asked = Signal()
 
-    def __init__(self, workbench: Workbench, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Tracked probe", parent)
-        self._desk = workbench
+        self._workspace = workspace
         self.words = text_label(wrap=True)
         self.frame_words = text_label(role="hint", wrap=True)
         self.tip = text_label()
@@ -51,9 +51,9 @@ class TrackerCard(Card):
         self.record = QPushButton()
         self.record.setProperty("role", "primary")
         self.record.setToolTip("Hold the tip still; half a second is averaged")
-        self.record.clicked.connect(lambda: attempt(workbench, workbench.tracker.press))
+        self.record.clicked.connect(lambda: attempt(workspace, workspace.tracker.press))
         self.dwell = QCheckBox("Record when the tip is held still")
-        self.dwell.toggled.connect(workbench.tracker.set_dwell)
+        self.dwell.toggled.connect(workspace.tracker.set_dwell)
         settings = QPushButton("Settings…")
         settings.setProperty("role", "link")
         settings.clicked.connect(self.settings_asked)
@@ -64,15 +64,15 @@ class TrackerCard(Card):
         row.addWidget(self.record, 1)
         self.add(row)
         self.add(self.dwell)
-        tracker = workbench.tracker
+        tracker = workspace.tracker
         follow(self, tracker.changed, self.refresh)
         follow(self, tracker.moved, self._on_moved)
-        follow(self, workbench.pose.target_changed, self.refresh)
+        follow(self, workspace.pose.target_changed, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show how the tracker stands."""
-        tracker, target = self._desk.tracker, self._desk.pose.target
+        tracker, target = self._workspace.tracker, self._workspace.pose.target
         self.setVisible(tracker.on)
         with blocked(self.dwell):
             self.dwell.setChecked(tracker.dwell)
@@ -85,9 +85,9 @@ class TrackerCard(Card):
         self._on_moved()
 
     def _on_moved(self) -> None:
-        tracker = self._desk.tracker
-        self.words.setText(tracker_words(self._desk))
-        set_role(self.words, tracker_role(self._desk))
+        tracker = self._workspace.tracker
+        self.words.setText(tracker_words(self._workspace))
+        set_role(self.words, tracker_role(self._workspace))
         tip = tracker.tip
         self.tip.setText("" if tip is None else "  ".join(f"{v:8.2f}" for v in tip) + " mm")
         self.tip.setEnabled(tracker.visible)

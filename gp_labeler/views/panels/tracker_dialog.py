@@ -23,7 +23,7 @@ from qtpy.QtWidgets import (
 from gp_core.errors import GpError
 from gp_core.pose.gate import PoseGate
 from gp_core.validation import FloatArray
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
 from gp_labeler.views.bind import follow, set_role
@@ -54,21 +54,21 @@ class TrackerDialog(QDialog):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose tracker.
     memory : WindowState
         Keeps what was typed from one day to the next.
     """
 
-    def __init__(self, workbench: Workbench, memory: WindowState, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, memory: WindowState, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._desk, self._memory = workbench, memory
+        self._workspace, self._memory = workspace, memory
         self.setWindowTitle("Tracked probe")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self._make_fields()
         self._make_buttons()
         self._lay_out()
-        tracker = workbench.tracker
+        tracker = workspace.tracker
         for signal in (tracker.changed, tracker.moved):
             follow(self, signal, self.refresh)
         self._recall()
@@ -79,9 +79,9 @@ class TrackerDialog(QDialog):
 
     def refresh(self, *_: object) -> None:
         """Show how tracker, calibration and sending stand."""
-        tracker = self._desk.tracker
-        self.words.setText(tracker_words(self._desk))
-        set_role(self.words, tracker_role(self._desk))
+        tracker = self._workspace.tracker
+        self.words.setText(tracker_words(self._workspace))
+        set_role(self.words, tracker_role(self._workspace))
         self.connect_button.setText("Disconnect" if tracker.on else "Connect")
         for set_it in (self.connect_button.setAutoDefault, self.connect_button.setDefault):
             set_it(not tracker.on)  # Return in a field must not end a link
@@ -102,7 +102,7 @@ class TrackerDialog(QDialog):
         )
 
     def _pivot_words(self) -> str:
-        tracker = self._desk.tracker
+        tracker = self._workspace.tracker
         if tracker.pivot is not None:
             return tracker.pivot.words
         if tracker.calibration is not None:
@@ -113,7 +113,7 @@ class TrackerDialog(QDialog):
     # What it does
 
     def _toggle_link(self) -> None:
-        tracker = self._desk.tracker
+        tracker = self._workspace.tracker
         if tracker.on:
             tracker.disconnect()
             return
@@ -147,7 +147,7 @@ class TrackerDialog(QDialog):
 
     def _use_tip(self) -> None:
         """Take a tip typed while the probe is tracked; otherwise connecting does."""
-        tracker, text = self._desk.tracker, self.fields["tip"].text()
+        tracker, text = self._workspace.tracker, self.fields["tip"].text()
         if not tracker.on or text == _tip_text(tracker.probe.tip_offset):
             return
         try:
@@ -160,17 +160,17 @@ class TrackerDialog(QDialog):
 
     def _use_still(self, may: bool) -> None:
         """Believe what stands still, at once where the probe is tracked; otherwise connecting does."""
-        if self._desk.tracker.on:
-            self._desk.tracker.set_may_stand_still(may)
+        if self._workspace.tracker.on:
+            self._workspace.tracker.set_may_stand_still(may)
             self._remember()
 
     def _toggle_pivot(self) -> None:
-        tracker = self._desk.tracker
+        tracker = self._workspace.tracker
         (tracker.start_pivot if tracker.pivot is None else tracker.cancel_pivot)()
 
     def _finish_pivot(self) -> None:
         try:
-            found = self._desk.tracker.finish_pivot()
+            found = self._workspace.tracker.finish_pivot()
         except GpError as error:
             self._complain(error)
             return
@@ -179,7 +179,7 @@ class TrackerDialog(QDialog):
         self._complain(None)
 
     def _toggle_sending(self) -> None:
-        tracker = self._desk.tracker
+        tracker = self._workspace.tracker
         if tracker.sending:
             tracker.stop_sending()
             return
@@ -192,7 +192,7 @@ class TrackerDialog(QDialog):
     def _use_gate(self, *_: object) -> None:
         """Send poses within the limits typed here from now on."""
         try:
-            self._desk.tracker.set_gate(PoseGate(self.radius.value, self.cone.value))
+            self._workspace.tracker.set_gate(PoseGate(self.radius.value, self.cone.value))
         except GpError as error:
             self._complain(error)
             self._show_gate()
@@ -201,11 +201,11 @@ class TrackerDialog(QDialog):
         self._complain(None)
 
     def _limits(self) -> list[float]:
-        gate = self._desk.tracker.gate
+        gate = self._workspace.tracker.gate
         return [gate.max_radius_mm, gate.max_cone_deg]
 
     def _show_gate(self) -> None:
-        gate = self._desk.tracker.gate
+        gate = self._workspace.tracker.gate
         self.radius.set_value(gate.max_radius_mm)
         self.cone.set_value(gate.max_cone_deg)
 
@@ -216,7 +216,7 @@ class TrackerDialog(QDialog):
     # What is remembered
 
     def _recall(self) -> None:
-        address = self._desk.tracker.address or TrackerAddress()
+        address = self._workspace.tracker.address or TrackerAddress()
         known: dict[str, Any] = {
             "host": address.host,
             "port": address.port,
@@ -225,22 +225,22 @@ class TrackerDialog(QDialog):
             "button": address.button or "",
             "tip": "0 0 0",
         }
-        still = self._desk.tracker.may_stand_still
-        if self._desk.tracker.address is None:
+        still = self._workspace.tracker.may_stand_still
+        if self._workspace.tracker.address is None:
             known |= self._memory.fields(_MEMORY)
             still = known.get(_STILL) is True
         self.still.setChecked(still)
         for name, field in self.fields.items():
             field.setText(str(known.get(name, "")))
         self._recall_gate()
-        if self._desk.tracker.probe.tip_offset.any():
-            self.fields["tip"].setText(_tip_text(self._desk.tracker.probe.tip_offset))
+        if self._workspace.tracker.probe.tip_offset.any():
+            self.fields["tip"].setText(_tip_text(self._workspace.tracker.probe.tip_offset))
 
     def _recall_gate(self) -> None:
         limits = self._memory.fields(_MEMORY).get(_GATE)
         if isinstance(limits, list) and len(limits) == 2:
             with contextlib.suppress(GpError, TypeError):  # a memory that was tampered with sets no limit
-                self._desk.tracker.set_gate(PoseGate(*limits))
+                self._workspace.tracker.set_gate(PoseGate(*limits))
         self._show_gate()
 
     def _remember(self) -> None:

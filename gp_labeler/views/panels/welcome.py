@@ -17,7 +17,7 @@ from qtpy.QtWidgets import (
 )
 
 from gp_core.landmarks.features import Side
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import elided, fit, font_of, pixels, text_width
@@ -46,7 +46,7 @@ class Welcome(QWidget):
 
     Parameters
     ----------
-    workbench : Workbench
+    workspace : Workspace
         Whose recent files it lists.
     actions : object, optional
         Not needed here; all panels are made alike.
@@ -57,9 +57,9 @@ class Welcome(QWidget):
     demo_asked = Signal()
     path_chosen = Signal(str)
 
-    def __init__(self, workbench: Workbench, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workbench = workbench
+        self._workspace = workspace
         self._icons: list[tuple[QLabel, str]] = []
         self._button_icons: list[tuple[QPushButton, str, bool]] = []
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
@@ -73,7 +73,7 @@ class Welcome(QWidget):
         """List the recent files anew."""
         emptied(self._recent)
         self._button_icons = [entry for entry in self._button_icons if entry[0].objectName() != "recent"]
-        recent = self._workbench.recent
+        recent = self._workspace.recent
         paths = [path for path in (recent.all() if recent else ()) if path.exists()][:_N_RECENT]
         for path in paths:
             self._recent.addWidget(self._recent_button(path))

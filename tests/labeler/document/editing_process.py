@@ -11,7 +11,8 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.document.edits import ClearPoint, LockPoints, MarkUnseen, PlacePoint, SwapPoints, SwapSides
-from gp_labeler.document.opening import new_session
+from gp_labeler.document.opening import new_specimen
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import SetNotes, SetThreshold
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import How, Provenance
@@ -36,21 +37,21 @@ def random_edit(rng):
 
 def main(folder: Path, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    session = new_session(folder / "state", specimen="GP-014", author="AB")
+    document = SpecimenDocument(new_specimen(folder / "state", specimen="GP-014"), author="AB")
     while True:
         chance = rng.random()
         try:
             if chance < 0.05:
-                session.save(folder / "GP-014")
+                document.save(folder / "GP-014")
             elif chance < 0.15:
-                session.undo()
+                document.undo()
             elif chance < 0.2:
-                session.redo()
+                document.redo()
             else:
-                session.do(random_edit(rng))
+                document.do(random_edit(rng))
         except GpError:
             continue
-        sys.stdout.write(json.dumps(document_of(session.state), sort_keys=True) + "\n")
+        sys.stdout.write(json.dumps(document_of(document.state), sort_keys=True) + "\n")
         sys.stdout.flush()
 
 

@@ -13,9 +13,10 @@ from typing import Any
 
 import pytest
 
-from gp_labeler.document.opening import open_session, recover_session
+from gp_labeler.document.opening import open_specimen, recover_specimen
 from gp_labeler.document.paths import journal_folder
 from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.offscreen.runner import run_script
 from gp_labeler.offscreen.script import read_script
@@ -38,9 +39,10 @@ def untimed(value: Any) -> Any:
 
 @pytest.mark.parametrize("version", [1, 2, 3])
 def test_specimen_files_open(version):
-    session = open_session(EARLIER / f"specimen_{version}.gpspecimen.json")
-    assert plain(document_of(session.state)) == EXPECTED[f"specimen_{version}"]
-    assert bool(session.notices) == (version < 3)  # an accepted ghost is a suggestion now, and that is said
+    loaded = open_specimen(EARLIER / f"specimen_{version}.gpspecimen.json")
+    document = SpecimenDocument(loaded)
+    assert plain(document_of(document.state)) == EXPECTED[f"specimen_{version}"]
+    assert bool(loaded.notices) == (version < 3)  # an accepted ghost is a suggestion now, and that is said
 
 
 @pytest.mark.parametrize("version", [1, 2, 3])
@@ -50,15 +52,15 @@ def test_journals_are_recovered_and_undo_works_back_to_what_was_saved(version, t
     shutil.copy(EARLIER / f"journal_{version}.jsonl", folder)
     (recovery,) = find_recoveries(tmp_path)
     assert not recovery.content.damage
-    session = recover_session(recovery, tmp_path)
-    assert plain(document_of(session.state)) == EXPECTED[f"journal_{version}"]
+    document = SpecimenDocument(recover_specimen(recovery, tmp_path))
+    assert plain(document_of(document.state)) == EXPECTED[f"journal_{version}"]
     texts = []
-    while (text := session.undo_text) is not None:
+    while (text := document.undo_text) is not None:
         texts.append(text)
-        assert session.undo()
+        assert document.undo()
     assert texts == EXPECTED[f"undo_{version}"]
-    assert plain(document_of(session.state)) == EXPECTED[f"specimen_{version}"]
-    session.close(discard=True)
+    assert plain(document_of(document.state)) == EXPECTED[f"specimen_{version}"]
+    document.close(discard=True)
 
 
 def test_recorded_scripts_run(tmp_path, qapp):

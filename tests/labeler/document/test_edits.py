@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from document_cases import MARK, PLACEABLE, edits, names, positions, predict, quick, shape, text_of
+from document_cases import MARK, PLACEABLE, Editing, edits, names, positions, predict, quick, shape, text_of
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,27 +28,25 @@ from gp_labeler.document.history import History
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetThreshold
 from gp_labeler.document.state import TO_DO, How, SpecimenState, point_key
-from gp_labeler.models import labelling
-from gp_labeler.models.session import Session
 
 L, R = Side.LEFT, Side.RIGHT
 
 
-def done(session, sequence):
+def done(editing, sequence):
     """Do what can be done; return the states, and check that what cannot leaves nothing behind."""
-    states = [session.state]
+    states = [editing.document.state]
     for edit in sequence:
-        before, undo = session.state, session.undo_text
+        before, undo = editing.document.state, editing.document.undo_text
         try:
-            changed = session.do(edit)
+            changed = editing.document.do(edit)
         except GpError:
-            assert session.state is before
-            assert session.undo_text == undo
+            assert editing.document.state is before
+            assert editing.document.undo_text == undo
         else:
-            assert changed == (session.state != before)
+            assert changed == (editing.document.state != before)
             if changed:
-                assert session.undo_text == edit.text
-                states.append(session.state)
+                assert editing.document.undo_text == edit.text
+                states.append(editing.document.state)
     return states
 
 
@@ -59,47 +57,47 @@ def placed(*sides):
 @quick
 @given(st.lists(edits, max_size=12))
 def test_undo_of_everything_is_where_it_began_and_redo_where_it_ended(sequence):
-    session = Session()
-    states = done(session, sequence)
+    editing = Editing()
+    states = done(editing, sequence)
     for state in reversed(states[:-1]):
-        assert session.undo()
-        assert session.state is state
-    assert not session.undo()
+        assert editing.document.undo()
+        assert editing.document.state is state
+    assert not editing.document.undo()
     for state in states[1:]:
-        assert session.redo()
-        assert session.state is state
-    assert not session.redo()
+        assert editing.document.redo()
+        assert editing.document.state is state
+    assert not editing.document.redo()
 
 
 @quick
 @given(st.lists(edits, max_size=8), st.data())
 def test_an_edit_after_undo_forgets_what_was_undone(sequence, data):
-    session = Session()
-    states = done(session, sequence)
+    editing = Editing()
+    states = done(editing, sequence)
     n = data.draw(st.integers(0, len(states) - 1))
     for _ in range(n):
-        session.undo()
-    session.do(SetThreshold(123456.5))
-    assert session.redo_text is None
-    assert session.undo()
-    assert session.state is states[len(states) - 1 - n]
+        editing.document.undo()
+    editing.document.do(SetThreshold(123456.5))
+    assert editing.document.redo_text is None
+    assert editing.document.undo()
+    assert editing.document.state is states[len(states) - 1 - n]
 
 
 @quick
 @given(st.lists(edits, max_size=10))
 def test_no_state_is_ever_changed_in_place(sequence):
-    session = Session()
+    editing = Editing()
     texts = []
     for edit in sequence:
-        texts.append((session.state, text_of(session.state)))
-        done(session, [edit])
+        texts.append((editing.document.state, text_of(editing.document.state)))
+        done(editing, [edit])
     assert all(text_of(state) == text for state, text in texts)
 
 
 @quick
 @given(st.lists(edits, max_size=12))
 def test_in_is_one_point_and_co_follows(sequence):
-    for state in done(Session(), sequence):
+    for state in done(Editing(), sequence):
         left, right = state.side(L), state.side(R)
         assert np.array_equal(left["IN"], right["IN"], equal_nan=True)
         assert left.status("IN") is right.status("IN")
@@ -111,13 +109,13 @@ def test_in_is_one_point_and_co_follows(sequence):
 @quick
 @given(st.lists(edits, max_size=8), st.lists(edits, max_size=8))
 def test_locked_points_stay_whatever_is_done(before, after):
-    session = Session()
-    done(session, before)
-    labelling.lock_all(session)
-    locked = {key: mark for key, mark in session.state.landmarks.items() if mark.settled}
+    editing = Editing()
+    done(editing, before)
+    editing.labels.lock_all()
+    locked = {key: mark for key, mark in editing.document.state.landmarks.items() if mark.settled}
     assert all(mark.locked for mark in locked.values())  # but nothing that is only suggested
     unlocking = [edit for edit in after if not isinstance(edit, (LockPoints, CheckPoint))]
-    for state in done(session, unlocking):
+    for state in done(editing, unlocking):
         assert {key: state.landmarks[key] for key in locked} == locked
 
 
@@ -126,10 +124,10 @@ def test_locked_points_stay_whatever_is_done(before, after):
     st.lists(edits, max_size=8), st.sampled_from(Side), st.sampled_from(PLACEABLE), st.sampled_from(PLACEABLE)
 )
 def test_swapping_twice_changes_nothing(sequence, side, code, other):
-    session = Session()
-    done(session, sequence)
-    labelling.lock_all(session, locked=False)
-    state = session.state
+    editing = Editing()
+    done(editing, sequence)
+    editing.labels.lock_all(locked=False)
+    state = editing.document.state
     swap = SwapPoints(side, code, other)
     keys = (point_key(side, code), point_key(side, other))
     dropped = {key: TO_DO for key in keys if state.landmarks.get(key, TO_DO).suggestion}
@@ -151,28 +149,28 @@ def test_edits_of_one_thing_leave_the_rest(position, name):
 
 
 def test_co_is_computed_and_cleared_live():
-    session = Session()
+    editing = Editing()
     for code in ("CA", "CB", "RWA"):
-        session.do(PlacePoint(L, code, shape()[code], MARK))
-        assert "CO" not in session.landmarks(L)
+        editing.document.do(PlacePoint(L, code, shape()[code], MARK))
+        assert "CO" not in editing.document.landmarks(L)
     changed = []
-    session.landmarks_changed.connect(changed.append)
-    session.do(PlacePoint(L, "RWP", shape()["RWP"], MARK))
-    session.do(ClearPoint(L, "CB"))
+    editing.document.landmarks_changed.connect(changed.append)
+    editing.document.do(PlacePoint(L, "RWP", shape()["RWP"], MARK))
+    editing.document.do(ClearPoint(L, "CB"))
     assert changed == [frozenset({(L, "RWP"), (L, "CO")}), frozenset({(L, "CB"), (L, "CO")})]
-    assert session.undo()
-    assert session.progress(L).text == "5 of 20"
+    assert editing.document.undo()
+    assert editing.labels.progress(L).text == "5 of 20"
 
 
 def test_in_tells_both_sides():
-    session = Session()
+    editing = Editing()
     changed = []
-    session.landmarks_changed.connect(changed.append)
-    session.do(PlacePoint(R, "IN", (1, 2, 3), MARK))
+    editing.document.landmarks_changed.connect(changed.append)
+    editing.document.do(PlacePoint(R, "IN", (1, 2, 3), MARK))
     assert changed == [frozenset({(L, "IN"), (R, "IN")})]
-    assert session.undo_text == "place IN"
-    session.do(MarkUnseen(L, "IN"))
-    assert session.landmarks(R).status("IN") is Status.UNSEEN
+    assert editing.document.undo_text == "place IN"
+    editing.document.do(MarkUnseen(L, "IN"))
+    assert editing.document.landmarks(R).status("IN") is Status.UNSEEN
 
 
 def test_what_cannot_be_done_says_why():
@@ -231,19 +229,19 @@ def test_moving_a_point_makes_it_unchecked():
 
 
 def test_nudges_in_a_row_are_one_undo():
-    session = Session(placed(L).apply(SpecimenState()), predict=predict)
-    start = session.state
+    editing = Editing(placed(L).apply(SpecimenState()), predict=predict)
+    start = editing.document.state
     for _ in range(5):
-        labelling.nudge(session, (0.1, 0, 0), side=L, code="ZL")
-    assert session.landmarks(L)["ZL"][0] == pytest.approx(shape()["ZL"][0] + 0.5)
-    labelling.nudge(session, (0.1, 0, 0), side=L, code="CA")
-    assert session.state.landmark(L, "CA").provenance.how is How.MESH
-    session.undo()
-    assert session.undo_text == "nudge ZL left"
-    session.undo()
-    assert session.state is start
+        editing.labels.nudge((0.1, 0, 0), side=L, code="ZL")
+    assert editing.document.landmarks(L)["ZL"][0] == pytest.approx(shape()["ZL"][0] + 0.5)
+    editing.labels.nudge((0.1, 0, 0), side=L, code="CA")
+    assert editing.document.state.landmark(L, "CA").provenance.how is How.MESH
+    editing.document.undo()
+    assert editing.document.undo_text == "nudge ZL left"
+    editing.document.undo()
+    assert editing.document.state is start
     with pytest.raises(GpError, match="ZL right is not placed yet"):
-        labelling.nudge(session, (0.1, 0, 0), side=R, code="ZL")
+        editing.labels.nudge((0.1, 0, 0), side=R, code="ZL")
 
 
 def test_history_is_bounded():
@@ -260,27 +258,27 @@ def test_history_is_bounded():
 
 
 def test_undo_brings_the_user_back_to_the_feature():
-    session = Session()
-    first = session.active
-    labelling.place(session, (1, 2, 3))
-    assert session.active != first
-    session.undo()
-    assert session.active == first
+    editing = Editing()
+    first = editing.labels.active
+    editing.labels.place((1, 2, 3))
+    assert editing.labels.active != first
+    editing.document.undo()
+    assert editing.labels.active == first
 
 
 def test_signals_tell_only_what_changed_and_after_it_holds():
-    session = Session()
+    editing = Editing()
     heard = []
-    session.threshold_changed.connect(
-        lambda value: heard.append(("threshold", value, session.state.threshold))
+    editing.document.threshold_changed.connect(
+        lambda value: heard.append(("threshold", value, editing.document.state.threshold))
     )
-    session.details_changed.connect(lambda: heard.append("details"))
-    session.landmarks_changed.connect(lambda points: heard.append(points))
-    session.history_changed.connect(lambda: heard.append(session.undo_text))
-    session.dirty_changed.connect(lambda dirty: heard.append(dirty))
-    session.do(SetThreshold(5))
-    session.do(SetThreshold(5))
-    session.undo()
+    editing.document.details_changed.connect(lambda: heard.append("details"))
+    editing.document.landmarks_changed.connect(lambda points: heard.append(points))
+    editing.document.history_changed.connect(lambda: heard.append(editing.document.undo_text))
+    editing.document.dirty_changed.connect(lambda dirty: heard.append(dirty))
+    editing.document.do(SetThreshold(5))
+    editing.document.do(SetThreshold(5))
+    editing.document.undo()
     assert heard == [
         ("threshold", 5.0, 5.0),
         "set threshold to 5",
@@ -292,7 +290,7 @@ def test_signals_tell_only_what_changed_and_after_it_holds():
 
 
 def test_a_session_refuses_other_threads():
-    session = Session()
+    editing = Editing()
     with ThreadPoolExecutor(1) as pool, pytest.raises(RuntimeError, match="own thread"):
-        pool.submit(session.do, SetThreshold(1)).result()
-    assert session.state.threshold is None
+        pool.submit(editing.document.do, SetThreshold(1)).result()
+    assert editing.document.state.threshold is None

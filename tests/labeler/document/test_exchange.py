@@ -1,4 +1,4 @@
-"""Landmark files out of a session and back in."""
+"""Landmark files out of a editing and back in."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import json
 
 import numpy as np
 import pytest
-from document_cases import MARK, FakeVolume, shape
+from document_cases import MARK, Editing, FakeVolume, shape
 
 from gp_core.errors import FeatureError, GpError
 from gp_core.io import load_specimens, read_landmarks, write_csv
@@ -18,80 +18,78 @@ from gp_labeler.document.landmark_import import ImportLandmarks, MisfitError, im
 from gp_labeler.document.recent_files import RecentFiles
 from gp_labeler.document.specimen_json import document_of, state_of
 from gp_labeler.document.state import How, SpecimenState
-from gp_labeler.models import labelling
-from gp_labeler.models.session import Session
 
 L, R = Side.LEFT, Side.RIGHT
 
 
 @pytest.fixture
-def session():
-    session = Session(SpecimenState("GP-014"), author="AB", clock=lambda: "2026-01-01T00:00:00+00:00")
-    session.attach_volume(FakeVolume())
-    session.do(ImportLandmarks((shape(L), shape(R)), MARK))
-    return session
+def editing():
+    editing = Editing(SpecimenState("GP-014"), author="AB", clock=lambda: "2026-01-01T00:00:00+00:00")
+    editing.document.attach_volume(FakeVolume())
+    editing.document.do(ImportLandmarks((shape(L), shape(R)), MARK))
+    return editing
 
 
-def test_out_and_in_again_is_the_same(session, tmp_path):
-    report = export_landmarks(session.state, tmp_path)
+def test_out_and_in_again_is_the_same(editing, tmp_path):
+    report = export_landmarks(editing.document.state, tmp_path)
     assert [path.name for path in report.files] == ["GP-014_L.mrk.json", "GP-014_R.mrk.json"]
     assert report.is_complete
     assert report.text == "Wrote GP-014_L.mrk.json, GP-014_R.mrk.json."
-    again = Session(SpecimenState("GP-014"))
-    again.attach_volume(FakeVolume())
-    assert import_landmarks(again, report.files) == ()
-    assert again.undo_text == "import 37 points"
-    assert again.state.landmarks == session.state.landmarks
+    again = Editing(SpecimenState("GP-014"))
+    again.document.attach_volume(FakeVolume())
+    assert import_landmarks(again.document, report.files) == ()
+    assert again.document.undo_text == "import 37 points"
+    assert again.document.state.landmarks == editing.document.state.landmarks
     (specimen,) = load_specimens([tmp_path])
     assert specimen.name == "GP-014"
-    assert np.array_equal(specimen.side(R).points, session.landmarks(R).points)
+    assert np.array_equal(specimen.side(R).points, editing.document.landmarks(R).points)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_every_format_reads_back(session, tmp_path, suffix):
-    labelling.clear(session, side=L, code="ZL")
-    labelling.mark_unseen(session, side=L, code="MN")
-    report = export_landmarks(session.state, tmp_path / "new", formats=[suffix])
+def test_every_format_reads_back(editing, tmp_path, suffix):
+    editing.labels.clear(side=L, code="ZL")
+    editing.labels.mark_unseen(side=L, code="MN")
+    report = export_landmarks(editing.document.state, tmp_path / "new", formats=[suffix])
     assert not report.is_complete
     read = read_landmarks(report.files[0])
-    assert np.array_equal(read.points, session.landmarks(L).points, equal_nan=True)
+    assert np.array_equal(read.points, editing.document.landmarks(L).points, equal_nan=True)
     assert (read.status("ZL"), read.status("MN")) == (Status.TO_DO, Status.UNSEEN)
 
 
-def test_what_is_missing_is_said(session, tmp_path):
-    labelling.clear(session, side=L, code="ZL")
-    labelling.mark_unseen(session, side=L, code="MN")
-    labelling.clear(session, side=R, code="CA")
-    assert export_landmarks(session.state, tmp_path).text.splitlines()[1:] == [
+def test_what_is_missing_is_said(editing, tmp_path):
+    editing.labels.clear(side=L, code="ZL")
+    editing.labels.mark_unseen(side=L, code="MN")
+    editing.labels.clear(side=R, code="CA")
+    assert export_landmarks(editing.document.state, tmp_path).text.splitlines()[1:] == [
         "Missing on the left side, to do: ZL.",
         "Missing on the left side, not seen: MN.",
         "Missing on the right side, to do: CA.",
         "Missing on the right side: CO is computed from CA, CB, RWA and RWP.",
     ]
-    one = Session(ImportLandmarks((shape(L),), MARK).apply(SpecimenState("B")))
-    report = export_landmarks(one.state, tmp_path)
+    one = Editing(ImportLandmarks((shape(L),), MARK).apply(SpecimenState("B")))
+    report = export_landmarks(one.document.state, tmp_path)
     assert [path.name for path in report.files] == ["B_L.mrk.json"]
     assert "The right side is not labelled and was not written." in report.text
     assert not report.is_complete
 
 
-def test_export_refuses_what_it_should(session, tmp_path):
-    export_landmarks(session.state, tmp_path)
+def test_export_refuses_what_it_should(editing, tmp_path):
+    export_landmarks(editing.document.state, tmp_path)
     with pytest.raises(GpError, match=r"GP-014_L\.mrk\.json: exists already"):
-        export_landmarks(session.state, tmp_path)
-    export_landmarks(session.state, tmp_path, overwrite=True)
+        export_landmarks(editing.document.state, tmp_path)
+    export_landmarks(editing.document.state, tmp_path, overwrite=True)
     with pytest.raises(GpError, match="nothing is placed yet"):
         export_landmarks(SpecimenState(), tmp_path)
     with pytest.raises(GpError, match="format must be one of"):
-        export_landmarks(session.state, tmp_path, formats=[".xyz"])
+        export_landmarks(editing.document.state, tmp_path, formats=[".xyz"])
     (tmp_path / "file").write_text("")
     with pytest.raises(GpError, match="cannot be made"):
-        export_landmarks(session.state, tmp_path / "file" / "x")
+        export_landmarks(editing.document.state, tmp_path / "file" / "x")
 
 
-def test_an_exported_file_carries_its_origin_but_no_path(session, tmp_path):
-    session.attach_volume(FakeVolume(path=tmp_path / "private" / "scan.nrrd"))
-    (left, _) = export_landmarks(session.state, tmp_path).files
+def test_an_exported_file_carries_its_origin_but_no_path(editing, tmp_path):
+    editing.document.attach_volume(FakeVolume(path=tmp_path / "private" / "scan.nrrd"))
+    (left, _) = export_landmarks(editing.document.state, tmp_path).files
     text = left.read_text()
     assert "private" not in text
     header = json.loads(text)["gpLabeler"]
@@ -105,86 +103,86 @@ def test_an_exported_file_carries_its_origin_but_no_path(session, tmp_path):
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_who_looked_at_a_point_again_goes_with_it(session, tmp_path, suffix):
-    session.do(CheckPoint(L, "CA", by=session.author))
-    session.do(CheckPoint(L, "CB"))
-    export_landmarks(session.state, tmp_path, formats=[suffix])
+def test_who_looked_at_a_point_again_goes_with_it(editing, tmp_path, suffix):
+    editing.document.do(CheckPoint(L, "CA", by=editing.document.author))
+    editing.document.do(CheckPoint(L, "CB"))
+    export_landmarks(editing.document.state, tmp_path, formats=[suffix])
     assert dict(read_landmarks(tmp_path / f"GP-014_L{suffix}").checked) == {"CA": "AB", "CB": ""}
-    labelling.place(session, session.landmarks(L)["CA"] + [0.5, 0, 0], side=L, code="CA")
-    export_landmarks(session.state, tmp_path, formats=[suffix], overwrite=True)
+    editing.labels.place(editing.document.landmarks(L)["CA"] + [0.5, 0, 0], side=L, code="CA")
+    export_landmarks(editing.document.state, tmp_path, formats=[suffix], overwrite=True)
     assert dict(read_landmarks(tmp_path / f"GP-014_L{suffix}").checked) == {"CB": ""}
-    again = state_of(document_of(session.state))
+    again = state_of(document_of(editing.document.state))
     assert again.landmark(L, "CB").checked
-    assert again == session.state
+    assert again == editing.document.state
 
 
-def test_points_that_cannot_be_of_this_scan_are_refused(session, tmp_path):
-    far = Session(SpecimenState("far"))
-    far.do(ImportLandmarks((shape(L),), MARK))
-    labelling.place(far, (60, 0, 0), side=L, code="ZL")
-    labelling.place(far, (0, 0, -70), side=L, code="MN")
-    (file,) = export_landmarks(far.state, tmp_path).files
-    before = session.state
+def test_points_that_cannot_be_of_this_scan_are_refused(editing, tmp_path):
+    far = Editing(SpecimenState("far"))
+    far.document.do(ImportLandmarks((shape(L),), MARK))
+    far.labels.place((60, 0, 0), side=L, code="ZL")
+    far.labels.place((0, 0, -70), side=L, code="MN")
+    (file,) = export_landmarks(far.document.state, tmp_path).files
+    before = editing.document.state
     with pytest.raises(
         MisfitError, match=r"specimen GP-014: 2 of 19 points .MN left, ZL left. lie outside the scan"
     ):
-        import_landmarks(session, [file])
-    assert session.state is before
-    warnings = import_landmarks(session, [file], accept_misfit=True)
+        import_landmarks(editing.document, [file])
+    assert editing.document.state is before
+    warnings = import_landmarks(editing.document, [file], accept_misfit=True)
     assert warnings[0] == "far_L.mrk.json is of specimen far"
     assert warnings[1].startswith("2 of 19 points")
 
 
-def test_a_flipped_file_is_recognised(session, tmp_path):
+def test_a_flipped_file_is_recognised(editing, tmp_path):
     class Octant(FakeVolume):
         def contains(self, points):
             return (points[:, 0] < 20).all() & (points[:, 1] < 40) & (points[:, 0] < 0)
 
-    flipped = Session(SpecimenState("GP-014"))
-    flipped.do(ImportLandmarks((shape(L).with_point("IN", (1, 0, 0)),), MARK))
-    (file,) = export_landmarks(flipped.state, tmp_path).files
-    session.attach_volume(Octant())
+    flipped = Editing(SpecimenState("GP-014"))
+    flipped.document.do(ImportLandmarks((shape(L).with_point("IN", (1, 0, 0)),), MARK))
+    (file,) = export_landmarks(flipped.document.state, tmp_path).files
+    editing.document.attach_volume(Octant())
     with pytest.raises(MisfitError, match="With x and y negated all lie inside: is the file RAS"):
-        import_landmarks(session, [file])
+        import_landmarks(editing.document, [file])
 
 
-def test_points_off_the_bone(session, tmp_path):
-    (left, _) = export_landmarks(session.state, tmp_path).files
+def test_points_off_the_bone(editing, tmp_path):
+    (left, _) = export_landmarks(editing.document.state, tmp_path).files
 
     def near(n_off):
         return lambda points: np.arange(len(points)) >= n_off
 
     with pytest.raises(MisfitError, match=r"10 of 19 points \(CA left, CB left, .*\.\.\.\) lie off the bone"):
-        import_landmarks(session, [left], near_bone=near(10))
-    assert import_landmarks(session, [left], near_bone=near(1)) == (
+        import_landmarks(editing.document, [left], near_bone=near(10))
+    assert import_landmarks(editing.document, [left], near_bone=near(1)) == (
         "1 of 19 points (CA left) lie off the bone",
     )
 
 
-def test_files_of_others(session, tmp_path):
+def test_files_of_others(editing, tmp_path):
     plain = tmp_path / "points.csv"
     write_csv(plain, shape(R))
     with pytest.raises(FeatureError, match="does not say which side"):
-        import_landmarks(session, [plain])
-    assert import_landmarks(session, [plain], side="R") == ()
+        import_landmarks(editing.document, [plain])
+    assert import_landmarks(editing.document, [plain], side="R") == ()
     with pytest.raises(GpError, match="no landmark file was given"):
-        import_landmarks(session, [])
-    fresh = Session(author="CD", clock=lambda: "now")
-    import_landmarks(fresh, [plain], side="R")
-    found = fresh.state.landmark(R, "CA").provenance
+        import_landmarks(editing.document, [])
+    fresh = Editing(author="CD", clock=lambda: "now")
+    import_landmarks(fresh.document, [plain], side="R")
+    found = fresh.document.state.landmark(R, "CA").provenance
     assert (found.how, found.by, found.source) == (How.IMPORTED, "CD", "points.csv")
-    assert fresh.undo_text == "import 19 points"
+    assert fresh.document.undo_text == "import 19 points"
 
 
-def test_labels_of_another_scan_are_told(session, tmp_path):
-    (left, _) = export_landmarks(session.state, tmp_path).files
+def test_labels_of_another_scan_are_told(editing, tmp_path):
+    (left, _) = export_landmarks(editing.document.state, tmp_path).files
     content = json.loads(left.read_text())
     content["gpLabeler"]["provenance"] = {"CA": {"how": "magic"}, "XX": {"how": "mesh"}}
     left.write_text(json.dumps(content))
-    other = Session(SpecimenState("GP-014"))
-    other.attach_volume(FakeVolume(checksum="other"))
-    assert import_landmarks(other, [left]) == ("GP-014_L.mrk.json was labelled on another scan",)
-    assert other.state.landmark(L, "CA").provenance.how is How.IMPORTED
+    other = Editing(SpecimenState("GP-014"))
+    other.document.attach_volume(FakeVolume(checksum="other"))
+    assert import_landmarks(other.document, [left]) == ("GP-014_L.mrk.json was labelled on another scan",)
+    assert other.document.state.landmark(L, "CA").provenance.how is How.IMPORTED
 
 
 def test_recent_files(tmp_path):

@@ -22,8 +22,9 @@ from gp_labeler.document.journal import Journal, read_journal
 from gp_labeler.document.json_changes import difference, dumped, patched
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.lock import FileLock, InUseError
-from gp_labeler.document.opening import UnsavedEditsError, new_session, open_session, recover_session
+from gp_labeler.document.opening import UnsavedEditsError, new_specimen, open_specimen, recover_specimen
 from gp_labeler.document.recovery import find_recoveries, replayed
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import SetNotes, SetThreshold
 from gp_labeler.document.specimen_json import document_of, state_of
 
@@ -32,26 +33,26 @@ documents = st.dictionaries(st.text(max_size=2), json_values, max_size=4)
 actions = st.lists(edits | st.sampled_from(("undo", "undo", "redo", "save", "volume")), max_size=25)
 
 
-def act(session, sequence, folder):
+def act(document, sequence, folder):
     for action in sequence:
         try:
             if action == "save":
-                session.save(folder / "specimen", overwrite=True)
+                document.save(folder / "specimen", overwrite=True)
             elif action == "volume":
-                session.attach_volume(
-                    FakeVolume(checksum=str(len(session.state.landmarks))), accept_changes=True
+                document.attach_volume(
+                    FakeVolume(checksum=str(len(document.state.landmarks))), accept_changes=True
                 )
             elif action in ("undo", "redo"):
-                getattr(session, action)()
+                getattr(document, action)()
             else:
-                session.do(action, merge=True)
+                document.do(action, merge=True)
         except GpError:
             continue
 
 
-def abandon(session):
+def abandon(document):
     """Let go of the lock without tidying up, as a killed program does."""
-    session._keeper.close(keep_journal=True)
+    document._store.close(keep_journal=True)
 
 
 @quick
@@ -83,22 +84,22 @@ def _flat(value, path=()):
 def test_replaying_the_journal_gives_the_last_state_and_its_undo(sequence):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        session = new_session(folder / "state")
+        document = SpecimenDocument(new_specimen(folder / "state"))
         with contextlib.ExitStack() as stack:
-            stack.callback(abandon, session)
-            act(session, sequence, folder)
-        expected, was_dirty = session.state, session.dirty
+            stack.callback(abandon, document)
+            act(document, sequence, folder)
+        expected, was_dirty = document.state, document.dirty
         found = find_recoveries(folder / "state")
         if not found:
             assert not was_dirty or expected.landmarks == {}
             return
-        again = recover_session(found[0], folder / "state")
+        again = SpecimenDocument(recover_specimen(found[0], folder / "state"))
         with contextlib.ExitStack() as stack:
             stack.callback(again.close, discard=True)
             assert text_of(again.state) == text_of(expected)
-            while session._history.to_undo and again._history.to_undo:
-                assert again._history.undo().text == session._history.undo().text
-                assert text_of(again.state) == text_of(session.state)
+            while document._history.to_undo and again._history.to_undo:
+                assert again._history.undo().text == document._history.undo().text
+                assert text_of(again.state) == text_of(document.state)
 
 
 @quick
@@ -106,13 +107,13 @@ def test_replaying_the_journal_gives_the_last_state_and_its_undo(sequence):
 def test_a_torn_or_damaged_line_costs_only_itself(sequence, data):
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        session = new_session(folder, clock=lambda: "now")
-        states = [text_of(session.state)]
+        document = SpecimenDocument(new_specimen(folder), clock=lambda: "now")
+        states = [text_of(document.state)]
         with contextlib.ExitStack() as stack:
-            stack.callback(abandon, session)
+            stack.callback(abandon, document)
             for edit in sequence:
-                act(session, [edit], folder)
-                states.append(text_of(session.state))
+                act(document, [edit], folder)
+                states.append(text_of(document.state))
         (path,) = (folder / "journals").glob("*.jsonl")
         content = path.read_bytes()
         header = content.index(b"\n") + 1
@@ -138,11 +139,11 @@ def test_a_torn_or_damaged_line_costs_only_itself(sequence, data):
 
 @pytest.mark.parametrize("line", [0, 1, 3, 5])
 def test_one_flipped_bit_costs_one_edit_and_a_copy_of_the_file_is_kept(line, tmp_path):
-    session = new_session(tmp_path, specimen="GP-014")
+    document = SpecimenDocument(new_specimen(tmp_path, specimen="GP-014"))
     codes = ("CA", "CB", "OS", "RWA", "RWP")
     for i, code in enumerate(codes):
-        session.do(PlacePoint(L, code, (i, 2 * i, 3), MARK))
-    abandon(session)
+        document.do(PlacePoint(L, code, (i, 2 * i, 3), MARK))
+    abandon(document)
     (path,) = (tmp_path / "journals").glob("*.jsonl")
     lines = path.read_bytes().splitlines(keepends=True)
     middle = len(lines[line]) // 2
@@ -151,7 +152,7 @@ def test_one_flipped_bit_costs_one_edit_and_a_copy_of_the_file_is_kept(line, tmp
 
     (recovery,) = find_recoveries(tmp_path)
     assert "1 edit in" in recovery.text
-    again = recover_session(recovery, tmp_path)
+    again = SpecimenDocument(recover_specimen(recovery, tmp_path))
     kept = {code for n, code in enumerate(codes, start=1) if n != line}
     assert {code for code in codes if (L, code) in again.state.landmarks} == kept
     (copy,) = (tmp_path / "journals").glob("*.damaged")
@@ -166,14 +167,14 @@ def test_one_flipped_bit_costs_one_edit_and_a_copy_of_the_file_is_kept(line, tmp
 
 
 def test_edits_go_on_behind_a_torn_line(tmp_path):
-    session = new_session(tmp_path)
-    session.do(SetNotes("one"))
-    abandon(session)
+    document = SpecimenDocument(new_specimen(tmp_path))
+    document.do(SetNotes("one"))
+    abandon(document)
     (path,) = (tmp_path / "journals").glob("*.jsonl")
     with path.open("ab") as file:
         file.write(b'{"record":{"kind":"edit","n":2,"text":"a very long line that was torn ' + b"x" * 500)
     (recovery,) = find_recoveries(tmp_path)
-    again = recover_session(recovery, tmp_path)
+    again = SpecimenDocument(recover_specimen(recovery, tmp_path))
     assert again.state.notes == "one"
     again.do(SetNotes("two"))
     abandon(again)
@@ -183,10 +184,10 @@ def test_edits_go_on_behind_a_torn_line(tmp_path):
 
 
 def test_a_full_disk_refuses_the_edit_and_keeps_the_journal(tmp_path, monkeypatch):
-    session = new_session(tmp_path)
-    session.do(SetNotes("kept"))
+    document = SpecimenDocument(new_specimen(tmp_path))
+    document.do(SetNotes("kept"))
     heard = []
-    session.history_changed.connect(lambda: heard.append(1))
+    document.history_changed.connect(lambda: heard.append(1))
 
     def full(handle):
         raise OSError(errno.ENOSPC, "No space left on device")
@@ -194,42 +195,42 @@ def test_a_full_disk_refuses_the_edit_and_keeps_the_journal(tmp_path, monkeypatc
     with monkeypatch.context() as patch:
         patch.setattr(journal_module.os, "fsync", full)
         with pytest.raises(GpError, match=r"cannot be kept safe: No space left.*It was not made"):
-            session.do(SetNotes("lost"))
-    assert (session.state.notes, session.undo_text, heard) == ("kept", "edit notes", [])
-    session.do(SetThreshold(5))
-    abandon(session)
+            document.do(SetNotes("lost"))
+    assert (document.state.notes, document.undo_text, heard) == ("kept", "edit notes", [])
+    document.do(SetThreshold(5))
+    abandon(document)
     (recovery,) = find_recoveries(tmp_path)
     assert (recovery.state.notes, recovery.state.threshold) == ("kept", 5.0)
 
 
 def test_an_edit_is_on_the_disk_before_it_shows(tmp_path):
-    session = new_session(tmp_path)
+    document = SpecimenDocument(new_specimen(tmp_path))
     (path,) = (tmp_path / "journals").glob("*.jsonl")
     on_disk = []
-    session.landmarks_changed.connect(lambda _: on_disk.append(state_of(read_journal(path).document)))
-    session.do(PlacePoint(L, "CA", (1, 2, 3), MARK))
-    assert on_disk == [session.state]
-    session.close(discard=True)
+    document.landmarks_changed.connect(lambda _: on_disk.append(state_of(read_journal(path).document)))
+    document.do(PlacePoint(L, "CA", (1, 2, 3), MARK))
+    assert on_disk == [document.state]
+    document.close(discard=True)
 
 
 def test_saving_compacts_and_closing_tidies(tmp_path):
-    session = new_session(tmp_path, specimen="A")
+    document = SpecimenDocument(new_specimen(tmp_path, specimen="A"))
     for i in range(20):
-        session.do(SetThreshold(i))
-    session.save(tmp_path / "A")
+        document.do(SetThreshold(i))
+    document.save(tmp_path / "A")
     (path,) = (tmp_path / "journals").glob("*.jsonl")
     assert path.name.startswith("A-")
     assert len(path.read_text().splitlines()) == 1
-    assert not session.dirty
-    session.undo()
-    assert session.dirty
-    session.close()
+    assert not document.dirty
+    document.undo()
+    assert document.dirty
+    document.close()
     (recovery,) = find_recoveries(tmp_path)
     assert recovery.state.threshold == 18
     assert recovery.text.startswith("A: 1 unsaved edit, the last at ")
     assert recovery.text.endswith(": undo set threshold to 19")
     assert recovery.specimen_file == (tmp_path / "A.gpspecimen.json").resolve()
-    again = recover_session(recovery, tmp_path)
+    again = SpecimenDocument(recover_specimen(recovery, tmp_path))
     assert again.dirty
     assert again.redo()
     assert not again.dirty
@@ -239,87 +240,87 @@ def test_saving_compacts_and_closing_tidies(tmp_path):
 
 
 def test_nothing_is_offered_where_nothing_is_lost(tmp_path):
-    session = new_session(tmp_path)
-    session.attach_volume(FakeVolume())
-    assert not session.dirty
-    abandon(session)
+    document = SpecimenDocument(new_specimen(tmp_path))
+    document.attach_volume(FakeVolume())
+    assert not document.dirty
+    abandon(document)
     assert find_recoveries(tmp_path) == ()
     assert not list((tmp_path / "journals").iterdir())
 
 
 def test_a_kill_between_saving_and_tidying_offers_nothing(tmp_path):
-    session = new_session(tmp_path)
-    session.do(SetNotes("x"))
-    session.save(tmp_path / "x")
+    document = SpecimenDocument(new_specimen(tmp_path))
+    document.do(SetNotes("x"))
+    document.save(tmp_path / "x")
     (path,) = (tmp_path / "journals").glob("*.jsonl")
-    abandon(session)
-    path.write_bytes(b"".join(_lines_before_tidying(session)))
+    abandon(document)
+    path.write_bytes(b"".join(_lines_before_tidying(document)))
     assert find_recoveries(tmp_path) == ()
-    path.write_bytes(b"".join(_lines_before_tidying(session)))
-    session.path.unlink()
+    path.write_bytes(b"".join(_lines_before_tidying(document)))
+    document.path.unlink()
     assert len(find_recoveries(tmp_path)) == 1
 
 
-def _lines_before_tidying(session):
+def _lines_before_tidying(document):
     base = document_of(state_of({}))
-    changes = difference(base, document_of(session.state))
-    yield journal_module._base_line(base, session.path, None)
+    changes = difference(base, document_of(document.state))
+    yield journal_module._base_line(base, document.path, None)
     yield journal_module._line({"kind": "edit", "n": 1, "text": "edit notes", "time": "", "changes": changes})
 
 
 def test_opening_asks_about_what_was_left(tmp_path):
-    session = new_session(tmp_path / "state")
-    file = session.save(tmp_path / "A")
-    session.do(SetNotes("not saved"))
+    document = SpecimenDocument(new_specimen(tmp_path / "state"))
+    file = document.save(tmp_path / "A")
+    document.do(SetNotes("not saved"))
     with pytest.raises(InUseError, match=r"A\.gpspecimen\.json is open in another window \(process \d+ on "):
-        open_session(file, tmp_path / "state")
-    copy = open_session(file, tmp_path / "state", as_copy=True)
+        SpecimenDocument(open_specimen(file, tmp_path / "state"))
+    copy = SpecimenDocument(open_specimen(file, tmp_path / "state", as_copy=True))
     assert copy.path is None
     copy.close()
-    abandon(session)
+    abandon(document)
     with pytest.raises(
         UnsavedEditsError, match="was not saved before the program ended: unnamed: 1 unsaved"
     ) as caught:
-        open_session(file, tmp_path / "state")
+        SpecimenDocument(open_specimen(file, tmp_path / "state"))
     assert caught.value.recovery.state.notes == "not saved"
 
-    left = open_session(file, tmp_path / "state", unsaved="leave")
+    left = SpecimenDocument(open_specimen(file, tmp_path / "state", unsaved="leave"))
     assert left.state.notes == ""
     left.do(SetThreshold(7))
     (recovery,) = find_recoveries(tmp_path / "state")  # set aside, not lost
     with pytest.raises(InUseError):
-        recover_session(recovery, tmp_path / "state")
+        SpecimenDocument(recover_specimen(recovery, tmp_path / "state"))
     left.save()
     left.close()
-    taken = recover_session(recovery, tmp_path / "state")
+    taken = SpecimenDocument(recover_specimen(recovery, tmp_path / "state"))
     assert (taken.state.notes, taken.path) == ("not saved", file)
     with pytest.raises(GpError, match="was changed by another program since"):
         taken.save()
     taken.save(overwrite=True)
     taken.close()
-    again = open_session(file, tmp_path / "state", unsaved="recover")
+    again = SpecimenDocument(open_specimen(file, tmp_path / "state", unsaved="recover"))
     assert (again.state.notes, again.state.threshold, again.dirty) == ("not saved", None, False)
     again.close()
 
 
 def test_saving_over_what_is_not_ours_is_refused(tmp_path):
-    other = new_session(tmp_path / "state", specimen="B")
+    other = SpecimenDocument(new_specimen(tmp_path / "state", specimen="B"))
     file = other.save(tmp_path / "B")
-    session = new_session(tmp_path / "state")
-    session.do(SetNotes("mine"))
+    document = SpecimenDocument(new_specimen(tmp_path / "state"))
+    document.do(SetNotes("mine"))
     with pytest.raises(GpError, match=r"B\.gpspecimen\.json: exists already"):
-        session.save(file)
+        document.save(file)
     with pytest.raises(InUseError):
-        session.save(file, overwrite=True)
+        document.save(file, overwrite=True)
     other.close()
     with pytest.raises(GpError, match="never saved"):
-        session.save()
+        document.save()
     with pytest.raises(GpError, match="cannot be written"):
-        session.save(tmp_path / "no" / "folder")
-    assert (session.path, session.dirty) == (None, True)
-    assert session.save(file, overwrite=True) == file
-    assert open_session(file).state.notes == "mine"
-    session.close()
+        document.save(tmp_path / "no" / "folder")
+    assert (document.path, document.dirty) == (None, True)
+    assert document.save(file, overwrite=True) == file
+    assert SpecimenDocument(open_specimen(file)).state.notes == "mine"
+    document.close()
 
 
 def test_what_is_no_journal_is_left_alone(tmp_path):
@@ -346,12 +347,12 @@ def test_what_is_no_journal_is_left_alone(tmp_path):
 def test_a_state_directory_that_cannot_be_written(tmp_path):
     tmp_path.chmod(0o500)
     with pytest.raises(GpError, match="cannot be made"):
-        new_session(tmp_path / "state")
+        SpecimenDocument(new_specimen(tmp_path / "state"))
 
 
 def test_two_windows_on_one_scan_are_noticed(tmp_path):
     scan = tmp_path / "scan.nrrd"
-    one, two = new_session(tmp_path), new_session(tmp_path)
+    one, two = SpecimenDocument(new_specimen(tmp_path)), SpecimenDocument(new_specimen(tmp_path))
     assert one.attach_volume(FakeVolume(path=scan)) == ()
     (warning,) = two.attach_volume(FakeVolume(path=scan))
     assert "The scan scan.nrrd is open in another window" in warning
@@ -375,14 +376,14 @@ def test_locks(tmp_path):
 
 
 def test_undo_after_recovery_is_bounded(tmp_path):
-    session = new_session(tmp_path)
-    session.do(ImportLandmarks((shape(),), MARK))
+    document = SpecimenDocument(new_specimen(tmp_path))
+    document.do(ImportLandmarks((shape(),), MARK))
     for i in range(20):
-        session.do(SetThreshold(i))
-    abandon(session)
+        document.do(SetThreshold(i))
+    abandon(document)
     (recovery,) = find_recoveries(tmp_path)
     history = replayed(recovery.content, limit=5)
-    assert history.state == session.state
+    assert history.state == document.state
     taken = []
     while history.to_undo:
         taken.append(history.undo().text)
@@ -392,10 +393,10 @@ def test_undo_after_recovery_is_bounded(tmp_path):
 
 
 def test_a_line_that_is_missing_is_counted_and_what_follows_is_kept(tmp_path):
-    session = new_session(tmp_path)
+    document = SpecimenDocument(new_specimen(tmp_path))
     for i in range(4):
-        session.do(SetThreshold(i))
-    abandon(session)
+        document.do(SetThreshold(i))
+    abandon(document)
     (path,) = (tmp_path / "journals").glob("*.jsonl")
     lines = path.read_bytes().splitlines(keepends=True)
     path.write_bytes(b"".join([*lines[:2], *lines[3:]]))

@@ -15,9 +15,10 @@ import pytest
 from document_cases import text_of
 
 from gp_labeler.document.lock import FileLock
-from gp_labeler.document.opening import new_session, open_session, recover_session
+from gp_labeler.document.opening import new_specimen, open_specimen, recover_specimen
 from gp_labeler.document.paths import lock_path
 from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import SetNotes
 
 HERE = Path(__file__).parent
@@ -49,22 +50,22 @@ def test_killed_at_any_moment_nothing_confirmed_is_lost(tmp_path, seed):
     found = find_recoveries(tmp_path / "state")
     if found:
         (recovery,) = found
-        session = recover_session(recovery, tmp_path / "state")
+        document = SpecimenDocument(recover_specimen(recovery, tmp_path / "state"))
     elif (file := tmp_path / "GP-014.gpspecimen.json").exists():  # it was saved just then
-        session = open_session(file, tmp_path / "state")
+        document = SpecimenDocument(open_specimen(file, tmp_path / "state"))
     else:  # it came to no edit
-        session = new_session(tmp_path / "state", specimen="GP-014")
+        document = SpecimenDocument(new_specimen(tmp_path / "state", specimen="GP-014"))
     with contextlib.ExitStack() as stack:
-        stack.callback(session.close, discard=True)
-        assert text_of(session.state) in _accepted(confirmed, session)
-        session.do(SetNotes(session.state.notes + "!"))  # and the journal can go on
+        stack.callback(document.close, discard=True)
+        assert text_of(document.state) in _accepted(confirmed, document)
+        document.do(SetNotes(document.state.notes + "!"))  # and the journal can go on
 
 
-def _accepted(confirmed: list[str], session) -> set[str]:
+def _accepted(confirmed: list[str], document) -> set[str]:
     """The last confirmed state, or what one more step made of it: killed between journal and print."""
-    history = session._history
+    history = document._history
     neighbours = {text_of(step.state) for step in (history.to_undo, history.to_redo) if step is not None}
-    one_more = {text_of(session.state)} if confirmed[-1] in neighbours else set()
+    one_more = {text_of(document.state)} if confirmed[-1] in neighbours else set()
     return {confirmed[-1], *one_more}
 
 

@@ -16,14 +16,13 @@ from hypothesis import strategies as st
 from gp_core import disk
 from gp_core.errors import FileFormatError, GpError
 from gp_labeler.document.frozen_json import freeze
-from gp_labeler.document.opening import open_session
-from gp_labeler.document.specimen_document import VolumeChangedError
+from gp_labeler.document.opening import open_specimen
+from gp_labeler.document.specimen_document import SpecimenDocument, VolumeChangedError
 from gp_labeler.document.specimen_edits import SetNotes
 from gp_labeler.document.specimen_file import read_specimen, write_specimen
 from gp_labeler.document.specimen_json import document_of, state_of
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.volume_reference import VolumeReference
-from gp_labeler.models.session import Session
 
 volumes = st.none() | st.builds(
     VolumeReference,
@@ -135,15 +134,15 @@ def test_the_scan_is_found_where_the_folder_was_moved_to(tmp_path):
     there.mkdir()
     scan = there / "scan.nrrd"
     scan.write_text("voxels")
-    session = Session()
-    session.attach_volume(FakeVolume(path=scan))
-    session.save(there / "a")
+    document = SpecimenDocument()
+    document.attach_volume(FakeVolume(path=scan))
+    document.save(there / "a")
     assert read_specimen(there / "a.gpspecimen.json").volume.path == str(scan)
     here = tmp_path / "here"
     shutil.move(there, here)
     assert read_specimen(here / "a.gpspecimen.json").volume.path == str(here / "scan.nrrd")
     (here / "scan.nrrd").rename(tmp_path / "elsewhere.nrrd")
-    lost = Session(read_specimen(here / "a.gpspecimen.json"))
+    lost = SpecimenDocument(read_specimen(here / "a.gpspecimen.json"))
     assert lost.state.volume.path == str(scan)
     assert lost.volume_is_lost
     with pytest.raises(GpError, match="does not exist"):
@@ -155,12 +154,12 @@ def test_the_scan_is_found_where_the_folder_was_moved_to(tmp_path):
 
 
 def test_another_scan_is_noticed():
-    session = Session()
+    document = SpecimenDocument()
     with pytest.raises(GpError, match="no scan belongs to this specimen yet"):
-        session.relink("x")
-    session.attach_volume(FakeVolume())
-    session.attach_volume(FakeVolume(path=Path("moved")))
-    assert session.state.volume.path == "moved"
+        document.relink("x")
+    document.attach_volume(FakeVolume())
+    document.attach_volume(FakeVolume(path=Path("moved")))
+    assert document.state.volume.path == "moved"
     for other, message in [
         (FakeVolume(checksum="other"), "its voxels were changed since it was labelled"),
         (FakeVolume(size=(1, 50, 60)), "it has 1 x 50 x 60 voxels, the labelled one 40 x 50 x 60"),
@@ -170,10 +169,10 @@ def test_another_scan_is_noticed():
         ),
     ]:
         with pytest.raises(VolumeChangedError, match=message):
-            session.attach_volume(other)
-        assert session.volume == FakeVolume(path=Path("moved"))
-    session.attach_volume(FakeVolume(checksum="other"), accept_changes=True)
-    assert session.state.volume.checksum == "other"
+            document.attach_volume(other)
+        assert document.volume == FakeVolume(path=Path("moved"))
+    document.attach_volume(FakeVolume(checksum="other"), accept_changes=True)
+    assert document.state.volume.checksum == "other"
 
 
 def test_paths_and_notes_of_any_kind_are_kept(tmp_path):
@@ -182,20 +181,20 @@ def test_paths_and_notes_of_any_kind_are_kept(tmp_path):
     )
     write_specimen(tmp_path / "a", state)
     assert read_specimen(tmp_path / "a") == state
-    session = Session(state)
-    for do in (session.save, open_session):
+    document = SpecimenDocument(state)
+    for do in (document.save, open_specimen):
         with pytest.raises(GpError, match="is no path that can be"):
             do("a\0b")
 
 
 def test_undo_leaves_the_scan_alone():
-    session = Session()
-    session.do(SetNotes("x"))
-    session.attach_volume(FakeVolume(), import_choices={"reverse": True})
-    assert session.undo()
-    assert session.state.volume == VolumeReference.of(FakeVolume())
-    assert session.redo()
-    assert (session.state.notes, session.state.import_choices["reverse"]) == ("x", True)
+    document = SpecimenDocument()
+    document.do(SetNotes("x"))
+    document.attach_volume(FakeVolume(), import_choices={"reverse": True})
+    assert document.undo()
+    assert document.state.volume == VolumeReference.of(FakeVolume())
+    assert document.redo()
+    assert (document.state.notes, document.state.import_choices["reverse"]) == ("x", True)
 
 
 def test_frozen_values_cannot_be_changed_and_must_be_json():

@@ -12,8 +12,9 @@ import pytest
 from gp_core.errors import GpError
 from gp_labeler.document import state_directory
 from gp_labeler.document.lock import FileLock
-from gp_labeler.document.opening import new_session, recover_session
+from gp_labeler.document.opening import new_specimen, recover_specimen
 from gp_labeler.document.recovery import find_recoveries
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import SetNotes
 from gp_labeler.document.state_directory import stand_in_directory, write_problem
 from gp_labeler.views.state_question import directory_to_use
@@ -44,9 +45,9 @@ def fill(disk: Path) -> Path:
 
 def left_unsaved(directory: Path, notes: str) -> None:
     """Let a program be killed after an edit."""
-    session = new_session(directory, specimen="GP-014")
-    session.do(SetNotes(notes))
-    session.close()  # dirty: the journal stays, as after a kill
+    document = SpecimenDocument(new_specimen(directory, specimen="GP-014"))
+    document.do(SetNotes(notes))
+    document.close()  # dirty: the journal stays, as after a kill
 
 
 @pytest.fixture(params=["full", "read only"])
@@ -64,7 +65,7 @@ def test_what_was_left_is_offered_where_nothing_can_be_written(shut: Path, tmp_p
     (recovery,) = find_recoveries(shut)
     assert recovery.state.notes == "not lost"
     for directory in (tmp_path / "elsewhere", None):
-        again = recover_session(recovery, directory)
+        again = SpecimenDocument(recover_specimen(recovery, directory))
         again.do(SetNotes("goes on"))
         again.save(tmp_path / f"saved-{directory is None}")
         again.close()
@@ -74,7 +75,7 @@ def test_what_was_left_is_offered_where_nothing_can_be_written(shut: Path, tmp_p
 def test_a_full_disk_refuses_in_a_line(shut: Path) -> None:
     assert write_problem(shut)
     with pytest.raises(GpError, match=r"No space left|[Rr]ead-only"):
-        new_session(shut)
+        SpecimenDocument(new_specimen(shut))
 
 
 def test_space_that_is_freed_is_used(small_disk: Path) -> None:
@@ -82,7 +83,7 @@ def test_space_that_is_freed_is_used(small_disk: Path) -> None:
     assert "No space left" in write_problem(small_disk)
     rest.unlink()
     assert write_problem(small_disk) == ""
-    new_session(small_disk).close()
+    SpecimenDocument(new_specimen(small_disk)).close()
     assert [file for file in small_disk.rglob("*") if file.is_file()] == []
 
 

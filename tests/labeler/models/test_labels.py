@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
-from document_cases import MARK, PLACEABLE, FakeVolume, check, predict, shape
+from document_cases import MARK, PLACEABLE, Editing, FakeVolume, check, predict, shape
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
@@ -17,11 +17,10 @@ from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.edits import CheckPoint, ClearPoint, PlacePoint, SwapSides
 from gp_labeler.document.landmark_import import ImportLandmarks
+from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How, SpecimenState
-from gp_labeler.models import labelling
 from gp_labeler.models.ghosts import Expectations, mirror_ghosts
-from gp_labeler.models.session import Session
-from gp_labeler.models.view import View, ViewState
+from gp_labeler.models.view import ViewModel, ViewState
 from gp_labeler.models.workflow import Active, PointState, placing_order
 from gp_labeler.views.panels.card_content import content_of
 
@@ -31,86 +30,86 @@ BOTH = ImportLandmarks((shape(L), shape(R)), MARK)
 
 def test_auto_advance_visits_everything_once():
     for atlas in (None, predict):
-        session = Session(predict=atlas)
+        editing = Editing(predict=atlas)
         visited = []
-        while session.active.code is not None:
-            visited.append(session.active)
-            labelling.place(session, shape(session.active.side)[session.active.code])
+        while editing.labels.active.code is not None:
+            visited.append(editing.labels.active)
+            editing.labels.place(shape(editing.labels.active.side)[editing.labels.active.code])
         assert len(visited) == len(set(visited)) == 37  # 19 and 18: IN is shared
         assert {a.side for a in visited[:19]} == {L}
-        assert [session.progress(side).text for side in Side] == ["20 of 20", "20 of 20"]
-        assert session.click_text == "Everything is placed · drag a point to move it"
+        assert [editing.labels.progress(side).text for side in Side] == ["20 of 20", "20 of 20"]
+        assert editing.labels.click_text == "Everything is placed · drag a point to move it"
         with pytest.raises(GpError, match=r"no feature is chosen. Choose one in the table"):
-            labelling.place(session, (0, 0, 0))
+            editing.labels.place((0, 0, 0))
 
 
 def test_what_is_skipped_comes_again_and_what_is_unseen_does_not():
-    session = Session()
+    editing = Editing()
     seen = []
     for _ in range(19):
-        seen.append(session.active)
-        labelling.skip(session)
-    assert session.active == seen[0]
+        seen.append(editing.labels.active)
+        editing.labels.skip()
+    assert editing.labels.active == seen[0]
     assert len(set(seen)) == 19
-    labelling.mark_unseen(session)
-    assert session.active == seen[1]
-    assert session.state.landmark(L, "CA").provenance.how is How.UNSEEN
-    assert session.progress(L).text == "0 of 20, 1 not seen"
-    while session.active.side is L:
-        labelling.mark_unseen(session)
-    assert session.active == Active(R, "CA")
+    editing.labels.mark_unseen()
+    assert editing.labels.active == seen[1]
+    assert editing.document.state.landmark(L, "CA").provenance.how is How.UNSEEN
+    assert editing.labels.progress(L).text == "0 of 20, 1 not seen"
+    while editing.labels.active.side is L:
+        editing.labels.mark_unseen()
+    assert editing.labels.active == Active(R, "CA")
 
 
 def test_skipping_the_last_one_of_a_side_goes_to_the_other_and_comes_back():
-    session = Session(ImportLandmarks((shape(L).with_point("ZL", None),), MARK).apply(SpecimenState()))
-    assert session.active == Active(L, "ZL")
-    labelling.skip(session)
-    assert session.active == Active(R, "CA")
-    only = Session(ImportLandmarks((shape(L).with_point("ZL", None), shape(R)), MARK).apply(SpecimenState()))
-    labelling.skip(only)
-    assert only.active == Active(L, "ZL")
+    editing = Editing(ImportLandmarks((shape(L).with_point("ZL", None),), MARK).apply(SpecimenState()))
+    assert editing.labels.active == Active(L, "ZL")
+    editing.labels.skip()
+    assert editing.labels.active == Active(R, "CA")
+    only = Editing(ImportLandmarks((shape(L).with_point("ZL", None), shape(R)), MARK).apply(SpecimenState()))
+    only.labels.skip()
+    assert only.labels.active == Active(L, "ZL")
 
 
 def test_the_order_opens_with_three_and_then_follows_sure_ghosts():
     assert placing_order({})[:4] == ("CA", "RWP", "OS", "CB")
-    session = Session(predict=predict)
+    editing = Editing(predict=predict)
     for code in ("CA", "RWP", "OS"):
-        assert session.active.code == code
-        labelling.place(session, shape()[code])
-    ghosts = session.ghosts(L)
+        assert editing.labels.active.code == code
+        editing.labels.place(shape()[code])
+    ghosts = editing.labels.ghosts(L)
     assert set(ghosts) == set(PLACEABLE) - {"CA", "RWP", "OS"}
     unsure = {"CB", "IN"}
     sure = {c: g for c, g in ghosts.items() if c not in unsure}
     order = placing_order(sure)
     assert order[: len(sure)] == tuple(c for c in PLACEABLE if c in sure)
     assert sorted(order) == sorted(PLACEABLE)
-    assert session.active.code == "CB"
-    assert np.allclose(session.crosshair, ghosts["CB"].position)  # follows the ghost
+    assert editing.labels.active.code == "CB"
+    assert np.allclose(editing.view.crosshair, ghosts["CB"].position)  # follows the ghost
 
 
 def test_moving_a_point_goes_nowhere():
-    session = Session()
-    labelling.go_to(session, "L", "zl")
-    labelling.place(session, (1, 2, 3))
-    assert session.active.code == "CA"
-    labelling.go_to(session, L, "ZL")
-    assert session.crosshair.tolist() == [1, 2, 3]
-    labelling.place(session, (4, 5, 6), How.SLICE)
-    assert (session.active.code, session.undo_text) == ("ZL", "move ZL left")
-    labelling.place(session, (4, 5, 6), side=R, code="MN")  # not the active one
-    assert session.active.code == "ZL"
-    labelling.clear(session)
-    assert (session.active.code, "ZL" in session.landmarks(L)) == ("ZL", False)
-    session.view.update(auto_advance=False)
-    labelling.place(session, (1, 1, 1))
-    assert session.active.code == "ZL"
+    editing = Editing()
+    editing.labels.choose("L", "zl")
+    editing.labels.place((1, 2, 3))
+    assert editing.labels.active.code == "CA"
+    editing.labels.choose(L, "ZL")
+    assert editing.view.crosshair.tolist() == [1, 2, 3]
+    editing.labels.place((4, 5, 6), How.SLICE)
+    assert (editing.labels.active.code, editing.document.undo_text) == ("ZL", "move ZL left")
+    editing.labels.place((4, 5, 6), side=R, code="MN")  # not the active one
+    assert editing.labels.active.code == "ZL"
+    editing.labels.clear()
+    assert (editing.labels.active.code, "ZL" in editing.document.landmarks(L)) == ("ZL", False)
+    editing.view.update(auto_advance=False)
+    editing.labels.place((1, 1, 1))
+    assert editing.labels.active.code == "ZL"
 
 
 def test_points_know_where_they_come_from():
-    session = Session(author="AB", clock=lambda: "2026-01-02T03:04:05+00:00")
-    session.attach_volume(FakeVolume())
-    labelling.place(session, (1, 2, 3), How.SLICE)
-    found = session.state.landmark(L, "CA").provenance
+    editing = Editing(author="AB", clock=lambda: "2026-01-02T03:04:05+00:00")
+    editing.document.attach_volume(FakeVolume())
+    editing.labels.place((1, 2, 3), How.SLICE)
+    found = editing.document.state.landmark(L, "CA").provenance
     assert (found.how, found.time, found.by, found.voxel_mm) == (
         How.SLICE,
         "2026-01-02T03:04:05+00:00",
@@ -120,76 +119,76 @@ def test_points_know_where_they_come_from():
 
 
 def test_the_next_click_is_told():
-    session = Session()
-    assert session.click_text == "Click on bone or a slice to place CA left"
-    labelling.go_to(session, R, "IN")
-    assert session.click_text == "Click on bone or a slice to place IN (both sides)"
-    labelling.mark_unseen(session, side=R, code="IN")
-    labelling.go_to(session, L, "IN")
-    assert session.click_text == "Click on bone or a slice to place IN (both sides) after all"
-    session.do(PlacePoint(L, "ZL", (1, 2, 3), MARK))
-    labelling.go_to(session, L, "ZL")
-    assert session.click_text == (
+    editing = Editing()
+    assert editing.labels.click_text == "Click on bone or a slice to place CA left"
+    editing.labels.choose(R, "IN")
+    assert editing.labels.click_text == "Click on bone or a slice to place IN (both sides)"
+    editing.labels.mark_unseen(side=R, code="IN")
+    editing.labels.choose(L, "IN")
+    assert editing.labels.click_text == "Click on bone or a slice to place IN (both sides) after all"
+    editing.document.do(PlacePoint(L, "ZL", (1, 2, 3), MARK))
+    editing.labels.choose(L, "ZL")
+    assert editing.labels.click_text == (
         "ZL left is placed; a click does not move it. Drag it, use the arrow keys, or Shift+P and click"
     )
-    labelling.lock(session)
-    assert session.click_text == "ZL left is locked"
+    editing.labels.lock()
+    assert editing.labels.click_text == "ZL left is locked"
     with pytest.raises(GpError, match="ZL left is locked"):
-        labelling.place(session, (0, 0, 0))
-    session.set_active(Active(L))
-    assert session.click_text == "Choose a feature to place"
+        editing.labels.place((0, 0, 0))
+    editing.labels.set_active(Active(L))
+    assert editing.labels.click_text == "Choose a feature to place"
     with pytest.raises(FeatureError, match="CO is computed"):
-        session.set_active(Active(L, "CO"))
+        editing.labels.set_active(Active(L, "CO"))
 
 
 def test_locking_all_and_unlocking():
-    session = Session(BOTH.apply(SpecimenState()))
-    assert labelling.lock_all(session)
-    assert session.undo_text == "lock 37 points"
-    assert not labelling.lock_all(session)
-    assert labelling.lock_all(session, False)
-    assert not labelling.lock_all(Session())
+    editing = Editing(BOTH.apply(SpecimenState()))
+    assert editing.labels.lock_all()
+    assert editing.document.undo_text == "lock 37 points"
+    assert not editing.labels.lock_all()
+    assert editing.labels.lock_all(False)
+    assert not Editing().labels.lock_all()
 
 
 def test_states_of_points():
-    session = Session(predict=predict, check=check)
-    assert set(session.point_states(L).values()) == {PointState.TO_DO}
-    session.do(ImportLandmarks((shape(L),), MARK))
-    assert session.point_states(L)["CO"] is PointState.COMPUTED
-    assert list(session.point_states(L)) == list(CODES)
-    labelling.clear(session, side=L, code="ZL")
-    labelling.mark_unseen(session, side=L, code="MN")
+    editing = Editing(predict=predict, check=check)
+    assert set(editing.labels.point_states(L).values()) == {PointState.TO_DO}
+    editing.document.do(ImportLandmarks((shape(L),), MARK))
+    assert editing.labels.point_states(L)["CO"] is PointState.COMPUTED
+    assert list(editing.labels.point_states(L)) == list(CODES)
+    editing.labels.clear(side=L, code="ZL")
+    editing.labels.mark_unseen(side=L, code="MN")
     off = shape()["FPP"] + [0, 3, 0]
-    labelling.place(session, off, side=L, code="FPP")
-    states = session.point_states(L)
+    editing.labels.place(off, side=L, code="FPP")
+    states = editing.labels.point_states(L)
     assert states["ZL"] is PointState.GHOST
     assert states["MN"] is PointState.UNSEEN
     assert [c for c, s in states.items() if s is PointState.DOUBTFUL] == ["FPP"]
-    assert session.doubts(L)["FPP"].departure_of("FPP").distance == pytest.approx(3, abs=0.5)
-    session.do(CheckPoint(L, "FPP"))
-    assert session.point_states(L)["FPP"] is PointState.CHECKED
+    assert editing.labels.doubts(L)["FPP"].departure_of("FPP").distance == pytest.approx(3, abs=0.5)
+    editing.document.do(CheckPoint(L, "FPP"))
+    assert editing.labels.point_states(L)["FPP"] is PointState.CHECKED
 
 
 def test_ghosts_need_three_points_and_an_atlas():
-    session = Session()
+    editing = Editing()
     heard = []
-    session.ghosts_changed.connect(lambda: heard.append(1))
-    session.set_predict(predict)
+    editing.labels.ghosts_changed.connect(lambda: heard.append(1))
+    editing.labels.expect(predict)
     assert heard == [1]
     for code in ("CA", "RWP"):
-        session.do(PlacePoint(L, code, shape()[code] + [1, 2, 3], MARK))
-        assert not session.ghosts(L)
+        editing.document.do(PlacePoint(L, code, shape()[code] + [1, 2, 3], MARK))
+        assert not editing.labels.ghosts(L)
     with pytest.raises(GpError, match=r"nothing says yet where ZL left should be. Place three"):
-        labelling.accept_ghost(session, side=L, code="ZL")
-    session.do(PlacePoint(L, "OS", shape()["OS"] + [1, 2, 3], MARK))
-    ghost = session.ghosts(L)["ZL"]
+        editing.labels.accept_ghost(side=L, code="ZL")
+    editing.document.do(PlacePoint(L, "OS", shape()["OS"] + [1, 2, 3], MARK))
+    ghost = editing.labels.ghosts(L)["ZL"]
     assert np.allclose(ghost.position, shape()["ZL"] + [1, 2, 3])
     assert ghost.radius_95 == pytest.approx(np.sqrt(7.815) * 0.2)
-    labelling.go_to(session, L, "ZL")
-    labelling.accept_ghost(session)
-    assert session.state.landmark(L, "ZL").provenance.how is How.GHOST
-    assert session.point_states(L)["ZL"] is PointState.SUGGESTED
-    assert "ZL" not in session.ghosts(L)
+    editing.labels.choose(L, "ZL")
+    editing.labels.accept_ghost()
+    assert editing.document.state.landmark(L, "ZL").provenance.how is How.GHOST
+    assert editing.labels.point_states(L)["ZL"] is PointState.SUGGESTED
+    assert "ZL" not in editing.labels.ghosts(L)
 
 
 def test_an_edit_of_one_side_asks_the_atlas_for_that_side_alone():
@@ -199,28 +198,28 @@ def test_an_edit_of_one_side_asks_the_atlas_for_that_side_alone():
         asked.append(landmarks.side)
         return predict(landmarks)
 
-    session = Session(predict=counted)
+    editing = Editing(predict=counted)
     for side in (L, R):
         for code in ("CA", "RWP", "OS"):
-            session.do(PlacePoint(side, code, shape(side)[code], MARK))
-        session.ghosts(side)
-    session.ghosts(L)
+            editing.document.do(PlacePoint(side, code, shape(side)[code], MARK))
+        editing.labels.ghosts(side)
+    editing.labels.ghosts(L)
     asked.clear()
-    session.do(PlacePoint(R, "MH", shape(R)["MH"], MARK))
-    left, right = session.ghosts(L), session.ghosts(R)
+    editing.document.do(PlacePoint(R, "MH", shape(R)["MH"], MARK))
+    left, right = editing.labels.ghosts(L), editing.labels.ghosts(R)
     assert asked == [R]
     assert left["MH"].source == right["FPP"].source == "atlas"
 
 
 def test_a_side_at_rest_stays_judged_while_the_other_is_labelled():
-    session = Session(predict=predict, check=check)
-    session.do(ImportLandmarks((shape(L),), MARK))
-    session.judging(L).run(lambda _: None)
+    editing = Editing(predict=predict, check=check)
+    editing.document.do(ImportLandmarks((shape(L),), MARK))
+    editing.labels.checking(L).run(lambda _: None)
     for code in set(PLACEABLE) - {"IN"}:  # which is the left side's as well
-        labelling.place(session, shape(R)[code], side=R, code=code)
-        session.judging(R).run(lambda _: None)
-        session.ghosts(L), session.ghosts(R)  # as the views ask
-        assert session.judging(L).known is not None
+        editing.labels.place(shape(R)[code], side=R, code=code)
+        editing.labels.checking(R).run(lambda _: None)
+        editing.labels.ghosts(L), editing.labels.ghosts(R)  # as the views ask
+        assert editing.labels.checking(L).known is not None
 
 
 def test_an_atlas_that_cannot_say_expects_nothing():
@@ -238,13 +237,13 @@ def test_the_checker_is_asked_once_for_the_same_points():
         asked.append(landmarks)
         return check(landmarks)
 
-    session = Session(BOTH.apply(SpecimenState()), check=count)
-    assert session.point_states(L, wait=False)["ZL"] is PointState.PLACED
+    editing = Editing(BOTH.apply(SpecimenState()), check=count)
+    assert editing.labels.point_states(L, wait=False)["ZL"] is PointState.PLACED
     assert asked == []
-    assert session.point_states(L) == session.point_states(L)
+    assert editing.labels.point_states(L) == editing.labels.point_states(L)
     assert len(asked) == 1
-    session.do(PlacePoint(R, "ZL", (0, 0, 0), MARK))
-    session.doubts(L)
+    editing.document.do(PlacePoint(R, "ZL", (0, 0, 0), MARK))
+    editing.labels.doubts(L)
     assert len(asked) == 1
 
 
@@ -260,63 +259,65 @@ def test_nonsense_is_doubted_in_words_not_in_kilometres():
 
 
 def test_doubts_can_be_found_by_a_job():
-    session = Session(BOTH.apply(SpecimenState()), check=check)
-    session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
-    assert session.point_states(L, wait=False)["FPP"] is PointState.PLACED
+    editing = Editing(BOTH.apply(SpecimenState()), check=check)
+    editing.document.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
+    assert editing.labels.point_states(L, wait=False)["FPP"] is PointState.PLACED
     with ThreadPoolExecutor(1) as pool:
-        pool.submit(session.judging(L).run, lambda fraction: None).result()
-    assert session.point_states(L, wait=False)["FPP"] is PointState.DOUBTFUL
+        pool.submit(editing.labels.checking(L).run, lambda fraction: None).result()
+    assert editing.labels.point_states(L, wait=False)["FPP"] is PointState.DOUBTFUL
 
 
 def test_doubts_do_not_blink_while_an_edit_is_judged():
-    session = Session(BOTH.apply(SpecimenState()), check=check)
-    session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
+    editing = Editing(BOTH.apply(SpecimenState()), check=check)
+    editing.document.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
 
     def doubted() -> dict[str, float]:
-        states = session.point_states(L, wait=False)
-        assert set(session.near_doubts(L)) == {c for c, s in states.items() if s is PointState.DOUBTFUL}
-        doubts = session.near_doubts(L)
+        states = editing.labels.point_states(L, wait=False)
+        assert set(editing.labels.near_doubts(L)) == {
+            c for c, s in states.items() if s is PointState.DOUBTFUL
+        }
+        doubts = editing.labels.near_doubts(L)
         return {code: round(doubt.departure_of(code).distance, 1) for code, doubt in doubts.items()}
 
     assert doubted() == {}, "nobody has looked yet"
-    session.judging(L).run(lambda fraction: None)
+    editing.labels.checking(L).run(lambda fraction: None)
     assert doubted() == {"FPP": 3.0}
-    session.do(PlacePoint(L, "OS", shape()["OS"] + 0.01, MARK))
+    editing.document.do(PlacePoint(L, "OS", shape()["OS"] + 0.01, MARK))
     assert doubted() == {"FPP": 3.0}, "another point was moved"
-    session.judging(L).run(lambda fraction: None)
-    session.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 2, 0], MARK))
+    editing.labels.checking(L).run(lambda fraction: None)
+    editing.document.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 2, 0], MARK))
     assert doubted() == {"FPP": 2.0}, "its own place tells by itself"
-    session.do(PlacePoint(L, "FPP", shape()["FPP"], MARK))
+    editing.document.do(PlacePoint(L, "FPP", shape()["FPP"], MARK))
     assert doubted() == {}
-    session.undo()
-    session.do(ClearPoint(L, "FPP"))
+    editing.document.undo()
+    editing.document.do(ClearPoint(L, "FPP"))
     assert doubted() == {}, "what is not placed is not doubted"
-    session.undo()
-    session.judging(L).run(lambda fraction: None)
-    session.do(SwapSides())
+    editing.document.undo()
+    editing.labels.checking(L).run(lambda fraction: None)
+    editing.document.do(SwapSides())
     assert doubted() == {}, "all is new"
 
 
 def test_labels_under_the_name_of_the_other_side_are_called_so():
     atlas, rng = Atlas.published(), np.random.default_rng(3)
     right = {code: (atlas[code] + rng.normal(size=3) * 0.1) * [-1, 1, 1] for code in atlas.codes}
-    session = Session(check=partial(check_side, atlas=atlas))
+    editing = Editing(check=partial(check_side, atlas=atlas))
 
     def judged(side: Side) -> bool:
-        session.judging(side).run(lambda fraction: None)
-        return session.is_other_side(side)
+        editing.labels.checking(side).run(lambda fraction: None)
+        return editing.labels.is_other_side(side)
 
-    session.do(ImportLandmarks((LandmarkSet.from_mapping(right, L),), MARK))
-    assert not session.is_other_side(L), "nobody has looked yet"
+    editing.document.do(ImportLandmarks((LandmarkSet.from_mapping(right, L),), MARK))
+    assert not editing.labels.is_other_side(L), "nobody has looked yet"
     assert judged(L)
-    session.set_active(Active(L, "CB"))
-    card = content_of(session, has_scan=True)
+    editing.labels.set_active(Active(L, "CB"))
+    card = content_of(editing.labels, has_scan=True)
     assert "fit the right side" in card.status
     assert (card.action, card.action_text) == ("swap_sides", "Exchange left and right")
-    session.do(SwapSides())
+    editing.document.do(SwapSides())
     assert not judged(R)
     assert not judged(L)
-    session.do(PlacePoint(R, "CL", right["CL"] + [0, 4, 0], MARK))
+    editing.document.do(PlacePoint(R, "CL", right["CL"] + [0, 4, 0], MARK))
     assert not judged(R), "one that is off says nothing of the side"
 
 
@@ -325,12 +326,12 @@ def test_a_point_far_off_is_doubted_and_its_ghost_comes_where_it_belongs():
     rng = np.random.default_rng(3)
     points = {code: atlas[code] + rng.normal(size=3) * 0.1 for code in atlas.codes}
     points["MH"] = points["MH"] + [0, 2.5, 0]
-    session = Session(predict=partial(shape_predict, atlas), check=partial(check_side, atlas=atlas))
-    session.do(ImportLandmarks((LandmarkSet.from_mapping(points, L),), MARK))
-    assert set(session.doubts(L)) == {"MH"}
-    assert np.linalg.norm(session.doubts(L)["MH"].departure_of("MH").expected - atlas["MH"]) < 0.5
-    labelling.clear(session, side=L, code="MH")
-    ghost = session.ghosts(L)["MH"]
+    editing = Editing(predict=partial(shape_predict, atlas), check=partial(check_side, atlas=atlas))
+    editing.document.do(ImportLandmarks((LandmarkSet.from_mapping(points, L),), MARK))
+    assert set(editing.labels.doubts(L)) == {"MH"}
+    assert np.linalg.norm(editing.labels.doubts(L)["MH"].departure_of("MH").expected - atlas["MH"]) < 0.5
+    editing.labels.clear(side=L, code="MH")
+    ghost = editing.labels.ghosts(L)["MH"]
     assert np.linalg.norm(ghost.position - atlas["MH"]) < ghost.radius_95 < 1.0
 
 
@@ -341,9 +342,9 @@ def test_one_pair_mirrors_the_other_side():
     for code in PLACEABLE:
         assert np.allclose(ghosts[code].position, _mirrored_in_bisector(code))
     assert ghosts["CA"].radius_95 < ghosts["ZL"].radius_95
-    session = Session(ImportLandmarks((shape(L), some), MARK).apply(SpecimenState()))
-    assert session.ghosts(R)["ZL"].source == "mirror"
-    assert "IN" not in session.ghosts(R)
+    editing = Editing(ImportLandmarks((shape(L), some), MARK).apply(SpecimenState()))
+    assert editing.labels.ghosts(R)["ZL"].source == "mirror"
+    assert "IN" not in editing.labels.ghosts(R)
 
 
 def _mirrored_in_bisector(code):
@@ -354,23 +355,23 @@ def _mirrored_in_bisector(code):
 
 
 def test_crosshair_and_active_tell_only_changes():
-    session = Session()
+    editing = Editing()
     heard = []
-    session.crosshair_changed.connect(lambda p: heard.append(p.tolist()))
-    session.active_changed.connect(heard.append)
-    session.set_crosshair((1, 2, 3))
-    session.set_crosshair([1, 2, 3])
-    session.set_active(Active(L, "ZL"))
-    session.set_active(Active(L, "ZL"))
+    editing.view.crosshair_changed.connect(lambda p: heard.append(p.tolist()))
+    editing.labels.active_changed.connect(heard.append)
+    editing.view.set_crosshair((1, 2, 3))
+    editing.view.set_crosshair([1, 2, 3])
+    editing.labels.set_active(Active(L, "ZL"))
+    editing.labels.set_active(Active(L, "ZL"))
     assert heard == [[1, 2, 3], Active(L, "ZL")]
     with pytest.raises(ValueError, match="read-only"):
-        session.crosshair[0] = 5
+        editing.view.crosshair[0] = 5
     with pytest.raises(GpError, match="crosshair: position must be three finite"):
-        session.set_crosshair((1, 2))
+        editing.view.set_crosshair((1, 2))
 
 
 def test_view():
-    view = View()
+    view = ViewModel(SpecimenDocument())
     heard = []
     view.changed.connect(heard.append)
     view.update(layout="axial", mesh_opacity=1.0)

@@ -6,31 +6,31 @@ import json
 
 import numpy as np
 import pytest
+from document_cases import Editing
 
 from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_labeler.document import touching
 from gp_labeler.document.touches import TouchHow
-from gp_labeler.models.estimating import Estimating
 from gp_labeler.models.pose_exports import FORMATS, InsertionPath, save_pose
-from gp_labeler.models.session import Session
 
 
 @pytest.fixture
 def estimating():
-    session, animal = Session(), draw_animal(Atlas.published(), rng=np.random.default_rng(1)).side("L")
+    editing, animal = (
+        Editing(atlas=Atlas.published()),
+        draw_animal(Atlas.published(), rng=np.random.default_rng(1)).side("L"),
+    )
     for code in PROBE:
-        touching.record_touch(session, "L", code, animal[code], TouchHow.SCAN)
-    estimating = Estimating(session)
-    estimating.use_atlas(Atlas.published())
-    yield estimating
-    session.close(discard=True)
+        touching.record_touch(editing.document, "L", code, animal[code], TouchHow.SCAN)
+    yield editing.pose
+    editing.document.close(discard=True)
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
 def test_every_format_is_written_by_its_ending(tmp_path, estimating, suffix):
-    pose = estimating.current.pose
+    pose = estimating.estimate.pose
     file = save_pose(pose, tmp_path / f"pose{suffix}")
     text = file.read_text()
     number = repr(float(pose.origin[0])) if suffix != ".tfm" else "AffineTransform"
@@ -43,7 +43,7 @@ def test_every_format_is_written_by_its_ending(tmp_path, estimating, suffix):
 
 def test_another_ending_is_refused(tmp_path, estimating):
     with pytest.raises(GpError, match=r"no ending of a pose file.*\.tfm"):
-        save_pose(estimating.current.pose, tmp_path / "pose.txt")
+        save_pose(estimating.estimate.pose, tmp_path / "pose.txt")
     assert not list(tmp_path.iterdir())
 
 
@@ -51,7 +51,7 @@ def test_a_path_goes_with_the_cochlea_and_is_mirrored_for_the_other_ear(tmp_path
     table = tmp_path / "path.csv"
     table.write_text("x,y,z\n-0.5,2,0\n0,1.5,0.2\n0.4,1,0.5\n")
     left, right = (InsertionPath.read(table, side, units="mm") for side in Side)
-    estimate = estimating.current
+    estimate = estimating.estimate
     T_scan_cochlea = estimate.in_scan().T_scan_cochlea
     np.testing.assert_allclose(left.in_scan(estimate), T_scan_cochlea.apply(left.points), atol=1e-9)
     mirrored = right.points * (1, 1, -1)

@@ -7,15 +7,14 @@ from html.parser import HTMLParser
 
 import numpy as np
 import pytest
+from document_cases import Editing
 
 from gp_core import PROBE, Atlas
 from gp_core.atlas.sampling import draw_animal
 from gp_labeler.document import touching
 from gp_labeler.document.edits import PlacePoint
 from gp_labeler.document.state import How, Provenance, SpecimenState
-from gp_labeler.models.estimating import Estimating
 from gp_labeler.models.pose_report import PoseReport
-from gp_labeler.models.session import Session
 
 VOID = {"meta", "img", "br"}
 
@@ -48,28 +47,29 @@ class Page(HTMLParser):
 @pytest.fixture(scope="module")
 def made():
     atlas, rng = Atlas.published(), np.random.default_rng(0)
-    session = Session(SpecimenState("GP-014"), author="AB")
-    estimating = Estimating(session)
-    estimating.use_atlas(atlas)
+    editing = Editing(SpecimenState("GP-014"), author="AB", atlas=atlas)
+    estimating = editing.pose
     animal = draw_animal(atlas, rng=rng).side("L")
     for code in ("CA", "CB", "RWA", "RWP", "CL", "MN", "OS"):
-        session.do(PlacePoint(animal.side, code, animal[code], Provenance(How.MESH)))
+        editing.document.do(PlacePoint(animal.side, code, animal[code], Provenance(How.MESH)))
     for code in PROBE:
-        touching.record_touch(session, "L", code, animal[code] + (50, 0, 9), source="<Stylus & co>")
-    touching.record_touch(session, "L", "MN", animal["MN"] + (53, 0, 9))
-    touching.record_touch(session, "L", "S1", (1, 2, 3))
+        touching.record_touch(editing.document, "L", code, animal[code] + (50, 0, 9), source="<Stylus & co>")
+    touching.record_touch(editing.document, "L", "MN", animal["MN"] + (53, 0, 9))
+    touching.record_touch(editing.document, "L", "S1", (1, 2, 3))
     estimating.judge("reject", by="C&D", note="<too> deep")
-    yield session, estimating
-    session.close(discard=True)
+    yield editing, estimating
+    editing.document.close(discard=True)
 
 
 def report(made, pictures=None):
-    session, estimating = made
-    return PoseReport(session.state, estimating.current, pictures or {}, "2026-11-22T09:00:00+00:00")
+    editing, estimating = made
+    return PoseReport(
+        editing.document.state, estimating.estimate, pictures or {}, "2026-11-22T09:00:00+00:00"
+    )
 
 
 def test_it_says_what_the_estimate_says(made):
-    estimate = made[1].current
+    estimate = made[1].estimate
     page = Page(report(made).html())
     assert page.open == []
     assert "GP-014: pose of the left cochlea" in page.text
@@ -87,7 +87,7 @@ def test_it_says_what_the_estimate_says(made):
 
 def test_the_suspect_is_marked_and_the_verdict_is_told(made):
     page = Page(report(made).html())
-    assert made[1].current.pose.suspects == ("MN",)
+    assert made[1].estimate.pose.suspects == ("MN",)
     assert re.search(r"MN\s+suspect", page.text)
     assert re.search(r"Rejected\s+by C&D", page.text)
     assert "<too> deep" in page.text, "escaped, not lost"
@@ -95,26 +95,25 @@ def test_the_suspect_is_marked_and_the_verdict_is_told(made):
 
 
 def test_a_verdict_on_another_estimate_is_said_to_be_that():
-    session = Session(SpecimenState("GP-015"), author="AB")
-    estimating = Estimating(session)
-    estimating.use_atlas(Atlas.published())
+    editing = Editing(SpecimenState("GP-015"), author="AB", atlas=Atlas.published())
+    estimating = editing.pose
     for code in PROBE:
-        touching.record_touch(session, "L", code, Atlas.published()[code])
+        touching.record_touch(editing.document, "L", code, Atlas.published()[code])
     check = estimating.judge("accept")
-    made = (session, estimating)
+    made = (editing, estimating)
     assert "Not of this estimate" not in Page(report(made).html()).text
-    touching.record_touch(session, "L", "RWP", Atlas.published()["RWP"] + (0.8, 0, 0))
-    mm, degrees = estimating.current.moved_since(check.pose)
+    touching.record_touch(editing.document, "L", "RWP", Atlas.published()["RWP"] + (0.8, 0, 0))
+    mm, degrees = estimating.estimate.moved_since(check.pose)
     page = Page(report(made).html()).text
     assert f"Not of this estimate: it moved by {mm:.2f} mm and turned by {degrees:.1f}° since." in page
     assert mm > 0.05
-    session.undo()
-    assert estimating.current.moved_since(check.pose) is None
+    editing.document.undo()
+    assert estimating.estimate.moved_since(check.pose) is None
     estimating.choose(round_window="expected")
-    touching.record_touch(session, "L", "RWP", Atlas.published()["RWP"])
+    touching.record_touch(editing.document, "L", "RWP", Atlas.published()["RWP"])
     assert "round window as expected" in Page(report(made).html()).text
-    assert estimating.current.moved_since({}) is None
-    session.close(discard=True)
+    assert estimating.estimate.moved_since({}) is None
+    editing.document.close(discard=True)
 
 
 def test_pictures_are_part_of_the_page_or_named_beside_it(made):
@@ -127,19 +126,18 @@ def test_pictures_are_part_of_the_page_or_named_beside_it(made):
 
 def test_skull_features_tell_how_well_they_fit() -> None:
     atlas, rng = Atlas.published(), np.random.default_rng(0)
-    session = Session(SpecimenState("GP-015"), author="AB")
-    estimating = Estimating(session)
-    estimating.use_atlas(atlas)
+    editing = Editing(SpecimenState("GP-015"), author="AB", atlas=atlas)
+    estimating = editing.pose
     animal = draw_animal(atlas, rng=rng).side("L")
     for code in PROBE:
-        touching.record_touch(session, "L", code, animal[code])
+        touching.record_touch(editing.document, "L", code, animal[code])
     for n, there in enumerate(rng.uniform(-20, 20, (8, 3)), start=1):
-        touching.mark_skull(session, f"S{n}", there)
+        touching.mark_skull(editing.document, f"S{n}", there)
         off = 8.0 if n == 7 else 0.0  # one that is wrong
-        touching.record_touch(session, "L", f"S{n}", there + 0.1 * rng.normal(size=3) + off)
-    residuals = estimating.current.registered.fiducials.residuals_mm
-    text = Page(PoseReport(session.state, estimating.current).html()).text
+        touching.record_touch(editing.document, "L", f"S{n}", there + 0.1 * rng.normal(size=3) + off)
+    residuals = estimating.estimate.registered.fiducials.residuals_mm
+    text = Page(PoseReport(editing.document.state, estimating.estimate).html()).text
     for name in ("S1", "S5"):
         assert re.search(rf"{name} .{{0,60}} {residuals[name]:.2f} ", text)
     assert re.findall(r"(S\d) suspect", text) == ["S7"]
-    session.close(discard=True)
+    editing.document.close(discard=True)

@@ -1,4 +1,4 @@
-"""The workbench without a window: opening, meshing, dragging, saving; what goes wrong is said."""
+"""The workspace without a window: opening, meshing, dragging, saving; what goes wrong is said."""
 
 from __future__ import annotations
 
@@ -18,37 +18,36 @@ from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.document.state import How
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import QueueDispatcher
-from gp_labeler.models import labelling
 from gp_labeler.models.workflow import Active
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.card_content import content_of
 
 
-class Desk(Workbench):
-    """A workbench whose results are delivered on demand, and that remembers what it said."""
+class QueuedWorkspace(Workspace):
+    """A workspace whose results are delivered on demand, and that remembers what it said."""
 
     def __init__(self, directory: Path | None = None) -> None:
         self.calls = QueueDispatcher()
         self.said: list[tuple[str, str]] = []
         super().__init__(directory, self.calls, author="AB")
-        self.message.connect(lambda text, level: self.said.append((level, text)))
+        self.messages.said.connect(lambda text, level: self.said.append((level, text)))
 
     def wait(self) -> None:
         self.calls.deliver_until_idle(self.jobs)
 
 
 @pytest.fixture
-def desk(tmp_path):
-    made = Desk(tmp_path / "state")
+def workspace(tmp_path):
+    made = QueuedWorkspace(tmp_path / "state")
     yield made
     made.close(discard=True)
 
 
 @pytest.fixture
-def on_ball(desk, ball):
-    desk.open_volume(ball)
-    desk.wait()
-    return desk
+def on_ball(workspace, ball):
+    workspace.scan.begin(ball)
+    workspace.wait()
+    return workspace
 
 
 @pytest.fixture
@@ -56,214 +55,215 @@ def ball_file(tmp_path) -> Path:
     return write_ball(tmp_path / "ball.mha")
 
 
-def test_a_scan_becomes_bone(desk, ball_file) -> None:
+def test_a_scan_becomes_bone(workspace, ball_file) -> None:
     seen = []
-    desk.surfaces_changed.connect(lambda: seen.append(len(desk.surfaces)))
-    desk.open(ball_file)
-    desk.wait()
-    assert 700 < desk.threshold < 1400
+    workspace.bone.surfaces_changed.connect(lambda: seen.append(len(workspace.bone.surfaces)))
+    workspace.open(ball_file)
+    workspace.wait()
+    assert 700 < workspace.scan.threshold < 1400
     assert seen[-1] >= 1
-    hit = desk.surfaces[0].pick(MIDDLE - [0, 20, 0], [0, 1, 0])
+    hit = workspace.bone.surfaces[0].pick(MIDDLE - [0, 20, 0], [0, 1, 0])
     assert abs(np.linalg.norm(hit.point - MIDDLE) - BALL_MM) < VOXEL_MM
-    assert desk.session.state.specimen == "ball"
-    assert desk.session.state.volume.checksum
-    assert not desk.session.dirty
-    np.testing.assert_allclose(desk.session.crosshair, MIDDLE)
+    assert workspace.document.state.specimen == "ball"
+    assert workspace.document.state.volume.checksum
+    assert not workspace.document.dirty
+    np.testing.assert_allclose(workspace.view.crosshair, MIDDLE)
 
 
 def test_a_threshold_is_an_edit_and_a_proposal_is_none(on_ball) -> None:
-    proposed = on_ball.threshold
-    assert on_ball.session.undo_text is None
+    proposed = on_ball.scan.threshold
+    assert on_ball.document.undo_text is None
     previews = []
-    on_ball.threshold_previewed.connect(previews.append)
-    on_ball.preview_threshold(1100.0)
-    on_ball.set_threshold(1000.0)
+    on_ball.scan.threshold_previewed.connect(previews.append)
+    on_ball.scan.preview_threshold(1100.0)
+    on_ball.scan.set_threshold(1000.0)
     assert previews == [1100.0, None]
     on_ball.wait()
-    before = on_ball.surfaces[0].n_triangles
-    assert on_ball.threshold == 1000.0
-    on_ball.session.undo()
+    before = on_ball.bone.surfaces[0].n_triangles
+    assert on_ball.scan.threshold == 1000.0
+    on_ball.document.undo()
     on_ball.wait()
-    assert on_ball.threshold == proposed
-    assert on_ball.surfaces[0].n_triangles != before
+    assert on_ball.scan.threshold == proposed
+    assert on_ball.bone.surfaces[0].n_triangles != before
 
 
-def test_ears_are_meshed_finely_once_their_place_is_known(desk) -> None:
+def test_ears_are_meshed_finely_once_their_place_is_known(workspace) -> None:
     ball = ball_volume()
     large = np.kron(ball.array, np.ones((5, 5, 5), dtype=np.uint8)).astype(np.uint16)
     volume = Volume.from_parts(large, [VOXEL_MM / 5] * 3, ball.origin, name="large")
-    desk.open_volume(volume)
-    desk.wait()
-    assert {part.stride for part in desk.surfaces} == {2}
+    workspace.scan.begin(volume)
+    workspace.wait()
+    assert {part.stride for part in workspace.bone.surfaces} == {2}
     for code, offset in (("CA", (5, 0, 0)), ("RWP", (5, 2, 0)), ("OS", (5, 0, 2))):
-        labelling.place(desk.session, MIDDLE + np.array(offset), side=Side.LEFT, code=code)
-    desk.mesh_ears(half_mm=1.0)
-    desk.wait()
-    assert {part.stride for part in desk.surfaces} == {1, 2}
+        workspace.labels.place(MIDDLE + np.array(offset), side=Side.LEFT, code=code)
+    workspace.bone.mesh_ears(half_mm=1.0)
+    workspace.wait()
+    assert {part.stride for part in workspace.bone.surfaces} == {1, 2}
 
 
 def test_a_drag_shows_at_once_and_is_one_edit(on_ball) -> None:
-    session, seen = on_ball.session, []
-    labelling.place(session, MIDDLE, side=Side.LEFT, code="CA")
-    on_ball.dragged.connect(lambda drag: seen.append(None if drag is None else drag.position.copy()))
-    assert on_ball.begin_drag(Side.LEFT, "CA")
+    seen, document, labels = [], on_ball.document, on_ball.labels
+    labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    on_ball.interaction.dragged.connect(
+        lambda drag: seen.append(None if drag is None else drag.position.copy())
+    )
+    assert on_ball.interaction.begin_drag(Side.LEFT, "CA")
     for x in (1.0, 2.0, 3.0):
-        on_ball.drag_to(MIDDLE + np.array([x, 0, 0]), How.SLICE)
-        np.testing.assert_array_equal(session.landmarks("L")["CA"], MIDDLE)
-    assert on_ball.end_drag()
+        on_ball.interaction.drag_to(MIDDLE + np.array([x, 0, 0]), How.SLICE)
+        np.testing.assert_array_equal(document.landmarks("L")["CA"], MIDDLE)
+    assert on_ball.interaction.end_drag()
     assert seen[-1] is None
-    np.testing.assert_array_equal(session.landmarks("L")["CA"], MIDDLE + np.array([3, 0, 0]))
-    session.undo()
-    np.testing.assert_array_equal(session.landmarks("L")["CA"], MIDDLE)
+    np.testing.assert_array_equal(document.landmarks("L")["CA"], MIDDLE + np.array([3, 0, 0]))
+    document.undo()
+    np.testing.assert_array_equal(document.landmarks("L")["CA"], MIDDLE)
 
 
 def test_a_drag_that_comes_home_is_no_edit(on_ball) -> None:
-    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
-    on_ball.begin_drag(Side.LEFT, "CA")
-    on_ball.drag_to(MIDDLE + np.array([1, 0, 0]), How.SLICE)
-    on_ball.drag_to(MIDDLE, How.SLICE)
-    assert not on_ball.end_drag()
-    assert not on_ball.begin_drag(Side.RIGHT, "CA")  # not placed
-    labelling.lock(on_ball.session, side=Side.LEFT, code="CA")
-    assert not on_ball.begin_drag(Side.LEFT, "CA")
+    on_ball.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    on_ball.interaction.begin_drag(Side.LEFT, "CA")
+    on_ball.interaction.drag_to(MIDDLE + np.array([1, 0, 0]), How.SLICE)
+    on_ball.interaction.drag_to(MIDDLE, How.SLICE)
+    assert not on_ball.interaction.end_drag()
+    assert not on_ball.interaction.begin_drag(Side.RIGHT, "CA")  # not placed
+    on_ball.labels.lock(side=Side.LEFT, code="CA")
+    assert not on_ball.interaction.begin_drag(Side.LEFT, "CA")
 
 
 def test_listeners_follow_from_one_specimen_to_the_next(on_ball, ball) -> None:
     seen = []
-    on_ball.landmarks_changed.connect(seen.append)
-    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
-    old = on_ball.session
-    on_ball.open_volume(ball)
-    assert on_ball.session is not old
-    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CB")
+    on_ball.document.landmarks_changed.connect(seen.append)
+    on_ball.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    on_ball.scan.begin(ball)
+    assert not on_ball.document.landmarks(Side.LEFT).placed
+    on_ball.labels.place(MIDDLE, side=Side.LEFT, code="CB")
     assert [sorted(code for _, code in changed) for changed in seen] == [["CA"], ["CB"]]
 
 
 def test_arrow_keys_have_a_point_to_move(on_ball) -> None:
-    assert on_ball.nudged_point() is None
-    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
-    assert on_ball.session.active != Active(Side.LEFT, "CA")
-    assert on_ball.nudged_point() == (Side.LEFT, "CA")  # the one placed last
-    on_ball.go_to(Side.LEFT, "CA")
-    labelling.place(on_ball.session, MIDDLE + 1, side=Side.LEFT, code="CB")
-    assert on_ball.nudged_point() == (Side.LEFT, "CA")  # the chosen one
+    assert on_ball.interaction.nudged_point() is None
+    on_ball.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    assert on_ball.labels.active != Active(Side.LEFT, "CA")
+    assert on_ball.interaction.nudged_point() == (Side.LEFT, "CA")  # the one placed last
+    on_ball.labels.go_to(Side.LEFT, "CA")
+    on_ball.labels.place(MIDDLE + 1, side=Side.LEFT, code="CB")
+    assert on_ball.interaction.nudged_point() == (Side.LEFT, "CA")  # the chosen one
 
 
-def test_a_specimen_finds_its_scan(desk, ball_file, tmp_path) -> None:
-    desk.open(ball_file)
-    desk.wait()
-    labelling.place(desk.session, MIDDLE, side=Side.LEFT, code="CA")
-    saved = desk.session.save(tmp_path / "one")
-    desk.open_volume(ball_volume())
-    desk.open(saved)
-    desk.wait()
-    assert desk.volume.name == "ball"
-    assert desk.surfaces
-    assert "CA" in desk.session.landmarks("L")
+def test_a_specimen_finds_its_scan(workspace, ball_file, tmp_path) -> None:
+    workspace.open(ball_file)
+    workspace.wait()
+    workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    saved = workspace.document.save(tmp_path / "one")
+    workspace.scan.begin(ball_volume())
+    workspace.open(saved)
+    workspace.wait()
+    assert workspace.scan.volume.name == "ball"
+    assert workspace.bone.surfaces
+    assert "CA" in workspace.document.landmarks("L")
 
 
-def test_where_a_specimen_is_kept_tells_two_of_one_name_apart(desk, ball, tmp_path, monkeypatch) -> None:
+def test_where_a_specimen_is_kept_tells_two_of_one_name_apart(workspace, ball, tmp_path, monkeypatch) -> None:
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("USERPROFILE", str(tmp_path))
-    desk.open_volume(ball)
-    assert desk.place == ""
+    workspace.scan.begin(ball)
+    assert workspace.document.location == ""
     for name, place in (("ball", "~"), ("study/ball", "~/study"), ("study/ball 2", "~/study/ball 2")):
         (tmp_path / "study").mkdir(exist_ok=True)
-        saved = desk.session.save(tmp_path / name)
-        assert desk.place == str(Path(place))
-    desk.open_specimen(saved, as_copy=True)
-    assert desk.place == f"copy of {Path('~/study/ball 2')}"
-    desk.open_volume(ball)
-    assert desk.place == ""
+        saved = workspace.document.save(tmp_path / name)
+        assert workspace.document.location == str(Path(place))
+    workspace.open_specimen(saved, as_copy=True)
+    assert workspace.document.location == f"copy of {Path('~/study/ball 2')}"
+    workspace.scan.begin(ball)
+    assert workspace.document.location == ""
 
 
-def test_a_scan_that_moved_is_named_and_found_again(desk, ball_file, tmp_path) -> None:
-    desk.open(ball_file)
-    desk.wait()
-    saved = desk.session.save(tmp_path / "one")
-    desk.open_volume(ball_volume())
+def test_a_scan_that_moved_is_named_and_found_again(workspace, ball_file, tmp_path) -> None:
+    workspace.open(ball_file)
+    workspace.wait()
+    saved = workspace.document.save(tmp_path / "one")
+    workspace.scan.begin(ball_volume())
     moved = ball_file.rename(tmp_path / "elsewhere.mha")
-    desk.open(saved)
-    desk.wait()
-    assert desk.volume is None
-    assert any("ball" in text and level == "warning" for level, text in desk.said)
-    desk.find_scan(moved)
-    desk.wait()
-    assert desk.volume is not None
+    workspace.open(saved)
+    workspace.wait()
+    assert workspace.scan.volume is None
+    assert any("ball" in text and level == "warning" for level, text in workspace.said)
+    workspace.scan.find(moved)
+    workspace.wait()
+    assert workspace.scan.volume is not None
 
 
-def test_a_phantom_which_is_in_no_file_is_made_anew(desk, tmp_path) -> None:
-    desk.open_demo(seed=3, spacing=0.5)
-    desk.wait()
-    labelling.place(desk.session, desk.truth.side("L")["CA"], side=Side.LEFT, code="CA")
-    saved = desk.session.save(tmp_path / "one")
-    desk.open_volume(ball_volume())
-    desk.wait()
-    desk.open(saved)
-    desk.wait()
-    assert desk.volume is not None
-    assert desk.volume.name == "phantom-3"
-    assert desk.truth is not None
-    assert [text for level, text in desk.said if level != "info"] == []
+def test_a_phantom_which_is_in_no_file_is_made_anew(workspace, tmp_path) -> None:
+    workspace.scan.open_demo(seed=3, spacing=0.5)
+    workspace.wait()
+    workspace.labels.place(workspace.scan.truth.side("L")["CA"], side=Side.LEFT, code="CA")
+    saved = workspace.document.save(tmp_path / "one")
+    workspace.scan.begin(ball_volume())
+    workspace.wait()
+    workspace.open(saved)
+    workspace.wait()
+    assert workspace.scan.volume is not None
+    assert workspace.scan.volume.name == "phantom-3"
+    assert workspace.scan.truth is not None
+    assert [text for level, text in workspace.said if level != "info"] == []
 
 
-def test_a_scan_that_changed_is_noticed(desk, ball_file, tmp_path) -> None:
+def test_a_scan_that_changed_is_noticed(workspace, ball_file, tmp_path) -> None:
     import SimpleITK as sitk  # noqa: N813
 
-    desk.open(ball_file)
-    desk.wait()
-    saved = desk.session.save(tmp_path / "one")
+    workspace.open(ball_file)
+    workspace.wait()
+    saved = workspace.document.save(tmp_path / "one")
     image = sitk.ReadImage(str(ball_file))
     sitk.WriteImage(image + 1.0, str(ball_file))
     differs = []
-    desk.scan_differs.connect(lambda error, volume: differs.append((error, volume)))
-    desk.open_volume(ball_volume())
-    desk.open(saved)
-    desk.wait()
-    assert desk.volume is None
+    workspace.scan.differs.connect(lambda error, volume: differs.append((error, volume)))
+    workspace.scan.begin(ball_volume())
+    workspace.open(saved)
+    workspace.wait()
+    assert workspace.scan.volume is None
     (error, volume), *_ = differs
     assert "voxels" in str(error)
-    desk.accept_scan(volume)
-    assert desk.volume is volume
+    workspace.scan.accept(volume)
+    assert workspace.scan.volume is volume
 
 
 def test_what_cannot_be_read_is_said_and_leaves_all_as_it_was(on_ball, tmp_path) -> None:
     (tmp_path / "x.nrrd").write_text("no scan")
-    session = on_ball.session
+    state = on_ball.document.state
     on_ball.open(tmp_path / "x.nrrd")
     on_ball.wait()
     assert on_ball.said[-1][0] == "error"
     assert "x.nrrd" in on_ball.said[-1][1]
-    assert on_ball.session is session
+    assert on_ball.document.state is state
 
 
-def test_reading_can_be_stopped(desk, ball_file) -> None:
-    desk.open(ball_file)
-    desk.jobs.cancel_all()
-    desk.wait()
-    assert desk.volume is None
-    assert desk.said == []
+def test_reading_can_be_stopped(workspace, ball_file) -> None:
+    workspace.open(ball_file)
+    workspace.jobs.cancel_all()
+    workspace.wait()
+    assert workspace.scan.volume is None
+    assert workspace.said == []
 
 
 def test_the_atlas_brings_ghosts(on_ball) -> None:
-    on_ball.load_atlas()
+    on_ball.atlas.load()
     on_ball.wait()
     from gp_core.atlas.atlas import Atlas
 
     atlas = Atlas.published()
     for code in ("CA", "RWP", "OS"):
         where = atlas.mean[atlas.codes.index(code)] + MIDDLE
-        labelling.place(on_ball.session, where, side=Side.LEFT, code=code)
-    ghosts = on_ball.session.ghosts(Side.LEFT)
+        on_ball.labels.place(where, side=Side.LEFT, code=code)
+    ghosts = on_ball.labels.ghosts(Side.LEFT)
     for code in ("CB", "RWA", "LLI"):
         expected = atlas.mean[atlas.codes.index(code)] + MIDDLE
         assert np.linalg.norm(ghosts[code].position - expected) < 0.1
 
 
 def test_actions_say_why_they_cannot(on_ball) -> None:
-    labelling.place(on_ball.session, MIDDLE, side=Side.LEFT, code="CA")
-    labelling.lock(on_ball.session, side=Side.LEFT, code="CA")
-    on_ball.go_to(Side.LEFT, "CA")
+    on_ball.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    on_ball.labels.lock(side=Side.LEFT, code="CA")
+    on_ball.labels.go_to(Side.LEFT, "CA")
     assert not run("point.clear", on_ball, None)  # not even offered
     assert not ACTIONS["point.clear"].enabled(on_ball)
     assert not run("edit.swap_sides", on_ball, None)
@@ -271,93 +271,99 @@ def test_actions_say_why_they_cannot(on_ball) -> None:
     with pytest.raises(GpError, match="unknown action"):
         run("edit.dance", on_ball, None)
     with pytest.raises(GpError, match="tool must be one of"):
-        on_ball.set_tool("hammer")
+        on_ball.interaction.set_tool("hammer")
 
 
 def test_the_mesh_is_written(on_ball, tmp_path) -> None:
-    on_ball.save_mesh(tmp_path / "ball.ply")
+    on_ball.bone.save_mesh(tmp_path / "ball.ply")
     on_ball.wait()
     assert (tmp_path / "ball.ply").stat().st_size > 1000
     assert on_ball.said[-1] == ("info", "Wrote ball.ply")
 
 
-def test_the_published_atlas_is_loaded_behind_the_window(desk) -> None:
-    assert desk.atlas is None
-    desk.load_atlas()
-    desk.wait()
-    assert desk.atlas is Atlas.published()
-    assert desk.atlas_specimens == ()
+def test_the_published_atlas_is_loaded_behind_the_window(workspace) -> None:
+    assert workspace.atlas.current is None
+    workspace.atlas.load()
+    workspace.wait()
+    assert workspace.atlas.current is Atlas.published()
+    assert workspace.atlas.specimens == ()
 
 
-def test_an_atlas_in_use_stays_for_the_next_specimen_and_is_not_loaded_over(desk, ball) -> None:
+def test_an_atlas_in_use_stays_for_the_next_specimen_and_is_not_loaded_over(workspace, ball) -> None:
     told = []
-    desk.atlas_changed.connect(lambda: told.append(desk.atlas.name))
+    workspace.atlas.changed.connect(lambda: told.append(workspace.atlas.current.name))
     animal = Specimen("A", {Side.LEFT: LandmarkSet.empty("L")})
     own = replace(Atlas.published(), name="own")
-    desk.use_atlas(own, [animal])
-    desk.load_atlas()
-    desk.open_volume(ball)
-    desk.wait()
+    workspace.atlas.use(own, [animal])
+    workspace.atlas.load()
+    workspace.scan.begin(ball)
+    workspace.wait()
     assert told == ["own"]
-    assert (desk.atlas, desk.atlas_specimens) == (own, (animal,))
+    assert (workspace.atlas.current, workspace.atlas.specimens) == (own, (animal,))
     for code in ("CA", "CB", "RWA"):
-        labelling.place(desk.session, own[code] + MIDDLE, How.SLICE, side=Side.LEFT, code=code)
-    np.testing.assert_allclose(desk.session.ghosts(Side.LEFT)["RWP"].position, own["RWP"] + MIDDLE, atol=0.01)
+        workspace.labels.place(own[code] + MIDDLE, How.SLICE, side=Side.LEFT, code=code)
+    np.testing.assert_allclose(
+        workspace.labels.ghosts(Side.LEFT)["RWP"].position, own["RWP"] + MIDDLE, atol=0.01
+    )
 
 
-def test_small_parts_are_left_out_as_asked(desk) -> None:
+def test_small_parts_are_left_out_as_asked(workspace) -> None:
     array = ball_volume().array.copy()
     array[60:62, 60:62, 60:62] = 1400  # half a millimetre across
     volume = Volume.from_parts(array, [VOXEL_MM] * 3, [0, 0, 0], name="ball")
-    desk.open_volume(volume)
-    desk.wait()
+    workspace.scan.begin(volume)
+    workspace.wait()
     corner = volume.voxel_to_scan(np.array([[61.0, 61, 61]]))[0]
 
     def has_speck() -> bool:
-        points = np.concatenate([part.points for part in desk.surfaces])
+        points = np.concatenate([part.points for part in workspace.bone.surfaces])
         return bool((np.linalg.norm(points - corner, axis=1) < 1).any())
 
-    assert desk.smallest_part_mm == 1.0
+    assert workspace.bone.smallest_part_mm == 1.0
     assert not has_speck()
-    desk.set_smallest_part(0)
-    desk.wait()
+    workspace.bone.set_smallest_part(0)
+    workspace.wait()
     assert has_speck()
     with pytest.raises(GpError, match=r"a length in mm from 0, got -1"):
-        desk.set_smallest_part(-1)
+        workspace.bone.set_smallest_part(-1)
     with pytest.raises(GpError, match=r"a length in mm from 0, got nan"):
-        desk.set_smallest_part(float("nan"))
+        workspace.bone.set_smallest_part(float("nan"))
 
 
-def test_bone_too_thin_for_the_first_look_is_shown_by_the_second(desk) -> None:
+def test_bone_too_thin_for_the_first_look_is_shown_by_the_second(workspace) -> None:
     array = np.zeros((200, 200, 200), np.uint8)
     array[100, 20:180, 20:180] = 200  # one voxel thick
-    desk.open_volume(Volume.from_parts(array, [0.1] * 3, [0, 0, 0], name="sheet"))
-    desk.wait()
+    workspace.scan.begin(Volume.from_parts(array, [0.1] * 3, [0, 0, 0], name="sheet"))
+    workspace.wait()
     seen = []
-    desk.surfaces_changed.connect(lambda: seen.append(sum(part.n_triangles for part in desk.surfaces)))
-    desk.set_threshold(150)
-    desk.wait()
+    workspace.bone.surfaces_changed.connect(
+        lambda: seen.append(sum(part.n_triangles for part in workspace.bone.surfaces))
+    )
+    workspace.scan.set_threshold(150)
+    workspace.wait()
     assert seen[-1] > 60_000
-    assert not [text for level, text in desk.said if level == "error"]
+    assert not [text for level, text in workspace.said if level == "error"]
 
 
 def test_what_is_edited_while_another_scan_loads_is_kept_and_told(on_ball, ball_file) -> None:
-    desk = on_ball
-    labelling.place(desk.session, MIDDLE + np.array([0, 0, 6]), How.MESH, side=Side.LEFT, code="CA")
-    desk.abandon()
-    desk.open(ball_file)
-    labelling.place(desk.session, MIDDLE + np.array([0, 6, 0]), How.MESH, side=Side.LEFT, code="CB")
-    desk.wait()
-    assert not desk.session.dirty
-    assert any("Unsaved edits of ball are kept" in text for level, text in desk.said if level == "warning")
-    (kept,) = find_recoveries(desk.directory)
-    desk.recover(kept)
-    assert {"CA", "CB"} <= set(desk.session.state.side(Side.LEFT).placed)
+    workspace = on_ball
+    workspace.labels.place(MIDDLE + np.array([0, 0, 6]), How.MESH, side=Side.LEFT, code="CA")
+    workspace.document.abandon()
+    workspace.open(ball_file)
+    workspace.labels.place(MIDDLE + np.array([0, 6, 0]), How.MESH, side=Side.LEFT, code="CB")
+    workspace.wait()
+    assert not workspace.document.dirty
+    assert any(
+        "Unsaved edits of ball are kept" in text for level, text in workspace.said if level == "warning"
+    )
+    (kept,) = find_recoveries(workspace.directory)
+    workspace.document.recover(kept)
+    assert {"CA", "CB"} <= set(workspace.document.state.side(Side.LEFT).placed)
 
 
 def test_what_is_given_up_is_not_offered_again(on_ball, ball_file) -> None:
-    labelling.place(on_ball.session, MIDDLE + np.array([0, 0, 6]), How.MESH, side=Side.LEFT, code="CA")
-    on_ball.abandon()
+    on_ball.labels.place(MIDDLE + np.array([0, 0, 6]), How.MESH, side=Side.LEFT, code="CA")
+    on_ball.document.abandon()
     on_ball.open(ball_file)
     on_ball.wait()
     assert not any("kept" in text for _, text in on_ball.said)
@@ -365,29 +371,29 @@ def test_what_is_given_up_is_not_offered_again(on_ball, ball_file) -> None:
 
 
 def test_a_single_point_off_the_bone_is_doubted_by_the_scan(on_ball) -> None:
-    on_ball.use_atlas(Atlas.published())
+    on_ball.atlas.use(Atlas.published())
     out = np.array([0.0, 0.0, 1.0])
-    labelling.place(on_ball.session, MIDDLE + (BALL_MM + 1.0) * out, side=Side.LEFT, code="IN")
+    on_ball.labels.place(MIDDLE + (BALL_MM + 1.0) * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    doubt = on_ball.session.near_doubts(Side.LEFT)["IN"]
+    doubt = on_ball.labels.near_doubts(Side.LEFT)["IN"]
     assert doubt.kind == "off bone"
     distance = float(doubt.text.split()[2])
     assert distance == pytest.approx(1.0, abs=VOXEL_MM)
-    on_ball.go_to(Side.LEFT, "IN")
-    assert "from bone" in content_of(on_ball.session, has_scan=True).status
-    labelling.place(on_ball.session, MIDDLE + BALL_MM * out, side=Side.LEFT, code="IN")
+    on_ball.labels.go_to(Side.LEFT, "IN")
+    assert "from bone" in content_of(on_ball.labels, has_scan=True).status
+    on_ball.labels.place(MIDDLE + BALL_MM * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    assert not on_ball.session.near_doubts(Side.LEFT)
-    labelling.place(on_ball.session, MIDDLE + (BALL_MM - 2.0) * out, side=Side.LEFT, code="IN")
+    assert not on_ball.labels.near_doubts(Side.LEFT)
+    on_ball.labels.place(MIDDLE + (BALL_MM - 2.0) * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    assert not on_ball.session.near_doubts(Side.LEFT), "within bone it is not off it"
+    assert not on_ball.labels.near_doubts(Side.LEFT), "within bone it is not off it"
 
 
 def test_the_scan_is_asked_again_when_its_threshold_changes(on_ball) -> None:
-    on_ball.use_atlas(Atlas.published())
-    labelling.place(on_ball.session, MIDDLE + np.array([0, 0, BALL_MM]), side=Side.LEFT, code="IN")
+    on_ball.atlas.use(Atlas.published())
+    on_ball.labels.place(MIDDLE + np.array([0, 0, BALL_MM]), side=Side.LEFT, code="IN")
     on_ball.wait()
-    assert not on_ball.session.near_doubts(Side.LEFT)
-    on_ball.set_threshold(float(on_ball.volume.array.max()) + 1)
+    assert not on_ball.labels.near_doubts(Side.LEFT)
+    on_ball.scan.set_threshold(float(on_ball.scan.volume.array.max()) + 1)
     on_ball.wait()
-    assert on_ball.session.near_doubts(Side.LEFT)["IN"].text == "IN is far from bone"
+    assert on_ball.labels.near_doubts(Side.LEFT)["IN"].text == "IN is far from bone"

@@ -49,26 +49,26 @@ def drive() -> dict[str, object]:
     window.resize(1200, 800)
     window.move(QPoint(20, 20))
     window.show()
-    window.workbench.open_volume(ball_volume())
-    while window.workbench.jobs.running:
+    window.workspace.scan.begin(ball_volume())
+    while window.workspace.jobs.running:
         QTest.qWait(10)
     QTest.qWaitForWindowExposed(window)
     window.activateWindow()
     QTest.qWait(200)
-    session, scene = window.workbench.session, window.grid.scene_view
+    scene, document = window.grid.scene_view, window.workspace.document
     axial = next(view for plane, view in window.grid.slice_views.items() if plane.value == "axial")
     scene.view_from("A")
-    session.set_crosshair(INSIDE)
+    window.workspace.view.set_crosshair(INSIDE)
     found: dict[str, object] = {"platform": app.platformName()}
 
     point_at(axial, axial.pixel_at(INSIDE))
     xdotool("click", 1)
-    until(lambda: "CA" in session.landmarks(Side.LEFT))
-    found["slice_off"] = float(np.linalg.norm(session.landmarks(Side.LEFT)["CA"] - INSIDE))
+    until(lambda: "CA" in document.landmarks(Side.LEFT))
+    found["slice_off"] = float(np.linalg.norm(document.landmarks(Side.LEFT)["CA"] - INSIDE))
     point_at(scene, scene.pixel_at(ON_BONE))
     xdotool("click", 1)
-    until(lambda: "RWP" in session.landmarks(Side.LEFT))
-    found["bone_off"] = float(np.linalg.norm(session.landmarks(Side.LEFT)["RWP"] - ON_BONE))
+    until(lambda: "RWP" in document.landmarks(Side.LEFT))
+    found["bone_off"] = float(np.linalg.norm(document.landmarks(Side.LEFT)["RWP"] - ON_BONE))
     before = scene.scene.camera.direction
     point_at(scene, scene.pixel_at(MIDDLE - [3.0, 5.0, 2.0]))  # on bone, away from the point
     xdotool("mousedown", 1)
@@ -76,14 +76,14 @@ def drive() -> dict[str, object]:
     xdotool("mouseup", 1)
     until(lambda: bool((before != scene.scene.camera.direction).any()))
     found["turned_deg"] = float(np.degrees(np.arccos(np.clip(before @ scene.scene.camera.direction, -1, 1))))
-    found["placed"] = list(session.landmarks(Side.LEFT).placed)
+    found["placed"] = list(document.landmarks(Side.LEFT).placed)
     xdotool("key", "ctrl+z")
-    until(lambda: list(session.landmarks(Side.LEFT).placed) != found["placed"])
-    found["after_undo"] = list(session.landmarks(Side.LEFT).placed)
-    layout = session.view.state.layout
+    until(lambda: list(document.landmarks(Side.LEFT).placed) != found["placed"])
+    found["after_undo"] = list(document.landmarks(Side.LEFT).placed)
+    layout = window.workspace.view.state.layout
     xdotool("key", "z")
-    until(lambda: session.view.state.layout != layout)
-    found["layout"] = session.view.state.layout
+    until(lambda: window.workspace.view.state.layout != layout)
+    found["layout"] = window.workspace.view.state.layout
     close(window)
     return found
 

@@ -14,12 +14,11 @@ from window_cases import settle
 from gp_core.io import read_landmarks
 from gp_core.landmarks.features import Side, index_of
 from gp_labeler.document.landmark_export import export_landmarks
-from gp_labeler.document.opening import new_session
 from gp_labeler.document.state import How
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.threshold import propose_threshold
-from gp_labeler.models import labelling
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
 
 SIZE = (1200, 800)
@@ -54,22 +53,24 @@ def texts(folder) -> list[str]:
 
 
 def test_python_calls_leave_the_same_files(folder) -> None:
-    session = new_session(specimen="ball")
+    workspace = Workspace()
+    workspace.document.begin("ball")
     volume = read_volume(folder / "ball.nrrd")
-    session.attach_volume(volume)
-    session.set_measure(partial(scan_evidence, volume, propose_threshold(volume)))
+    workspace.document.attach_volume(volume)
+    workspace.document.measure = partial(scan_evidence, volume, propose_threshold(volume))
     sets = {side: read_landmarks(folder / "out" / f"ball_{side.value}.mrk.json") for side in Side}
     for side, code, view, _ in CLICKS:
         how = How.MESH if view == "3d" else How.SLICE
-        labelling.place(session, sets[Side(side)][code], how, side=side, code=code)
-    export_landmarks(session.measured_state, folder / "python")
+        workspace.labels.place(sets[Side(side)][code], how, side=side, code=code)
+    export_landmarks(workspace.document.measured_state, folder / "python")
+    workspace.close(discard=True)
     assert texts(folder / "python") == texts(folder / "out")
 
 
 def test_events_in_the_window_leave_the_same_files(qtbot, make_window, folder) -> None:
     window = make_window(atlas=True)
     window.resize(*SIZE)
-    window.workbench.open_scan(folder / "ball.nrrd")
+    window.workspace.scan.open(folder / "ball.nrrd")
     settle(qtbot, window)
     window.grid.scene_view.view_from("A")
     window.grid.reset()

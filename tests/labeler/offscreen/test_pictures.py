@@ -44,11 +44,11 @@ def brightest(image: QImage) -> np.ndarray:
 @pytest.fixture
 def window(qtbot, make_window):
     window = make_window()
-    window.workbench.open_volume(spotted())
+    window.workspace.scan.begin(spotted())
     settle(qtbot, window)
     for name in ("outline_visible", "labels_visible"):
-        window.workbench.session.view.update(**{name: False})
-    window.workbench.session.view.update(level=1600.0, width=2400.0)
+        window.workspace.view.update(**{name: False})
+    window.workspace.view.update(level=1600.0, width=2400.0)
     return window
 
 
@@ -57,7 +57,7 @@ def window(qtbot, make_window):
 def test_a_bright_spot_is_seen_where_it_lies(window, plane, size) -> None:
     view, aside = window.grid.slice_views[plane], MIDDLE - 4.0
     aside[plane.axis] = SPOT[plane.axis]  # in its slice, the crosshair's lines away from it
-    window.workbench.session.set_crosshair(aside)
+    window.workspace.view.set_crosshair(aside)
     image = picture(window, plane.value, size)
     found = brightest(image)
     assert (image.width(), image.height()) == (size or (view.width(), view.height()))
@@ -78,7 +78,7 @@ def l_shaped() -> Volume:
 @pytest.mark.parametrize(("letter", "sign"), [("A", 1), ("P", -1)])
 def test_left_is_where_it_should_be_in_3d(qtbot, make_window, letter, sign) -> None:
     window = make_window()
-    window.workbench.open_volume(l_shaped())
+    window.workspace.scan.begin(l_shaped())
     settle(qtbot, window)
     window.grid.scene_view.view_from(letter)
     window.grid.scene_view.reset()

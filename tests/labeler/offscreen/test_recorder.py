@@ -24,7 +24,6 @@ from gp_labeler.document.landmark_import import import_landmarks
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes
 from gp_labeler.document.state import How
 from gp_labeler.document.touches import TouchHow
-from gp_labeler.models import labelling
 from gp_labeler.models.workflow import Active
 from gp_labeler.offscreen.runner import run_script
 from gp_labeler.offscreen.script import make_script, read_script
@@ -111,12 +110,20 @@ class Recording:
 
     def __init__(self, qtbot, window, folder) -> None:
         self.qtbot, self.window, self.folder = qtbot, window, folder
-        self.desk, self.script = window.workbench, folder / "script.json"
+        self.workspace, self.script = window.workspace, folder / "script.json"
         (folder / "first").mkdir(exist_ok=True)
 
     @property
-    def session(self):
-        return self.desk.session
+    def document(self):
+        return self.workspace.document
+
+    @property
+    def labels(self):
+        return self.workspace.labels
+
+    @property
+    def view(self):
+        return self.workspace.view
 
     @property
     def recorder(self) -> Recorder:
@@ -135,8 +142,8 @@ class Recording:
 
     def check(self, *files: str) -> list[str]:
         """Save, end the recording, run the script, compare what both leave; return its steps."""
-        self.session.save(self.folder / "first" / SAVED, overwrite=True)
-        export_landmarks(self.session.measured_state, self.folder / "first", overwrite=True)
+        self.document.save(self.folder / "first" / SAVED, overwrite=True)
+        export_landmarks(self.document.measured_state, self.folder / "first", overwrite=True)
         self.window.ui.prompts.files = [self.script]
         self.window.commands.run("help.record")
         assert self.recorder is None
@@ -165,7 +172,7 @@ def write_path(folder) -> Path:
 @pytest.fixture
 def recording(qtbot, make_window, tmp_path):
     window = make_window(atlas=True)
-    window.workbench.open_scan(write_ball(tmp_path / "ball.nrrd"))
+    window.workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
     settle(qtbot, window)
     return Recording(qtbot, window, tmp_path)
 
@@ -177,48 +184,48 @@ def click(view, position) -> None:
 
 def place_three(recording) -> None:
     """Place two of the left and one of the right by clicks, and nudge one."""
-    session, scene = recording.session, recording.window.grid.scene_view
+    scene, document = recording.window.grid.scene_view, recording.document
     axial = recording.window.grid.slice_views[Plane.AXIAL]
     recording.window.set_step("label")  # elsewhere a click looks
     scene.view_from("A")
-    session.set_crosshair(INSIDE)
+    recording.view.set_crosshair(INSIDE)
     axial.setFocus()
     click(axial, INSIDE)  # CA
     for _ in range(3):
         QTest.keyClick(axial, Qt.Key.Key_Left)
     click(scene, ON_BONE)  # RWP
-    recording.desk.go_to(Side.RIGHT, "OS")
+    recording.workspace.labels.go_to(Side.RIGHT, "OS")
     click(scene, ON_BONE + np.array([1.0, 0.1, 1.0]))
-    assert session.state.landmarks.keys() == {(Side.LEFT, "CA"), (Side.LEFT, "RWP"), (Side.RIGHT, "OS")}
+    assert document.state.landmarks.keys() == {(Side.LEFT, "CA"), (Side.LEFT, "RWP"), (Side.RIGHT, "OS")}
 
 
 def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
     recording.begin()
     place_three(recording)
-    desk, run = recording.desk, recording.run
-    desk.go_to(Side.LEFT, "CB")
+    workspace, run = recording.workspace, recording.run
+    workspace.labels.go_to(Side.LEFT, "CB")
     assert run("point.unseen") == ["choose", "action"]
-    desk.go_to(Side.LEFT, "CA")
+    workspace.labels.go_to(Side.LEFT, "CA")
     assert run("point.check") == ["choose", "action"]
     assert run("point.lock") == ["choose", "action"]
-    desk.go_to(Side.RIGHT, "OS")
+    workspace.labels.go_to(Side.RIGHT, "OS")
     assert run("point.place") == []  # it is placed already
     assert run("point.replace") == []
     assert run("point.place") == ["put"]  # where the crosshair is
     assert run("edit.undo") == ["undo"]
     assert run("edit.redo") == ["action"]
     assert run("edit.swap", "CB") == ["choose", "action"]
-    desk.go_to(Side.LEFT, "CA")
+    workspace.labels.go_to(Side.LEFT, "CA")
     assert run("point.lock") == ["choose", "action"]
     assert run("edit.swap_sides") == ["action"]
     assert run("point.lock_all") == ["action"]
     assert run("edit.undo") == ["undo"]
-    desk.go_to(Side.RIGHT, "RWP")
+    workspace.labels.go_to(Side.RIGHT, "RWP")
     assert run("point.clear") == ["choose", "action"]
-    desk.set_threshold(1003.25)
+    workspace.scan.set_threshold(1003.25)
     settle(recording.qtbot, recording.window)
-    recording.session.do(SetNotes("one"), merge=False)
-    recording.session.do(SetNotes('one "two"\nthrée'), merge=True)
+    recording.document.do(SetNotes("one"), merge=False)
+    recording.document.do(SetNotes('one "two"\nthrée'), merge=True)
     steps = recording.check()
     assert [do for do in steps if do in ("put", "threshold", "specimen", "save")] == [
         *("put", "put", "put", "put", "put", "threshold", "specimen", "save")
@@ -234,79 +241,81 @@ def test_imports_of_every_kind_are_done_again(recording) -> None:
     ]
     (recording.folder / "far.csv").write_text("\n".join(lines))
     files, how = [recording.folder / "far.csv"], {"side": "L", "accept_misfit": True}
-    import_landmarks(recording.session, files, replace_placed=False, **how)
-    assert recording.session.undo()
-    import_landmarks(recording.session, files, **how)
-    labelling.nudge(recording.session, [0.1, 0, 0], side="L", code="CB")
+    import_landmarks(recording.document, files, replace_placed=False, **how)
+    assert recording.document.undo()
+    import_landmarks(recording.document, files, **how)
+    recording.labels.nudge([0.1, 0, 0], side="L", code="CB")
     assert recording.check().count("import") == 2
 
 
 def test_suggestions_and_confirmations_are_done_again(recording) -> None:
     recording.begin()
     for code, at in (("CA", (2, 0, 0)), ("RWP", (-2, 1, 0)), ("OS", (0, -2, 1))):
-        labelling.place(recording.session, MIDDLE + at, How.SLICE, side="L", code=code)
-    recording.desk.go_to(Side.LEFT, "CB")
+        recording.labels.place(MIDDLE + at, How.SLICE, side="L", code=code)
+    recording.workspace.labels.go_to(Side.LEFT, "CB")
     assert recording.run("point.accept_ghost") == ["suggest"]
     assert recording.recorder.tables[-1]["source"] == "atlas"
     assert recording.run("point.accept_all") == ["suggest"]
     assert recording.run("edit.undo") == ["undo"]
     assert recording.run("edit.redo") == ["action"]
     for code in ("CB", "RWA"):
-        recording.desk.go_to(Side.LEFT, code)
+        recording.workspace.labels.go_to(Side.LEFT, code)
         assert recording.run("point.confirm") == []  # not drawn yet: it is shown first
         assert recording.run("point.confirm") == ["confirm"]
     assert [table["feature"] for table in recording.recorder.tables if table["do"] == "confirm"] == [
         "CB",
         "RWA",
     ]
-    assert recording.session.progress(Side.LEFT).text == "6 placed, 14 suggested"  # CO is computed
+    assert recording.labels.progress(Side.LEFT).text == "6 placed, 14 suggested"  # CO is computed
     recording.check(*FILES[:2])
 
 
 def test_touches_and_verdicts_are_done_again(recording) -> None:
-    session, pose, atlas = recording.session, recording.desk.pose, recording.desk.atlas
+    pose, atlas, document = recording.workspace.pose, recording.workspace.atlas.current, recording.document
     assert atlas is not None
     recording.begin()
     place_three(recording)
-    touching.record_touch(session, "R", "IN", [1.0, 2.0, 3.0], TouchHow.TRACKED)
-    touching.move_touches(session, "R")
-    touching.clear_touches(session, "L", "IN")
+    touching.record_touch(document, "R", "IN", [1.0, 2.0, 3.0], TouchHow.TRACKED)
+    touching.move_touches(document, "R")
+    touching.clear_touches(document, "L", "IN")
     for n, code in enumerate(("MN", "OS", "RWA", "LLI")):
         where = atlas[code] + [0.1 * n, 200, 0]
         details = {"source": "probe", "n_samples": 9, "spread_mm": 0.07} if n % 2 else {}
-        touching.record_touch(session, "L", code, where, TouchHow.TRACKED, **details)
-    touching.leave_out(session, "L", "OS")
-    touching.leave_out(session, "L", "OS", False)
-    touching.swap_touches(session, "L", "MN", "OS")
-    touching.record_touch(session, "L", "ZL", [0, 0, 0], TouchHow.TRACKED)
-    touching.clear_touches(session, "L", "ZL")
-    touching.mark_skull(session, "S1", [1, 2, 3])
-    touching.record_touch(session, "R", "MN", [0.5, 0, 0])
-    touching.clear_touches(session, "R")
+        touching.record_touch(document, "L", code, where, TouchHow.TRACKED, **details)
+    touching.leave_out(document, "L", "OS")
+    touching.leave_out(document, "L", "OS", False)
+    touching.swap_touches(document, "L", "MN", "OS")
+    touching.record_touch(document, "L", "ZL", [0, 0, 0], TouchHow.TRACKED)
+    touching.clear_touches(document, "L", "ZL")
+    touching.mark_skull(document, "S1", [1, 2, 3])
+    touching.record_touch(document, "R", "MN", [0.5, 0, 0])
+    touching.clear_touches(document, "R")
     lines = [",".join([code, *map(repr, atlas[code].tolist())]) for code in ("CL", "MN", "OI")]
     file = recording.folder / "touches.csv"
     file.write_text("\n".join(["label,x,y,z", *lines]))
-    touching.load_touches(session, file, "R")
-    session.undo()
-    session.redo()
+    touching.load_touches(document, file, "R")
+    document.undo()
+    document.redo()
     pose.choose(probe_noise=0.3)
-    pose.estimating.judge("reject", by="AB", note="tilted")
+    pose.judge("reject", by="AB", note="tilted")
     steps = recording.check()
     assert steps[-3:-1] == ["estimate", "verdict"]
 
 
 def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
-    desk, run = recording.desk, recording.run
+    workspace, run = recording.workspace, recording.run
     recording.begin()
     place_three(recording)
     assert run("pose.touch") == ["action"]
     for n, code in enumerate(("MN", "OS", "RWA", "LLI")):
-        touching.record_touch(desk.session, "L", code, desk.atlas[code] + MIDDLE + n / 9, TouchHow.SCAN)
+        touching.record_touch(
+            workspace.document, "L", code, workspace.atlas.current[code] + MIDDLE + n / 9, TouchHow.SCAN
+        )
     assert run("pose.overlay") == ["overlay"]
     assert run("pose.overlay") == ["overlay"]
     assert run("pose.along_axis") == ["action"]
     assert run("tool.place") == ["action"]
-    desk.pose.estimating.judge("accept", by="AB")
+    workspace.pose.judge("accept", by="AB")
     assert recording.recorder.tables[-1]["do"] == "verdict"
     recording.window.ui.prompts.files = [recording.folder / "first" / "pose.json"]
     assert run("pose.export")[-1] == "estimate"
@@ -320,7 +329,7 @@ def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
 
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_an_own_atlas_and_an_insertion_path_are_taken_again(recording, when) -> None:
-    desk, first, prompts = recording.desk, recording.folder / "first", recording.window.ui.prompts
+    workspace, first, prompts = recording.workspace, recording.folder / "first", recording.window.ui.prompts
     animals = write_animals(recording.folder / "animals", drawn_animals(3))
 
     def take() -> None:
@@ -338,8 +347,10 @@ def test_an_own_atlas_and_an_insertion_path_are_taken_again(recording, when) -> 
         take()
     place_three(recording)
     for code in ("MN", "OS", "RWA", "LLI", "RWP"):
-        touching.record_touch(recording.session, "R", code, desk.atlas[code] * (-1, 1, 1) + [0, 0, 300])
-    desk.pose.choose(side=Side.RIGHT, round_window="expected")
+        touching.record_touch(
+            recording.document, "R", code, workspace.atlas.current[code] * (-1, 1, 1) + [0, 0, 300]
+        )
+    workspace.pose.choose(side=Side.RIGHT, round_window="expected")
     prompts.files = [first / "own.json"]
     assert recording.run("atlas.save") == ["action"]
     prompts.files = [first / "carried.csv"]
@@ -353,12 +364,12 @@ def test_an_own_atlas_and_an_insertion_path_are_taken_again(recording, when) -> 
 
 def test_another_atlas_is_taken_again(recording) -> None:
     file = recording.folder / "own.json"
-    recording.desk.atlas.save(file)
+    recording.workspace.atlas.current.save(file)
     recording.begin()
-    recording.desk.open_atlas(file)
+    recording.workspace.atlas.open(file)
     settle(recording.qtbot, recording.window)
     assert recording.recorder.tables[-1] == {"do": "atlas", "path": str(file)}
-    recording.desk.use_published_atlas()
+    recording.workspace.atlas.use_published()
     settle(recording.qtbot, recording.window)
     assert recording.recorder.tables[-1]["path"] == "published"
     place_three(recording)
@@ -366,23 +377,23 @@ def test_another_atlas_is_taken_again(recording) -> None:
 
 
 def test_what_is_seen_is_written_with_its_value(recording) -> None:
-    recording.session.view.update(outline_visible=False)  # as this person likes it
+    recording.view.update(outline_visible=False)  # as this person likes it
     recording.begin()
     assert recording.recorder.tables[1]["outline"] is False
     for id, do in ACTION_STEPS.items():
         if id.startswith("view.") or (id.startswith("tool.") and id != "tool.place"):
             layout = "axial" if id == "view.four-up" else "four-up"
-            recording.session.view.update(level=100.0, width=50.0, mesh_opacity=0.5, layout=layout)
-            if not ACTIONS[id].enabled(recording.desk):
+            recording.view.update(level=100.0, width=50.0, mesh_opacity=0.5, layout=layout)
+            if not ACTIONS[id].enabled(recording.workspace):
                 continue
             recording.run(id)
             assert recording.recorder.tables[-1]["do"] == do, id
-    recording.session.view.update(mesh_opacity=0.7)
+    recording.view.update(mesh_opacity=0.7)
     n = len(recording.recorder.tables)
-    recording.session.view.update(mesh_opacity=0.8)  # a slider on its way
+    recording.view.update(mesh_opacity=0.8)  # a slider on its way
     assert len(recording.recorder.tables) == n
     assert recording.recorder.tables[-1] == {"do": "view", "opacity": 0.8}
-    labelling.place(recording.session, MIDDLE, How.SLICE, side="L", code="CA")
+    recording.labels.place(MIDDLE, How.SLICE, side="L", code="CA")
     recording.check(*FILES[:2])
 
 
@@ -406,11 +417,11 @@ def test_files_written_are_written_again(recording) -> None:
 def test_work_that_was_begun_before_is_kept_beside_the_script(recording) -> None:
     place_three(recording)
     recording.begin()
-    labelling.place(recording.session, MIDDLE, How.SLICE, side="R", code="CA")
+    recording.labels.place(MIDDLE, How.SLICE, side="R", code="CA")
     assert recording.run("edit.undo") == ["undo"]
     assert recording.run("edit.undo") == ["open", "view"]  # of what was done before
     assert recording.run("edit.redo") == ["open", "view"]
-    labelling.place(recording.session, MIDDLE, How.SLICE, side="R", code="CB")
+    recording.labels.place(MIDDLE, How.SLICE, side="R", code="CB")
     recording.check()
     assert (recording.folder / "script_start1.gpspecimen.json").exists()
 
@@ -422,61 +433,61 @@ def test_another_scan_is_opened_without_what_was_not_saved(recording) -> None:
     recording.window.ui.prompts.answers = ["Do not save"]
     recording.window.ui.open_path(other)
     settle(recording.qtbot, recording.window)
-    labelling.place(recording.session, MIDDLE, How.MESH, side="L", code="CA")
-    recording.session.do(RenameSpecimen("ball"))
+    recording.labels.place(MIDDLE, How.MESH, side="L", code="CA")
+    recording.document.do(RenameSpecimen("ball"))
     recording.check(*FILES[:2])
 
 
 def test_what_was_only_touched_needs_no_scan_until_it_gets_one(qtbot, make_window, tmp_path) -> None:
     window = make_window()
     recording = Recording(qtbot, window, tmp_path)
-    touching.record_touch(recording.session, "L", "MN", [1, 2, 3])
+    touching.record_touch(recording.document, "L", "MN", [1, 2, 3])
     recording.begin()
-    touching.record_touch(recording.session, "L", "OS", [4, 2, 3])
+    touching.record_touch(recording.document, "L", "OS", [4, 2, 3])
     assert recording.run("file.new", "Do not save") == ["open", "view"]
-    touching.record_touch(recording.session, "R", "OS", [4, 5, 3])
-    window.workbench.open_scan(write_ball(tmp_path / "ball.nrrd"))
+    touching.record_touch(recording.document, "R", "OS", [4, 5, 3])
+    window.workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
     settle(qtbot, window)
-    assert recording.session.state.specimen == "ball"
-    labelling.place(recording.session, MIDDLE, side="L", code="CA")
+    assert recording.document.state.specimen == "ball"
+    recording.labels.place(MIDDLE, side="L", code="CA")
     assert recording.check(FILES[0]).count("open") == 3
-    assert len(recording.session.state.touches) == 1
+    assert len(recording.document.state.touches) == 1
 
 
 @pytest.mark.slow
 def test_a_phantom_with_labels_comes_back_with_them(qtbot, make_window, tmp_path) -> None:
     window = make_window()
-    window.workbench.open_demo(3, 0.4)
+    window.workspace.scan.open_demo(3, 0.4)
     settle(qtbot, window, 60)
     recording = Recording(qtbot, window, tmp_path)
-    labelling.place(recording.session, window.workbench.truth.side(Side.LEFT)["CA"], side="L", code="CA")
+    recording.labels.place(window.workspace.scan.truth.side(Side.LEFT)["CA"], side="L", code="CA")
     recording.begin()
-    recording.session.do(RenameSpecimen("ball"))
-    labelling.place(recording.session, window.workbench.truth.side(Side.LEFT)["CB"], side="L", code="CB")
+    recording.document.do(RenameSpecimen("ball"))
+    recording.labels.place(window.workspace.scan.truth.side(Side.LEFT)["CB"], side="L", code="CB")
     recording.check(*FILES[:2])
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(2))
 def test_anything_in_any_order_is_done_again(recording, seed) -> None:
-    rng, session = np.random.default_rng(seed), recording.session
+    rng, document, labels = np.random.default_rng(seed), recording.document, recording.labels
     codes = ["CA", "CB", "IN", "RWP"]
 
     def one() -> None:
         side, (code, other) = Side(rng.choice(["L", "R"])), rng.choice(codes, 2, replace=False)
-        session.set_active(Active(side, code))
+        labels.set_active(Active(side, code))
         what = rng.integers(12)
         if what < 3:
             how = (How.MESH, How.SLICE)[rng.integers(2)]
-            labelling.place(session, MIDDLE + rng.uniform(-3, 3, 3), how, side=side, code=code)
+            labels.place(MIDDLE + rng.uniform(-3, 3, 3), how, side=side, code=code)
         elif what < 5:
-            labelling.nudge(session, rng.normal(size=3), side=side, code=code)
+            labels.nudge(rng.normal(size=3), side=side, code=code)
         elif what < 8:
-            (session.undo, session.undo, session.redo)[what - 5]()
+            (document.undo, document.undo, document.redo)[what - 5]()
         elif what == 8:
-            session.do(SetNotes(str(rng.integers(3))), merge=bool(rng.integers(2)))
+            document.do(SetNotes(str(rng.integers(3))), merge=bool(rng.integers(2)))
         elif what == 9 and "IN" not in (code, other):
-            session.do(SwapPoints(side, code, other))
+            document.do(SwapPoints(side, code, other))
         else:
             verbs = ("point.unseen", "point.lock", "point.check", "point.clear", "edit.swap_sides")
             recording.window.commands.run(str(rng.choice(verbs)))
@@ -489,9 +500,9 @@ def test_anything_in_any_order_is_done_again(recording, seed) -> None:
     some(10)
     recording.begin()
     some(40)
-    labelling.lock_all(session, False)
-    labelling.place(session, MIDDLE, side="L", code="ZL")
-    labelling.place(session, MIDDLE, side="R", code="ZL")
+    labels.lock_all(False)
+    labels.place(MIDDLE, side="L", code="ZL")
+    labels.place(MIDDLE, side="R", code="ZL")
     recording.check()
 
 
@@ -516,11 +527,11 @@ def test_a_toml_script_runs(recording) -> None:
 
 def test_a_recorder_lets_go_of_its_window(make_window) -> None:
     window = make_window()
-    recorder, desk = Recorder(window), window.workbench
-    listening = len(desk.saved)
+    recorder, workspace = Recorder(window), window.workspace
+    listening = len(workspace.document.saved)
     recorder.deleteLater()
     QCoreApplication.sendPostedEvents(recorder, QEvent.Type.DeferredDelete)
-    assert len(desk.saved) == listening - 1
+    assert len(workspace.document.saved) == listening - 1
 
 
 def test_reference_points_are_written_and_cleared(recording) -> None:
@@ -531,6 +542,6 @@ def test_reference_points_are_written_and_cleared(recording) -> None:
     assert recording.run("file.show_references") == ["reference"]
     assert recording.recorder.tables[-1]["files"] == [str(file)]
     assert recording.run("file.clear_references") == ["reference"]
-    assert not recording.desk.references.points
+    assert not recording.workspace.references.points
     place_three(recording)
     recording.check()

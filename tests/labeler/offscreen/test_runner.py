@@ -180,7 +180,7 @@ IMPOSSIBLE = (
 
 def test_what_cannot_be_done_says_why(tmp_path) -> None:
     rig = Rig(tmp_path / "out", tmp_path)
-    rig.desk.open_volume(ball_volume())
+    rig.workspace.scan.begin(ball_volume())
     rig.settle()
     try:
         for number, (table, text) in enumerate(IMPOSSIBLE, start=1):

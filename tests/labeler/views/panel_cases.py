@@ -1,4 +1,4 @@
-"""Shared by the tests of the panels: a workbench with a small scan, points of the atlas laid into it."""
+"""Shared by the tests of the panels: a workspace with a small scan, points of the atlas laid into it."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from gp_core import Atlas
 from gp_core.landmarks.features import Side
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import QueueDispatcher
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 
 ATLAS = Atlas.published()
 PANEL_WIDTH = 472
@@ -28,20 +27,20 @@ def grey_volume(seed: int = 0) -> Volume:
     return Volume.from_parts(array.clip(0, 255).astype(np.uint8), (1.5,) * 3, (-20, -40, -30), name="GP-014")
 
 
-def desk_with_scan(**options) -> Workbench:
-    """Make a workbench on that scan, with the atlas, whose jobs wait to be delivered."""
-    desk = Workbench(None, QueueDispatcher(), atlas=ATLAS, author="tester", **options)
+def desk_with_scan(**options) -> Workspace:
+    """Make a workspace on that scan, with the atlas, whose jobs wait to be delivered."""
+    workspace = Workspace(None, QueueDispatcher(), atlas=ATLAS, author="tester", **options)
     volume = grey_volume()
-    desk.session.attach_volume(volume)
-    desk.volume_opened.emit(volume)
-    return desk
+    workspace.document.attach_volume(volume)
+    workspace.scan.opened.emit(volume)
+    return workspace
 
 
-def deliver(desk: Workbench) -> None:
-    """Let the jobs of a workbench come to their end."""
-    dispatcher = desk.jobs._dispatch
+def deliver(workspace: Workspace) -> None:
+    """Let the jobs of a workspace come to their end."""
+    dispatcher = workspace.jobs._dispatch
     assert isinstance(dispatcher, QueueDispatcher)
-    dispatcher.deliver_until_idle(desk.jobs, timeout=180)  # compiling may be part of it
+    dispatcher.deliver_until_idle(workspace.jobs, timeout=180)  # compiling may be part of it
 
 
 def in_scan(code: str, side: Side = Side.LEFT) -> np.ndarray:
@@ -50,10 +49,10 @@ def in_scan(code: str, side: Side = Side.LEFT) -> np.ndarray:
     return np.array([(out + 5.0) * (1 if side is Side.LEFT else -1), -ahead - 10.0, up])
 
 
-def place(desk: Workbench, *codes: str, side: Side = Side.LEFT) -> None:
+def place(workspace: Workspace, *codes: str, side: Side = Side.LEFT) -> None:
     """Place features where the atlas has them."""
     for code in codes:
-        labelling.place(desk.session, in_scan(code, side), side=side, code=code)
+        workspace.labels.place(in_scan(code, side), side=side, code=code)
 
 
 def cut_words(root: QWidget) -> Iterator[str]:

@@ -19,11 +19,11 @@ from gp_labeler.views.recorder import Recorder
 
 @pytest.fixture
 def window(qtbot, one_window, ball):
-    one_window.workbench.session.view.update(layout="3d")
-    one_window.workbench.open_volume(ball)
+    one_window.workspace.view.update(layout="3d")
+    one_window.workspace.scan.begin(ball)
     settle(qtbot, one_window)
     yield one_window
-    one_window.workbench.meshes.clear()
+    one_window.workspace.meshes.clear()
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def test_the_menu_adds_it_and_takes_it_away(qtbot, window, file) -> None:
     window.ui.prompts.files = [file]
     assert window.commands.run("file.add_mesh")
     settle(qtbot, window)
-    assert [mesh.name for mesh in window.workbench.meshes.meshes] == ["implant"]
+    assert [mesh.name for mesh in window.workspace.meshes.meshes] == ["implant"]
     assert 500 < (_pixels(window) != before).any(axis=-1).sum() < before.size / 9
     assert window.commands.run("file.remove_meshes")
     settle(qtbot, window)
@@ -52,7 +52,7 @@ def test_the_menu_adds_it_and_takes_it_away(qtbot, window, file) -> None:
 
 
 def test_python_adds_any_dataset(qtbot, window) -> None:
-    meshes = window.workbench.meshes
+    meshes = window.workspace.meshes
     names = [meshes.add(pv.Cube(center=MIDDLE), color="red", opacity=0.5) for _ in range(2)]
     assert names == ["mesh", "mesh 2"]
     with pytest.raises(GpError, match="the mesh cannot be drawn"):
@@ -64,31 +64,31 @@ def test_python_adds_any_dataset(qtbot, window) -> None:
 
 
 def test_another_scan_takes_them_away(qtbot, window, file, ball) -> None:
-    window.workbench.meshes.add(file)
-    window.workbench.open_volume(ball)
+    window.workspace.meshes.add(file)
+    window.workspace.scan.begin(ball)
     settle(qtbot, window)
-    assert window.workbench.meshes.meshes == ()
+    assert window.workspace.meshes.meshes == ()
     assert window.grid.scene_view.scene.added.names == ()
 
 
 def test_a_damaged_file_is_told_and_nothing_is_shown(qtbot, window, file) -> None:
     file.write_bytes(file.read_bytes()[:-7])
     told = []
-    window.workbench.message.connect(lambda text, kind: told.append((text, kind)))
+    window.workspace.messages.said.connect(lambda text, kind: told.append((text, kind)))
     window.ui.prompts.files = [file]
     window.commands.run("file.add_mesh")
     settle(qtbot, window)
     assert [(kind, "implant.stl" in text, "cut off" in text) for text, kind in told] == [
         ("error", True, True)
     ]
-    assert window.workbench.meshes.meshes == ()
+    assert window.workspace.meshes.meshes == ()
 
 
 def test_what_is_added_is_recorded_as_steps(qtbot, window, file) -> None:
     recorder = Recorder(window)
     recorder.tables.clear()
-    window.workbench.meshes.add(file, color="red")
-    window.workbench.meshes.clear()
+    window.workspace.meshes.add(file, color="red")
+    window.workspace.meshes.clear()
     assert recorder.tables == [
         {"do": "add_mesh", "file": str(file), "name": "implant", "options": {"color": "red"}},
         {"do": "remove_mesh", "name": "implant"},

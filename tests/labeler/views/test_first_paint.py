@@ -18,7 +18,7 @@ window.grab()
 window.grid.scene_view.grab()
 late = [name for name in {late!r} if name in sys.modules]
 print(json.dumps(late))
-window.workbench.abandon()
+window.workspace.document.abandon()
 """
 
 

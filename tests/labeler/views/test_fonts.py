@@ -14,7 +14,6 @@ from window_cases import ball_volume, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
 from gp_labeler.scene.colours import DARK, LIGHT, contrast
 from gp_labeler.scene.sprites import Text, text_image
 from gp_labeler.scene.typeface import FAMILY, font_file, font_files
@@ -95,7 +94,7 @@ def test_the_larger_text_of_the_desktop_is_followed(make_window, monkeypatch) ->
 
 
 def test_slices_and_3d_follow_the_text_size(qtbot, window) -> None:
-    labelling.place(window.workbench.session, [10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
+    window.workspace.labels.place([10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
     settle(qtbot, window)
     assert window.grid.scene_view.scene.text_scale == pytest.approx(fonts.desktop_scale())
     small, large = (word_picture("CA", size, "#FFFFFF", 1.0).box.height() for size in (13, 26))
@@ -105,17 +104,17 @@ def test_slices_and_3d_follow_the_text_size(qtbot, window) -> None:
 
 
 def test_nothing_in_the_bar_moves_with_what_can_be_undone(qtbot, window) -> None:
-    session = window.workbench.session
+    labels = window.workspace.labels
     bar = window.findChild(type(window.centralWidget().layout().itemAt(0).widget()))
 
     def places() -> list[tuple[int, int]]:
         QApplication.processEvents()
         return [(button.x(), button.width()) for button, _ in bar._icons if button.isVisible()]
 
-    labelling.place(session, [10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
+    labels.place([10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
     one = places()
-    labelling.place(session, [10.0, -20.0, 36.0], How.MESH, side=Side.RIGHT, code="RWM")
-    labelling.mark_unseen(session, side=Side.LEFT, code="DTL")
+    labels.place([10.0, -20.0, 36.0], How.MESH, side=Side.RIGHT, code="RWM")
+    labels.mark_unseen(side=Side.LEFT, code="DTL")
     assert places() == one
     window.ui.save = lambda **_: True
     assert "DTL" in window.commands.actions["edit.undo"].text()
@@ -136,7 +135,7 @@ def test_words_in_the_views_are_legible_in_both_themes(colours) -> None:
 
 def test_the_instruction_is_always_whole(qtbot, window) -> None:
     volume = ball_volume()
-    window.workbench.open_volume(volume)
+    window.workspace.scan.begin(volume)
     settle(qtbot, window)
     for width in (1400, 1000, 853, 640):
         for size in (100, 150, 200):
@@ -144,7 +143,7 @@ def test_the_instruction_is_always_whole(qtbot, window) -> None:
             window.resize(width, 512)
             window.grid.hovered.emit(volume.origin)
             for tool in ("place", "look", "grey"):
-                window.workbench.set_tool(tool)
+                window.workspace.interaction.set_tool(tool)
                 QApplication.processEvents()
                 text = window.status.next_click
                 need = text.heightForWidth(text.width()) if text.wordWrap() else text.sizeHint().height()

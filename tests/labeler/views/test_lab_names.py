@@ -12,7 +12,7 @@ from qtpy.QtWidgets import QWidget
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
 from gp_labeler.document.lab_names import LabNamesMemory
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
 
@@ -20,10 +20,10 @@ _CLICK = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def desk(tmp_path):
-    desk = Workbench(tmp_path / "state")
-    yield desk
-    desk.close()
+def workspace(tmp_path):
+    workspace = Workspace(tmp_path / "state")
+    yield workspace
+    workspace.close()
 
 
 @pytest.fixture
@@ -46,8 +46,8 @@ def _choose(dialog: LandmarkImportDialog, name: str, code: str) -> None:
     box.setCurrentIndex(box.findData(code))
 
 
-def test_unknown_names_are_chosen_once_and_remembered(desk, parent, qtbot, theirs) -> None:
-    dialog = LandmarkImportDialog(desk, [theirs], parent=parent)
+def test_unknown_names_are_chosen_once_and_remembered(workspace, parent, qtbot, theirs) -> None:
+    dialog = LandmarkImportDialog(workspace, [theirs], parent=parent)
     dialog.show()
     assert dialog.names.isVisible()
     assert not dialog.take.isEnabled()
@@ -57,26 +57,26 @@ def test_unknown_names_are_chosen_once_and_remembered(desk, parent, qtbot, their
     qtbot.mouseClick(dialog.names.leave_rest, _CLICK)
     assert dialog.take.isEnabled()
     qtbot.mouseClick(dialog.take, _CLICK)
-    placed = desk.session.landmarks(Side.LEFT)
+    placed = workspace.document.landmarks(Side.LEFT)
     assert set(placed.placed) == {"CA", "CB"}
     np.testing.assert_allclose(placed["CA"], [1, 2, 3])
 
-    again = LandmarkImportDialog(desk, [theirs], parent=parent)
+    again = LandmarkImportDialog(workspace, [theirs], parent=parent)
     again.show()
     assert not again.names.isVisible()
     assert again.take.isEnabled()
     again.reject()
 
 
-def test_one_list_of_both_sides_is_taken_whole(desk, parent, qtbot, tmp_path) -> None:
+def test_one_list_of_both_sides_is_taken_whole(workspace, parent, qtbot, tmp_path) -> None:
     file = tmp_path / "GP01.csv"
     file.write_text("name,x,y,z\nCA_L,1,2,3\nCA_R,9,2,3\nIN,5,0,0\n", encoding="utf-8")
-    dialog = LandmarkImportDialog(desk, [file], parent=parent)
+    dialog = LandmarkImportDialog(workspace, [file], parent=parent)
     dialog.show()
     qtbot.mouseClick(dialog.take, _CLICK)
     for side, x in ((Side.LEFT, 1), (Side.RIGHT, 9)):
-        assert set(desk.session.landmarks(side).placed) == {"CA", "IN"}
-        assert desk.session.landmarks(side)["CA"][0] == x
+        assert set(workspace.document.landmarks(side).placed) == {"CA", "IN"}
+        assert workspace.document.landmarks(side)["CA"][0] == x
 
 
 def test_a_memory_that_is_damaged_counts_as_empty(tmp_path) -> None:
@@ -89,8 +89,8 @@ def test_a_memory_that_is_damaged_counts_as_empty(tmp_path) -> None:
     assert LabNamesMemory(None).recall() == LabelNames({})
 
 
-def test_a_name_stands_for_a_feature_of_one_side(desk, parent, qtbot, theirs) -> None:
-    dialog = LandmarkImportDialog(desk, [theirs], parent=parent)
+def test_a_name_stands_for_a_feature_of_one_side(workspace, parent, qtbot, theirs) -> None:
+    dialog = LandmarkImportDialog(workspace, [theirs], parent=parent)
     dialog.show()
     assert not dialog.names.side_box("Apex R").isEnabled()
     _choose(dialog, "Apex", "CA")
@@ -101,29 +101,29 @@ def test_a_name_stands_for_a_feature_of_one_side(desk, parent, qtbot, theirs) ->
     side = dialog.names.side_box("Apex R")
     side.setCurrentIndex(side.findData("R"))
     qtbot.mouseClick(dialog.take, _CLICK)
-    np.testing.assert_allclose(desk.session.landmarks(Side.LEFT)["CA"], [1, 2, 3])
-    np.testing.assert_allclose(desk.session.landmarks(Side.RIGHT)["CA"], [7, 8, 9])
-    assert LabNamesMemory(desk.directory).recall().translate("apex r") == "CA_R"
+    np.testing.assert_allclose(workspace.document.landmarks(Side.LEFT)["CA"], [1, 2, 3])
+    np.testing.assert_allclose(workspace.document.landmarks(Side.RIGHT)["CA"], [7, 8, 9])
+    assert LabNamesMemory(workspace.directory).recall().translate("apex r") == "CA_R"
 
 
-def test_a_table_of_names_is_loaded_and_remembered(desk, parent, qtbot, theirs, tmp_path) -> None:
+def test_a_table_of_names_is_loaded_and_remembered(workspace, parent, qtbot, theirs, tmp_path) -> None:
     table = tmp_path / "names.csv"
     table.write_text("their name,our code\nAPEX,CA\nbase,CB\nApex R,CA_R\nBregma,\nLambda,\nTip,OS\n")
     prompts = SimpleNamespace(open_files=lambda *_: [table])
-    dialog = LandmarkImportDialog(desk, [theirs], None, prompts, parent)
+    dialog = LandmarkImportDialog(workspace, [theirs], None, prompts, parent)
     dialog.show()
     qtbot.mouseClick(dialog.names.load, _CLICK)
     assert dialog.names.codes == {"Apex": "CA", "Base": "CB", "Apex R": "CA_R", "Bregma": ""}
     qtbot.mouseClick(dialog.take, _CLICK)
-    assert set(desk.session.landmarks(Side.LEFT).placed) == {"CA", "CB"}
-    assert LabNamesMemory(desk.directory).recall().translate("tip") == "OS"  # of another file, next time
+    assert set(workspace.document.landmarks(Side.LEFT).placed) == {"CA", "CB"}
+    assert LabNamesMemory(workspace.directory).recall().translate("tip") == "OS"  # of another file, next time
 
 
-def test_a_table_that_is_none_is_named(desk, parent, qtbot, theirs, tmp_path) -> None:
+def test_a_table_that_is_none_is_named(workspace, parent, qtbot, theirs, tmp_path) -> None:
     table = tmp_path / "names.csv"
     table.write_text("Apex,no feature\n")
     prompts = SimpleNamespace(open_files=lambda *_: [table])
-    dialog = LandmarkImportDialog(desk, [theirs], None, prompts, parent)
+    dialog = LandmarkImportDialog(workspace, [theirs], None, prompts, parent)
     dialog.show()
     qtbot.mouseClick(dialog.names.load, _CLICK)
     said = [notice.words for notice in dialog.findChildren(Notice)]

@@ -19,8 +19,7 @@ from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.specimen_document import utc_now
 from gp_labeler.document.specimen_file import write_specimen
 from gp_labeler.document.state import How, Provenance, SpecimenState
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.atlas_panel import AtlasCard, AtlasPanel
 from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
 from gp_labeler.views.panels.card_content import content_of
@@ -32,16 +31,16 @@ L, R = Side.LEFT, Side.RIGHT
 
 
 @pytest.fixture
-def desk() -> Iterator[Workbench]:
-    desk = desk_with_scan()
-    deliver(desk)
-    yield desk
-    desk.close(discard=True)
+def workspace() -> Iterator[Workspace]:
+    workspace = desk_with_scan()
+    deliver(workspace)
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
-def panel(desk, qtbot) -> AtlasPanel:
-    panel = AtlasPanel(desk)
+def panel(workspace, qtbot) -> AtlasPanel:
+    panel = AtlasPanel(workspace)
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(panel.width(), 900)
@@ -78,10 +77,10 @@ def test_the_published_atlas_is_described(panel) -> None:
     assert cell(panel, "RWA", 2) == "–"  # noqa: RUF001
 
 
-def test_labels_are_held_against_it_and_doubts_flagged(desk, panel, qtbot) -> None:
-    place(desk, "CA", "CB", "RWA", "RWP", "OS", "LLI")
-    labelling.place(desk.session, np.add(in_scan("OI"), [0, 0, 3.0]), side=L, code="OI")
-    deliver(desk)
+def test_labels_are_held_against_it_and_doubts_flagged(workspace, panel, qtbot) -> None:
+    place(workspace, "CA", "CB", "RWA", "RWP", "OS", "LLI")
+    workspace.labels.place(np.add(in_scan("OI"), [0, 0, 3.0]), side=L, code="OI")
+    deliver(workspace)
     distance, n_sd = cell(panel, "OI", 2).split(" · ")
     assert float(distance) == pytest.approx(3, abs=0.5)
     assert float(n_sd) > 5
@@ -92,22 +91,22 @@ def test_labels_are_held_against_it_and_doubts_flagged(desk, panel, qtbot) -> No
     table = panel.labels.table
     index = table.rows.index(table.rows.codes.index("OI"), 2)
     qtbot.mouseClick(table.viewport(), CLICK, pos=table.visualRect(index).center())
-    assert (desk.session.active.side, desk.session.active.code) == (L, "OI")
+    assert (workspace.labels.active.side, workspace.labels.active.code) == (L, "OI")
 
 
-def test_points_that_are_doubted_for_another_reason_are_named_beside_the_table(desk, panel) -> None:
-    place(desk, "CA", "CB", "RWP", "OS", "LLI")
-    labelling.place(desk.session, in_scan("LLI"), side=L, code="RWA")  # half a millimetre off, and on LLI
-    deliver(desk)
+def test_points_that_are_doubted_for_another_reason_are_named_beside_the_table(workspace, panel) -> None:
+    place(workspace, "CA", "CB", "RWP", "OS", "LLI")
+    workspace.labels.place(in_scan("LLI"), side=L, code="RWA")  # half a millimetre off, and on LLI
+    deliver(workspace)
     assert panel.labels.verdict.text() == (
         "All 6 labels that can be checked fit the atlas; 2 have other doubts: LLI left, RWA left."
     )
-    labelling.place(desk.session, in_scan("RWA"), side=L, code="RWA")
-    deliver(desk)
+    workspace.labels.place(in_scan("RWA"), side=L, code="RWA")
+    deliver(workspace)
     assert panel.labels.verdict.text() == "All 6 labels that can be checked fit the atlas."
 
 
-def test_an_atlas_is_fitted_and_tried_out(desk, panel, folder, qtbot) -> None:
+def test_an_atlas_is_fitted_and_tried_out(workspace, panel, folder, qtbot) -> None:
     asked = []
     panel.asked.connect(asked.append)
     for button in (panel.own.files, panel.own.folder, panel.which.open, panel.which.save):
@@ -116,38 +115,38 @@ def test_an_atlas_is_fitted_and_tried_out(desk, panel, folder, qtbot) -> None:
     animal = drawn_animals(1)[0]
     write_side(folder, "torn", animal.side(L))
     (folder / "torn_L.mrk.json").write_text("{")
-    desk.fit_atlas([folder])
-    assert desk.jobs.running
-    deliver(desk)
+    workspace.atlas.fit([folder])
+    assert workspace.jobs.running
+    deliver(workspace)
     assert panel.which.name.toolTip() == "3 animals, 6 sides"
     QApplication.processEvents()
     words = [notice.words for notice in panel.own.findChildren(Notice) if notice.isVisibleTo(panel)]
     assert words == ["3 animals, 6 sides were read.", "Skipped torn_L.mrk.json"]
     assert panel.trial.run.isEnabled()
-    desk.try_atlas()
+    workspace.atlas.try_out()
     assert not panel.trial.run.isEnabled()
-    deliver(desk)
+    deliver(workspace)
     assert [row[0] for row in panel.trial.figures] == ["Robust", "JRMPC"]
     assert all(float(mean) <= float(most) for _, mean, most, *_ in panel.trial.figures)
     assert "6 sides of 3 animals" in panel.trial.words.text()
 
 
-def test_fitting_can_be_stopped(desk, panel, folder, qtbot) -> None:
-    desk.fit_atlas([folder])
+def test_fitting_can_be_stopped(workspace, panel, folder, qtbot) -> None:
+    workspace.atlas.fit([folder])
     assert panel.own.stop.isVisibleTo(panel)
     qtbot.mouseClick(panel.own.stop, CLICK)
-    deliver(desk)
-    assert desk.is_published_atlas
+    deliver(workspace)
+    assert workspace.atlas.is_published
     assert not panel.own.stop.isVisibleTo(panel)
 
 
 @pytest.mark.parametrize("theme", [DARK, LIGHT])
 @pytest.mark.parametrize("wide", [False, True])
-def test_no_word_is_cut(desk, panel, folder, theme, wide) -> None:
-    desk.fit_atlas([folder])
-    deliver(desk)
-    desk.try_atlas()
-    deliver(desk)
+def test_no_word_is_cut(workspace, panel, folder, theme, wide) -> None:
+    workspace.atlas.fit([folder])
+    deliver(workspace)
+    workspace.atlas.try_out()
+    deliver(workspace)
     apply_theme(panel, theme)
     panel.set_wide(wide)
     panel.resize(1100 if wide else panel.width(), 900)
@@ -171,30 +170,30 @@ def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qt
     assert not window.grid.isVisible()
     drop(window, folder)
     settle(qtbot, window)
-    desk = window.workbench
-    assert desk.atlas.n_samples == 6
+    workspace = window.workspace
+    assert workspace.atlas.current.n_samples == 6
     window.ui.prompts.files = [tmp_path / "own.json"]
     window.commands.run("atlas.save")
     assert Atlas.load(tmp_path / "own.json").n_samples == 6
     window.commands.run("atlas.published")
     settle(qtbot, window)
-    assert desk.is_published_atlas
+    assert workspace.atlas.is_published
     assert not window.commands.actions["atlas.published"].isEnabled()
     qtbot.mouseClick(window.rail.buttons["scan"], CLICK)
     assert window.welcome.isVisible()
     drop(window, tmp_path / "own.json")
     settle(qtbot, window)
-    assert desk.atlas.n_samples == 6
-    assert desk.volume is None
+    assert workspace.atlas.current.n_samples == 6
+    assert workspace.scan.volume is None
     window.commands.run("atlas.show")
     assert window.rail.step == "atlas"
     window.ui.prompts.files = [folder]
     window.commands.run("atlas.fit_folder")
     settle(qtbot, window)
-    assert len(desk.atlas_specimens) == 3
+    assert len(workspace.atlas.specimens) == 3
     window.commands.run("atlas.try")
     settle(qtbot, window, 180)  # compiling may be part of it
-    assert desk.trial.n_sides == 6
+    assert workspace.atlas.trial.n_sides == 6
 
 
 def test_an_atlas_that_is_gone_at_the_next_start_is_told_until_another_is_chosen(
@@ -202,10 +201,10 @@ def test_an_atlas_that_is_gone_at_the_next_start_is_told_until_another_is_chosen
 ) -> None:
     window = make_window(atlas=True)
     settle(qtbot, window)
-    window.workbench.fit_atlas([folder])
+    window.workspace.atlas.fit([folder])
     settle(qtbot, window)
-    window.workbench.save_atlas(tmp_path / "own.json")
-    window.workbench.open_atlas(tmp_path / "own.json")
+    window.workspace.atlas.save(tmp_path / "own.json")
+    window.workspace.atlas.open(tmp_path / "own.json")
     settle(qtbot, window)
     close(window)
     (tmp_path / "own.json").unlink()
@@ -229,7 +228,7 @@ def test_a_damaged_atlas_dropped_on_the_window_is_named(make_window, tmp_path, q
     drop(window, file)
     settle(qtbot, window)
     assert "half.json" in window.status.next_click.text()
-    assert window.workbench.is_published_atlas
+    assert window.workspace.atlas.is_published
 
 
 def _wrong_animals(tmp_path):
@@ -259,9 +258,9 @@ def test_what_is_left_out_is_listed_and_opens_where_it_is(make_window, tmp_path,
     folder = _wrong_animals(tmp_path)
     window = make_window(atlas=True)
     settle(qtbot, window)
-    desk, own = window.workbench, window.findChild(AtlasPanel).own
+    workspace, own = window.workspace, window.findChild(AtlasPanel).own
     qtbot.mouseClick(window.rail.buttons["atlas"], CLICK)
-    desk.fit_atlas([folder])
+    workspace.atlas.fit([folder])
     settle(qtbot, window)
     words = [notice.words for notice in own.findings.findChildren(Notice)]
     assert words[1] == "GP02 left: CA and CB look exchanged"
@@ -270,25 +269,27 @@ def test_what_is_left_out_is_listed_and_opens_where_it_is(make_window, tmp_path,
     qtbot.mouseClick(more, CLICK)
     assert len(own.findings.findChildren(Notice)) > 5
     assert list(cut_words(window.findChild(AtlasPanel))) == []
-    spread = desk.atlas.variances(["CA"])[0]
+    spread = workspace.atlas.current.variances(["CA"])[0]
     _tick(qtbot, own.keep_doubtful)
     settle(qtbot, window)
-    assert desk.atlas.variances(["CA"])[0] > 10 * spread
+    assert workspace.atlas.current.variances(["CA"])[0] > 10 * spread
     _tick(qtbot, own.keep_doubtful)
     settle(qtbot, window)
-    assert desk.atlas.variances(["CA"])[0] == spread
+    assert workspace.atlas.current.variances(["CA"])[0] == spread
     show = next(b for b in own.findings.findChildren(QPushButton) if "GP02" in b.accessibleName())
     qtbot.mouseClick(show, CLICK)
     settle(qtbot, window)
-    assert desk.session.state.specimen == "GP02"
-    assert (desk.session.active.side, desk.session.active.code) == (L, "CA")
+    assert workspace.document.state.specimen == "GP02"
+    assert (workspace.labels.active.side, workspace.labels.active.code) == (L, "CA")
 
 
-def test_the_card_names_the_atlas_that_is_not_the_published_one(desk, folder) -> None:
-    place(desk, "CA", "RWP", "OS")
-    desk.go_to(L, "CB")
-    assert "By the atlas" not in content_of(desk.session, has_scan=True, atlas=desk.atlas_words).status
-    desk.fit_atlas([folder])
-    deliver(desk)
-    status = content_of(desk.session, has_scan=True, atlas=desk.atlas_words).status
+def test_the_card_names_the_atlas_that_is_not_the_published_one(workspace, folder) -> None:
+    place(workspace, "CA", "RWP", "OS")
+    workspace.labels.go_to(L, "CB")
+    assert (
+        "By the atlas" not in content_of(workspace.labels, has_scan=True, atlas=workspace.atlas.text).status
+    )
+    workspace.atlas.fit([folder])
+    deliver(workspace)
+    status = content_of(workspace.labels, has_scan=True, atlas=workspace.atlas.text).status
     assert status.endswith("By the atlas of 3 animals, 6 sides.")

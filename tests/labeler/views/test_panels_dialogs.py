@@ -20,8 +20,7 @@ from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.jobs.runner import QueueDispatcher
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.export_dialog import ExportDialog
 from gp_labeler.views.panels.import_dialog import ImportDialog
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
@@ -33,10 +32,10 @@ CLICK = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def desk() -> Iterator[Workbench]:
-    desk = desk_with_scan()
-    yield desk
-    desk.close(discard=True)
+def workspace() -> Iterator[Workspace]:
+    workspace = desk_with_scan()
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
@@ -59,10 +58,10 @@ def stack(tmp_path) -> Path:
     return folder
 
 
-def opened(desk: Workbench, path: Path, parent: QWidget) -> ImportDialog:
-    dialog = ImportDialog(desk, inspect_volume(path), parent=parent)
+def opened(workspace: Workspace, path: Path, parent: QWidget) -> ImportDialog:
+    dialog = ImportDialog(workspace, inspect_volume(path), parent=parent)
     dialog.show()
-    deliver(desk)
+    deliver(workspace)
     return dialog
 
 
@@ -74,26 +73,26 @@ def findings(dialog: QWidget) -> list[tuple[str, str]]:
 # Opening a scan
 
 
-def test_a_stack_is_refused_until_somebody_knows_its_voxel_size(desk, stack, parent, qtbot):
-    dialog = opened(desk, stack, parent)
+def test_a_stack_is_refused_until_somebody_knows_its_voxel_size(workspace, stack, parent, qtbot):
+    dialog = opened(workspace, stack, parent)
     assert not dialog.load.isEnabled()
     assert [field.text() for field in dialog.spacing.fields] == ["", "", ""]
     dialog.accept()
-    assert desk.jobs.running == ()
+    assert workspace.jobs.running == ()
     assert dialog.isVisible()
     qtbot.keyClicks(dialog.spacing.fields[0], "0.5")
     assert dialog.load.isEnabled()
     assert dialog.plan.spacing == (0.5, 0.5, 0.5)
     assert dialog.facts.values["Size"].text() == "25.0 × 15.0 × 20.0 mm"  # noqa: RUF001
     qtbot.mouseClick(dialog.load, CLICK)
-    deliver(desk)
-    assert desk.volume.size == (50, 30, 40)
-    assert desk.volume.spacing == pytest.approx((0.5, 0.5, 0.5))
-    assert desk.session.state.import_choices["spacing"] == pytest.approx([0.5] * 3)
+    deliver(workspace)
+    assert workspace.scan.volume.size == (50, 30, 40)
+    assert workspace.scan.volume.spacing == pytest.approx((0.5, 0.5, 0.5))
+    assert workspace.document.state.import_choices["spacing"] == pytest.approx([0.5] * 3)
 
 
-def test_micrometres_and_a_voxel_size_of_its_own_for_each_axis(desk, stack, parent, qtbot):
-    dialog = opened(desk, stack, parent)
+def test_micrometres_and_a_voxel_size_of_its_own_for_each_axis(workspace, stack, parent, qtbot):
+    dialog = opened(workspace, stack, parent)
     dialog.spacing.unit.setCurrentText("µm")
     dialog.spacing.same.click()
     for field, text in zip(dialog.spacing.fields, ("300", "300", "400,5"), strict=True):
@@ -102,8 +101,8 @@ def test_micrometres_and_a_voxel_size_of_its_own_for_each_axis(desk, stack, pare
     dialog.reject()
 
 
-def test_nonsense_and_impossible_sizes_are_said(desk, stack, parent, qtbot):
-    dialog = opened(desk, stack, parent)
+def test_nonsense_and_impossible_sizes_are_said(workspace, stack, parent, qtbot):
+    dialog = opened(workspace, stack, parent)
     field = dialog.spacing.fields[0]
     qtbot.keyClicks(field, "0.5x")
     assert not dialog.load.isEnabled()
@@ -119,60 +118,60 @@ def test_nonsense_and_impossible_sizes_are_said(desk, stack, parent, qtbot):
     dialog.reject()
 
 
-def test_the_sides_are_shown_and_can_be_reversed(desk, stack, parent, qtbot):
-    dialog = opened(desk, stack, parent)
+def test_the_sides_are_shown_and_can_be_reversed(workspace, stack, parent, qtbot):
+    dialog = opened(workspace, stack, parent)
     qtbot.keyClicks(dialog.spacing.fields[0], "0.5")
     axial, coronal = (picture.plane for picture in dialog.pictures)
     assert (axial.letters, coronal.letters) == ("RLPA", "RLIS")
     assert coronal.grey[:5].max() > coronal.grey[-5:].max()
     dialog.reverse.click()
-    deliver(desk)
+    deliver(workspace)
     coronal = dialog.pictures[1].plane
     assert coronal.grey[:5].max() < coronal.grey[-5:].max()
     qtbot.mouseClick(dialog.load, CLICK)
-    deliver(desk)
-    assert desk.session.state.import_choices["reverse"] is True
-    assert desk.volume.array[0].max() > desk.volume.array[-1].max()
+    deliver(workspace)
+    assert workspace.document.state.import_choices["reverse"] is True
+    assert workspace.scan.volume.array[0].max() > workspace.scan.volume.array[-1].max()
 
 
-def test_every_second_voxel_takes_an_eighth(desk, stack, parent, qtbot):
-    dialog = opened(desk, stack, parent)
+def test_every_second_voxel_takes_an_eighth(workspace, stack, parent, qtbot):
+    dialog = opened(workspace, stack, parent)
     before = dialog.plan.n_bytes
     dialog.stride.setCurrentIndex(1)
     assert dialog.plan.n_bytes == before / 8
     dialog.reject()
 
 
-def test_several_stacks_can_be_chosen_from(desk, tmp_path, parent):
+def test_several_stacks_can_be_chosen_from(workspace, tmp_path, parent):
     for name, width in (("a", 40), ("b", 60)):
         for k in range(20):
             tifffile.imwrite(tmp_path / f"{name}_{k:03d}.tif", np.full((30, width), k, np.uint8))
-    dialog = opened(desk, tmp_path, parent)
+    dialog = opened(workspace, tmp_path, parent)
     assert dialog.series.count() == 2
     other = next(n for n in range(2) if "60" in dialog.series.itemText(n) or "b" in dialog.series.itemText(n))
     dialog.series.setCurrentIndex(other)
     dialog.series.activated.emit(other)
-    deliver(desk)
+    deliver(workspace)
     assert dialog.plan.choice == dialog.series.itemData(other)
     assert dialog.plan.size[0] == 60
     dialog.reject()
 
 
 @pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
-def test_no_word_of_the_import_dialog_is_cut_off(desk, stack, parent, qtbot, theme):
+def test_no_word_of_the_import_dialog_is_cut_off(workspace, stack, parent, qtbot, theme):
     apply_theme(parent, theme)
-    dialog = opened(desk, stack, parent)
+    dialog = opened(workspace, stack, parent)
     qtbot.keyClicks(dialog.spacing.fields[0], "500")
     assert list(cut_words(dialog)) == []
     dialog.reject()
 
 
-def test_names_of_any_length_fit(desk, tmp_path, parent, qtbot):
+def test_names_of_any_length_fit(workspace, tmp_path, parent, qtbot):
     folder = tmp_path / ("a_very_long_name_without_a_single_space_" * 4)
     folder.mkdir()
     for k in range(3):
         tifffile.imwrite(folder / f"s{k}.tif", np.full((30, 30), k, np.uint8))
-    dialog = opened(desk, folder, parent)
+    dialog = opened(workspace, folder, parent)
     content = dialog.facts.parentWidget()
     qtbot.waitUntil(lambda: content.width() <= dialog.width())
     assert content.minimumSizeHint().width() < 560
@@ -182,10 +181,10 @@ def test_names_of_any_length_fit(desk, tmp_path, parent, qtbot):
 # Export
 
 
-def test_an_export_says_what_is_missing_and_writes_the_chosen_formats(desk, tmp_path, parent, qtbot):
-    place(desk, "CA", "CB", "RWA")
-    labelling.mark_unseen(desk.session, side=Side.LEFT, code="RWM")
-    dialog = ExportDialog(desk, tmp_path, parent=parent)
+def test_an_export_says_what_is_missing_and_writes_the_chosen_formats(workspace, tmp_path, parent, qtbot):
+    place(workspace, "CA", "CB", "RWA")
+    workspace.labels.mark_unseen(side=Side.LEFT, code="RWM")
+    dialog = ExportDialog(workspace, tmp_path, parent=parent)
     dialog.show()
     said = dict(reversed(pair) for pair in findings(dialog))
     left = next(words for words in said if "left side has" in words)
@@ -198,12 +197,12 @@ def test_an_export_says_what_is_missing_and_writes_the_chosen_formats(desk, tmp_
     assert json.loads((tmp_path / "unnamed_L.mrk.json").read_text())["markups"]
 
 
-def test_files_of_that_name_are_replaced_only_when_asked(desk, tmp_path, parent, qtbot):
-    place(desk, "CA", "CB", "RWA")
-    export_landmarks(desk.session.state, tmp_path)
+def test_files_of_that_name_are_replaced_only_when_asked(workspace, tmp_path, parent, qtbot):
+    place(workspace, "CA", "CB", "RWA")
+    export_landmarks(workspace.document.state, tmp_path)
     before = (tmp_path / "unnamed_L.mrk.json").read_bytes()
-    place(desk, "RWP")
-    dialog = ExportDialog(desk, tmp_path, parent=parent)
+    place(workspace, "RWP")
+    dialog = ExportDialog(workspace, tmp_path, parent=parent)
     dialog.show()
     assert not dialog.export.isEnabled()
     dialog.replace.click()
@@ -211,8 +210,8 @@ def test_files_of_that_name_are_replaced_only_when_asked(desk, tmp_path, parent,
     assert (tmp_path / "unnamed_L.mrk.json").read_bytes() != before
 
 
-def test_nothing_placed_is_nothing_to_export(desk, tmp_path, parent, qtbot):
-    dialog = ExportDialog(desk, tmp_path, parent=parent)
+def test_nothing_placed_is_nothing_to_export(workspace, tmp_path, parent, qtbot):
+    dialog = ExportDialog(workspace, tmp_path, parent=parent)
     dialog.show()
     assert not dialog.export.isEnabled()
     assert list(cut_words(dialog)) == []
@@ -223,42 +222,42 @@ def test_nothing_placed_is_nothing_to_export(desk, tmp_path, parent, qtbot):
 
 
 @pytest.fixture
-def landmark_file(desk, tmp_path) -> Path:
-    place(desk, "CA", "CB", "RWA", "RWP")
-    export_landmarks(desk.session.state, tmp_path)
+def landmark_file(workspace, tmp_path) -> Path:
+    place(workspace, "CA", "CB", "RWA", "RWP")
+    export_landmarks(workspace.document.state, tmp_path)
     for code in ("CA", "CB", "RWA", "RWP"):
-        labelling.clear(desk.session, side=Side.LEFT, code=code)
+        workspace.labels.clear(side=Side.LEFT, code=code)
     return tmp_path / "unnamed_L.mrk.json"
 
 
-def test_an_import_shows_what_the_file_holds_and_takes_it(desk, landmark_file, parent, qtbot):
-    dialog = LandmarkImportDialog(desk, [landmark_file], parent=parent)
+def test_an_import_shows_what_the_file_holds_and_takes_it(workspace, landmark_file, parent, qtbot):
+    dialog = LandmarkImportDialog(workspace, [landmark_file], parent=parent)
     dialog.show()
     assert findings(dialog) == [("info", "unnamed_L.mrk.json: 5 points of the left side")]
     qtbot.mouseClick(dialog.take, CLICK)
-    assert set(desk.session.landmarks(Side.LEFT).placed) == {"CA", "CB", "CO", "RWA", "RWP"}
-    np.testing.assert_allclose(desk.session.landmarks(Side.LEFT)["CA"], in_scan("CA"))
+    assert set(workspace.document.landmarks(Side.LEFT).placed) == {"CA", "CB", "CO", "RWA", "RWP"}
+    np.testing.assert_allclose(workspace.document.landmarks(Side.LEFT)["CA"], in_scan("CA"))
 
 
-def test_points_off_the_bone_need_a_second_word(desk, landmark_file, parent, qtbot):
+def test_points_off_the_bone_need_a_second_word(workspace, landmark_file, parent, qtbot):
     off_bone = lambda points: np.zeros(len(points), dtype=bool)  # noqa: E731
-    dialog = LandmarkImportDialog(desk, [landmark_file], off_bone, parent=parent)
+    dialog = LandmarkImportDialog(workspace, [landmark_file], off_bone, parent=parent)
     dialog.show()
     qtbot.mouseClick(dialog.take, CLICK)
-    assert desk.session.landmarks(Side.LEFT).placed == ()
+    assert workspace.document.landmarks(Side.LEFT).placed == ()
     assert "off the bone" in findings(dialog)[0][1]
     assert not dialog.take.isEnabled()
     dialog.anyway.click()
     qtbot.mouseClick(dialog.take, CLICK)
-    assert len(desk.session.landmarks(Side.LEFT).placed) == 5
+    assert len(workspace.document.landmarks(Side.LEFT).placed) == 5
     assert [level for level, _ in findings(dialog)] == ["good", "warning"]
     dialog.reject()
 
 
-def test_a_file_that_is_none_is_named(desk, tmp_path, parent):
+def test_a_file_that_is_none_is_named(workspace, tmp_path, parent):
     bad = tmp_path / "x.mrk.json"
     bad.write_text("{")
-    dialog = LandmarkImportDialog(desk, [bad], parent=parent)
+    dialog = LandmarkImportDialog(workspace, [bad], parent=parent)
     dialog.show()
     assert not dialog.take.isEnabled()
     level, words = findings(dialog)[0]
@@ -275,10 +274,9 @@ def state_directory(tmp_path) -> Path:
     """What two programs left that were killed in the middle of their work."""
     directory = tmp_path / "state"
     code = (
-        "import os; from pathlib import Path; from gp_labeler.models import labelling\n"
-        "from gp_labeler.document.opening import new_session\n"
-        f"for n in ('GP-014', 'GP-015'):\n    s = new_session(Path({str(directory)!r}), specimen=n)\n"
-        "    labelling.place(s, [1, 2, 3], side='L', code='CA')\n"
+        "import os; from pathlib import Path; from gp_labeler.models.workspace import Workspace\n"
+        f"for n in ('GP-014', 'GP-015'):\n    w = Workspace(Path({str(directory)!r})); w.document.begin(n)\n"
+        "    w.labels.place([1, 2, 3], side='L', code='CA')\n"
         "os._exit(9)"
     )
     subprocess.run([sys.executable, "-c", code], check=False, cwd=Path(__file__).parents[3])
@@ -308,7 +306,7 @@ def test_recovery_offers_each_and_deletes_only_at_the_second_click(state_directo
     assert dialog.list.count() == 1
     with qtbot.waitSignal(dialog.recover_asked) as told:
         qtbot.mouseClick(dialog.recover, CLICK)
-    desk = Workbench(state_directory, QueueDispatcher())
-    desk.recover(told.args[0])
-    assert "CA" in desk.session.landmarks(Side.LEFT)
-    desk.close(discard=True)
+    workspace = Workspace(state_directory, QueueDispatcher())
+    workspace.document.recover(told.args[0])
+    assert "CA" in workspace.document.landmarks(Side.LEFT)
+    workspace.close(discard=True)

@@ -14,9 +14,8 @@ from qtpy.QtWidgets import QMenu
 
 from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
 from gp_labeler.document.edits import CheckPoint, SwapPoints
-from gp_labeler.models import labelling
 from gp_labeler.models.workflow import Active
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
 from gp_labeler.views.panels.feature_card import FeatureCard
@@ -35,15 +34,15 @@ LOWEST_PANEL = QSize(PANEL_WIDTH, 698)
 
 
 @pytest.fixture
-def desk() -> Iterator[Workbench]:
-    desk = desk_with_scan()
-    yield desk
-    desk.close(discard=True)
+def workspace() -> Iterator[Workspace]:
+    workspace = desk_with_scan()
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
-def panel(desk: Workbench, qtbot) -> LabelPanel:
-    panel = LabelPanel(desk)
+def panel(workspace: Workspace, qtbot) -> LabelPanel:
+    panel = LabelPanel(workspace)
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(LOWEST_PANEL)
@@ -64,59 +63,59 @@ def word(table: LandmarkTable, code: str, side: Side) -> str:
 # Table
 
 
-def test_a_click_on_a_cell_makes_that_point_active_and_goes_there(desk, panel, qtbot):
-    place(desk, "OS", side=RIGHT)
+def test_a_click_on_a_cell_makes_that_point_active_and_goes_there(workspace, panel, qtbot):
+    place(workspace, "OS", side=RIGHT)
     click_cell(qtbot, panel.table, "OS", 2)
-    assert desk.session.active == Active(RIGHT, "OS")
-    np.testing.assert_allclose(desk.session.crosshair, in_scan("OS", RIGHT))
+    assert workspace.labels.active == Active(RIGHT, "OS")
+    np.testing.assert_allclose(workspace.view.crosshair, in_scan("OS", RIGHT))
     click_cell(qtbot, panel.table, "MN", 1)
-    assert desk.session.active == Active(LEFT, "MN")
+    assert workspace.labels.active == Active(LEFT, "MN")
 
 
-def test_a_click_on_a_name_stays_on_the_side_being_worked_on(desk, panel, qtbot):
-    desk.session.set_active(Active(RIGHT, "CA"))
+def test_a_click_on_a_name_stays_on_the_side_being_worked_on(workspace, panel, qtbot):
+    workspace.labels.set_active(Active(RIGHT, "CA"))
     click_cell(qtbot, panel.table, "FPP", 0)
-    assert desk.session.active == Active(RIGHT, "FPP")
+    assert workspace.labels.active == Active(RIGHT, "FPP")
 
 
-def test_a_click_on_the_computed_origin_shows_it_and_keeps_the_active_point(desk, panel, qtbot):
-    place(desk, "CA", "CB", "RWA", "RWP")
-    before = desk.session.active
+def test_a_click_on_the_computed_origin_shows_it_and_keeps_the_active_point(workspace, panel, qtbot):
+    place(workspace, "CA", "CB", "RWA", "RWP")
+    before = workspace.labels.active
     click_cell(qtbot, panel.table, "CO", 1)
-    assert desk.session.active == before
-    np.testing.assert_allclose(desk.session.crosshair, desk.session.landmarks(LEFT)["CO"])
+    assert workspace.labels.active == before
+    np.testing.assert_allclose(workspace.view.crosshair, workspace.document.landmarks(LEFT)["CO"])
 
 
-def test_arrow_keys_walk_through_the_points(desk, panel, qtbot):
+def test_arrow_keys_walk_through_the_points(workspace, panel, qtbot):
     click_cell(qtbot, panel.table, "CA", 1)
     qtbot.keyClick(panel.table.view, Qt.Key.Key_Down)
-    assert desk.session.active == Active(LEFT, "CB")
+    assert workspace.labels.active == Active(LEFT, "CB")
     qtbot.keyClick(panel.table.view, Qt.Key.Key_Right)
-    assert desk.session.active == Active(RIGHT, "CB")
+    assert workspace.labels.active == Active(RIGHT, "CB")
 
 
-def test_delete_clears_the_point_of_the_cell(desk, panel, qtbot):
-    place(desk, "CA")
+def test_delete_clears_the_point_of_the_cell(workspace, panel, qtbot):
+    place(workspace, "CA")
     click_cell(qtbot, panel.table, "CA", 1)
     qtbot.keyClick(panel.table.view, Qt.Key.Key_Delete)
-    assert "CA" not in desk.session.landmarks(LEFT)
+    assert "CA" not in workspace.document.landmarks(LEFT)
 
 
-def test_the_table_follows_the_active_point_without_changing_it(desk, panel):
+def test_the_table_follows_the_active_point_without_changing_it(workspace, panel):
     asked = []
-    desk.active_changed.connect(asked.append)
-    desk.session.set_active(Active(RIGHT, "ZL"))
+    workspace.labels.active_changed.connect(asked.append)
+    workspace.labels.set_active(Active(RIGHT, "ZL"))
     current = panel.table.view.currentIndex()
     assert (current.row(), current.column()) == (index_of("ZL"), 2)
     assert asked == [Active(RIGHT, "ZL")]
 
 
-def test_every_state_has_its_word(desk, panel):
-    place(desk, "CA", "CB", "RWA", "RWP", "OS", "LLI", "MH")
-    labelling.place(desk.session, np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
-    labelling.mark_unseen(desk.session, side=LEFT, code="RWM")
-    desk.session.do(CheckPoint(LEFT, "CA"))
-    deliver(desk)
+def test_every_state_has_its_word(workspace, panel):
+    place(workspace, "CA", "CB", "RWA", "RWP", "OS", "LLI", "MH")
+    workspace.labels.place(np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
+    workspace.labels.mark_unseen(side=LEFT, code="RWM")
+    workspace.document.do(CheckPoint(LEFT, "CA"))
+    deliver(workspace)
     table = panel.table
     assert word(table, "CA", LEFT) == "checked"
     assert word(table, "CB", LEFT) == "placed"
@@ -125,17 +124,17 @@ def test_every_state_has_its_word(desk, panel):
     assert word(table, "FPA", LEFT) == "ghost"
     assert word(table, "FPA", RIGHT) == "to do"
     assert word(table, "CO", RIGHT) == "by itself", "nobody places it"
-    distance = desk.session.doubts(LEFT)["OI"].departure_of("OI").distance
+    distance = workspace.labels.doubts(LEFT)["OI"].departure_of("OI").distance
     assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
 
 
-def test_the_header_counts_each_side(desk, panel):
-    place(desk, "CA", "CB", "RWA", "RWP")
+def test_the_header_counts_each_side(workspace, panel):
+    place(workspace, "CA", "CB", "RWA", "RWP")
     header = [panel.table.model.headerData(n, Qt.Orientation.Horizontal) for n in range(3)]
     assert header == ["Feature", "Left 5/20", "Right 0/20"]
 
 
-def test_all_rows_and_words_fit_at_the_smallest_window(desk, panel, qtbot):
+def test_all_rows_and_words_fit_at_the_smallest_window(workspace, panel, qtbot):
     view = panel.table.view
     assert view.verticalScrollBar().maximum() == 0
     metrics = QFontMetrics(view.font())
@@ -153,40 +152,40 @@ def menu_actions(menu: QMenu) -> dict:
     return {a.text(): a for a in menu.actions() if a.text()}
 
 
-def test_the_menu_locks_swaps_checks_and_clears(desk, panel):
-    place(desk, "RWA", "RWP", "CA")
-    before = {code: desk.session.landmarks(LEFT)[code].copy() for code in ("RWA", "RWP")}
-    menu = landmark_menu(desk, LEFT, "RWA", panel)
+def test_the_menu_locks_swaps_checks_and_clears(workspace, panel):
+    place(workspace, "RWA", "RWP", "CA")
+    before = {code: workspace.document.landmarks(LEFT)[code].copy() for code in ("RWA", "RWP")}
+    menu = landmark_menu(workspace, LEFT, "RWA", panel)
     swaps = next(m for m in menu.findChildren(QMenu) if m.title() == "Exchange with")
     next(a for a in swaps.actions() if a.text().startswith("RWP")).trigger()
-    np.testing.assert_allclose(desk.session.landmarks(LEFT)["RWP"], before["RWA"])
-    desk.session.undo()
+    np.testing.assert_allclose(workspace.document.landmarks(LEFT)["RWP"], before["RWA"])
+    workspace.document.undo()
     menu_actions(menu)["Mark as checked"].trigger()
-    assert desk.session.state.landmark(LEFT, "RWA").checked
+    assert workspace.document.state.landmark(LEFT, "RWA").checked
     menu_actions(menu)["Lock"].trigger()
-    assert desk.session.state.landmark(LEFT, "RWA").locked
-    locked = menu_actions(landmark_menu(desk, LEFT, "RWA", panel))
+    assert workspace.document.state.landmark(LEFT, "RWA").locked
+    locked = menu_actions(landmark_menu(workspace, LEFT, "RWA", panel))
     assert not locked["Clear"].isEnabled()
     locked["Unlock"].trigger()
-    menu_actions(landmark_menu(desk, LEFT, "RWA", panel))["Clear"].trigger()
-    assert "RWA" not in desk.session.landmarks(LEFT)
+    menu_actions(landmark_menu(workspace, LEFT, "RWA", panel))["Clear"].trigger()
+    assert "RWA" not in workspace.document.landmarks(LEFT)
 
 
-def test_the_menu_copies_a_position_in_mm(desk, panel):
-    place(desk, "CA")
-    menu_actions(landmark_menu(desk, LEFT, "CA", panel))["Copy position (LPS, mm)"].trigger()
+def test_the_menu_copies_a_position_in_mm(workspace, panel):
+    place(workspace, "CA")
+    menu_actions(landmark_menu(workspace, LEFT, "CA", panel))["Copy position (LPS, mm)"].trigger()
     copied = [float(x) for x in QGuiApplication.clipboard().text().split()]
     np.testing.assert_allclose(copied, in_scan("CA"), atol=1e-4)
 
 
-def test_a_computed_point_offers_nothing_to_edit(desk, panel):
-    assert set(menu_actions(landmark_menu(desk, LEFT, "CO", panel))) == {
+def test_a_computed_point_offers_nothing_to_edit(workspace, panel):
+    assert set(menu_actions(landmark_menu(workspace, LEFT, "CO", panel))) == {
         "Go to CO left",
         "Copy position (LPS, mm)",
     }
 
 
-def test_a_right_click_opens_the_menu(desk, panel, qtbot):
+def test_a_right_click_opens_the_menu(workspace, panel, qtbot):
     where = panel.table.view.visualRect(panel.table.model.index(0, 1)).center()
     panel.table.view.customContextMenuRequested.emit(QPoint(where))
     menus = [m for m in panel.table.findChildren(QMenu) if m.title() == ""]
@@ -198,88 +197,88 @@ def test_a_right_click_opens_the_menu(desk, panel, qtbot):
 # Card
 
 
-def test_the_primary_button_suggests_the_ghost_and_goes_on(desk, panel, qtbot):
-    place(desk, "CA", "RWP", "OS")
-    active = desk.session.active
-    ghost = desk.session.ghosts(active.side)[active.code].position.copy()
+def test_the_primary_button_suggests_the_ghost_and_goes_on(workspace, panel, qtbot):
+    place(workspace, "CA", "RWP", "OS")
+    active = workspace.labels.active
+    ghost = workspace.labels.ghosts(active.side)[active.code].position.copy()
     assert panel.card.content.action == "ghost"
     qtbot.mouseClick(panel.card.primary, CLICK)
-    suggestion = desk.session.landmarks(active.side).suggested[active.code]
+    suggestion = workspace.document.landmarks(active.side).suggested[active.code]
     np.testing.assert_allclose(suggestion.position, ghost)
-    assert desk.session.active != active
+    assert workspace.labels.active != active
 
 
-def test_without_a_ghost_it_places_at_the_crosshair(desk, panel, qtbot):
-    desk.session.set_crosshair([1.0, 2.0, 3.0])
+def test_without_a_ghost_it_places_at_the_crosshair(workspace, panel, qtbot):
+    workspace.view.set_crosshair([1.0, 2.0, 3.0])
     qtbot.mouseClick(panel.card.primary, CLICK)
-    np.testing.assert_allclose(desk.session.landmarks(LEFT)["CA"], [1, 2, 3])
+    np.testing.assert_allclose(workspace.document.landmarks(LEFT)["CA"], [1, 2, 3])
 
 
-def test_labels_of_the_other_side_are_swapped_by_the_primary_button(desk, panel, qtbot):
+def test_labels_of_the_other_side_are_swapped_by_the_primary_button(workspace, panel, qtbot):
     codes = [feature.code for feature in FEATURES if not feature.computed and not feature.shared]
     for code in codes:
-        labelling.place(desk.session, in_scan(code, RIGHT), side=LEFT, code=code)
-    deliver(desk)
-    desk.go_to(LEFT, "CL")
+        workspace.labels.place(in_scan(code, RIGHT), side=LEFT, code=code)
+    deliver(workspace)
+    workspace.labels.go_to(LEFT, "CL")
     assert "fit the right side" in panel.card.content.status
     assert panel.card.primary.text().startswith("Exchange left and right")
     assert list(cut_words(panel)) == []
     qtbot.mouseClick(panel.card.primary, CLICK)
-    assert set(desk.session.landmarks(RIGHT).placed) >= set(codes)
-    assert not set(desk.session.landmarks(LEFT).placed) & set(codes)
+    assert set(workspace.document.landmarks(RIGHT).placed) >= set(codes)
+    assert not set(workspace.document.landmarks(LEFT).placed) & set(codes)
 
 
-def test_a_placed_point_can_be_checked_and_a_locked_one_unlocked(desk, panel, qtbot):
-    place(desk, "CA")
-    desk.go_to(LEFT, "CA")
+def test_a_placed_point_can_be_checked_and_a_locked_one_unlocked(workspace, panel, qtbot):
+    place(workspace, "CA")
+    workspace.labels.go_to(LEFT, "CA")
     qtbot.mouseClick(panel.card.primary, CLICK)
-    assert desk.session.state.landmark(LEFT, "CA").checked
-    labelling.lock(desk.session, side=LEFT, code="CA")
+    assert workspace.document.state.landmark(LEFT, "CA").checked
+    workspace.labels.lock(side=LEFT, code="CA")
     assert panel.card.content.action == "unlock"
     qtbot.mouseClick(panel.card.primary, CLICK)
-    assert not desk.session.state.landmark(LEFT, "CA").locked
+    assert not workspace.document.state.landmark(LEFT, "CA").locked
 
 
-def test_skip_unseen_and_side_buttons(desk, panel, qtbot):
+def test_skip_unseen_and_side_buttons(workspace, panel, qtbot):
     qtbot.mouseClick(panel.card.skip, CLICK)
-    assert desk.session.active == Active(LEFT, "RWP")
+    assert workspace.labels.active == Active(LEFT, "RWP")
     qtbot.mouseClick(panel.card.unseen, CLICK)
-    assert desk.session.state.landmark(LEFT, "RWP").unseen
-    code = desk.session.active.code
+    assert workspace.document.state.landmark(LEFT, "RWP").unseen
+    code = workspace.labels.active.code
     qtbot.mouseClick(panel.card.sides[RIGHT], CLICK)
-    assert desk.session.active == Active(RIGHT, code)
+    assert workspace.labels.active == Active(RIGHT, code)
 
 
-def test_an_error_is_told_and_nothing_else_happens(desk, panel, qtbot):
+def test_an_error_is_told_and_nothing_else_happens(workspace, panel, qtbot):
     told = []
-    desk.message.connect(lambda text, level: told.append((text, level)))
-    place(desk, "CA")
-    labelling.lock(desk.session, side=LEFT, code="CA")
-    desk.go_to(LEFT, "CA")
-    panel.card._do(lambda: labelling.clear(desk.session))
+    workspace.messages.said.connect(lambda text, level: told.append((text, level)))
+    place(workspace, "CA")
+    workspace.labels.lock(side=LEFT, code="CA")
+    workspace.labels.go_to(LEFT, "CA")
+    panel.card._do(lambda: workspace.labels.clear())
     assert [level for _, level in told] == ["error"]
     assert "CA left is locked" in told[0][0]
-    assert "CA" in desk.session.landmarks(LEFT)
+    assert "CA" in workspace.document.landmarks(LEFT)
 
 
-def test_everything_done_offers_the_export(desk, panel, qtbot):
+def test_everything_done_offers_the_export(workspace, panel, qtbot):
     for side in Side:
         for row in FEATURES:
             if not row.computed:
-                labelling.mark_unseen(desk.session, side=side, code=row.code)
+                workspace.labels.mark_unseen(side=side, code=row.code)
     assert panel.card.content.name == "Everything is labelled"
     with qtbot.waitSignal(panel.card.export_asked):
         qtbot.mouseClick(panel.card.primary, CLICK)
 
 
 def test_without_a_scan_the_card_offers_to_open_one(qtbot):
-    desk = Workbench(None)
-    card = FeatureCard(desk)
+    workspace = Workspace(None)
+    card = FeatureCard(workspace)
     qtbot.addWidget(card)
     card.show()
     with qtbot.waitSignal(card.open_asked):
         qtbot.mouseClick(card.primary, CLICK)
-    desk.close(discard=True)
+    workspace.close(discard=True)
 
 
 def test_on_a_very_high_screen_the_picture_is_no_tower(panel, qtbot):
@@ -290,18 +289,18 @@ def test_on_a_very_high_screen_the_picture_is_no_tower(panel, qtbot):
 
 
 @pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
-def test_no_word_of_any_feature_is_cut_off_at_1280_by_800(desk, panel, qtbot, theme):
-    place(desk, "CA", "RWP", "OS")
+def test_no_word_of_any_feature_is_cut_off_at_1280_by_800(workspace, panel, qtbot, theme):
+    place(workspace, "CA", "RWP", "OS")
     apply_theme(panel, theme)
     cut = []
     for row in FEATURES:
         if not row.computed:
-            desk.go_to(LEFT, row.code)
+            workspace.labels.go_to(LEFT, row.code)
             cut += [f"{row.code}: {words}" for words in cut_words(panel.card)]
     assert cut == []
 
 
-def test_all_of_the_card_can_be_reached_by_keyboard(desk, panel, qtbot):
+def test_all_of_the_card_can_be_reached_by_keyboard(workspace, panel, qtbot):
     panel.card.primary.setFocus()
     reached = set()
     for _ in range(12):
@@ -314,8 +313,8 @@ def test_all_of_the_card_can_be_reached_by_keyboard(desk, panel, qtbot):
 # Rail
 
 
-def test_the_rail_tells_of_steps_that_are_built_and_only_those(desk, qtbot):
-    rail = Rail(desk)
+def test_the_rail_tells_of_steps_that_are_built_and_only_those(workspace, qtbot):
+    rail = Rail(workspace)
     qtbot.addWidget(rail)
     rail.show()
     told = []
@@ -333,14 +332,14 @@ def test_the_rail_tells_of_steps_that_are_built_and_only_those(desk, qtbot):
 # Looks
 
 
-def test_a_panel_that_is_gone_hears_nothing_more(desk, qtbot):
-    panel = LabelPanel(desk)
+def test_a_panel_that_is_gone_hears_nothing_more(workspace, qtbot):
+    panel = LabelPanel(workspace)
     panel.show()
     panel.close()
     panel.deleteLater()
     QCoreApplication.sendPostedEvents(panel, QEvent.Type.DeferredDelete)
     assert not isalive(panel)
-    place(desk, "CA")  # would raise in a slot of a deleted widget
+    place(workspace, "CA")  # would raise in a slot of a deleted widget
 
 
 @pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
@@ -375,20 +374,20 @@ def test_left_and_right_pictures_are_of_different_ears():
         assert left != right, code
 
 
-def test_an_index_outside_the_table_has_no_data(desk, qtbot):
-    table = LandmarkTable(desk)
+def test_an_index_outside_the_table_has_no_data(workspace, qtbot):
+    table = LandmarkTable(workspace)
     qtbot.addWidget(table)
     assert table.model.data(QModelIndex()) is None
 
 
-def test_names_that_look_exchanged_are_exchanged_by_the_card(panel, desk, qtbot):
-    place(desk, "CA", "CB", "RWP", "OS", "MH", "LLI")
-    desk.session.do(SwapPoints(LEFT, "CA", "CB"))
-    deliver(desk)
-    desk.go_to(LEFT, "CB")
+def test_names_that_look_exchanged_are_exchanged_by_the_card(panel, workspace, qtbot):
+    place(workspace, "CA", "CB", "RWP", "OS", "MH", "LLI")
+    workspace.document.do(SwapPoints(LEFT, "CA", "CB"))
+    deliver(workspace)
+    workspace.labels.go_to(LEFT, "CB")
     card = panel.card
     qtbot.waitUntil(lambda: card.primary.text().startswith("Exchange CA and CB"))
     qtbot.mouseClick(card.primary, CLICK)
-    deliver(desk)
-    assert not desk.session.near_doubts(LEFT)
-    np.testing.assert_allclose(desk.session.landmarks(LEFT)["CA"], in_scan("CA"))
+    deliver(workspace)
+    assert not workspace.labels.near_doubts(LEFT)
+    np.testing.assert_allclose(workspace.document.landmarks(LEFT)["CA"], in_scan("CA"))

@@ -16,13 +16,11 @@ from gp_core import PROBE
 from gp_core.atlas.sampling import draw_animal
 from gp_core.landmarks.features import CODES, Side, index_of
 from gp_labeler.document.edits import MarkUnseen, PlacePoint, SwapSides
-from gp_labeler.document.state import How, Provenance
+from gp_labeler.document.state import How, Provenance, SpecimenState
 from gp_labeler.document.touches import TouchHow
 from gp_labeler.jobs.runner import QueueDispatcher
-from gp_labeler.models import labelling
-from gp_labeler.models.session import Session
 from gp_labeler.models.workflow import Active
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views import feature_picture as pictures
 from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
 from gp_labeler.views.panels.label_panel import LabelPanel
@@ -36,15 +34,15 @@ LEFT, RIGHT = Side.LEFT, Side.RIGHT
 
 
 @pytest.fixture
-def desk() -> Iterator[Workbench]:
-    desk = desk_with_scan()
-    yield desk
-    desk.close(discard=True)
+def workspace() -> Iterator[Workspace]:
+    workspace = desk_with_scan()
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
-def panel(desk: Workbench, qtbot) -> LabelPanel:
-    panel = LabelPanel(desk)
+def panel(workspace: Workspace, qtbot) -> LabelPanel:
+    panel = LabelPanel(workspace)
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(PANEL_WIDTH, 698)
@@ -100,84 +98,84 @@ def picture_of(code: str, side: Side, size: QSize, theme: Theme, ratio: float = 
     return pixels(feature_picture(code, side, size, theme, ratio=ratio))
 
 
-def edits(desk: Workbench) -> Iterator[str]:
+def edits(workspace: Workspace) -> Iterator[str]:
     """Do all sorts of things one after another, and name each when it is done."""
-    session = desk.session
-    place(desk, "CA", "RWP", "OS", "RWA")
+    document, labels = workspace.document, workspace.labels
+    place(workspace, "CA", "RWP", "OS", "RWA")
     yield "placed, with ghosts of all others"
-    session.do(PlacePoint(RIGHT, "MH", tuple(in_scan("MH", RIGHT)), Provenance(How.MESH)))
+    document.do(PlacePoint(RIGHT, "MH", tuple(in_scan("MH", RIGHT)), Provenance(How.MESH)))
     yield "placed on the side that is not worked on"
-    place(desk, "IN", "FPP")
-    labelling.nudge(session, (2.5, 0, 0), side=LEFT, code="FPP")
+    place(workspace, "IN", "FPP")
+    labels.nudge((2.5, 0, 0), side=LEFT, code="FPP")
     yield "one is doubtful"
-    labelling.lock(session, side=LEFT, code="CA")
+    labels.lock(side=LEFT, code="CA")
     yield "locked"
-    session.undo()
-    session.undo()
+    document.undo()
+    document.undo()
     yield "undone"
-    session.do(SwapSides())
+    document.do(SwapSides())
     yield "sides swapped"
-    session.do(MarkUnseen(LEFT, "CC", Provenance(How.UNSEEN)))
-    session.set_active(Active(RIGHT, "IN"))
+    document.do(MarkUnseen(LEFT, "CC", Provenance(How.UNSEEN)))
+    labels.set_active(Active(RIGHT, "IN"))
     yield "another active"
-    session.set_predict(None)
+    labels.expect(None)
     yield "without an atlas"
-    desk._replace(Session())
+    workspace.document.load(SpecimenState())
     yield "another specimen"
 
 
-def test_one_point_draws_the_cell_of_that_point_alone(desk, panel):
+def test_one_point_draws_the_cell_of_that_point_alone(workspace, panel):
     view = panel.table.view
-    place(desk, "CA", "RWP", "OS")  # from here on the others have ghosts
+    place(workspace, "CA", "RWP", "OS")  # from here on the others have ghosts
     painted = Painted(view.viewport())
     painted.taken()
-    desk.session.do(PlacePoint(RIGHT, "MH", tuple(in_scan("MH", RIGHT)), Provenance(How.MESH)))
+    workspace.document.do(PlacePoint(RIGHT, "MH", tuple(in_scan("MH", RIGHT)), Provenance(How.MESH)))
     cell = view.visualRect(panel.table.model.index(index_of("MH"), 2))
     assert painted.taken() == QRegion(cell)
 
 
-def test_a_change_of_the_active_point_draws_two_rows(desk, panel):
+def test_a_change_of_the_active_point_draws_two_rows(workspace, panel):
     view = panel.table.view
-    desk.session.set_active(Active(LEFT, "OS"))
+    workspace.labels.set_active(Active(LEFT, "OS"))
     painted = Painted(view.viewport())
     painted.taken()
-    desk.session.set_active(Active(LEFT, "MH"))
+    workspace.labels.set_active(Active(LEFT, "MH"))
     rows = {view.rowAt(y) for box in painted.taken() for y in (box.top(), box.bottom())}
     assert rows == {index_of("OS"), index_of("MH")}
 
 
-def test_what_changes_nothing_draws_nothing(desk, panel):
+def test_what_changes_nothing_draws_nothing(workspace, panel):
     painted = Painted(panel.table.view.viewport())
     painted.taken()
-    desk.doubts_changed.emit()
-    desk.ghosts_changed.emit()
+    workspace.labels.doubts_changed.emit()
+    workspace.labels.ghosts_changed.emit()
     assert painted.taken().isEmpty()
 
 
-def test_doubts_are_told_where_there_are_any_and_judging_is_always(desk):
+def test_doubts_are_told_where_there_are_any_and_judging_is_always(workspace):
     told: list[str] = []
-    desk.judged.connect(lambda: told.append("judged"))
-    desk.doubts_changed.connect(lambda: told.append("doubts"))
-    place(desk, "CA", "RWP", "OS", "RWA", "FPP", "MH")
-    deliver(desk)
+    workspace.labels.checked.connect(lambda: told.append("judged"))
+    workspace.labels.doubts_changed.connect(lambda: told.append("doubts"))
+    place(workspace, "CA", "RWP", "OS", "RWA", "FPP", "MH")
+    deliver(workspace)
     assert set(told) == {"judged"}
-    labelling.nudge(desk.session, (2.5, 0, 0), side=LEFT, code="FPP")
-    deliver(desk)
+    workspace.labels.nudge((2.5, 0, 0), side=LEFT, code="FPP")
+    deliver(workspace)
     assert told[-2:] == ["judged", "doubts"]
 
 
-def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(desk, panel):
-    for what in edits(desk):
-        deliver(desk)
+def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(workspace, panel):
+    for what in edits(workspace):
+        deliver(workspace)
         settle()
         assert is_same(on_screen(panel), pixels(panel.grab())), what
 
 
-def test_the_table_is_never_stale(desk, qtbot):
-    model = LandmarkModel(desk)
-    for what in edits(desk):
-        deliver(desk)  # until then, one made now may know of doubts that nobody told of
-        fresh = LandmarkModel(desk)
+def test_the_table_is_never_stale(workspace, qtbot):
+    model = LandmarkModel(workspace)
+    for what in edits(workspace):
+        deliver(workspace)  # until then, one made now may know of doubts that nobody told of
+        fresh = LandmarkModel(workspace)
         for row in range(len(CODES)):
             cells = [[m.itemData(m.index(row, column)) for column in range(3)] for m in (model, fresh)]
             assert cells[0] == cells[1], (what, CODES[row])
@@ -248,10 +246,10 @@ def test_a_ground_has_the_colours_of_its_theme(theme):
 
 def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
     animal = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
-    desk = Workbench(None, QueueDispatcher(), atlas=ATLAS)
+    workspace = Workspace(None, QueueDispatcher(), atlas=ATLAS)
     for code in (*PROBE, "ZL"):
-        desk.pose.record(animal[code], TouchHow.TYPED, name=code)
-    model, painted = TouchModel(desk, lambda _: None), set()
+        workspace.pose.record(animal[code], TouchHow.TYPED, name=code)
+    model, painted = TouchModel(workspace, lambda _: None), set()
 
     def note(first: QModelIndex, last: QModelIndex) -> None:
         columns = range(first.column(), last.column() + 1)
@@ -261,7 +259,7 @@ def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
     for far in (0.02, 6.0, 0.0):  # within the scale of the bars, beyond it, and back
         before, largest = model.rows, model.largest
         painted.clear()
-        desk.pose.record(animal["ZL"] + far, TouchHow.TYPED, name="ZL")
+        workspace.pose.record(animal["ZL"] + far, TouchHow.TYPED, name="ZL")
         model.refresh()
         for n, (new, old) in enumerate(zip(model.rows, before, strict=True)):
             if new.name == "ZL":
@@ -271,7 +269,7 @@ def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
             if replace(new, misfit=old.misfit) == old:
                 assert not {(n, column) for column in range(model.columnCount())} & painted - {(n, MISFIT)}
         assert far != 6.0 or model.largest != largest
-    desk.close(discard=True)
+    workspace.close(discard=True)
 
 
 def test_a_dialog_has_the_theme_of_the_window_that_opened_it(qtbot) -> None:

@@ -15,7 +15,7 @@ from qtpy.QtWidgets import QApplication, QPushButton
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import SetThreshold
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import mm_text, position_text, spacing_text, value_text, voxel_text
 from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.number_field import NumberField
@@ -28,17 +28,17 @@ CLICK = Qt.MouseButton.LeftButton
 
 
 @pytest.fixture
-def desk() -> Iterator[Workbench]:
-    desk = desk_with_scan()
-    desk.session.do(SetThreshold(110.0))
-    deliver(desk)
-    yield desk
-    desk.close(discard=True)
+def workspace() -> Iterator[Workspace]:
+    workspace = desk_with_scan()
+    workspace.document.do(SetThreshold(110.0))
+    deliver(workspace)
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
-def panel(desk: Workbench, qtbot) -> ScanPanel:
-    panel = ScanPanel(desk)
+def panel(workspace: Workspace, qtbot) -> ScanPanel:
+    panel = ScanPanel(workspace)
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(panel.width(), 760)
@@ -47,76 +47,76 @@ def panel(desk: Workbench, qtbot) -> ScanPanel:
     return panel
 
 
-def undo_texts(desk: Workbench) -> list[str]:
+def undo_texts(workspace: Workspace) -> list[str]:
     found = []
-    while desk.session.undo_text is not None:
-        found.append(desk.session.undo_text)
-        desk.session.undo()
+    while workspace.document.undo_text is not None:
+        found.append(workspace.document.undo_text)
+        workspace.document.undo()
     return found
 
 
 # Threshold
 
 
-def test_a_drag_of_the_threshold_previews_all_the_way_and_is_one_undo(desk, panel, qtbot):
+def test_a_drag_of_the_threshold_previews_all_the_way_and_is_one_undo(workspace, panel, qtbot):
     previewed = []
-    desk.threshold_previewed.connect(previewed.append)
+    workspace.scan.threshold_previewed.connect(previewed.append)
     slider, y = panel.bone.slider, 40
     start = round(slider.x_of(110.0))
     qtbot.mousePress(slider, CLICK, pos=QPoint(start, y))
     for x in range(start, start + 60, 10):
         qtbot.mouseMove(slider, QPoint(x, y))
-    assert desk.session.state.threshold == 110.0
+    assert workspace.document.state.threshold == 110.0
     assert len([value for value in previewed if value is not None]) >= 6
     qtbot.mouseRelease(slider, CLICK, pos=QPoint(start + 50, y))
-    chosen = desk.session.state.threshold
+    chosen = workspace.document.state.threshold
     assert chosen > 120
     assert previewed[-1] is None
-    assert len(undo_texts(desk)) == 2
+    assert len(undo_texts(workspace)) == 2
 
 
-def test_the_threshold_moves_by_keys_and_a_held_key_is_one_undo(desk, panel, qtbot):
+def test_the_threshold_moves_by_keys_and_a_held_key_is_one_undo(workspace, panel, qtbot):
     slider = panel.bone.slider
     slider.setFocus()
     for _ in range(5):
         qtbot.keyPress(slider, Qt.Key.Key_Right)
-    assert desk.session.state.threshold == 110.0
+    assert workspace.document.state.threshold == 110.0
     qtbot.keyRelease(slider, Qt.Key.Key_Right)
-    assert desk.session.state.threshold > 110.0
-    assert len(undo_texts(desk)) == 2
+    assert workspace.document.state.threshold > 110.0
+    assert len(undo_texts(workspace)) == 2
 
 
-def test_a_typed_threshold_is_taken_and_nonsense_is_not(desk, panel, qtbot):
+def test_a_typed_threshold_is_taken_and_nonsense_is_not(workspace, panel, qtbot):
     box = panel.bone.box
     box.selectAll()
     qtbot.keyClicks(box, "95.5")
     qtbot.keyClick(box, Qt.Key.Key_Return)
-    assert desk.session.state.threshold == 95.5
+    assert workspace.document.state.threshold == 95.5
     box.selectAll()
     qtbot.keyClicks(box, "-")
     panel.mesh.opacity.setFocus()
-    assert desk.session.state.threshold == 95.5
+    assert workspace.document.state.threshold == 95.5
 
 
-def test_undo_brings_the_slider_back(desk, panel):
-    desk.set_threshold(140.0)
+def test_undo_brings_the_slider_back(workspace, panel):
+    workspace.scan.set_threshold(140.0)
     assert panel.bone.slider.value == 140.0
-    desk.session.undo()
+    workspace.document.undo()
     assert panel.bone.slider.value == 110.0
     assert panel.bone.box.value == 110.0
 
 
-def test_the_proposed_threshold_parts_the_two_greys(desk, panel, qtbot):
+def test_the_proposed_threshold_parts_the_two_greys(workspace, panel, qtbot):
     qtbot.mouseClick(panel.bone.propose, CLICK)
-    deliver(desk)
-    assert 60 < desk.session.state.threshold < 170
+    deliver(workspace)
+    assert 60 < workspace.document.state.threshold < 170
 
 
 # Greys and mesh
 
 
-def test_grey_presets_set_the_window_and_auto_takes_it_back(desk, panel, qtbot):
-    view = desk.session.view
+def test_grey_presets_set_the_window_and_auto_takes_it_back(workspace, panel, qtbot):
+    view = workspace.view
     qtbot.mouseClick(panel.grey.presets["Bone"], CLICK)
     assert view.state.level > 110.0
     assert panel.grey.presets["Bone"].isChecked()
@@ -128,18 +128,18 @@ def test_grey_presets_set_the_window_and_auto_takes_it_back(desk, panel, qtbot):
     assert view.state.width == 50
 
 
-def test_opacity_and_what_is_shown(desk, panel, qtbot):
+def test_opacity_and_what_is_shown(workspace, panel, qtbot):
     panel.mesh.opacity.setFocus()
     qtbot.keyClick(panel.mesh.opacity, Qt.Key.Key_PageDown)
-    assert desk.session.view.state.mesh_opacity == pytest.approx(0.9)
+    assert workspace.view.state.mesh_opacity == pytest.approx(0.9)
     panel.mesh.checks["outline_visible"].setFocus()
     qtbot.keyClick(panel.mesh.checks["outline_visible"], Qt.Key.Key_Space)
-    assert desk.session.view.state.outline_visible is False
-    desk.session.view.update(mesh_opacity=0.4)
+    assert workspace.view.state.outline_visible is False
+    workspace.view.update(mesh_opacity=0.4)
     assert panel.mesh.opacity.value() == 40
 
 
-def test_the_mesh_card_counts_triangles_and_offers_to_save(desk, panel, qtbot):
+def test_the_mesh_card_counts_triangles_and_offers_to_save(workspace, panel, qtbot):
     assert "triangles" in panel.mesh.state.text()
     with qtbot.waitSignal(panel.mesh.save_asked):
         qtbot.mouseClick(panel.mesh.save, CLICK)
@@ -160,38 +160,38 @@ def test_facts_tell_size_type_and_axes():
 
 
 def test_an_empty_panel_says_what_to_do(qtbot):
-    desk = Workbench(None)
-    panel = ScanPanel(desk)
+    workspace = Workspace(None)
+    panel = ScanPanel(workspace)
     qtbot.addWidget(panel)
     panel.show()
     assert panel.bone.slider.value is None
     assert not panel.bone.propose.isEnabled()
     assert not panel.mesh.save.isEnabled()
     volume = grey_volume()
-    desk.session.attach_volume(volume)
-    desk.volume_opened.emit(volume)
+    workspace.document.attach_volume(volume)
+    workspace.scan.opened.emit(volume)
     assert panel.facts.values["Name"].text() == "GP-014"
-    desk.close(discard=True)
+    workspace.close(discard=True)
 
 
-def test_notes_are_one_undo_for_all_that_was_typed(desk, qtbot):
-    notes = NotesPanel(desk)
+def test_notes_are_one_undo_for_all_that_was_typed(workspace, qtbot):
+    notes = NotesPanel(workspace)
     qtbot.addWidget(notes)
     notes.show()
     notes.text.setFocus()
     qtbot.keyClicks(notes.text, "left bulla")
     notes.keep()
-    assert desk.session.state.notes == "left bulla"
+    assert workspace.document.state.notes == "left bulla"
     qtbot.keyClicks(notes.text, " damaged")
     notes.keep()
-    assert desk.session.state.notes == "left bulla damaged"
-    desk.session.undo()
-    assert desk.session.state.notes == ""
+    assert workspace.document.state.notes == "left bulla damaged"
+    workspace.document.undo()
+    assert workspace.document.state.notes == ""
     assert notes.text.toPlainText() == ""
 
 
 @pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda t: t.name)
-def test_no_word_of_the_scan_panel_is_cut_off(desk, panel, theme):
+def test_no_word_of_the_scan_panel_is_cut_off(workspace, panel, theme):
     apply_theme(panel, theme)
     assert list(cut_words(panel)) == []
 
@@ -207,11 +207,11 @@ def drop(page: Welcome, path: Path) -> None:
 
 
 def test_the_first_page_offers_scan_specimen_demo_and_recent_files(tmp_path, qtbot):
-    desk = Workbench(tmp_path / "state")
+    workspace = Workspace(tmp_path / "state")
     (tmp_path / "GP-014.nrrd").write_text("")
-    desk.recent.add(tmp_path / "GP-014.nrrd")
-    desk.recent.add(tmp_path / "gone.nrrd")
-    page = Welcome(desk)
+    workspace.recent.add(tmp_path / "GP-014.nrrd")
+    workspace.recent.add(tmp_path / "gone.nrrd")
+    page = Welcome(workspace)
     apply_theme(page, DARK)
     qtbot.addWidget(page)
     page.resize(900, 640)
@@ -233,7 +233,7 @@ def test_the_first_page_offers_scan_specimen_demo_and_recent_files(tmp_path, qtb
         drop(page, tmp_path)
     assert told.args == [str(tmp_path)]
     assert list(cut_words(page)) == []
-    desk.close(discard=True)
+    workspace.close(discard=True)
 
 
 # Parts
@@ -261,9 +261,9 @@ def test_a_number_field_steps_and_tells_once(qtbot):
     assert told == [6.0, -4.0]
 
 
-def test_the_rail_marks_what_is_done(desk, qtbot):
-    rail = Rail(desk)
+def test_the_rail_marks_what_is_done(workspace, qtbot):
+    rail = Rail(workspace)
     qtbot.addWidget(rail)
     assert rail.buttons["scan"].accessibleDescription().endswith("done")
-    place(desk, "CA", side=Side.RIGHT)
+    place(workspace, "CA", side=Side.RIGHT)
     assert not rail.buttons["label"].accessibleDescription().endswith("done")

@@ -17,7 +17,7 @@ from gp_labeler.document.edits import PlacePoint
 from gp_labeler.document.state import How, Provenance
 from gp_labeler.jobs.physical import PhysicalTest
 from gp_labeler.jobs.runner import Progress
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.panels.physical_dialog import PhysicalDialog
 
@@ -35,10 +35,10 @@ class Saving:
 
 
 @pytest.fixture
-def desk(qtbot):
-    desk = Workbench(dispatcher=QtDispatcher(), atlas=Atlas.published(), author="AB")
-    yield desk
-    desk.close(discard=True)
+def workspace(qtbot):
+    workspace = Workspace(dispatcher=QtDispatcher(), atlas=Atlas.published(), author="AB")
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
@@ -48,36 +48,36 @@ def top(qtbot):
     return widget
 
 
-def touch_and_label(session):
+def touch_and_label(document):
     rng = np.random.default_rng(4)
     animal = draw_animal(Atlas.published(), rng=rng).side("L")
     for code in ("CA", "CB", "RWA", "RWP"):
-        session.do(PlacePoint(animal.side, code, animal[code], Provenance(How.MESH)))
+        document.do(PlacePoint(animal.side, code, animal[code], Provenance(How.MESH)))
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn[:, 0] *= np.linalg.det(turn)
     T_tracker_scan = RigidTransform.from_parts(turn, (9, 90, -200), dst="tracker", src="scan")
     for name, position in {**animal.as_mapping(PROBE), **SKULL}.items():
         moved = T_tracker_scan.apply([position])[0] + 0.05 * rng.normal(size=3)
-        touching.record_touch(session, "L", name, moved)
+        touching.record_touch(document, "L", name, moved)
     for name, position in SKULL.items():
-        touching.mark_skull(session, name, position)
+        touching.mark_skull(document, name, position)
     return animal
 
 
-def test_the_job_gives_what_the_estimate_shows(desk):
-    touch_and_label(desk.session)
-    test = PhysicalTest.of(desk.session.state, desk.pose.side, desk.atlas)
+def test_the_job_gives_what_the_estimate_shows(workspace):
+    touch_and_label(workspace.document)
+    test = PhysicalTest.of(workspace.document.state, workspace.pose.side, workspace.atlas.current)
     result = PhysicalTest(test.touches, test.ct, test.atlas, n=20).run(Progress(lambda *_: None))
     row = next(r for r in result.report.rows if r.registration == "names")
-    error_mm, error_deg = desk.pose.estimate.errors()
+    error_mm, error_deg = workspace.pose.estimate.errors()
     assert row.e_co_mm == pytest.approx(error_mm, abs=1e-9)
     assert row.e_ma_deg == pytest.approx(error_deg, abs=1e-9)
     assert result.figure.startswith(b"\x89PNG")
 
 
-def test_the_dialog_shows_and_saves(qtbot, desk, top, tmp_path):
-    touch_and_label(desk.session)
-    dialog = PhysicalDialog(desk, Saving(tmp_path), top)
+def test_the_dialog_shows_and_saves(qtbot, workspace, top, tmp_path):
+    touch_and_label(workspace.document)
+    dialog = PhysicalDialog(workspace, Saving(tmp_path), top)
     dialog.show()
     qtbot.waitUntil(lambda: dialog.result_found is not None)
     assert dialog.rows.rowCount() == 1 + len(dialog.result_found.report.rows)
@@ -90,11 +90,11 @@ def test_the_dialog_shows_and_saves(qtbot, desk, top, tmp_path):
     dialog.accept()
 
 
-def test_without_skull_features_the_remedy_is_told(qtbot, desk, top, tmp_path):
+def test_without_skull_features_the_remedy_is_told(qtbot, workspace, top, tmp_path):
     animal = draw_animal(Atlas.published(), rng=np.random.default_rng(4)).side("L")
     for code in PROBE:
-        touching.record_touch(desk.session, "L", code, animal[code])
-    dialog = PhysicalDialog(desk, Saving(tmp_path), top)
+        touching.record_touch(workspace.document, "L", code, animal[code])
+    dialog = PhysicalDialog(workspace, Saving(tmp_path), top)
     dialog.show()
     qtbot.waitUntil(lambda: dialog.findings.count() > 0)
     assert "CA" in dialog.findings.itemAt(0).widget().words

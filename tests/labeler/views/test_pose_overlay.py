@@ -150,8 +150,8 @@ def test_a_slice_beside_the_region_does_not_cut_it() -> None:
 
 
 def test_names_stand_beside_what_is_near(qtbot) -> None:
-    desk = desk_with_scan()
-    view = SliceView(desk, Plane.CORONAL)
+    workspace = desk_with_scan()
+    view = SliceView(workspace, Plane.CORONAL)
     qtbot.addWidget(view)
     overlay = PoseOverlay(view)
     assert view.layers == [overlay]
@@ -163,7 +163,7 @@ def test_names_stand_beside_what_is_near(qtbot) -> None:
     far = {name.text for name in overlay.names(through(beside(0.0, 9.0, 0.0)), 1.0)}
     assert {"robust · off 2.50 mm, 0.0°", "labelled", "MN ?"} <= near
     assert far == {""}
-    desk.close(discard=True)
+    workspace.close(discard=True)
 
 
 def test_a_window_draws_it_with_its_slices_and_takes_it_away(qtbot, window) -> None:

@@ -20,9 +20,8 @@ from gp_core.errors import GpError
 from gp_labeler.document import touching
 from gp_labeler.document.touches import TouchHow
 from gp_labeler.jobs.runner import QueueDispatcher
-from gp_labeler.models import labelling
 from gp_labeler.models.pose import ORDER
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
 from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
@@ -53,19 +52,19 @@ def find(name: str) -> Path:
 
 
 @pytest.fixture
-def desk() -> Iterator[Workbench]:
-    desk = Workbench(None, QueueDispatcher(), atlas=ATLAS, author="AB")
-    yield desk
-    desk.close(discard=True)
+def workspace() -> Iterator[Workspace]:
+    workspace = Workspace(None, QueueDispatcher(), atlas=ATLAS, author="AB")
+    yield workspace
+    workspace.close(discard=True)
 
 
 @pytest.fixture
-def panel(desk: Workbench, qtbot) -> PosePanel:
-    return shown(desk, qtbot)
+def panel(workspace: Workspace, qtbot) -> PosePanel:
+    return shown(workspace, qtbot)
 
 
-def shown(desk: Workbench, qtbot, size: QSize = NARROW, theme=DARK) -> PosePanel:
-    panel = PosePanel(desk)
+def shown(workspace: Workspace, qtbot, size: QSize = NARROW, theme=DARK) -> PosePanel:
+    panel = PosePanel(workspace)
     apply_theme(panel, theme)
     qtbot.addWidget(panel)
     panel.set_wide(size.width() > PANEL_WIDTH)
@@ -76,14 +75,14 @@ def shown(desk: Workbench, qtbot, size: QSize = NARROW, theme=DARK) -> PosePanel
     return panel
 
 
-def touch(desk: Workbench, *codes: str, noise: float = 0.1, seed: int = 1) -> None:
+def touch(workspace: Workspace, *codes: str, noise: float = 0.1, seed: int = 1) -> None:
     rng = np.random.default_rng(seed)
     for code in codes:
-        desk.pose.record(ANIMAL[code] + THERE + noise * rng.normal(size=3), TouchHow.TYPED, name=code)
+        workspace.pose.record(ANIMAL[code] + THERE + noise * rng.normal(size=3), TouchHow.TYPED, name=code)
 
 
-def touches(desk: Workbench, side: Side = LEFT) -> dict[str, tuple[float, float, float]]:
-    return {name: t.position for (of, name), t in desk.session.state.touches.items() if of is side}
+def touches(workspace: Workspace, side: Side = LEFT) -> dict[str, tuple[float, float, float]]:
+    return {name: t.position for (of, name), t in workspace.document.state.touches.items() if of is side}
 
 
 def cell(panel: PosePanel, name: str, column: int) -> QPoint:
@@ -118,12 +117,12 @@ def notices(panel: PosePanel) -> str:
 
 
 @pytest.mark.parametrize("name", list(FILES))
-def test_a_dropped_probe_file_gives_the_numbers_of_the_library(desk, panel, qtbot, name):
+def test_a_dropped_probe_file_gives_the_numbers_of_the_library(workspace, panel, qtbot, name):
     path, side = find(name), FILES[name]
     qtbot.mouseClick(panel.head.side.buttons[side.value], CLICK)
     drop(panel, path)
     alone = estimate_pose(read_touches(path, side), side, ATLAS)
-    assert desk.pose.estimate.pose.as_dict() == alone.as_dict()
+    assert workspace.pose.estimate.pose.as_dict() == alone.as_dict()
     shown_origin = panel.result.one.origin.text().replace("\N{MINUS SIGN}", "-").removesuffix("mm").split()
     np.testing.assert_allclose([float(x) for x in shown_origin], alone.origin, atol=0.005)
     assert f"{alone.radius_95:.2f} mm" in panel.result.one.region.text()
@@ -133,29 +132,29 @@ def test_a_dropped_probe_file_gives_the_numbers_of_the_library(desk, panel, qtbo
         assert row.suspect is (code in alone.suspects)
 
 
-def test_six_touches_are_typed_one_after_the_other(desk, panel, qtbot):
+def test_six_touches_are_typed_one_after_the_other(workspace, panel, qtbot):
     qtbot.mouseClick(panel.touches.ways["type"], CLICK)
     for code in ORDER[:6]:
         position = ANIMAL[code] + THERE
-        assert desk.pose.target == code
+        assert workspace.pose.target == code
         qtbot.keyClicks(editor(panel), " ".join(f"{x:.4f}" for x in position))
         qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
         QApplication.processEvents()
-    np.testing.assert_allclose(touches(desk)["RWP"], ANIMAL["RWP"] + THERE, atol=1e-4)
-    assert set(touches(desk)) == set(PROBE)
+    np.testing.assert_allclose(touches(workspace)["RWP"], ANIMAL["RWP"] + THERE, atol=1e-4)
+    assert set(touches(workspace)) == set(PROBE)
     assert "95 % within" in panel.result.one.region.text()
     assert panel.result.verdict.label.text() == "Good"
     assert "Touch IN next" in panel.result.next.text()
     qtbot.keyClick(editor(panel), Qt.Key.Key_Escape)
-    assert set(touches(desk)) == set(PROBE)
+    assert set(touches(workspace)) == set(PROBE)
 
 
-def test_before_the_third_touch_it_says_how_many_are_wanting(desk, panel):
+def test_before_the_third_touch_it_says_how_many_are_wanting(workspace, panel):
     assert panel.result.waiting.text() == "3 more touches for an estimate"
-    touch(desk, "CL", "MN")
+    touch(workspace, "CL", "MN")
     assert panel.result.waiting.text() == "1 more touch for an estimate"
     assert not panel.result.one.isVisible()
-    touch(desk, "OS")
+    touch(workspace, "OS")
     assert panel.result.one.isVisible()
     assert not panel.result.waiting.isVisible()
 
@@ -173,9 +172,9 @@ def test_what_is_no_position_is_said_so(text):
         parse_position(text, "MN")
 
 
-def test_a_slip_while_typing_keeps_what_was_typed(desk, panel, qtbot):
+def test_a_slip_while_typing_keeps_what_was_typed(workspace, panel, qtbot):
     told = []
-    desk.message.connect(lambda *what: told.append(what))
+    workspace.messages.said.connect(lambda *what: told.append(what))
     panel.touches.table.edit_position("CL")
     qtbot.keyClicks(editor(panel), "1.5 2.5")
     qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
@@ -185,55 +184,58 @@ def test_a_slip_while_typing_keeps_what_was_typed(desk, panel, qtbot):
     assert "Type x y z in mm" in " ".join(panel.touches.notices.shown[0])
     qtbot.keyClicks(editor(panel), " 3.5")
     qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
-    assert touches(desk) == {"CL": (1.5, 2.5, 3.5)}
+    assert touches(workspace) == {"CL": (1.5, 2.5, 3.5)}
     assert not panel.touches.notices.isVisible()
 
 
-def test_what_is_being_typed_outlives_a_touch_from_elsewhere(desk, panel, qtbot):
-    touch(desk, "CL", "LLI", "MN", "OS")
+def test_what_is_being_typed_outlives_a_touch_from_elsewhere(workspace, panel, qtbot):
+    touch(workspace, "CL", "LLI", "MN", "OS")
     panel.touches.table.edit_position("OS")
     editor(panel).selectAll()
     qtbot.keyClicks(editor(panel), "1 2")
-    touch(desk, "RWA", "MN", seed=2)  # the misfit of OS changes, and so does its row
+    touch(workspace, "RWA", "MN", seed=2)  # the misfit of OS changes, and so does its row
     assert editor(panel).text() == "1 2"
     qtbot.keyClicks(editor(panel), " 3")
     qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
-    assert touches(desk)["OS"] == (1, 2, 3)
+    assert touches(workspace)["OS"] == (1, 2, 3)
 
 
-def test_a_field_that_is_left_half_filled_in_says_so_and_changes_nothing(desk, panel, qtbot):
+def test_a_field_that_is_left_half_filled_in_says_so_and_changes_nothing(workspace, panel, qtbot):
     panel.touches.table.edit_position("CL")
     qtbot.keyClicks(editor(panel), "1 2")
     panel.verdict.note.setFocus()
-    assert touches(desk) == {}
+    assert touches(workspace) == {}
     assert "CL" in panel.touches.notices.shown[0][1]
 
 
-def test_random_clicks_and_keys_leave_it_whole(desk, panel, qtbot):
+def test_random_clicks_and_keys_leave_it_whole(workspace, panel, qtbot):
     rng = np.random.default_rng(5)
-    touch(desk, *PROBE)
+    touch(workspace, *PROBE)
     keys = [Qt.Key.Key_Return, Qt.Key.Key_Delete, Qt.Key.Key_Space, Qt.Key.Key_Escape, Qt.Key.Key_Down]
     for _ in range(150):
         what = rng.integers(6)
-        name = str(rng.choice(desk.pose.names))
+        name = str(rng.choice(workspace.pose.names))
         if what < 3:
             click(qtbot, panel, name, int(rng.integers(5)))
         elif what == 3:
             qtbot.keyClick(QApplication.focusWidget() or panel.touches.table, keys[rng.integers(len(keys))])
         elif what == 4:
-            desk.session.undo() if rng.integers(2) else desk.session.redo()
+            workspace.document.undo() if rng.integers(2) else workspace.document.redo()
         else:
             touch(
-                desk, str(rng.choice(ORDER)), noise=float(rng.choice([0.1, 3.0])), seed=int(rng.integers(99))
+                workspace,
+                str(rng.choice(ORDER)),
+                noise=float(rng.choice([0.1, 3.0])),
+                seed=int(rng.integers(99)),
             )
     QApplication.processEvents()
-    made = desk.pose.estimate
+    made = workspace.pose.estimate
     assert panel.result.one.isVisible() is (made is not None and made.pose is not None)
-    assert {row.name for row in panel.touches.model.rows if row.touch is not None} == set(touches(desk))
+    assert {row.name for row in panel.touches.model.rows if row.touch is not None} == set(touches(workspace))
 
 
-def test_a_touch_is_changed_by_a_double_click(desk, panel, qtbot):
-    touch(desk, "CL", "MN", "OS", noise=0)
+def test_a_touch_is_changed_by_a_double_click(workspace, panel, qtbot):
+    touch(workspace, "CL", "MN", "OS", noise=0)
     where = cell(panel, "MN", XYZ)
     qtbot.mouseClick(panel.touches.table.viewport(), CLICK, pos=where)
     qtbot.mouseDClick(panel.touches.table.viewport(), CLICK, pos=where)
@@ -241,37 +243,37 @@ def test_a_touch_is_changed_by_a_double_click(desk, panel, qtbot):
     editor(panel).selectAll()
     qtbot.keyClicks(editor(panel), "1, 2, 3")
     qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
-    assert touches(desk)["MN"] == (1, 2, 3)
+    assert touches(workspace)["MN"] == (1, 2, 3)
 
 
-def test_lines_with_names_are_pasted_at_once(desk, panel, qtbot):
+def test_lines_with_names_are_pasted_at_once(workspace, panel, qtbot):
     lines = [f"{code}, " + ", ".join(f"{x:.3f}" for x in ANIMAL[code]) for code in PROBE]
     QGuiApplication.clipboard().setText("\n".join(["label, x, y, z", *lines, ""]))
     panel.touches.table.setFocus()
     qtbot.keyClick(panel.touches.table, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
-    assert set(touches(desk)) == set(PROBE)
+    assert set(touches(workspace)) == set(PROBE)
     QGuiApplication.clipboard().setText("7 8 9")
     click(qtbot, panel, "ZL", NAME)
     qtbot.keyClick(panel.touches.table, Qt.Key.Key_V, Qt.KeyboardModifier.ControlModifier)
-    assert touches(desk)["ZL"] == (7, 8, 9)
+    assert touches(workspace)["ZL"] == (7, 8, 9)
 
 
-def test_a_bad_file_is_named_with_what_to_do_and_nothing_is_lost(desk, panel, tmp_path):
-    touch(desk, *PROBE)
-    before = desk.session.state
+def test_a_bad_file_is_named_with_what_to_do_and_nothing_is_lost(workspace, panel, tmp_path):
+    touch(workspace, *PROBE)
+    before = workspace.document.state
     bad = tmp_path / "milk.dat"
     bad.write_text("milk, bread")
     told = []
-    desk.message.connect(lambda *what: told.append(what))
+    workspace.messages.said.connect(lambda *what: told.append(what))
     drop(panel, bad)
-    assert desk.session.state == before
+    assert workspace.document.state == before
     assert told[-1][1] == "error"
     assert "milk.dat" in told[-1][0]
     level, words, remedy = panel.touches.notices.shown[0]
     assert (level, "milk.dat" in words) == ("error", True)
     assert panel.touches.notices.isVisible()
     assert remedy or "." in words
-    touch(desk, "ZL")
+    touch(workspace, "ZL")
     panel.touches.table.use_asked.emit("ZL")
     assert not panel.touches.notices.isVisible(), "what works takes the message away"
 
@@ -281,198 +283,198 @@ def test_only_files_of_touches_are_taken(tmp_path):
     assert not any(holds_touches(Path(name)) for name in ("a.nrrd", "b.gpspecimen.json", "c"))
 
 
-def test_undo_takes_a_file_back(desk, panel, qtbot):
-    touch(desk, "CL", "MN", "OS")
+def test_undo_takes_a_file_back(workspace, panel, qtbot):
+    touch(workspace, "CL", "MN", "OS")
     drop(panel, find("SkullA_Left_new.dat"))
-    assert "S1" in touches(desk)
+    assert "S1" in touches(workspace)
     assert panel.touches.model.row_of("S1") == -1, "eight more rows are shown where they are wanted"
     assert panel.touches.more.accessibleName() == "Show 8 skull features"
     qtbot.mouseClick(panel.touches.more, CLICK)
     assert panel.touches.model.row_of("S1") == len(ORDER)
-    desk.session.undo()
-    assert set(touches(desk)) == {"CL", "MN", "OS"}
+    workspace.document.undo()
+    assert set(touches(workspace)) == {"CL", "MN", "OS"}
     assert panel.touches.model.row_of("S1") == -1
 
 
 # What is made of them
 
 
-def test_a_click_leaves_a_point_out_and_takes_it_in_again(desk, panel, qtbot):
-    touch(desk, *PROBE)
-    before = desk.pose.estimate.pose
+def test_a_click_leaves_a_point_out_and_takes_it_in_again(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
+    before = workspace.pose.estimate.pose
     click(qtbot, panel, "MN", USE)
-    assert desk.session.state.touches[LEFT, "MN"].left_out
-    assert "MN" not in desk.pose.estimate.pose.residuals
+    assert workspace.document.state.touches[LEFT, "MN"].left_out
+    assert "MN" not in workspace.pose.estimate.pose.residuals
     assert "1 left out" in panel.touches.heading.text()
     row = panel.touches.model.rows[panel.touches.model.row_of("MN")]
     assert (row.state, row.misfit) == ("unseen", None)
     click(qtbot, panel, "MN", USE)
-    assert desk.pose.estimate.pose.as_dict() == before.as_dict()
+    assert workspace.pose.estimate.pose.as_dict() == before.as_dict()
 
 
-def test_it_says_beforehand_what_leaving_out_changes(desk, panel, qtbot):
-    touch(desk, *PROBE)
-    moved, turned = desk.pose.estimating.without("MN")
+def test_it_says_beforehand_what_leaving_out_changes(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
+    moved, turned = workspace.pose.without("MN")
     click(qtbot, panel, "MN", NAME)
     qtbot.waitUntil(lambda: bool(panel.touches.change.toolTip()))
     said = panel.touches.change.toolTip()
     assert said == f"Without MN: CO {moved:.2f} mm, axis {turned:.1f}°"
-    before = desk.pose.estimate.pose
+    before = workspace.pose.estimate.pose
     click(qtbot, panel, "MN", USE)
-    after = desk.pose.estimate.pose
+    after = workspace.pose.estimate.pose
     assert np.linalg.norm(after.origin - before.origin) == pytest.approx(moved)
     qtbot.waitUntil(lambda: panel.touches.change.toolTip().startswith("With MN"))
 
 
-def test_one_touch_or_all_are_cleared_and_come_back(desk, panel, qtbot):
-    touch(desk, *PROBE)
+def test_one_touch_or_all_are_cleared_and_come_back(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
     click(qtbot, panel, "OS", CLEAR)
-    assert "OS" not in touches(desk)
-    assert desk.pose.target == "OS"
+    assert "OS" not in touches(workspace)
+    assert workspace.pose.target == "OS"
     qtbot.mouseClick(panel.touches.clear, CLICK)
-    assert touches(desk) == {}
+    assert touches(workspace) == {}
     assert panel.result.waiting.isVisible()
-    desk.session.undo()
-    desk.session.undo()
-    assert set(touches(desk)) == set(PROBE)
+    workspace.document.undo()
+    workspace.document.undo()
+    assert set(touches(workspace)) == set(PROBE)
     panel.touches.table.setFocus()
     click(qtbot, panel, "MN", NAME)
     qtbot.keyClick(panel.touches.table, Qt.Key.Key_Delete)
-    assert "MN" not in touches(desk)
+    assert "MN" not in touches(workspace)
 
 
-def test_a_mistouch_is_marked_by_shape_and_called_out(desk, panel):
-    touch(desk, *PROBE)
-    desk.pose.record(ANIMAL["MN"] + THERE + [3.0, 0, 0], TouchHow.TYPED, name="MN")
+def test_a_mistouch_is_marked_by_shape_and_called_out(workspace, panel):
+    touch(workspace, *PROBE)
+    workspace.pose.record(ANIMAL["MN"] + THERE + [3.0, 0, 0], TouchHow.TYPED, name="MN")
     rows = {row.name: row for row in panel.touches.model.rows}
     assert (rows["MN"].state, rows["MN"].suspect, rows["OS"].state) == ("doubtful", True, "placed")
     assert "MN does not fit the other points" in notices(panel)
     assert panel.result.verdict.label.text() == "Look twice"
 
 
-def test_the_wrong_side_is_called_out_and_right_on_the_other(desk, panel, qtbot):
+def test_the_wrong_side_is_called_out_and_right_on_the_other(workspace, panel, qtbot):
     qtbot.mouseClick(panel.head.side.buttons["R"], CLICK)
-    touch(desk, *PROBE)
+    touch(workspace, *PROBE)
     assert "left side fits these points better than the right" in notices(panel)
     assert "check the side" in notices(panel).lower()
     assert panel.result.verdict.label.text() == "Check the side"
-    wrong = touches(desk, Side.RIGHT)
+    wrong = touches(workspace, Side.RIGHT)
     qtbot.mouseClick(panel.result.other_side, CLICK)
-    assert desk.pose.side is LEFT
+    assert workspace.pose.side is LEFT
     assert panel.head.side.value == "L"
-    assert touches(desk) == wrong
-    assert touches(desk, Side.RIGHT) == {}
+    assert touches(workspace) == wrong
+    assert touches(workspace, Side.RIGHT) == {}
     assert panel.result.verdict.label.text() == "Good"
     assert not panel.result.other_side.isVisible()
-    desk.session.undo()
-    assert touches(desk, Side.RIGHT) == wrong, "one step"
+    workspace.document.undo()
+    assert touches(workspace, Side.RIGHT) == wrong, "one step"
     assert panel.head.side.value == "R", "the panel does not look cleared"
     assert panel.result.other_side.isVisible()
 
 
-def test_swapped_names_are_called_out_and_exchanged_by_a_click(desk, panel, qtbot):
-    touch(desk, *PROBE)
-    at = touches(desk)
-    desk.pose.record(at["MN"], TouchHow.TYPED, name="OS")
-    desk.pose.record(at["OS"], TouchHow.TYPED, name="MN")
+def test_swapped_names_are_called_out_and_exchanged_by_a_click(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
+    at = touches(workspace)
+    workspace.pose.record(at["MN"], TouchHow.TYPED, name="OS")
+    workspace.pose.record(at["OS"], TouchHow.TYPED, name="MN")
     assert "look exchanged" in notices(panel)
     assert panel.result.verdict.label.text() == "Check the names"
     assert panel.result.swap.text() in ("Exchange MN and OS", "Exchange OS and MN")
     assert not panel.result.next.isVisible()
-    wrong = touches(desk)
+    wrong = touches(workspace)
     qtbot.mouseClick(panel.result.swap, CLICK)
-    assert touches(desk) == at
+    assert touches(workspace) == at
     assert panel.result.verdict.label.text() == "Good"
     assert not panel.result.swap.isVisible()
     with pytest.raises(GpError, match="no two touches"):
-        desk.pose.swap_names()
-    desk.session.undo()
-    assert touches(desk) == wrong, "one step"
+        workspace.pose.swap_names()
+    workspace.document.undo()
+    assert touches(workspace) == wrong, "one step"
     assert panel.result.swap.isVisible()
 
 
-def test_a_side_that_is_undecided_is_offered_with_its_odds(desk, panel, qtbot):
-    touch(desk, "OS", "MN", "RWA")
+def test_a_side_that_is_undecided_is_offered_with_its_odds(workspace, panel, qtbot):
+    touch(workspace, "OS", "MN", "RWA")
     assert panel.result.verdict.label.text() == "Side undecided"
     assert panel.result.other_side.isVisible()
     assert panel.result.other_side.text() == "Take as the right side  (3 % likely)"
-    pose = desk.pose.estimate.pose
+    pose = workspace.pose.estimate.pose
     assert f"{pose.radius_95:.2f} mm" in panel.result.one.region.text()
     beside = panel.result.one.allowance.text()
     assert f"As named: {pose.plain_radius_95:.2f} mm" in beside
     assert "several parts" in beside
-    before = touches(desk)
+    before = touches(workspace)
     qtbot.mouseClick(panel.result.other_side, CLICK)
-    assert (desk.pose.side, touches(desk, Side.RIGHT)) == (Side.RIGHT, before)
+    assert (workspace.pose.side, touches(workspace, Side.RIGHT)) == (Side.RIGHT, before)
     touch_in = ANIMAL["IN"] + THERE
-    desk.session.undo()
-    desk.pose.record(touch_in, TouchHow.TYPED, name="IN")
-    touch(desk, "CL", "LLI", "RWP")
+    workspace.document.undo()
+    workspace.pose.record(touch_in, TouchHow.TYPED, name="IN")
+    touch(workspace, "CL", "LLI", "RWP")
     assert panel.result.verdict.label.text() == "Good"
     assert not panel.result.other_side.isVisible()
     assert "As named" not in panel.result.one.allowance.text()
 
 
-def test_the_shared_error_is_the_users_and_stated_with_the_region(desk, panel, qtbot):
-    touch(desk, *PROBE)
+def test_the_shared_error_is_the_users_and_stated_with_the_region(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
     assert panel.head.shared.text() == "0.2"
     assert panel.result.one.allowance.text() == "With a shared error of 0.2 mm"
-    before, origin = desk.pose.estimate.pose.radius_95, desk.pose.estimate.pose.origin
+    before, origin = workspace.pose.estimate.pose.radius_95, workspace.pose.estimate.pose.origin
     panel.head.shared.setFocus()
     panel.head.shared.selectAll()
     qtbot.keyClicks(panel.head.shared, "0.8")
     qtbot.keyClick(panel.head.shared, Qt.Key.Key_Return)
-    pose = desk.pose.estimate.pose
-    assert (pose.shared_error, desk.pose.estimating.settings.shared_error) == (0.8, 0.8)
+    pose = workspace.pose.estimate.pose
+    assert (pose.shared_error, workspace.pose.settings.shared_error) == (0.8, 0.8)
     assert pose.radius_95 > 2 * before
     np.testing.assert_array_equal(pose.origin, origin)
     assert panel.result.one.allowance.text() == "With a shared error of 0.8 mm"
-    assert desk.pose.gains()[0].radius_95_now == pytest.approx(pose.plain_radius_95)
+    assert workspace.pose.gains()[0].radius_95_now == pytest.approx(pose.plain_radius_95)
     with pytest.raises(GpError, match="shared error must be from 0 to 20 mm"):
-        desk.pose.choose(shared_error=-1)
+        workspace.pose.choose(shared_error=-1)
 
 
-def test_the_likelier_reading_is_taken_in_one_step(desk, panel):
-    touch(desk, *PROBE)
-    assert desk.pose.take_likelier() is None
-    at = touches(desk)
-    desk.pose.record(at["CL"], TouchHow.TYPED, name="OS")
-    desk.pose.record(at["OS"], TouchHow.TYPED, name="CL")
-    taken = desk.pose.take_likelier()
+def test_the_likelier_reading_is_taken_in_one_step(workspace, panel):
+    touch(workspace, *PROBE)
+    assert workspace.pose.take_likelier() is None
+    at = touches(workspace)
+    workspace.pose.record(at["CL"], TouchHow.TYPED, name="OS")
+    workspace.pose.record(at["OS"], TouchHow.TYPED, name="CL")
+    taken = workspace.pose.take_likelier()
     assert set(taken.exchanged) == {"CL", "OS"}
-    assert touches(desk) == at
+    assert touches(workspace) == at
 
 
-def test_an_atlas_that_is_not_the_one_chosen_is_told_beside_the_estimate(desk, panel):
+def test_an_atlas_that_is_not_the_one_chosen_is_told_beside_the_estimate(workspace, panel):
     assert not panel.head.problem.isVisible()
-    desk.atlas_problem = "The atlas of own.json cannot be had any more: own.json: does not exist."
-    desk.atlas_details_changed.emit()
+    workspace.atlas.problem = "The atlas of own.json cannot be had any more: own.json: does not exist."
+    workspace.atlas.details_changed.emit()
     assert panel.head.problem.isVisible()
     assert "The published one is in use." in panel.head.problem.text()
-    desk.use_atlas(ATLAS)
+    workspace.atlas.use(ATLAS)
     assert not panel.head.problem.isVisible()
 
 
-def test_a_verdict_is_not_taken_for_one_on_another_estimate(desk, panel, qtbot):
-    touch(desk, *PROBE)
+def test_a_verdict_is_not_taken_for_one_on_another_estimate(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
     qtbot.mouseClick(panel.verdict.accept, CLICK)
     (said,) = panel.verdict.findChildren(Notice)
     assert said.level == "good"
-    desk.pose.record(ANIMAL["RWP"] + THERE + [0.8, 0, 0], TouchHow.TYPED, name="RWP")
+    workspace.pose.record(ANIMAL["RWP"] + THERE + [0.8, 0, 0], TouchHow.TYPED, name="RWP")
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     (said,) = panel.verdict.findChildren(Notice)
     assert said.level == "warning"
     assert any("since then it moved by" in label.text() for label in said.findChildren(QLabel))
 
 
-def test_two_methods_stand_side_by_side(desk, panel, qtbot):
+def test_two_methods_stand_side_by_side(workspace, panel, qtbot):
     rng = np.random.default_rng(0)
-    desk.use_atlas(ATLAS, [draw_animal(ATLAS, rng=rng, name=f"S{n}") for n in range(4)])
-    touch(desk, *PROBE)
+    workspace.atlas.use(ATLAS, [draw_animal(ATLAS, rng=rng, name=f"S{n}") for n in range(4)])
+    touch(workspace, *PROBE)
     qtbot.mouseClick(panel.head.method.buttons["both"], CLICK)
     assert "being made ready" in notices(panel)
-    deliver(desk)
-    poses = desk.pose.estimate.poses
+    deliver(workspace)
+    poses = workspace.pose.estimate.poses
     first = [row[0].text() for row in panel.result.two.cells]
     assert first[1] == "CO x"
     assert panel.result.two.cells[1][1].text() == f"{poses['robust'].origin[0]:.2f}"
@@ -481,112 +483,112 @@ def test_two_methods_stand_side_by_side(desk, panel, qtbot):
     assert f"{apart:.2f} mm" in panel.result.two.apart.text()
 
 
-def test_a_method_without_what_it_needs_says_so(desk, panel, qtbot):
-    touch(desk, *PROBE)
-    desk.pose.estimating.set_joint_ready()
+def test_a_method_without_what_it_needs_says_so(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
+    workspace.pose.set_joint_ready()
     qtbot.mouseClick(panel.head.method.buttons["jrmpc"], CLICK)
     assert "JRMPC" in notices(panel)
     assert not panel.result.one.isVisible()
 
 
-def test_probe_noise_is_given_and_found_again(desk, panel, qtbot):
-    touch(desk, *PROBE)
-    found = f"{desk.pose.estimate.pose.probe_noise:.2f}"
+def test_probe_noise_is_given_and_found_again(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
+    found = f"{workspace.pose.estimate.pose.probe_noise:.2f}"
     assert found in panel.head.found.text()
     qtbot.keyClicks(panel.head.noise, "0.5")
     qtbot.keyClick(panel.head.noise, Qt.Key.Key_Return)
-    assert desk.pose.estimating.settings.probe_noise == 0.5
+    assert workspace.pose.settings.probe_noise == 0.5
     qtbot.keyClick(panel.head.noise, Qt.Key.Key_A, Qt.KeyboardModifier.ControlModifier)
     qtbot.keyClick(panel.head.noise, Qt.Key.Key_Delete)
-    assert desk.pose.estimating.settings.probe_noise is None
+    assert workspace.pose.settings.probe_noise is None
     assert found in panel.head.found.text()
 
 
-def test_the_point_that_gains_most_is_aimed_at_with_a_click(desk, panel, qtbot):
-    touch(desk, *PROBE)
-    best = desk.pose.gains()[0].code
-    desk.pose.aim("OI")
+def test_the_point_that_gains_most_is_aimed_at_with_a_click(workspace, panel, qtbot):
+    touch(workspace, *PROBE)
+    best = workspace.pose.gains()[0].code
+    workspace.pose.aim("OI")
     qtbot.mouseClick(panel.result.next, CLICK)
-    assert desk.pose.target == best
+    assert workspace.pose.target == best
 
 
 # In the scan, and the verdict
 
 
 def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
-    desk = desk_with_scan()
-    panel = shown(desk, qtbot)
+    workspace = desk_with_scan()
+    panel = shown(workspace, qtbot)
     shift = np.array([3.0, -12.0, 4.0])
     for code in ("CA", "CB", *PROBE):
-        labelling.place(desk.session, ANIMAL[code] + shift, side=LEFT, code=code)
-    touch(desk, *PROBE, noise=0.05)
-    estimate, facts = desk.pose.estimate, panel.in_scan.facts
+        workspace.labels.place(ANIMAL[code] + shift, side=LEFT, code=code)
+    touch(workspace, *PROBE, noise=0.05)
+    estimate, facts = workspace.pose.estimate, panel.in_scan.facts
     mm, deg = estimate.errors()
     assert facts["From the labels"].text() == f"CO {mm:.2f} mm, axis {deg:.1f}°"
     assert facts["FRE"].text() == f"{estimate.registered.fre_mm:.2f} mm"
     assert facts["Laid in"].text() == "by labelled features, 6 of 6"
     qtbot.mouseClick(panel.in_scan.way.buttons["skull"], CLICK)
-    assert desk.pose.estimate.registered is None
+    assert workspace.pose.estimate.registered is None
     assert "at least 3 points" in " ".join(panel.in_scan.notices.shown[0])
     for n, corner in enumerate(np.eye(3) * 9, 1):
-        touching.record_touch(desk.session, LEFT, f"S{n}", corner + THERE)
-        desk.session.set_crosshair(corner + shift)
+        touching.record_touch(workspace.document, LEFT, f"S{n}", corner + THERE)
+        workspace.view.set_crosshair(corner + shift)
         assert panel.in_scan.mark.text() == f"Mark skull point S{n} at the crosshair"
         qtbot.mouseClick(panel.in_scan.mark, CLICK)
-    assert desk.pose.estimate.registered.way == "skull"
+    assert workspace.pose.estimate.registered.way == "skull"
     qtbot.mouseClick(panel.touches.more, CLICK)
     shown_at = []
-    desk.point_shown.connect(shown_at.append)
+    workspace.view.point_shown.connect(shown_at.append)
     click(qtbot, panel, "S2", NAME)
     np.testing.assert_allclose(shown_at[-1], np.add(shift, (0, 9, 0)), atol=1e-6)
     assert list(cut_words(panel)) == []
-    desk.close(discard=True)
+    workspace.close(discard=True)
 
 
-def test_skull_features_come_from_a_file(desk, panel, tmp_path):
+def test_skull_features_come_from_a_file(workspace, panel, tmp_path):
     (tmp_path / "skull.csv").write_text("label,x,y,z\nS1,1,2,3\nS2,4,5,7\nS3,9,1,0\n")
     assert panel.in_scan.take_file(tmp_path / "skull.csv")
-    assert desk.session.state.skull["S2"] == (4, 5, 7)
+    assert workspace.document.state.skull["S2"] == (4, 5, 7)
     assert "3" in panel.in_scan.skull.text()
     (tmp_path / "none.csv").write_text("label,x,y,z\nCA,1,2,3\n")
     assert not panel.in_scan.take_file(tmp_path / "none.csv")
-    assert len(desk.session.state.skull) == 3
+    assert len(workspace.document.state.skull) == 3
 
 
-def test_a_verdict_is_kept_with_initials_and_note(desk, panel, qtbot):
+def test_a_verdict_is_kept_with_initials_and_note(workspace, panel, qtbot):
     assert not panel.verdict.accept.isEnabled()
-    touch(desk, *PROBE)
+    touch(workspace, *PROBE)
     panel.verdict.initials.clear()
     qtbot.keyClicks(panel.verdict.initials, "CD")
     qtbot.keyClicks(panel.verdict.note, "seen on the mesh")
     qtbot.mouseClick(panel.verdict.accept, CLICK)
-    check = desk.session.state.pose_checks[-1]
+    check = workspace.document.state.pose_checks[-1]
     assert (check.side, check.verdict, check.by, check.note) == (LEFT, "accept", "CD", "seen on the mesh")
-    assert check.pose["radius_95_mm"] == desk.pose.estimate.pose.radius_95
+    assert check.pose["radius_95_mm"] == workspace.pose.estimate.pose.radius_95
     said = panel.verdict._said.itemAt(0).widget()
     assert said.words.startswith("Accepted by CD")
     qtbot.mouseClick(panel.verdict.reject, CLICK)
-    assert [c.verdict for c in desk.session.state.pose_checks] == ["accept", "reject"]
-    desk.session.undo()
-    assert [c.verdict for c in desk.session.state.pose_checks] == ["accept"]
+    assert [c.verdict for c in workspace.document.state.pose_checks] == ["accept", "reject"]
+    workspace.document.undo()
+    assert [c.verdict for c in workspace.document.state.pose_checks] == ["accept"]
 
 
-def test_what_is_drawn_is_chosen(desk, panel, qtbot):
-    desk.begin_judging()
+def test_what_is_drawn_is_chosen(workspace, panel, qtbot):
+    workspace.begin_judging()
     panel.overlay.parts["vectors"].click()
-    assert desk.pose.overlay.vectors
+    assert workspace.pose.overlay.vectors
     panel.overlay.opacity.setValue(40)
-    assert desk.pose.overlay.opacity == 0.4
+    assert workspace.pose.overlay.opacity == 0.4
     panel.overlay.visible.click()
-    assert not desk.pose.overlay.visible
+    assert not workspace.pose.overlay.visible
     assert not panel.overlay.parts["region"].isEnabled()
 
 
-def test_other_parts_of_the_program_are_asked_for(desk, panel, qtbot):
+def test_other_parts_of_the_program_are_asked_for(workspace, panel, qtbot):
     asked = []
     for name in ("tracker", "guide", "atlas", "report", "export", "touch_file", "skull_file"):
         getattr(panel, f"{name}_asked").connect(lambda *_, name=name: asked.append(name))
-    touch(desk, *PROBE)
+    touch(workspace, *PROBE)
     for button in (panel.touches.ways["file"], panel.touches.ways["tracker"], panel.touches.guide):
         qtbot.mouseClick(button, CLICK)
     for button in (panel.head.to_atlas, panel.report, panel.export, panel.in_scan.file):
@@ -600,29 +602,29 @@ def test_other_parts_of_the_program_are_asked_for(desk, panel, qtbot):
 @pytest.mark.parametrize("theme", [DARK, LIGHT], ids=lambda theme: theme.name)
 @pytest.mark.parametrize("size", [NARROW, WIDE], ids=["narrow", "wide"])
 @pytest.mark.parametrize("n", [0, 3, 11])
-def test_no_word_is_cut(desk, qtbot, theme, size, n):
-    touch(desk, *ORDER[:n])
-    panel = shown(desk, qtbot, size, theme)
+def test_no_word_is_cut(workspace, qtbot, theme, size, n):
+    touch(workspace, *ORDER[:n])
+    panel = shown(workspace, qtbot, size, theme)
     assert list(cut_words(panel)) == []
     panel.hide()
 
 
-def test_a_hidden_panel_computes_nothing_and_is_right_when_shown(desk, panel, monkeypatch):
+def test_a_hidden_panel_computes_nothing_and_is_right_when_shown(workspace, panel, monkeypatch):
     panel.hide()
     asked = []
-    monkeypatch.setattr(type(desk.pose), "gains", lambda self: asked.append(1) or ())
-    touch(desk, *PROBE)
+    monkeypatch.setattr(type(workspace.pose), "gains", lambda self: asked.append(1) or ())
+    touch(workspace, *PROBE)
     assert asked == []
     panel.show()
     assert panel.result.one.isVisible()
 
 
-def test_a_touch_shows_at_once(desk, panel):
-    touch(desk, *PROBE)
+def test_a_touch_shows_at_once(workspace, panel):
+    touch(workspace, *PROBE)
     took = []
     for n in range(8):
         start = time.process_time()  # not what else the machine does
-        touch(desk, ORDER[n], seed=n)
+        touch(workspace, ORDER[n], seed=n)
         QApplication.processEvents()
         took.append(time.process_time() - start)
     assert min(took) < 0.03

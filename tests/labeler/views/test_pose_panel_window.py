@@ -11,7 +11,6 @@ from window_cases import BALL_MM, MIDDLE, ball_volume, close, drop_file, settle
 from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.sampling import draw_animal
 from gp_labeler.document.touches import TouchHow
-from gp_labeler.models import labelling
 from gp_labeler.models.pose import ORDER
 from gp_labeler.scene.planes import Plane
 from gp_labeler.tracker import TrackerAddress
@@ -31,14 +30,14 @@ def touch_file(folder, animal=ANIMAL, name="GP-7_L.csv"):
 
 
 def touched(window) -> dict[str, tuple[float, float, float]]:
-    return {name: touch.position for (_, name), touch in window.workbench.session.state.touches.items()}
+    return {name: touch.position for (_, name), touch in window.workspace.document.state.touches.items()}
 
 
 @pytest.fixture
 def bare(make_window):
     """A window with nothing open."""
     window = make_window()
-    window.workbench.use_atlas(ATLAS)
+    window.workspace.atlas.use(ATLAS)
     return window
 
 
@@ -79,11 +78,11 @@ def test_keys_are_commands_and_no_letters_of_the_specimens_name(qtbot, bare):
         name.selectAll()
         qtbot.keyClicks(name, "GP-9")
         qtbot.keyClick(name, Qt.Key.Key_Return)
-    assert bare.workbench.session.state.specimen == "GP-9"
+    assert bare.workspace.document.state.specimen == "GP-9"
 
 
 def test_the_key_that_records_works_from_the_moment_a_tracker_is_connected(bare):
-    tracker, record = bare.workbench.tracker, bare.commands.actions["pose.record"]
+    tracker, record = bare.workspace.tracker, bare.commands.actions["pose.record"]
     assert not record.isEnabled()
     tracker.connect(TrackerAddress(port=1))
     assert record.isEnabled()
@@ -99,7 +98,7 @@ def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_win
     bare.commands.run("file.save")
     saved = tmp_path / "touched.gpspecimen.json"
     assert saved.exists()
-    assert "touched" in bare.windowTitle() or bare.workbench.session.state.specimen in bare.windowTitle()
+    assert "touched" in bare.windowTitle() or bare.workspace.document.state.specimen in bare.windowTitle()
     close(bare)
     again = make_window()
     again.ui.open_path(saved)
@@ -111,7 +110,7 @@ def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_win
 
 def test_the_views_come_with_the_scan_and_the_step_stays(qtbot, bare):
     to_step(qtbot, bare, "pose")
-    bare.workbench.open_volume(ball_volume())
+    bare.workspace.scan.begin(ball_volume())
     settle(qtbot, bare)
     assert bare.rail.step == "pose"
     assert bare.grid.isVisible()
@@ -121,12 +120,12 @@ def test_the_views_come_with_the_scan_and_the_step_stays(qtbot, bare):
 def test_a_scan_that_is_opened_later_joins_what_was_touched(qtbot, bare, tmp_path):
     to_step(qtbot, bare, "pose")
     drop_file(bare, touch_file(tmp_path))
-    bare.workbench.open_volume(ball_volume())
+    bare.workspace.scan.begin(ball_volume())
     settle(qtbot, bare)
     assert set(touched(bare)) == set(PROBE)
-    assert bare.workbench.volume is not None
-    assert bare.workbench.session.state.specimen == "ball"
-    bare.workbench.open_volume(ball_volume())
+    assert bare.workspace.scan.volume is not None
+    assert bare.workspace.document.state.specimen == "ball"
+    bare.workspace.scan.begin(ball_volume())
     settle(qtbot, bare)
     assert touched(bare) == {}, "the next scan is another specimen's"
 
@@ -145,19 +144,19 @@ def test_another_specimen_is_begun_without_a_scan(qtbot, bare, tmp_path):
     assert bare.ui.prompts.asked == ["Not saved"]
     assert touched(bare) == {}
     assert bare.steps["pose"].isVisible()
-    assert head.specimen.text() == bare.workbench.session.state.specimen != "GP-7"
+    assert head.specimen.text() == bare.workspace.document.state.specimen != "GP-7"
 
 
 # A dry run
 
 
 def test_clicks_on_bone_and_slices_touch(qtbot, window):
-    window.workbench.use_atlas(ATLAS)
+    window.workspace.atlas.use(ATLAS)
     to_step(qtbot, window, "pose")
-    panel, desk = window.steps["pose"], window.workbench
+    panel, workspace = window.steps["pose"], window.workspace
     assert not panel.touches.ways["scan"].isChecked()
     qtbot.mouseClick(panel.touches.ways["scan"], CLICK)
-    assert desk.tool == "touch"
+    assert workspace.interaction.tool == "touch"
     assert window.status.next_click.text() == "Click on bone or a slice where CL left is"
     scene = window.grid.scene_view
     x, y = scene.pixel_at(MIDDLE)
@@ -167,70 +166,70 @@ def test_clicks_on_bone_and_slices_touch(qtbot, window):
     axial = window.grid.slice_views[Plane.AXIAL]
     qtbot.mouseClick(axial, CLICK, pos=QPoint(axial.width() // 2, axial.height() // 2))
     assert set(touched(window)) == {"CL", "LLI"}
-    assert {t.how for t in desk.session.state.touches.values()} == {TouchHow.SCAN}
-    assert desk.session.state.landmarks == {}, "nothing was labelled"
+    assert {t.how for t in workspace.document.state.touches.values()} == {TouchHow.SCAN}
+    assert workspace.document.state.landmarks == {}, "nothing was labelled"
     to_step(qtbot, window, "label")
-    assert desk.tool == "place", "a click labels again"
+    assert workspace.interaction.tool == "place", "a click labels again"
     to_step(qtbot, window, "pose")
-    assert desk.tool == "look", "a click that looks at the estimate moves no landmark"
+    assert workspace.interaction.tool == "look", "a click that looks at the estimate moves no landmark"
 
 
 def test_a_dry_run_ends_in_an_estimate_and_its_error(qtbot, window):
-    desk = window.workbench
-    desk.use_atlas(ATLAS)
+    workspace = window.workspace
+    workspace.atlas.use(ATLAS)
     shift = MIDDLE - ANIMAL["CO"]
     for code in ("CA", "CB", "RWA", "RWP"):
-        labelling.place(desk.session, ANIMAL[code] + shift, side=LEFT, code=code)
+        workspace.labels.place(ANIMAL[code] + shift, side=LEFT, code=code)
     to_step(qtbot, window, "pose")
     for code in PROBE:
-        desk.pose.record(ANIMAL[code] + shift, TouchHow.SCAN, name=code)
+        workspace.pose.record(ANIMAL[code] + shift, TouchHow.SCAN, name=code)
     panel = window.steps["pose"]
-    mm, deg = desk.pose.estimate.errors()
+    mm, deg = workspace.pose.estimate.errors()
     assert panel.in_scan.facts["From the labels"].text() == f"CO {mm:.2f} mm, axis {deg:.1f}°"
     assert "in the scan" in panel.result.heading.text()
     assert not panel.in_scan.way.isVisible(), "nothing to register"
     panel.touches.table.edit_position("ZL")
     position = ANIMAL["ZL"] + shift
     assert panel.touches.model.record("ZL", " ".join(map(str, position)))
-    assert desk.session.state.touches[LEFT, "ZL"].frame == "scan", "typed beside touches of the scan"
+    assert workspace.document.state.touches[LEFT, "ZL"].frame == "scan", "typed beside touches of the scan"
 
 
 # Commands
 
 
 def test_keys_and_menu_do_what_the_panel_does(qtbot, window):
-    desk = window.workbench
-    desk.use_atlas(ATLAS)
+    workspace = window.workspace
+    workspace.atlas.use(ATLAS)
     to_step(qtbot, window, "pose")
     window.grid.scene_view.setFocus()
     qtbot.keyClick(window, Qt.Key.Key_I)
-    assert desk.tool == "touch"
+    assert workspace.interaction.tool == "touch"
     qtbot.keyClick(window, Qt.Key.Key_N, Qt.KeyboardModifier.ShiftModifier)
-    assert desk.pose.target == ORDER[1]
+    assert workspace.pose.target == ORDER[1]
     qtbot.keyClick(window, Qt.Key.Key_Q, Qt.KeyboardModifier.ShiftModifier)
-    assert desk.pose.side is Side.RIGHT
+    assert workspace.pose.side is Side.RIGHT
     qtbot.keyClick(window, Qt.Key.Key_Q, Qt.KeyboardModifier.ShiftModifier)
     qtbot.keyClick(window, Qt.Key.Key_Y)
-    assert not desk.pose.overlay.visible
+    assert not workspace.pose.overlay.visible
     assert not window.commands.actions["pose.accept"].isEnabled()
     for code in PROBE:
-        desk.pose.record(ANIMAL[code] + MIDDLE, TouchHow.SCAN, name=code)
+        workspace.pose.record(ANIMAL[code] + MIDDLE, TouchHow.SCAN, name=code)
     for id in ("pose.accept", "pose.along_axis", "pose.through_window", "pose.clear"):
         assert window.commands.actions[id].isEnabled(), id
     scene = window.grid.scene_view.scene
     qtbot.keyClick(window, Qt.Key.Key_A)
-    axis = desk.pose.estimate.in_scan().axis
+    axis = workspace.pose.estimate.in_scan().axis
     eye = np.array(scene.camera.direction)
     assert abs(eye @ axis) == pytest.approx(1.0, abs=1e-6)
     window.steps["pose"].verdict.initials.setText("XY")
     window.commands.run("pose.reject")
-    assert desk.session.state.pose_checks[-1].by == "XY"
+    assert workspace.document.state.pose_checks[-1].by == "XY"
     window.commands.run("pose.clear")
     assert touched(window) == {}
 
 
 def test_files_are_asked_for(qtbot, window, tmp_path):
-    window.workbench.use_atlas(ATLAS)
+    window.workspace.atlas.use(ATLAS)
     window.ui.prompts.files = [touch_file(tmp_path)]
     assert window.commands.run("pose.open_touches")
     assert window.rail.step == "pose"
@@ -239,7 +238,7 @@ def test_files_are_asked_for(qtbot, window, tmp_path):
     skull.write_text("label,x,y,z\nS1,1,2,3\n")
     window.ui.prompts.files = [skull]
     qtbot.mouseClick(window.steps["pose"].in_scan.file, CLICK)
-    assert window.workbench.session.state.skull == {"S1": (1, 2, 3)}
+    assert window.workspace.document.state.skull == {"S1": (1, 2, 3)}
 
 
 def test_elsewhere_a_dropped_file_is_opened_as_ever(qtbot, window, tmp_path):

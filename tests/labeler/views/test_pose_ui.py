@@ -17,9 +17,9 @@ ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
 
 
 def touch(window, animal=ANIMAL, how=TouchHow.TYPED) -> None:
-    window.workbench.use_atlas(ATLAS)
+    window.workspace.atlas.use(ATLAS)
     for code in PROBE:
-        window.workbench.pose.record(animal[code], how, name=code)
+        window.workspace.pose.record(animal[code], how, name=code)
 
 
 def test_the_authors_path_is_carried_once_its_axes_are_told(make_window, shared_data):
@@ -28,7 +28,7 @@ def test_the_authors_path_is_carried_once_its_axes_are_told(make_window, shared_
     window.ui.prompts.files = [shared_data / "usevitch2021" / "Curve_Points.csv"]
     window.ui.prompts.answers = ["m", "left", "z,-y,x", "The first 20"]
     window.ui.ask_path()
-    carried = window.workbench.pose.path
+    carried = window.workspace.pose.path
     assert len(carried.points) == 20
     assert carried.points[0, 1] > 1.5, "it begins at the round window"
     assert next(iter(carried.readings(carried.source, "L", units="m"))) == "z,-y,x", "likeliest first"
@@ -47,7 +47,7 @@ def test_a_path_in_the_cochlea_frame_asks_for_no_axes(make_window, tmp_path):
     table.write_text("-0.5,2,0\n0,1.5,0.2\n0.4,1,0.5\n")
     window.ui.prompts.files, window.ui.prompts.answers = [table], ["mm", "left"]
     window.ui.ask_path()
-    assert len(window.workbench.pose.path.points) == 3
+    assert len(window.workspace.pose.path.points) == 3
 
 
 def test_a_report_leaves_the_camera_where_it_was(window, tmp_path):
@@ -56,7 +56,7 @@ def test_a_report_leaves_the_camera_where_it_was(window, tmp_path):
     shift = MIDDLE - ANIMAL["CO"]
     touch(window, {code: ANIMAL[code] + shift for code in PROBE}, TouchHow.SCAN)
     camera = window.grid.scene_view.scene.camera
-    window.workbench.session.set_crosshair(MIDDLE + 5.0)
+    window.workspace.view.set_crosshair(MIDDLE + 5.0)
     camera.focus_on(MIDDLE - 3.0, across_mm=3.0)
     before = camera.state()
     window.ui.prompts.files = [tmp_path / "report.pdf"]
@@ -73,13 +73,13 @@ def told(panel) -> list[str]:
 
 def test_a_file_named_for_the_other_side_is_told_and_moved_by_a_click(qtbot, make_window, shared_data):
     window = make_window()
-    window.workbench.use_atlas(ATLAS)
+    window.workspace.atlas.use(ATLAS)
     window.set_step("pose")
     panel = window.steps["pose"]
     assert panel.take_file(shared_data / "probe" / "SkullD_Right.dat")
     assert "By its name SkullD_Right.dat is of the right side." in told(panel)
     qtbot.mouseClick(panel.result.other_side, Qt.MouseButton.LeftButton)
-    assert window.workbench.pose.side is Side.RIGHT
+    assert window.workspace.pose.side is Side.RIGHT
     assert not any("By its name" in text for text in told(panel))
 
 
@@ -89,10 +89,10 @@ def test_y_of_the_robot_is_chosen_in_the_menu_and_told_with_the_file(make_window
     touch(window, {code: ANIMAL[code] + 0.15 * rng.normal(size=3) for code in PROBE})
     file, command = tmp_path / "robot.csv", window.commands.actions["pose.touched_window"]
     matrices, said = [], []
-    window.workbench.message.connect(lambda text, level: said.append(text))
+    window.workspace.messages.said.connect(lambda text, level: said.append(text))
     for of in ("touched", "expected"):
         assert command.isChecked() is (of == "touched")
-        window.workbench.pose.export(file)
+        window.workspace.pose.export(file)
         assert said[-1] == f"Wrote robot.csv, y to the {of} round window"
         matrices.append(np.loadtxt(file, delimiter=","))
         window.commands.run("pose.touched_window")

@@ -12,8 +12,7 @@ from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
-from gp_labeler.models.workspace import Workbench
+from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
 
@@ -31,13 +30,13 @@ def write_list(folder, **points) -> object:
 
 @pytest.fixture
 def window(qtbot, one_window, ball):
-    one_window.workbench.set_tool("place")
-    one_window.workbench.session.view.update(layout="four-up")
-    one_window.workbench.open_volume(ball)
+    one_window.workspace.interaction.set_tool("place")
+    one_window.workspace.view.update(layout="four-up")
+    one_window.workspace.scan.begin(ball)
     one_window.activateWindow()
     settle(qtbot, one_window)
     yield one_window
-    one_window.workbench.references.clear()
+    one_window.workspace.references.clear()
 
 
 @pytest.fixture
@@ -64,9 +63,9 @@ def test_they_are_drawn_on_slices_near_them_only(shown, plane) -> None:
     away = np.zeros(3)
     away[plane.axis] = 4.0
     for crosshair, is_seen in ((at, True), (at + away, False)):
-        shown.workbench.session.set_crosshair(crosshair)
+        shown.workspace.view.set_crosshair(crosshair)
         before = _pixels(view)
-        shown.workbench.references.clear()
+        shown.workspace.references.clear()
         changed = (_pixels(view) != before).any(axis=-1)
         assert bool(changed.any()) == is_seen
         if is_seen:
@@ -91,74 +90,74 @@ def test_they_are_drawn_on_bone_and_go_when_cleared(shown, qtbot) -> None:
 
 
 def test_a_click_on_one_places_the_landmark_that_is_to_do(shown) -> None:
-    session = shown.workbench.session
-    assert not session.state.landmarks
+    document, labels = shown.workspace.document, shown.workspace.labels
+    assert not document.state.landmarks
     view = shown.grid.scene_view
     view.view_from("A")
     QTest.mouseClick(view, _LEFT, pos=_pixel(view, ON_BONE))
-    assert np.linalg.norm(session.landmarks(Side.LEFT)["CA"] - ON_BONE) < 2 * VOXEL_MM
-    code, axial = session.active.code, shown.grid.slice_views[Plane.AXIAL]
-    session.set_crosshair(INSIDE)
+    assert np.linalg.norm(document.landmarks(Side.LEFT)["CA"] - ON_BONE) < 2 * VOXEL_MM
+    code, axial = labels.active.code, shown.grid.slice_views[Plane.AXIAL]
+    shown.workspace.view.set_crosshair(INSIDE)
     QTest.mouseClick(axial, _LEFT, pos=_pixel(axial, INSIDE))
-    assert np.linalg.norm(session.landmarks(Side.LEFT)[code] - INSIDE) < 2 * VOXEL_MM
+    assert np.linalg.norm(document.landmarks(Side.LEFT)[code] - INSIDE) < 2 * VOXEL_MM
 
 
 def test_they_cannot_be_dragged_and_have_no_menu(shown) -> None:
-    before = shown.workbench.session.state
+    before = shown.workspace.document.state
     view = shown.grid.scene_view
     view.view_from("A")
     start = _pixel(view, ON_BONE)
     QTest.mousePress(view, _LEFT, pos=start)
     QTest.mouseMove(view, start + QPoint(30, 10))
-    assert shown.workbench.drag is None
+    assert shown.workspace.interaction.drag is None
     QTest.mouseRelease(view, _LEFT, pos=start + QPoint(30, 10))
-    assert shown.workbench.session.state is before
-    assert shown.workbench.session.progress(Side.LEFT).text.startswith("0 ")
+    assert shown.workspace.document.state is before
+    assert shown.workspace.labels.progress(Side.LEFT).text.startswith("0 ")
 
 
 def test_a_landmark_under_one_is_still_picked(shown) -> None:
-    session, view = shown.workbench.session, shown.grid.scene_view
-    shown.workbench.set_tool("look")
+    view, document, labels = shown.grid.scene_view, shown.workspace.document, shown.workspace.labels
+    shown.workspace.interaction.set_tool("look")
     view.view_from("A")
     QTest.mouseClick(view, _LEFT, pos=_pixel(view, ON_BONE))
-    assert session.active.code == "CA"
-    assert np.linalg.norm(session.crosshair - ON_BONE) < 2 * VOXEL_MM
-    labelling.place(session, ON_BONE, How.MESH, side=Side.LEFT, code="OS")
-    assert session.active.code != "OS"
+    assert labels.active.code == "CA"
+    assert np.linalg.norm(shown.workspace.view.crosshair - ON_BONE) < 2 * VOXEL_MM
+    labels.place(ON_BONE, How.MESH, side=Side.LEFT, code="OS")
+    assert labels.active.code != "OS"
     QTest.mouseClick(view, _LEFT, pos=_pixel(view, ON_BONE))
-    assert session.active.code == "OS"
-    assert set(session.landmarks(Side.LEFT).placed) == {"OS"}
+    assert labels.active.code == "OS"
+    assert set(document.landmarks(Side.LEFT).placed) == {"OS"}
 
 
 def test_another_scan_clears_them(shown, ball) -> None:
-    shown.workbench.open_volume(ball)
-    assert not shown.workbench.references.points
+    shown.workspace.scan.begin(ball)
+    assert not shown.workspace.references.points
 
 
 def test_those_outside_the_scan_are_said(window, tmp_path) -> None:
     told = []
-    window.workbench.message.connect(lambda text, level: told.append((text, level)))
-    window.workbench.references.show(write_list(tmp_path, Apex=INSIDE, Far=MIDDLE + 100))
+    window.workspace.messages.said.connect(lambda text, level: told.append((text, level)))
+    window.workspace.references.show(write_list(tmp_path, Apex=INSIDE, Far=MIDDLE + 100))
     assert told == [("1 of 2 reference points lie outside the scan and are not shown", "warning")]
 
 
 def test_unknown_names_can_be_shown_instead_of_imported(window, tmp_path, qtbot) -> None:
-    desk, file = window.workbench, write_list(tmp_path, Apex=INSIDE)
-    dialog = LandmarkImportDialog(desk, [file], parent=window)
+    workspace, file = window.workspace, write_list(tmp_path, Apex=INSIDE)
+    dialog = LandmarkImportDialog(workspace, [file], parent=window)
     dialog.show()
     assert dialog.show_only.isVisible()
     qtbot.mouseClick(dialog.show_only, _LEFT)
-    assert [point.name for point in desk.references.points] == ["Apex"]
-    assert not desk.session.state.landmarks
-    known = LandmarkImportDialog(desk, [write_list(tmp_path, CA=INSIDE)], parent=window)
+    assert [point.name for point in workspace.references.points] == ["Apex"]
+    assert not workspace.document.state.landmarks
+    known = LandmarkImportDialog(workspace, [write_list(tmp_path, CA=INSIDE)], parent=window)
     known.show()
     assert not known.show_only.isVisible()
     known.reject()
 
 
 def test_what_cannot_be_shown_is_refused_and_the_rest_stays(tmp_path) -> None:
-    desk, told = Workbench(), []
-    references = desk.references
+    workspace, told = Workspace(), []
+    references = workspace.references
     references.changed.connect(lambda: told.append(1))
     references.show(write_list(tmp_path, CA_L=INSIDE, CA_R=ON_BONE))
     assert [point.name for point in references.points] == ["CA L", "CA R"]
@@ -173,4 +172,4 @@ def test_what_cannot_be_shown_is_refused_and_the_rest_stays(tmp_path) -> None:
     references.clear()
     references.clear()
     assert len(told) == 2
-    desk.close()
+    workspace.close()

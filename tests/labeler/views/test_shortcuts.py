@@ -113,12 +113,12 @@ def test_every_shortcut_of_the_sheet_fires_on_a_real_display(keyboard) -> None:
     [("f", 2, 1), ("b", 2, -1), ("Next", 2, -1), ("Prior", 2, 1), ("Left", 0, -1), ("Up", 1, -1)],
 )
 def test_keys_over_a_slice_move_by_a_voxel_on_a_real_display(keyboard, keysym, axis, voxels) -> None:
-    session, view = keyboard.workbench.session, keyboard.grid.slice_views[Plane.AXIAL]
-    session.set_crosshair(MIDDLE + VOXEL_MM / 2)  # on a slice, not between two
+    view = keyboard.grid.slice_views[Plane.AXIAL]
+    keyboard.workspace.view.set_crosshair(MIDDLE + VOXEL_MM / 2)  # on a slice, not between two
     view.setFocus()
-    before = np.array(session.crosshair)
+    before = np.array(keyboard.workspace.view.crosshair)
     _press(keysym)
-    _wait(lambda: not np.allclose(session.crosshair, before), 5.0)
-    moved = session.crosshair - before
+    _wait(lambda: not np.allclose(keyboard.workspace.view.crosshair, before), 5.0)
+    moved = keyboard.workspace.view.crosshair - before
     assert moved[axis] == pytest.approx(voxels * VOXEL_MM)
     assert np.count_nonzero(np.abs(moved) > 1e-9) == 1

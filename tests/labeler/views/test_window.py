@@ -24,7 +24,6 @@ from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.models import labelling
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.application import make_window as make_plain
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
@@ -53,7 +52,7 @@ def test_the_first_page_gives_way_to_the_scan(qtbot, make_window, ball) -> None:
     window = make_window()
     assert window.pages.currentIndex() == 0
     assert "Open" in window.status.next_click.text()
-    window.workbench.open_volume(ball)
+    window.workspace.scan.begin(ball)
     settle(qtbot, window)
     assert window.pages.currentIndex() == 1
     assert window.windowTitle().startswith("ball")
@@ -86,7 +85,7 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
     window = make_window()
     window.ui.open_path(tmp_path / "ball.nrrd")
     settle(qtbot, window)
-    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     assert window.isWindowModified()
     window.ui.prompts.files = [tmp_path / "one"]
     window.commands.run("file.save")
@@ -95,12 +94,12 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
     assert not window.isWindowModified()
     close(window)
     again = make_window()
-    assert saved.resolve() in again.workbench.recent.all()
+    assert saved.resolve() in again.workspace.recent.all()
     again.ui.open_path(saved)
     settle(qtbot, again)
-    np.testing.assert_array_equal(again.workbench.session.landmarks("L")["CA"], MIDDLE)
-    assert again.workbench.volume.size == volume.size
-    assert again.workbench.surfaces
+    np.testing.assert_array_equal(again.workspace.document.landmarks("L")["CA"], MIDDLE)
+    assert again.workspace.scan.volume.size == volume.size
+    assert again.workspace.bone.surfaces
 
 
 def test_a_file_that_is_no_scan_is_said_in_words(qtbot, make_window, tmp_path) -> None:
@@ -121,13 +120,13 @@ def test_a_scan_without_a_voxel_size_is_asked_about(qtbot, make_window, tmp_path
     window.ui.open_path(tmp_path / "ball.tif")
     settle(qtbot, window)
     assert window.ui.prompts.asked
-    if window.workbench.volume is not None:
-        assert window.workbench.session.state.import_choices
+    if window.workspace.scan.volume is not None:
+        assert window.workspace.document.state.import_choices
 
 
 @pytest.mark.parametrize("answer", ["", "Save", "Do not save"])
 def test_closing_with_unsaved_edits_asks(window, tmp_path, answer) -> None:
-    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     window.ui.prompts.answers = [answer]
     window.ui.prompts.files = [tmp_path / "saved"]
     assert window.close() is (answer != "")
@@ -138,24 +137,24 @@ def test_closing_with_unsaved_edits_asks(window, tmp_path, answer) -> None:
 
 
 def test_edits_that_are_not_wanted_are_not_offered_again(qtbot, window, tmp_path) -> None:
-    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     (tmp_path / "x.gpspecimen.json").write_text("{}")
     window.ui.prompts.answers = ["Do not save"]
     window.ui.open_path(tmp_path / "x.gpspecimen.json")  # no specimen: the edits are still there
-    assert "CA" in window.workbench.session.landmarks("L")
-    window.workbench.open_volume(ball_volume())
+    assert "CA" in window.workspace.document.landmarks("L")
+    window.workspace.scan.begin(ball_volume())
     settle(qtbot, window)
     assert find_recoveries(tmp_path / "state") == ()
 
 
 def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_path) -> None:
-    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
-    window.workbench.close()  # as if killed: nothing asked, nothing saved
+    window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    window.workspace.close()  # as if killed: nothing asked, nothing saved
     again = make_window()
     again.ui.prompts.answers = ["Recover"]
     again.ui.take_recoveries(find_recoveries(tmp_path / "state"))
-    assert "CA" in again.workbench.session.landmarks("L")
-    assert again.workbench.session.undo_text == "place CA left"
+    assert "CA" in again.workspace.document.landmarks("L")
+    assert again.workspace.document.undo_text == "place CA left"
 
 
 _KILLED = """
@@ -168,15 +167,15 @@ from window_cases import MIDDLE, ball_volume
 app = make_application()
 window = make_window(Path(sys.argv[1]), atlas=False)
 window.show()
-window.workbench.open_volume(ball_volume())
+window.workspace.scan.begin(ball_volume())
 end = time.monotonic() + 30
-while window.workbench.jobs.running and time.monotonic() < end:
+while window.workspace.jobs.running and time.monotonic() < end:
     app.processEvents()
 view = window.grid.scene_view
 x, y = view.pixel_at(MIDDLE)
 for dx in (0, 15, 30):
     QTest.mouseClick(view, Qt.MouseButton.LeftButton, pos=QPoint(int(x) + dx, int(y)))
-marks = window.workbench.session.landmarks("L")
+marks = window.workspace.document.landmarks("L")
 print(repr({code: marks[code].tolist() for code in marks.placed}), flush=True)
 app.exec()
 """
@@ -198,10 +197,10 @@ def test_a_window_killed_in_the_middle_loses_nothing(make_window, tmp_path) -> N
     window = make_window()
     window.ui.prompts.answers = ["Recover"]
     window.ui.take_recoveries(find_recoveries(tmp_path / "state"))
-    session = window.workbench.session
+    document = window.workspace.document
     for code, where in placed.items():
-        np.testing.assert_array_equal(session.landmarks("L")[code], where)
-    assert session.undo_text == "place OS left"
+        np.testing.assert_array_equal(document.landmarks("L")[code], where)
+    assert document.undo_text == "place OS left"
 
 
 def _kept(window) -> str:
@@ -209,15 +208,15 @@ def _kept(window) -> str:
 
 
 def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tmp_path) -> None:
-    saved = window.workbench.session.save(tmp_path / "one")
+    saved = window.workspace.document.save(tmp_path / "one")
     other = make_window()
     other.ui.prompts.answers = [""]
     other.ui.open_path(saved)
     assert other.ui.prompts.asked == ["Open elsewhere"]
     other.ui.prompts.answers = ["Open a copy"]
     other.ui.open_path(saved)
-    assert other.workbench.session.path is None
-    assert other.workbench.session.state.specimen == "ball"
+    assert other.workspace.document.path is None
+    assert other.workspace.document.state.specimen == "ball"
     titles = [each.windowTitle().replace("[*]", "") for each in (window, other)]
     original = tmp_path / "one"
     assert titles == [f"ball – {original} – gp-labeler", f"ball – copy of {original} – gp-labeler"]  # noqa: RUF001
@@ -229,19 +228,19 @@ def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tm
 
 
 def test_landmarks_are_exported_and_imported(window, make_window, tmp_path) -> None:
-    session = window.workbench.session
-    labelling.place(session, MIDDLE, side=Side.LEFT, code="CA")
+    document, labels = window.workspace.document, window.workspace.labels
+    labels.place(MIDDLE, side=Side.LEFT, code="CA")
     folder = tmp_path / "out"
     folder.mkdir()
     window.ui.prompts.files = [folder]
     window.commands.run("file.export")
     assert [f.name for f in folder.iterdir()] == ["ball_L.mrk.json"]
     assert "right side is not labelled" in window.status.next_click.text()
-    labelling.clear(session, side=Side.LEFT, code="CA")
+    labels.clear(side=Side.LEFT, code="CA")
     window.ui.prompts.files = [folder / "ball_L.mrk.json"]
     window.ui.prompts.answers = ["Import nevertheless"]
     window.commands.run("file.import")
-    np.testing.assert_allclose(session.landmarks("L")["CA"], MIDDLE)
+    np.testing.assert_allclose(document.landmarks("L")["CA"], MIDDLE)
 
 
 def test_the_look_is_remembered(window, make_window) -> None:
@@ -251,7 +250,7 @@ def test_the_look_is_remembered(window, make_window) -> None:
     close(window)
     again = make_window()
     assert again.theme_name == "light"
-    assert not again.workbench.session.view.state.labels_visible
+    assert not again.workspace.view.state.labels_visible
 
 
 def test_damaged_memory_does_no_harm(make_window, tmp_path) -> None:
@@ -260,7 +259,7 @@ def test_damaged_memory_does_no_harm(make_window, tmp_path) -> None:
         '{"geometry": 3, "theme": "pink", "view": {"outline_visible": 7}}'
     )
     window = make_window()
-    assert window.workbench.session.view.state.outline_visible is True
+    assert window.workspace.view.state.outline_visible is True
     assert window.isVisible()
 
 
@@ -316,17 +315,17 @@ def test_the_window_answers_while_work_goes_on(qtbot, window) -> None:
     timer = QTimer(interval=5)
     timer.timeout.connect(answer)
     timer.start()
-    task = window.workbench.jobs.submit(work)
+    task = window.workspace.jobs.submit(work)
     settle(qtbot, window)
     timer.stop()
     assert task.result, "on the thread of the window, work would have waited for its answers in vain"
 
 
 def test_work_can_be_stopped(qtbot, window) -> None:
-    window.workbench.jobs.submit(Slow())
+    window.workspace.jobs.submit(Slow())
     qtbot.waitUntil(lambda: window.status.work.bar.isVisible())
     QTest.mouseClick(window.status.work.stop, Qt.MouseButton.LeftButton)
-    qtbot.waitUntil(lambda: not window.workbench.jobs.running)
+    qtbot.waitUntil(lambda: not window.workspace.jobs.running)
     assert not window.status.work.bar.isVisible()
 
 
@@ -339,9 +338,9 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
         window = make_plain(None, atlas=False)
         window.ui.prompts = Answers()
         window.show()
-        window.workbench.open_volume(ball_volume())
+        window.workspace.scan.begin(ball_volume())
         settle(qtbot, window)
-        remains += [weakref.ref(window.grid.scene_view.scene), weakref.ref(window.workbench)]
+        remains += [weakref.ref(window.grid.scene_view.scene), weakref.ref(window.workspace)]
         close(window)
         del window
     gc.collect()
@@ -372,9 +371,9 @@ def test_a_first_window_fits_the_screen_and_offers_to_open_a_scan(qapp) -> None:
 def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tmp_path) -> None:
     first, file = make_window(), tmp_path / "ball.mha"
     write_ball(file)
-    first.workbench.open_scan(file, spacing=0.25)
+    first.workspace.scan.open(file, spacing=0.25)
     settle(qtbot, first)
-    saved = first.workbench.session.save(tmp_path / "one")
+    saved = first.workspace.document.save(tmp_path / "one")
     close(first)
     window = make_window()
     assert window.rail.step == "scan"
@@ -393,13 +392,13 @@ def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
 
 def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:
     long = Volume.from_parts(ball_volume().array[:, 12:52, 24:40], [0.25] * 3, [0, 0, 0], name="long")
-    window.workbench.open_volume(long)
+    window.workspace.scan.begin(long)
     settle(qtbot, window)
     view = window.grid.slice_views[Plane.AXIAL]
 
     def visit(*layouts: str) -> None:
         for layout in layouts:
-            window.workbench.session.view.update(layout=layout)
+            window.workspace.view.update(layout=layout)
             qtbot.wait(30)
 
     whole = view.shown
@@ -418,11 +417,11 @@ def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) 
 def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make_window, tmp_path) -> None:
     window, file = make_window(), tmp_path / "ball.mha"
     write_ball(file)
-    window.workbench.open_scan(file, spacing=0.25)
+    window.workspace.scan.open(file, spacing=0.25)
     settle(qtbot, window)
-    labelling.place(window.workbench.session, np.array([8.0, 8.0, 8.0]), side=Side.LEFT, code="CA")
-    saved = window.workbench.session.save(tmp_path / "one")
-    window.workbench.open_volume(ball_volume())
+    window.workspace.labels.place(np.array([8.0, 8.0, 8.0]), side=Side.LEFT, code="CA")
+    saved = window.workspace.document.save(tmp_path / "one")
+    window.workspace.scan.begin(ball_volume())
     moved = file.rename(tmp_path / "elsewhere.mha")
     window.ui.open_path(saved)
     settle(qtbot, window)
@@ -434,8 +433,8 @@ def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make
     window.ui.prompts.files = [moved]
     QTest.mouseClick(card.primary, Qt.MouseButton.LeftButton)
     settle(qtbot, window)
-    assert window.workbench.volume is not None
-    assert "CA" in window.workbench.session.landmarks(Side.LEFT)
+    assert window.workspace.scan.volume is not None
+    assert "CA" in window.workspace.document.landmarks(Side.LEFT)
 
 
 def test_high_dpi_pictures_have_as_many_pixels(window) -> None:
@@ -445,11 +444,11 @@ def test_high_dpi_pictures_have_as_many_pixels(window) -> None:
 
 
 def test_another_volume_replaces_the_first(qtbot, window) -> None:
-    labelling.place(window.workbench.session, MIDDLE, side=Side.LEFT, code="CA")
+    window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     other = Volume.from_parts(ball_volume().array, [0.5] * 3, [0, 0, 0], name="other")
-    window.workbench.open_volume(other)
+    window.workspace.scan.begin(other)
     settle(qtbot, window)
-    assert window.workbench.session.state.specimen == "other"
+    assert window.workspace.document.state.specimen == "other"
     assert not window.grid.scene_view.scene.marks.marks
     for view in window.grid.slice_views.values():
         assert view.source.volume is other

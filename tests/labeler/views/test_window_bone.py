@@ -12,7 +12,6 @@ from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
 from gp_labeler.models.view import CUTS
 from gp_labeler.scene.planes import Plane
 
@@ -21,14 +20,14 @@ LEFT_BUTTON, NO_KEYS = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
 @pytest.fixture
 def window(qtbot, one_window, ball):
-    one_window.workbench.open_volume(ball)
+    one_window.workspace.scan.begin(ball)
     one_window.activateWindow()
     settle(qtbot, one_window)
     view = one_window.grid.scene_view
     view.view_from("A")
     view.reset()
     yield one_window
-    one_window.workbench.session.view.update(cut=None, slices_visible=False)
+    one_window.workspace.view.update(cut=None, slices_visible=False)
 
 
 def pixel(view, position) -> QPoint:
@@ -36,7 +35,7 @@ def pixel(view, position) -> QPoint:
 
 
 def placed(window) -> np.ndarray | None:
-    return window.workbench.session.landmarks(Side.LEFT).as_mapping().get("CA")
+    return window.workspace.document.landmarks(Side.LEFT).as_mapping().get("CA")
 
 
 def drag(view, start: QPoint, end: QPoint, modifiers=NO_KEYS) -> None:
@@ -66,11 +65,11 @@ def colour_at(view, position) -> np.ndarray:
 
 @pytest.mark.parametrize("id", [f"view.cut_{plane}" for plane in CUTS])
 def test_the_nearer_half_goes_and_what_lies_inside_is_clicked(window, id) -> None:
-    view, desk = window.grid.scene_view, window.workbench
+    view, workspace = window.grid.scene_view, window.workspace
     letter = {"view.cut_axial": "S", "view.cut_sagittal": "L"}.get(id, "A")
     view.view_from(letter)
     into, up = view.scene.camera.direction, view.scene.camera.up
-    desk.session.set_crosshair(MIDDLE)
+    workspace.view.set_crosshair(MIDDLE)
     whole = colour_at(view, MIDDLE + 4.5 * up)
     assert window.commands.run(id)
     cut_face = colour_at(view, MIDDLE + 4.5 * up)
@@ -80,18 +79,18 @@ def test_the_nearer_half_goes_and_what_lies_inside_is_clicked(window, id) -> Non
     QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, MIDDLE))
     assert np.linalg.norm(placed(window) - (MIDDLE + 3.0 * into)) < VOXEL_MM  # the far wall of the hollow
     assert window.commands.run(id)  # once more leaves it whole
-    assert desk.session.view.state.cut is None
+    assert workspace.view.state.cut is None
     assert np.abs(colour_at(view, MIDDLE + 4.5 * up) - whole).max() < 4
 
 
 def test_a_cut_is_turned_moved_and_forgotten_with_the_specimen(qtbot, window, ball) -> None:
-    view, desk = window.grid.scene_view, window.workbench
-    desk.session.set_crosshair(MIDDLE)
+    view, workspace = window.grid.scene_view, window.workspace
+    workspace.view.set_crosshair(MIDDLE)
     window.commands.run("view.cut_coronal")
-    first = desk.session.view.state.cut
+    first = workspace.view.state.cut
     assert first.normal == (0, 1, 0)  # looking from the front, what lies behind stays
     window.commands.run("view.cut_flip")
-    assert desk.session.view.state.cut.normal == (0, -1, 0)
+    assert workspace.view.state.cut.normal == (0, -1, 0)
     scene = view.scene
     assert scene.pick(*scene.display_of(MIDDLE[None])[0]).point[1] == pytest.approx(MIDDLE[1] - 6, abs=0.1)
     window.commands.run("view.cut_flip")
@@ -100,15 +99,15 @@ def test_a_cut_is_turned_moved_and_forgotten_with_the_specimen(qtbot, window, ba
                         Qt.KeyboardModifier.AltModifier, Qt.ScrollPhase.NoScrollPhase, False)  # fmt: skip
     before = view.scene.camera.state()
     QApplication.sendEvent(view, wheel)
-    assert desk.session.view.state.cut.origin[1] == pytest.approx(MIDDLE[1] + 2 * VOXEL_MM)
+    assert workspace.view.state.cut.origin[1] == pytest.approx(MIDDLE[1] + 2 * VOXEL_MM)
     assert view.scene.camera.state() == before  # Alt+wheel moves the cut and zooms nothing
     window.commands.run("view.cut_here")
-    assert desk.session.view.state.cut == first
+    assert workspace.view.state.cut == first
     window.commands.run("view.cut_deeper")
-    assert desk.session.view.state.cut.origin[1] == pytest.approx(MIDDLE[1] + 0.5)
-    desk.open_volume(ball)
+    assert workspace.view.state.cut.origin[1] == pytest.approx(MIDDLE[1] + 0.5)
+    workspace.scan.begin(ball)
     settle(qtbot, window)
-    assert desk.session.view.state.cut is None
+    assert workspace.view.state.cut is None
     assert view.scene.bone.cut is None
 
 
@@ -116,7 +115,7 @@ def test_what_a_cut_lays_open_is_seen_no_more_through_bone(window) -> None:
     scene = window.grid.scene_view.scene
     inside, behind = MIDDLE + np.array([0.0, 0.5, 0]), MIDDLE + np.array([0, 5.0, 0])
     assert scene.hidden([inside, behind]).tolist() == [True, True]
-    window.workbench.session.set_crosshair(MIDDLE)
+    window.workspace.view.set_crosshair(MIDDLE)
     window.commands.run("view.cut_coronal")
     assert scene.hidden([inside, behind]).tolist() == [False, True]
 
@@ -125,22 +124,22 @@ def test_the_mesh_card_cuts_and_shows_the_cut(window) -> None:
     card = window._scan.mesh
     assert not any(button.isChecked() for button in card.cut.planes.values())
     card.cut.planes["axial"].click()
-    assert window.workbench.session.view.state.cut.plane == "axial"
+    assert window.workspace.view.state.cut.plane == "axial"
     assert card.cut.planes["axial"].isChecked()
     assert "axial" in card.cut.where.text()
     card.cut.flip.click()
     card.cut.planes["sagittal"].click()
     assert [p for p, button in card.cut.planes.items() if button.isChecked()] == ["sagittal"]
     card.cut.planes["sagittal"].click()
-    assert window.workbench.session.view.state.cut is None
+    assert window.workspace.view.state.cut is None
     card.checks["slices_visible"].click()
-    assert window.workbench.session.view.state.slices_visible
+    assert window.workspace.view.state.slices_visible
 
 
 def test_a_click_on_a_slice_in_3d_places_on_it_and_slices_hide_bone(window) -> None:
-    view, desk = window.grid.scene_view, window.workbench
+    view, workspace = window.grid.scene_view, window.workspace
     view.scene.camera.rotate(100, 60)
-    desk.session.set_crosshair(MIDDLE - np.array([0, 7.0, 0]))  # before the ball
+    workspace.view.set_crosshair(MIDDLE - np.array([0, 7.0, 0]))  # before the ball
     window.commands.run("view.slices_visible")
     view.grab()
     assert len(view.scene.slices.images) == 3
@@ -183,19 +182,23 @@ def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, w
 
 @pytest.mark.parametrize("plane", list(Plane))
 def test_a_point_placed_on_bone_stays_on_it_when_dragged_on_a_slice(window, plane) -> None:
-    view, session = window.grid.slice_views[plane], window.workbench.session
+    view, document, labels = (
+        window.grid.slice_views[plane],
+        window.workspace.document,
+        window.workspace.labels,
+    )
     away = 0.6 * BALL_MM * plane.right + 0.8 * BALL_MM * plane.down
     start = MIDDLE + away
-    labelling.place(session, start, How.MESH, side=Side.LEFT, code="CA")
-    session.set_crosshair(start)
+    labels.place(start, How.MESH, side=Side.LEFT, code="CA")
+    window.workspace.view.set_crosshair(start)
     beside = MIDDLE + 1.15 * BALL_MM * plane.right - 0.2 * plane.down
     drag(view, pixel(view, start), pixel(view, beside))
     there = placed(window)
     assert abs(np.linalg.norm(there - MIDDLE) - BALL_MM) < VOXEL_MM / 4
     assert (there - MIDDLE) @ plane.right > 0.98 * BALL_MM
     assert abs((there - start)[plane.axis]) <= VOXEL_MM / 2 + 1e-9
-    assert session.state.landmark(Side.LEFT, "CA").provenance.how is How.MESH
-    session.undo()
+    assert document.state.landmark(Side.LEFT, "CA").provenance.how is How.MESH
+    document.undo()
     np.testing.assert_array_equal(placed(window), start)  # one edit
     drag(view, pixel(view, start), pixel(view, MIDDLE + 0.1 * plane.right))  # into the hollow: on its wall
     assert np.linalg.norm(placed(window) - MIDDLE) == pytest.approx(3.0, abs=VOXEL_MM / 2)
@@ -203,10 +206,14 @@ def test_a_point_placed_on_bone_stays_on_it_when_dragged_on_a_slice(window, plan
 
 @pytest.mark.parametrize("key", [Qt.KeyboardModifier.AltModifier, Qt.KeyboardModifier.ShiftModifier])
 def test_alt_or_shift_lets_a_dragged_point_leave_the_bone(window, key) -> None:
-    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
+    view, document, labels = (
+        window.grid.slice_views[Plane.AXIAL],
+        window.workspace.document,
+        window.workspace.labels,
+    )
     start, free = MIDDLE + np.array([0, BALL_MM, 0]), MIDDLE + np.array([4.5, 0.5, 0])
-    labelling.place(session, start, How.MESH, side=Side.LEFT, code="CA")
-    session.set_crosshair(start)
+    labels.place(start, How.MESH, side=Side.LEFT, code="CA")
+    window.workspace.view.set_crosshair(start)
     drag(view, pixel(view, start), pixel(view, free), key)
     assert np.abs(placed(window) - free)[:2].max() < VOXEL_MM
-    assert session.state.landmark(Side.LEFT, "CA").provenance.how is How.SLICE
+    assert document.state.landmark(Side.LEFT, "CA").provenance.how is How.SLICE

@@ -10,7 +10,6 @@ from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
 from gp_labeler.models.workflow import Active
 from gp_labeler.scene.planes import Plane
 
@@ -37,9 +36,9 @@ def on_ball(*direction: float) -> np.ndarray:
 
 @pytest.fixture
 def window(qtbot, one_window, ball):
-    one_window.workbench.set_tool("place")
-    one_window.workbench.session.view.update(layout="four-up")
-    one_window.workbench.open_volume(ball)
+    one_window.workspace.interaction.set_tool("place")
+    one_window.workspace.view.update(layout="four-up")
+    one_window.workspace.scan.begin(ball)
     one_window.activateWindow()
     settle(qtbot, one_window)
     return one_window
@@ -53,27 +52,27 @@ def scene(window):
 
 
 def placed(window, code="CA", side=Side.LEFT):
-    landmarks = window.workbench.session.landmarks(side)
+    landmarks = window.workspace.document.landmarks(side)
     return landmarks.as_mapping().get(code)
 
 
 def test_a_click_where_a_landmark_is_seen_places_it_there(window, scene) -> None:
     for code, direction in (("CA", (0, -1, 0)), ("RWP", (0.5, -1, 0.3)), ("OS", (-0.4, -1, -0.5))):
-        assert window.workbench.session.active.code == code
+        assert window.workspace.labels.active.code == code
         known = on_ball(*direction)
         QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, known))
         assert np.linalg.norm(placed(window, code) - known) < VOXEL_MM
-    assert window.workbench.session.state.landmark(Side.LEFT, "CA").provenance.how is How.MESH
+    assert window.workspace.document.state.landmark(Side.LEFT, "CA").provenance.how is How.MESH
 
 
 @pytest.mark.parametrize("plane", list(Plane))
 def test_a_click_on_a_slice_places_on_it(window, plane) -> None:
     view = window.grid.slice_views[plane]
     known = MIDDLE + np.array([2.1, -1.7, 1.3])
-    window.workbench.session.set_crosshair(known)
+    window.workspace.view.set_crosshair(known)
     QTest.mouseClick(view, LEFT_BUTTON, pos=pixel(view, known))
     assert np.abs(placed(window) - known).max() < VOXEL_MM
-    assert window.workbench.session.state.landmark(Side.LEFT, "CA").provenance.how is How.SLICE
+    assert window.workspace.document.state.landmark(Side.LEFT, "CA").provenance.how is How.SLICE
 
 
 def test_left_is_on_the_right_of_the_screen(window) -> None:
@@ -107,7 +106,7 @@ def test_a_miss_places_nothing(window, scene) -> None:
     axial = window.grid.slice_views[Plane.AXIAL]
     QTest.mouseClick(axial, LEFT_BUTTON, pos=QPoint(2, 2))  # beside the scan
     assert placed(window) is None
-    assert window.workbench.session.undo_text is None
+    assert window.workspace.document.undo_text is None
     assert window.status.next_click.text() == "Click on bone or a slice to place CA left"  # and nobody scolds
 
 
@@ -128,7 +127,7 @@ def test_undo_and_redo_by_keys(qtbot, window, scene) -> None:
     scene.setFocus()
     QTest.keyClick(scene, Qt.Key.Key_Z, Qt.KeyboardModifier.ControlModifier)
     assert placed(window) is None
-    assert window.workbench.session.active == Active(Side.LEFT, "CA")
+    assert window.workspace.labels.active == Active(Side.LEFT, "CA")
     QTest.keyClick(scene, Qt.Key.Key_Y, Qt.KeyboardModifier.ControlModifier)
     np.testing.assert_array_equal(placed(window), where)
 
@@ -141,7 +140,7 @@ def test_a_dragged_point_stays_on_the_bone_and_is_one_edit(window, scene) -> Non
     assert np.linalg.norm(placed(window) - end) < VOXEL_MM
     assert abs(np.linalg.norm(placed(window) - MIDDLE) - BALL_MM) < VOXEL_MM / 4
     np.testing.assert_array_equal(scene.scene.camera.direction, before)
-    window.workbench.session.undo()
+    window.workspace.document.undo()
     assert np.linalg.norm(placed(window) - start) < VOXEL_MM
 
 
@@ -159,18 +158,18 @@ def test_escape_lets_a_dragged_point_go_back(window, scene) -> None:
     where = pixel(scene, start)
     QTest.mousePress(scene, LEFT_BUTTON, pos=where)
     QTest.mouseMove(scene, where + QPoint(30, 0))
-    assert window.workbench.drag is not None
+    assert window.workspace.interaction.drag is not None
     QTest.keyClick(scene, Qt.Key.Key_Escape)
     QTest.mouseRelease(scene, LEFT_BUTTON, pos=where + QPoint(30, 0))
     np.testing.assert_array_equal(placed(window), before)
-    np.testing.assert_array_equal(window.workbench.session.crosshair, before)
+    np.testing.assert_array_equal(window.workspace.view.crosshair, before)
 
 
 def test_a_point_dragged_on_a_slice_keeps_its_depth(window) -> None:
-    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
+    view, labels = window.grid.slice_views[Plane.AXIAL], window.workspace.labels
     start = MIDDLE + np.array([1.0, 1.0, 0.1])
-    labelling.place(session, start, How.SLICE, side=Side.LEFT, code="CA")
-    session.set_crosshair(MIDDLE)
+    labels.place(start, How.SLICE, side=Side.LEFT, code="CA")
+    window.workspace.view.set_crosshair(MIDDLE)
     to = MIDDLE + np.array([3.0, -1.0, 0.1])
     drag(view, pixel(view, start), pixel(view, to))
     assert np.abs(placed(window) - to).max() < VOXEL_MM
@@ -179,94 +178,102 @@ def test_a_point_dragged_on_a_slice_keeps_its_depth(window) -> None:
 
 def test_locked_points_cannot_be_dragged(window, scene) -> None:
     start = on_ball(0, -1, 0)
-    labelling.place(window.workbench.session, start, side=Side.LEFT, code="CA")
-    labelling.lock(window.workbench.session, side=Side.LEFT, code="CA")
+    window.workspace.labels.place(start, side=Side.LEFT, code="CA")
+    window.workspace.labels.lock(side=Side.LEFT, code="CA")
     drag(scene, pixel(scene, start), pixel(scene, on_ball(0.6, -1, 0.3)))
     np.testing.assert_array_equal(placed(window), start)
 
 
 def test_arrow_keys_nudge_a_voxel_at_a_time(window) -> None:
-    view, session = window.grid.slice_views[Plane.CORONAL], window.workbench.session
-    labelling.place(session, MIDDLE, How.SLICE, side=Side.LEFT, code="CA")
+    view, document, labels = (
+        window.grid.slice_views[Plane.CORONAL],
+        window.workspace.document,
+        window.workspace.labels,
+    )
+    labels.place(MIDDLE, How.SLICE, side=Side.LEFT, code="CA")
     view.setFocus()
     for key in (Qt.Key.Key_Right, Qt.Key.Key_Right, Qt.Key.Key_Up):
         QTest.keyClick(view, key)
     np.testing.assert_allclose(placed(window) - MIDDLE, [2 * VOXEL_MM, 0, VOXEL_MM], atol=1e-9)
-    session.undo()
+    document.undo()
     np.testing.assert_allclose(placed(window), MIDDLE)  # nudges in a row are one edit
 
 
 def test_arrow_keys_move_the_crosshair_where_nothing_is_placed(window) -> None:
-    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
-    session.set_crosshair(MIDDLE)
+    view = window.grid.slice_views[Plane.AXIAL]
+    window.workspace.view.set_crosshair(MIDDLE)
     view.setFocus()
     QTest.keyClick(view, Qt.Key.Key_Left)
-    np.testing.assert_allclose(session.crosshair - MIDDLE, [-VOXEL_MM, 0, 0], atol=1e-9)
+    np.testing.assert_allclose(window.workspace.view.crosshair - MIDDLE, [-VOXEL_MM, 0, 0], atol=1e-9)
 
 
 def test_a_double_click_maximises_and_takes_its_point_back(window, scene) -> None:
     where = pixel(scene, on_ball(0, -1, 0))
     QTest.mouseClick(scene, LEFT_BUTTON, pos=where)
     QTest.mouseDClick(scene, LEFT_BUTTON, pos=where)
-    assert window.workbench.session.view.state.layout == "3d"
+    assert window.workspace.view.state.layout == "3d"
     assert placed(window) is None
     assert not window.grid.frames["axial"].isVisible()
     QTest.mouseDClick(window.grid.frames["3d"].header, LEFT_BUTTON)
-    assert window.workbench.session.view.state.layout == "four-up"
+    assert window.workspace.view.state.layout == "four-up"
     assert window.grid.frames["axial"].isVisible()
 
 
 def test_a_click_on_a_point_chooses_it_once_nothing_waits_to_be_placed_there(window, scene) -> None:
-    session = window.workbench.session
-    labelling.place(session, on_ball(0, -1, 0), side=Side.LEFT, code="CA")
-    labelling.place(session, on_ball(0.7, -1, 0), side=Side.LEFT, code="CB")
-    window.workbench.go_to(Side.LEFT, "CB")
+    labels = window.workspace.labels
+    labels.place(on_ball(0, -1, 0), side=Side.LEFT, code="CA")
+    labels.place(on_ball(0.7, -1, 0), side=Side.LEFT, code="CB")
+    window.workspace.labels.go_to(Side.LEFT, "CB")
     QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, on_ball(0, -1, 0)))
-    assert session.active == Active(Side.LEFT, "CA")
+    assert labels.active == Active(Side.LEFT, "CA")
 
 
 def test_letters_do_what_the_sheet_says(window, scene) -> None:
-    session, mesh = window.workbench.session, window.workbench.surfaces
+    mesh, document, labels = (
+        window.workspace.bone.surfaces,
+        window.workspace.document,
+        window.workspace.labels,
+    )
     scene.setFocus()
     for key in (Qt.Key.Key_W, Qt.Key.Key_J, Qt.Key.Key_E):  # VTK's own letters change nothing in 3D
         QTest.keyClick(scene, key)
-    assert window.workbench.tool == "grey"
-    assert window.workbench.surfaces is mesh
+    assert window.workspace.interaction.tool == "grey"
+    assert window.workspace.bone.surfaces is mesh
     QTest.keyClick(scene, Qt.Key.Key_P)
-    assert window.workbench.tool == "place"
+    assert window.workspace.interaction.tool == "place"
     QTest.keyClick(scene, Qt.Key.Key_X)
-    assert "CA" in session.landmarks(Side.LEFT).unseen
-    before = session.active
+    assert "CA" in document.landmarks(Side.LEFT).unseen
+    before = labels.active
     QTest.keyClick(scene, Qt.Key.Key_N)
-    assert session.active != before
+    assert labels.active != before
     QTest.keyClick(scene, Qt.Key.Key_Z)
-    assert session.view.state.layout == "axial"
+    assert window.workspace.view.state.layout == "axial"
     QTest.keyClick(window.grid.slice_views[Plane.AXIAL], Qt.Key.Key_V)
-    assert session.view.state.layout == "four-up"
+    assert window.workspace.view.state.layout == "four-up"
 
 
 def test_enter_suggests_the_ghost(qtbot, window) -> None:
-    window.workbench.load_atlas()
+    window.workspace.atlas.load()
     settle(qtbot, window)
-    session, scene = window.workbench.session, window.grid.scene_view
+    scene, document, labels = window.grid.scene_view, window.workspace.document, window.workspace.labels
     from gp_core.atlas.atlas import Atlas
 
     atlas = Atlas.published()
     for code in ("CA", "RWP", "OS"):
         where = atlas.mean[atlas.codes.index(code)] + MIDDLE
-        labelling.place(session, where, side=Side.LEFT, code=code)
-    code = session.active.code
-    ghost = session.ghosts(Side.LEFT)[code].position
-    np.testing.assert_allclose(session.crosshair, ghost)  # the views went there
+        labels.place(where, side=Side.LEFT, code=code)
+    code = labels.active.code
+    ghost = labels.ghosts(Side.LEFT)[code].position
+    np.testing.assert_allclose(window.workspace.view.crosshair, ghost)  # the views went there
     scene.setFocus()
     QTest.keyClick(scene, Qt.Key.Key_Return)
     assert placed(window, code) is None  # nobody has looked at it
-    np.testing.assert_allclose(session.landmarks(Side.LEFT).suggested[code].position, ghost)
-    code = session.active.code
+    np.testing.assert_allclose(document.landmarks(Side.LEFT).suggested[code].position, ghost)
+    code = labels.active.code
     table = window.steps["label"].table.view
     table.setFocus()
     QTest.keyClick(table, Qt.Key.Key_Return)
-    assert code in session.landmarks(Side.LEFT).suggested
+    assert code in document.landmarks(Side.LEFT).suggested
 
 
 def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
@@ -274,9 +281,9 @@ def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
     from qtpy.QtGui import QWheelEvent
     from qtpy.QtWidgets import QApplication
 
-    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
-    session.set_crosshair(MIDDLE)
-    before = session.crosshair
+    view = window.grid.slice_views[Plane.AXIAL]
+    window.workspace.view.set_crosshair(MIDDLE)
+    before = window.workspace.view.crosshair
     event = QWheelEvent(
         QPointF(50, 50),
         QPointF(50, 50),
@@ -288,14 +295,14 @@ def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
         False,
     )
     QApplication.sendEvent(view, event)
-    assert session.crosshair[2] - before[2] == pytest.approx(VOXEL_MM, abs=0.6 * VOXEL_MM)
+    assert window.workspace.view.crosshair[2] - before[2] == pytest.approx(VOXEL_MM, abs=0.6 * VOXEL_MM)
     coronal = window.grid.slice_views[Plane.CORONAL]
-    assert coronal.pixel_at(session.crosshair)[1] < coronal.pixel_at(before)[1]
+    assert coronal.pixel_at(window.workspace.view.crosshair)[1] < coronal.pixel_at(before)[1]
 
 
 def test_contrast_tool_changes_greys_and_places_nothing(window) -> None:
     view = window.grid.slice_views[Plane.AXIAL]
-    window.workbench.set_tool("grey")
+    window.workspace.interaction.set_tool("grey")
     before = view.window_level()
     middle = pixel(view, MIDDLE)
     drag(view, middle, middle + QPoint(40, 30))
@@ -306,23 +313,23 @@ def test_contrast_tool_changes_greys_and_places_nothing(window) -> None:
 
 
 def test_crosshair_tool_and_shift_move_the_crosshair(window, scene) -> None:
-    view, session = window.grid.slice_views[Plane.AXIAL], window.workbench.session
-    session.set_crosshair(MIDDLE)
-    window.workbench.set_tool("look")
+    view = window.grid.slice_views[Plane.AXIAL]
+    window.workspace.view.set_crosshair(MIDDLE)
+    window.workspace.interaction.set_tool("look")
     there = MIDDLE + np.array([2.0, 1.0, 0.0])
     QTest.mousePress(view, LEFT_BUTTON, pos=pixel(view, there))
     QTest.mouseRelease(view, LEFT_BUTTON, pos=pixel(view, there))
-    assert np.abs(session.crosshair - there).max() < VOXEL_MM
+    assert np.abs(window.workspace.view.crosshair - there).max() < VOXEL_MM
     assert placed(window) is None
     QTest.mouseClick(scene, LEFT_BUTTON, pos=pixel(scene, on_ball(0.2, -1, 0)))
-    assert np.linalg.norm(session.crosshair - on_ball(0.2, -1, 0)) < VOXEL_MM
+    assert np.linalg.norm(window.workspace.view.crosshair - on_ball(0.2, -1, 0)) < VOXEL_MM
     assert placed(window) is None
 
 
 def test_hovering_tells_position_voxel_and_value(window) -> None:
     view = window.grid.slice_views[Plane.AXIAL]
     there = MIDDLE + np.array([4.0, 1.0, 0.0])
-    window.workbench.session.set_crosshair(there)
+    window.workspace.view.set_crosshair(there)
     QTest.mouseMove(view, pixel(view, there))
     assert "voxel" in window.status.where.text()
     assert window.status.where.text().endswith("1400")
@@ -331,13 +338,13 @@ def test_hovering_tells_position_voxel_and_value(window) -> None:
 
 
 def test_a_resting_pointer_tells_what_comes_to_lie_under_it(window, scene, qtbot) -> None:
-    session, told = window.workbench.session, window.status.where
+    told = window.status.where
     view = window.grid.slice_views[Plane.AXIAL]
-    session.set_crosshair(MIDDLE)
+    window.workspace.view.set_crosshair(MIDDLE)
     QTest.mouseMove(view, pixel(view, MIDDLE + np.array([4.0, 1.0, 0.0])))
     before = told.text()
     assert before.endswith("1400")
-    session.set_crosshair(MIDDLE + np.array([0.0, 0.0, 5.5]))
+    window.workspace.view.set_crosshair(MIDDLE + np.array([0.0, 0.0, 5.5]))
     assert told.text() != before
     assert told.text().endswith("600"), "beside the ball"
     view.zoom_to(MIDDLE + np.array([0.0, 0.0, 5.5]), 0.5)
@@ -353,18 +360,18 @@ def test_a_resting_pointer_tells_what_comes_to_lie_under_it(window, scene, qtbot
 
 
 def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
-    session = window.workbench.session
+    labels = window.workspace.labels
     where = on_ball(1, 0.2, 0.4)
-    labelling.place(session, where, side=Side.RIGHT, code="FPA")
-    session.set_crosshair(MIDDLE)
+    labels.place(where, side=Side.RIGHT, code="FPA")
+    window.workspace.view.set_crosshair(MIDDLE)
     view = window.grid.slice_views[Plane.CORONAL]
     view.shown = view.shown.zoomed(6)
     table = window.steps["label"].table
     rows = (table.model.index(row, 2) for row in range(20))
     row = next(index for index in rows if table.target_of(index)[1] == "FPA")
     QTest.mouseClick(table.view.viewport(), LEFT_BUTTON, pos=table.view.visualRect(row).center())
-    assert session.active == Active(Side.RIGHT, "FPA")
-    np.testing.assert_allclose(session.crosshair, where)
+    assert labels.active == Active(Side.RIGHT, "FPA")
+    np.testing.assert_allclose(window.workspace.view.crosshair, where)
     x, y = view.pixel_at(where)
     assert 0 < x < view.width()
     assert 0 < y < view.height()
@@ -377,9 +384,9 @@ def test_a_right_click_on_a_point_offers_its_menu(window, scene) -> None:
     from qtpy.QtWidgets import QApplication, QMenu
 
     where = on_ball(0, -1, 0)
-    labelling.place(window.workbench.session, where, side=Side.LEFT, code="CA")
+    window.workspace.labels.place(where, side=Side.LEFT, code="CA")
     for view in (scene, window.grid.slice_views[Plane.CORONAL]):
-        window.workbench.session.set_crosshair(where)
+        window.workspace.view.set_crosshair(where)
         QTest.mouseClick(view, Qt.MouseButton.RightButton, pos=pixel(view, where))
         menu = QApplication.activePopupWidget()
         assert isinstance(menu, QMenu)
@@ -396,8 +403,8 @@ def test_points_can_grow_with_the_zoom(window) -> None:
 
 def test_looking_closely_brings_the_point_near_in_every_view(window, scene) -> None:
     where = on_ball(0.3, -1, 0.2)
-    labelling.place(window.workbench.session, where, side=Side.LEFT, code="CA")
-    window.workbench.go_to(Side.LEFT, "CA")
+    window.workspace.labels.place(where, side=Side.LEFT, code="CA")
+    window.workspace.labels.go_to(Side.LEFT, "CA")
     window.commands.run("view.zoom_to_point")
     for view in window.grid.views:
         x, y = view.pixel_at(where)
@@ -408,14 +415,14 @@ def test_looking_closely_brings_the_point_near_in_every_view(window, scene) -> N
 def test_the_slider_goes_through_the_slices(window) -> None:
     from gp_labeler.views.slice_slider import SliceSlider
 
-    session, frame = window.workbench.session, window.grid.frames["axial"]
+    frame = window.grid.frames["axial"]
     slider = frame.header.findChild(SliceSlider)
     assert slider.maximum() == 63
-    session.set_crosshair(MIDDLE)
+    window.workspace.view.set_crosshair(MIDDLE)
     before = slider.value()
     slider.setValue(before + 8)
-    assert session.crosshair[2] - MIDDLE[2] == pytest.approx(8 * VOXEL_MM, abs=VOXEL_MM)
-    np.testing.assert_allclose(session.crosshair[:2], MIDDLE[:2])
+    assert window.workspace.view.crosshair[2] - MIDDLE[2] == pytest.approx(8 * VOXEL_MM, abs=VOXEL_MM)
+    np.testing.assert_allclose(window.workspace.view.crosshair[:2], MIDDLE[:2])
     frame.view.step(-8)
     assert slider.value() == before
 

@@ -14,7 +14,6 @@ from window_cases import MIDDLE, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
-from gp_labeler.models import labelling
 from gp_labeler.models.workflow import PointState
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.drawn import drawn_marks
@@ -28,16 +27,16 @@ AWAY = MIDDLE + np.array([-2.0, 2.2, 0.125])
 @pytest.fixture
 def suggested(window):
     """The ball with MN suggested at `INSIDE`, seen from so far away that nobody can judge it."""
-    session = window.workbench.session
-    labelling.suggest(session, INSIDE, radius_95=0.8, source="atlas", side=L, code="MN")
-    window.workbench.go_to(L, "MN")
+    labels = window.workspace.labels
+    labels.suggest(INSIDE, radius_95=0.8, source="atlas", side=L, code="MN")
+    window.workspace.labels.go_to(L, "MN")
     for view in window.grid.views:
         view.zoom_to(INSIDE, 100.0)
     return window
 
 
 def status_of(window, code):
-    return window.workbench.session.point_states(L, wait=False)[code]
+    return window.workspace.labels.point_states(L, wait=False)[code]
 
 
 def click(view, position) -> None:
@@ -70,14 +69,14 @@ def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(qtbot, sug
     settle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.PLACED
-    assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.CONFIRMED
-    np.testing.assert_array_equal(suggested.workbench.session.landmarks(L)["MN"], INSIDE)
+    assert suggested.workspace.document.state.landmark(L, "MN").provenance.how is How.CONFIRMED
+    np.testing.assert_array_equal(suggested.workspace.document.landmarks(L)["MN"], INSIDE)
 
 
 def test_enters_without_a_picture_in_between_confirm_nothing(qtbot, suggested) -> None:
-    desk, axial = suggested.workbench, axial_of(suggested)
-    labelling.suggest(desk.session, AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
-    desk.go_to(L, "MN")
+    workspace, axial = suggested.workspace, axial_of(suggested)
+    workspace.labels.suggest(AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
+    workspace.labels.go_to(L, "MN")
     axial.setFocus()
     for _ in range(4):
         QTest.keyClick(axial, Qt.Key.Key_Return)
@@ -90,24 +89,24 @@ def test_enters_without_a_picture_in_between_confirm_nothing(qtbot, suggested) -
 
 
 def test_another_point_than_the_one_that_is_chosen_is_shown_first(qtbot, suggested) -> None:
-    desk = suggested.workbench
-    labelling.suggest(desk.session, INSIDE, radius_95=0.8, source="atlas", side=L, code="ZL")
-    desk.go_to(L, "MN")
+    workspace = suggested.workspace
+    workspace.labels.suggest(INSIDE, radius_95=0.8, source="atlas", side=L, code="ZL")
+    workspace.labels.go_to(L, "MN")
     suggested.grid.bring_close(INSIDE)
     settle(qtbot, suggested)
-    assert not desk.confirm(L, "ZL")  # of the menu
+    assert not workspace.interaction.confirm(L, "ZL")  # of the menu
     settle(qtbot, suggested)
-    assert desk.confirm(L, "ZL")
+    assert workspace.interaction.confirm(L, "ZL")
 
 
 def test_a_swap_says_which_suggestions_it_drops(suggested) -> None:
-    desk = suggested.workbench
-    labelling.suggest(desk.session, AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
-    desk.swap(L, "MN", "ZL")
+    workspace = suggested.workspace
+    workspace.labels.suggest(AWAY, radius_95=0.8, source="atlas", side=L, code="ZL")
+    workspace.labels.swap(L, "MN", "ZL")
     assert suggested.status.next_click.text() == (
         "The suggestions of MN and ZL were dropped; undo brings them back"
     )
-    desk.session.undo()
+    workspace.document.undo()
     assert status_of(suggested, "ZL") is PointState.SUGGESTED
 
 
@@ -125,10 +124,10 @@ def test_a_key_that_is_held_down_confirms_nothing(suggested) -> None:
 
 
 def test_a_slice_elsewhere_does_not_show_the_point(qtbot, suggested) -> None:
-    desk, axial = suggested.workbench, axial_of(suggested)
-    desk.confirm(L, "MN")  # brings it close
-    desk.session.set_crosshair(INSIDE + np.array([3.0, 3.0, 2.0]))
-    desk.session.view.update(layout="axial")
+    workspace, axial = suggested.workspace, axial_of(suggested)
+    workspace.interaction.confirm(L, "MN")  # brings it close
+    workspace.view.set_crosshair(INSIDE + np.array([3.0, 3.0, 2.0]))
+    workspace.view.update(layout="axial")
     assert not suggested.grid.can_judge(INSIDE)
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Return)
@@ -139,17 +138,17 @@ def test_a_slice_elsewhere_does_not_show_the_point(qtbot, suggested) -> None:
 
 
 def test_what_bone_hides_in_the_3d_view_is_judged_on_slices(qtbot, suggested) -> None:
-    desk, scene = suggested.workbench, suggested.grid.scene_view
-    desk.session.view.update(layout="3d")
+    workspace, scene = suggested.workspace, suggested.grid.scene_view
+    workspace.view.update(layout="3d")
     settle(qtbot, suggested)
     scene.setFocus()
     for _ in range(3):
         if status_of(suggested, "MN") is PointState.PLACED:
             break
-        assert desk.session.view.state.layout == "3d" or suggested.grid.can_judge(INSIDE)
+        assert workspace.view.state.layout == "3d" or suggested.grid.can_judge(INSIDE)
         QTest.keyClick(scene, Qt.Key.Key_Return)
         settle(qtbot, suggested)
-    assert desk.session.view.state.layout == "four-up"
+    assert workspace.view.state.layout == "four-up"
     assert status_of(suggested, "MN") is PointState.PLACED
 
 
@@ -178,16 +177,16 @@ def test_a_dragged_suggestion_is_placed_and_escape_leaves_it_suggested(suggested
     QTest.keyClick(axial, Qt.Key.Key_Escape)
     QTest.mouseRelease(axial, Qt.MouseButton.LeftButton, pos=QPoint(x + 20, y))
     assert status_of(suggested, "MN") is PointState.SUGGESTED
-    np.testing.assert_allclose(suggested.workbench.session.crosshair, INSIDE)
+    np.testing.assert_allclose(suggested.workspace.view.crosshair, INSIDE)
     QTest.mousePress(axial, Qt.MouseButton.LeftButton, pos=QPoint(x, y))
     QTest.mouseMove(axial, QPoint(x + 20, y))
     QTest.mouseRelease(axial, Qt.MouseButton.LeftButton, pos=QPoint(x + 20, y))
     assert status_of(suggested, "MN") is PointState.PLACED
-    assert suggested.workbench.session.state.landmark(L, "MN").provenance.how is How.SLICE
+    assert suggested.workspace.document.state.landmark(L, "MN").provenance.how is How.SLICE
 
 
 def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(qtbot, suggested) -> None:
-    desk, axial = suggested.workbench, axial_of(suggested)
+    workspace, axial = suggested.workspace, axial_of(suggested)
     axial.zoom_to(INSIDE, 10.0)
     click(axial, INSIDE)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
@@ -195,7 +194,7 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(qtbo
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.PLACED
-    assert desk.session.undo()
+    assert workspace.document.undo()
     elsewhere = INSIDE + np.array([1.0, 1.0, 0.0])
     click(axial, elsewhere)
     QTest.keyClick(axial, Qt.Key.Key_Space)
@@ -203,7 +202,7 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(qtbo
     QTest.keyClick(suggested, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
     click(axial, elsewhere)
     assert status_of(suggested, "MN") is PointState.PLACED
-    np.testing.assert_allclose(desk.session.landmarks(L)["MN"], elsewhere, atol=0.1)
+    np.testing.assert_allclose(workspace.document.landmarks(L)["MN"], elsewhere, atol=0.1)
 
 
 def test_from_afar_an_arrow_key_brings_a_suggestion_close_and_moves_nothing(qtbot, suggested) -> None:
@@ -217,17 +216,17 @@ def test_from_afar_an_arrow_key_brings_a_suggestion_close_and_moves_nothing(qtbo
 
 
 def test_an_arrow_key_after_a_correction_moves_the_point_that_was_corrected(suggested) -> None:
-    desk, axial = suggested.workbench, axial_of(suggested)
-    labelling.suggest(desk.session, AWAY, radius_95=5.0, source="atlas", side=L, code="IN")
-    desk.go_to(L, "MN")
+    workspace, axial = suggested.workspace, axial_of(suggested)
+    workspace.labels.suggest(AWAY, radius_95=5.0, source="atlas", side=L, code="IN")
+    workspace.labels.go_to(L, "MN")
     axial.zoom_to(INSIDE, 10.0)
     QTest.keyClick(suggested, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
     click(axial, INSIDE + np.array([1.0, 1.0, 0.0]))
-    before = desk.session.landmarks(L)["MN"]
+    before = workspace.document.landmarks(L)["MN"]
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "IN") is PointState.SUGGESTED
-    assert np.linalg.norm(desk.session.landmarks(L)["MN"] - before) > 0
+    assert np.linalg.norm(workspace.document.landmarks(L)["MN"] - before) > 0
 
 
 # Files of earlier versions
@@ -240,17 +239,17 @@ def test_the_window_says_once_that_accepted_ghosts_are_suggestions_now(qtbot, wi
     file = tmp_path / "old.gpspecimen.json"
     file.write_text(json.dumps(content))
     said = []
-    window.workbench.message.connect(lambda text, level: said.append((text, level)))
-    window.workbench.open_specimen(file)
+    window.workspace.messages.said.connect(lambda text, level: said.append((text, level)))
+    window.workspace.open_specimen(file)
     settle(qtbot, window)
     assert [text for text, level in said if "accepted ghost" in text and level == "warning"] == [
         "1 point was an accepted ghost that nobody had confirmed: it counts as a suggestion now (CA L). "
         "Confirm or correct each in the table."
     ]
-    assert window.workbench.session.progress(L).text == "1 placed, 1 suggested"
-    window.workbench.session.save()
-    window.workbench.begin()
-    window.workbench.open_specimen(file)
+    assert window.workspace.labels.progress(L).text == "1 placed, 1 suggested"
+    window.workspace.document.save()
+    window.workspace.document.begin()
+    window.workspace.open_specimen(file)
     assert sum("accepted ghost" in text for text, _ in said) == 1
 
 
@@ -258,7 +257,7 @@ def test_the_window_says_once_that_accepted_ghosts_are_suggestions_now(qtbot, wi
 
 
 def test_it_has_a_shape_of_its_own_everywhere(suggested) -> None:
-    (mark,) = drawn_marks(suggested.workbench)
+    (mark,) = drawn_marks(suggested.workspace)
     assert (mark.key, mark.state) == ("L:MN", "suggested")
     table = suggested.steps["label"].table
     row = [table.model.index(n, 1) for n in range(table.model.rowCount())]
@@ -267,17 +266,17 @@ def test_it_has_a_shape_of_its_own_everywhere(suggested) -> None:
     axial = axial_of(suggested)
     axial.zoom_to(INSIDE, 10.0)
     x, y = (int(n) for n in axial.pixel_at(INSIDE))
-    labelling.go_to(suggested.workbench.session, L, "CA")  # without the ring of the chosen one
+    suggested.workspace.labels.choose(L, "CA")  # without the ring of the chosen one
     before = axial.grab().toImage().copy(x - 8, y - 8, 17, 17)
-    labelling.confirm(suggested.workbench.session, side=L, code="MN")
+    suggested.workspace.labels.confirm(side=L, code="MN")
     after = axial.grab().toImage().copy(x - 8, y - 8, 17, 17)
     assert before.pixelColor(8, 8) != after.pixelColor(8, 8)  # open, then full
 
 
 def test_the_export_dialog_leaves_suggestions_out_unless_ticked(suggested, tmp_path) -> None:
-    desk = suggested.workbench
-    labelling.place(desk.session, AWAY, How.SLICE, side=L, code="CA")
-    dialog = ExportDialog(desk, tmp_path)
+    workspace = suggested.workspace
+    workspace.labels.place(AWAY, How.SLICE, side=L, code="CA")
+    dialog = ExportDialog(workspace, tmp_path)
     assert not dialog.suggested.isChecked()
     assert "_suggested" not in dialog.files.text()
     dialog.suggested.setChecked(True)
@@ -295,14 +294,14 @@ def test_the_export_dialog_leaves_suggestions_out_unless_ticked(suggested, tmp_p
 @pytest.fixture
 def placed(window):
     """The ball with CA placed at `INSIDE` and its row chosen, in the step Label."""
-    window.workbench.session.view.update(auto_advance=False)
-    labelling.place(window.workbench.session, INSIDE, How.SLICE, side=L, code="CA")
-    window.workbench.go_to(L, "CA")
+    window.workspace.view.update(auto_advance=False)
+    window.workspace.labels.place(INSIDE, How.SLICE, side=L, code="CA")
+    window.workspace.labels.go_to(L, "CA")
     return window
 
 
 def position_of(window):
-    return window.workbench.session.landmarks(L)["CA"]
+    return window.workspace.document.landmarks(L)["CA"]
 
 
 @pytest.mark.parametrize("name", ["axial", "3d"])
@@ -311,7 +310,7 @@ def test_a_click_elsewhere_leaves_a_placed_point_where_it_is(placed, name) -> No
     assert hover(view, AWAY) is Qt.CursorShape.ArrowCursor
     click(view, AWAY)
     np.testing.assert_array_equal(position_of(placed), INSIDE)
-    assert not np.allclose(placed.workbench.session.crosshair, INSIDE)  # it looks there
+    assert not np.allclose(placed.workspace.view.crosshair, INSIDE)  # it looks there
     assert "CA left is placed" in placed.status.next_click.text()
 
 
@@ -325,7 +324,7 @@ def test_a_point_is_re_placed_by_one_click_on_purpose(placed) -> None:
     np.testing.assert_allclose(position_of(placed), AWAY, atol=0.1)
     click(axial, INSIDE + np.array([0.0, 3.0, 0.0]))
     np.testing.assert_allclose(position_of(placed), AWAY, atol=0.1)  # one click, no more
-    placed.workbench.session.undo()
+    placed.workspace.document.undo()
     np.testing.assert_array_equal(position_of(placed), INSIDE)
 
 
@@ -333,23 +332,23 @@ def test_a_point_is_re_placed_by_one_click_on_purpose(placed) -> None:
 def test_re_placing_can_be_thought_better_of(placed, think_better) -> None:
     axial = axial_of(placed)
     placed.commands.run("point.replace")
-    assert placed.workbench.replacing
+    assert placed.workspace.interaction.replacing
     if think_better == "escape":
         axial.setFocus()
         QTest.keyClick(axial, Qt.Key.Key_Escape)
     elif think_better == "again":
         placed.commands.run("point.replace")
     elif think_better == "other row":
-        placed.workbench.go_to(L, "CB")
+        placed.workspace.labels.go_to(L, "CB")
     else:
         placed.set_step("pose")
-    assert not placed.workbench.replacing
+    assert not placed.workspace.interaction.replacing
     click(axial, AWAY)
     np.testing.assert_array_equal(position_of(placed), INSIDE)
 
 
 def test_a_locked_point_is_not_re_placed(placed) -> None:
-    labelling.lock(placed.workbench.session)
+    placed.workspace.labels.lock()
     assert not placed.commands.run("point.replace")
     assert not placed.commands.actions["point.place"].isEnabled()
 
@@ -359,22 +358,22 @@ def test_a_locked_point_is_not_re_placed(placed) -> None:
 def test_a_click_outside_the_step_label_looks_and_places_nothing(window, step, name) -> None:
     view = window.grid.scene_view if name == "3d" else axial_of(window)
     window.set_step(step)
-    before = window.workbench.session.state
+    before = window.workspace.document.state
     where = MIDDLE - [0, 6.0, 0] if name == "3d" else INSIDE
     window.grid.scene_view.view_from("A")
     assert hover(view, where) is Qt.CursorShape.ArrowCursor
     click(view, where)
-    assert window.workbench.session.state is before
-    np.testing.assert_allclose(window.workbench.session.crosshair, where, atol=0.3)
+    assert window.workspace.document.state is before
+    np.testing.assert_allclose(window.workspace.view.crosshair, where, atol=0.3)
 
 
 def test_p_goes_back_to_the_step_where_clicks_place(window) -> None:
     window.set_step("scan")
     QTest.keyClick(window, Qt.Key.Key_P)
     assert window.rail.step == "label"
-    assert window.workbench.tool == "place"
+    assert window.workspace.interaction.tool == "place"
     click(axial_of(window), INSIDE)
-    assert window.workbench.session.progress(L).n_placed == 1
+    assert window.workspace.labels.progress(L).n_placed == 1
 
 
 def test_on_the_scan_is_off_again_in_another_step(window) -> None:
@@ -384,5 +383,5 @@ def test_on_the_scan_is_off_again_in_another_step(window) -> None:
     assert window.status.next_click.text().startswith("Click on bone or a slice where")
     window.set_step("atlas")
     click(axial_of(window), INSIDE)
-    assert not window.workbench.session.state.touches
-    assert not window.workbench.session.state.landmarks
+    assert not window.workspace.document.state.touches
+    assert not window.workspace.document.state.landmarks

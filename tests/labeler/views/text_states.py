@@ -20,7 +20,6 @@ from gp_labeler.document import touching
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.touches import TouchHow
 from gp_labeler.imaging.readers import inspect_volume
-from gp_labeler.models import labelling
 from gp_labeler.models.workflow import Active
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.main_window import MainWindow
@@ -62,10 +61,10 @@ def walk_states(window: MainWindow, folder: Path, look: Look) -> None:
     look : callable
         Is given the name of each state, and the widget that shows it.
     """
-    desk = window.workbench
+    workspace = window.workspace
     _without_scan(window, look)
-    desk.use_atlas(ATLAS)
-    desk.open_volume(grey_volume())
+    workspace.atlas.use(ATLAS)
+    workspace.scan.begin(grey_volume())
     _settle(window)
     _scan(window, look)
     _label(window, look)
@@ -77,7 +76,7 @@ def walk_states(window: MainWindow, folder: Path, look: Look) -> None:
 
 def _settle(window: MainWindow) -> None:
     end = time.monotonic() + 180
-    while window.workbench.jobs.running and time.monotonic() < end:
+    while window.workspace.jobs.running and time.monotonic() < end:
         QApplication.processEvents()
         time.sleep(0.005)
     QApplication.processEvents()
@@ -87,7 +86,7 @@ def _without_scan(window: MainWindow, look: Look) -> None:
     look("first page", window)
     window.set_step("atlas")
     look("atlas, alone, being loaded", window)
-    window.workbench.use_atlas(ATLAS)
+    window.workspace.atlas.use(ATLAS)
     look("atlas, alone", window)
     window.set_step("pose")
     look("pose, alone, nothing touched", window)
@@ -96,7 +95,7 @@ def _without_scan(window: MainWindow, look: Look) -> None:
         _touch(window, code, animal[code] + THERE)
     _settle(window)
     look("pose, alone, estimated", window)
-    touching.clear_touches(window.workbench.session, LEFT)
+    touching.clear_touches(window.workspace.document, LEFT)
     window.set_step("scan")
 
 
@@ -107,75 +106,75 @@ def _scan(window: MainWindow, look: Look) -> None:
     look("scan, cut", window)
     window.commands.run("view.cut_axial")
     for layout in ("axial", "four-up"):
-        window.workbench.session.view.update(layout=layout)
+        window.workspace.view.update(layout=layout)
         look(f"layout {layout}", window)
     window.grid.hovered.emit(np.array([-12.34, 23.45, -34.56]))
     look("pointer over a slice", window)
 
 
 def _label(window: MainWindow, look: Look) -> None:
-    desk, session = window.workbench, window.workbench.session
+    workspace, document, labels = window.workspace, window.workspace.document, window.workspace.labels
     window.set_step("label")
     look("label, nothing placed", window)
-    place(desk, "CA", "CB", "RWP")
+    place(workspace, "CA", "CB", "RWP")
     _settle(window)
     for state, code, edit in (
         ("ghost", "RWA", lambda: None),
         ("placed", "CA", lambda: None),
         ("checked", "CB", lambda: window.commands.run("point.check")),
         ("locked", "RWP", lambda: window.commands.run("point.lock")),
-        ("unseen", "RWM", lambda: labelling.mark_unseen(session, side=LEFT, code="RWM")),
+        ("unseen", "RWM", lambda: labels.mark_unseen(side=LEFT, code="RWM")),
     ):
-        session.set_active(Active(LEFT, code))
+        labels.set_active(Active(LEFT, code))
         edit()
         _settle(window)
         look(f"label, {state}", window)
-    labelling.accept_all_ghosts(session, side=LEFT)
-    session.set_active(Active(LEFT, "MN"))
+    labels.accept_all_ghosts(side=LEFT)
+    labels.set_active(Active(LEFT, "MN"))
     _settle(window)
     look("label, suggested", window)
-    desk.arm_replacing()
+    workspace.interaction.arm_replacing()
     look("label, re-placing", window)
-    desk.arm_replacing(False)
-    session.undo()
-    place(desk, "OS", "LLI", "RWA")
-    labelling.place(session, np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
+    workspace.interaction.arm_replacing(False)
+    document.undo()
+    place(workspace, "OS", "LLI", "RWA")
+    labels.place(np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
     _settle(window)
-    session.set_active(Active(LEFT, "OI"))
+    labels.set_active(Active(LEFT, "OI"))
     look("label, doubtful", window)
-    labelling.suggest(session, in_scan("DTM"), radius_95=0.8, source="atlas", side=LEFT, code="DTM")
-    session.set_active(Active(LEFT, "DTM"))
+    labels.suggest(in_scan("DTM"), radius_95=0.8, source="atlas", side=LEFT, code="DTM")
+    labels.set_active(Active(LEFT, "DTM"))
     _settle(window)
     look("label, suggested", window)
     for code in ("RWA", "DTL", "IN", "ZL", "MN", "FPP"):
-        session.set_active(Active(RIGHT, code))
+        labels.set_active(Active(RIGHT, code))
         look(f"label, {code} right", window.steps["label"])
-    place(desk, "CA", "CB", "RWA", "RWP", "OS", side=RIGHT)
+    place(workspace, "CA", "CB", "RWA", "RWP", "OS", side=RIGHT)
     _settle(window)
     look("label, both sides", window)
 
 
 def _messages(window: MainWindow, look: Look) -> None:
-    desk = window.workbench
-    desk.say("Exported 40 points to GP-014_L.mrk.json and GP-014_R.mrk.json")
+    workspace = window.workspace
+    workspace.say("Exported 40 points to GP-014_L.mrk.json and GP-014_R.mrk.json")
     look("message", window)
-    desk.say(
+    workspace.say(
         f"/home/anatomy/2024/scans/{LONG_NAME}.nrrd: the values end before the header says they do: got "
         "5123 kB, expected 9123 kB. Copy the file again from the scanner, or export it there once more.",
         "error",
     )
     look("long error", window)
-    desk.set_tool("grey")
+    workspace.interaction.set_tool("grey")
     look("instruction, contrast", window)
-    desk.set_tool("place")
+    workspace.interaction.set_tool("place")
 
 
 def _touch(window: MainWindow, name: str, position: np.ndarray) -> None:
-    window.workbench.pose.record(position, TouchHow.TYPED, name=name)
+    window.workspace.pose.record(position, TouchHow.TYPED, name=name)
 
 
 def _pose(window: MainWindow, look: Look) -> None:
-    desk, session = window.workbench, window.workbench.session
+    workspace, document = window.workspace, window.workspace.document
     window.set_step("pose")
     look("pose, nothing touched", window)
     animal = {code: in_scan(code) for code in ("CA", "CB", *PROBE)}
@@ -184,14 +183,14 @@ def _pose(window: MainWindow, look: Look) -> None:
     for code in PROBE:
         _touch(window, code, moved[code] + 0.05 * rng.normal(size=3))
     for n, corner in enumerate(np.eye(3) * 9, 1):
-        touching.record_touch(session, LEFT, f"S{n}", corner)
+        touching.record_touch(document, LEFT, f"S{n}", corner)
     _settle(window)
     look("pose, estimated", window)
     window.judge_pose("accept")
-    touching.leave_out(session, LEFT, "OS", True)
+    touching.leave_out(document, LEFT, "OS", True)
     _settle(window)
     look("pose, one left out, judged", window)
-    touching.leave_out(session, LEFT, "OS", False)
+    touching.leave_out(document, LEFT, "OS", False)
     _touch(window, "MN", moved["MN"] + [3.0, 0, 0])
     _settle(window)
     look("pose, a mistouch", window)
@@ -199,43 +198,43 @@ def _pose(window: MainWindow, look: Look) -> None:
     _touch(window, "OS", moved["MN"])
     _settle(window)
     look("pose, names exchanged", window)
-    desk.pose.choose(side=RIGHT)
+    workspace.pose.choose(side=RIGHT)
     for code in PROBE:
         _touch(window, code, moved[code])
     _settle(window)
     look("pose, wrong side", window)
-    desk.pose.choose(side=LEFT)
+    workspace.pose.choose(side=LEFT)
     for code in PROBE:
         _touch(window, code, moved[code])
     window.steps["pose"].touches.model.show_skull(True)
     window.steps["pose"].touches.refresh()
-    desk.pose.choose(registration="skull")
+    workspace.pose.choose(registration="skull")
     _settle(window)
     look("pose, skull features", window)
-    desk.pose.choose(registration="auto", methods=("robust", "jrmpc"))
+    workspace.pose.choose(registration="auto", methods=("robust", "jrmpc"))
     _settle(window)
     look("pose, both methods, no animals", window)
-    desk.atlas_problem = f"The atlas of {LONG_NAME}.json cannot be had any more: it does not exist."
-    desk.atlas_details_changed.emit()
+    workspace.atlas.problem = f"The atlas of {LONG_NAME}.json cannot be had any more: it does not exist."
+    workspace.atlas.details_changed.emit()
     look("pose, atlas gone", window)
-    desk.set_tool("touch")
+    workspace.interaction.set_tool("touch")
     look("pose, touching on the scan", window)
-    desk.set_tool("look")
+    workspace.interaction.set_tool("look")
 
 
 def _atlas(window: MainWindow, folder: Path, look: Look) -> None:
-    desk = window.workbench
+    workspace = window.workspace
     window.set_step("atlas")
     look("atlas, chosen one gone", window)
-    desk.use_atlas(ATLAS)
+    workspace.atlas.use(ATLAS)
     look("atlas", window)
     animals = write_animals(folder / "animals", drawn_animals(3))
     (animals / "torn_L.mrk.json").write_text("{")
-    desk.fit_atlas([animals])
+    workspace.atlas.fit([animals])
     look("atlas, being fitted", window)
     _settle(window)
     look("atlas, fitted", window)
-    desk.try_atlas()
+    workspace.atlas.try_out()
     _settle(window)
     look("atlas, tried out", window)
     window.set_step("pose")
@@ -255,10 +254,10 @@ def _dialogs(window: MainWindow, folder: Path, look: Look) -> None:
 
 
 def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], QWidget]]:
-    desk = window.workbench
+    workspace = window.workspace
     out = folder / "out"
     out.mkdir(exist_ok=True)
-    export_landmarks(desk.session.state, out)
+    export_landmarks(workspace.document.state, out)
     file = next(out.glob("*_L.mrk.json"))
     bad = folder / f"{LONG_NAME}.mrk.json"
     bad.write_text("{")
@@ -268,23 +267,23 @@ def _dialog_makers(window: MainWindow, folder: Path) -> dict[str, Callable[[], Q
     saving = SimpleNamespace(save_file=lambda *_: None)
 
     def off() -> QWidget:
-        dialog = LandmarkImportDialog(desk, [file], off_bone, parent=window)
+        dialog = LandmarkImportDialog(workspace, [file], off_bone, parent=window)
         dialog.take.click()
         return dialog
 
     return {
-        "export": lambda: ExportDialog(desk, folder, parent=window),
-        "export, files there": lambda: ExportDialog(desk, out, parent=window),
-        "import landmarks": lambda: LandmarkImportDialog(desk, [file], parent=window),
+        "export": lambda: ExportDialog(workspace, folder, parent=window),
+        "export, files there": lambda: ExportDialog(workspace, out, parent=window),
+        "import landmarks": lambda: LandmarkImportDialog(workspace, [file], parent=window),
         "import landmarks, off the bone": off,
-        "import landmarks, other names": lambda: LandmarkImportDialog(desk, [theirs], parent=window),
-        "import landmarks, torn": lambda: LandmarkImportDialog(desk, [bad], parent=window),
-        "open a stack": lambda: ImportDialog(desk, inspect_volume(_stack(folder)), parent=window),
+        "import landmarks, other names": lambda: LandmarkImportDialog(workspace, [theirs], parent=window),
+        "import landmarks, torn": lambda: LandmarkImportDialog(workspace, [bad], parent=window),
+        "open a stack": lambda: ImportDialog(workspace, inspect_volume(_stack(folder)), parent=window),
         "recover": lambda: RecoverDialog(_recoveries(), window),
-        "tracker": lambda: TrackerDialog(desk, window.memory, window),
+        "tracker": lambda: TrackerDialog(workspace, window.memory, window),
         "keys": lambda: ShortcutsSheet(window),
-        "guide": lambda: GuideWindow(desk, window),
-        "physical test": lambda: PhysicalDialog(desk, saving, window),
+        "guide": lambda: GuideWindow(workspace, window),
+        "physical test": lambda: PhysicalDialog(workspace, saving, window),
     }
 
 

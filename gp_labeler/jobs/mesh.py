@@ -1,0 +1,169 @@
+"""Jobs that make and write meshes of bone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_core.validation import FloatArray
+from gp_labeler.imaging.mesh_files import read_mesh
+from gp_labeler.imaging.progress import Progress as Told
+from gp_labeler.imaging.stand_in import coarse_surface
+from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, extract_isosurface, overview_stride
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.loading import load_modules
+from gp_labeler.jobs.runner import Progress
+
+__all__ = ["MeshEars", "MeshFirst", "MeshOverview", "Meshes", "ReadMesh", "SaveMesh"]
+
+FIRST_LOOK_VOXELS = 96**3
+"""A mesh of so many voxels is there in a moment, and turns smoothly without a graphics card."""
+
+
+QUICK_TRIANGLES = 45_000
+
+
+@dataclass(frozen=True)
+class Meshes:
+    """The bone as it is drawn: parts that do not overlap, and a coarse stand-in while the camera moves."""
+
+    parts: tuple[Surface, ...] = ()
+    quick: tuple[Surface, ...] = ()
+
+
+@dataclass(frozen=True)
+class MeshFirst:
+    """Mesh a scan so coarsely that there is something to see at once."""
+
+    volume: Volume
+    threshold: float
+    smallest_mm: float = SMALLEST_PART_MM
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "First look"
+
+    def run(self, progress: Progress) -> Meshes:
+        """Mesh few voxels; nothing, where so coarse a look shows no bone."""
+        stride = overview_stride(self.volume, FIRST_LOOK_VOXELS)
+        return Meshes(_mesh_if_any(self, progress, stride=stride))
+
+
+@dataclass(frozen=True)
+class MeshOverview:
+    """Mesh a whole scan as finely as can be turned by hand."""
+
+    volume: Volume
+    threshold: float
+    smallest_mm: float = SMALLEST_PART_MM
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Making the bone surface"
+
+    def run(self, progress: Progress) -> Meshes:
+        """Mesh all of it, and a stand-in of few triangles."""
+        stride = overview_stride(self.volume)
+        whole = _mesh(self, progress, end=0.8, stride=stride)
+        if whole.n_triangles <= QUICK_TRIANGLES:
+            return Meshes((whole,))
+        progress(0.9)
+        return Meshes((whole,), (coarse_surface(whole, QUICK_TRIANGLES),))
+
+
+@dataclass(frozen=True, eq=False)
+class MeshEars:
+    """Mesh boxes around the ears at full resolution, and cut them out of the overview."""
+
+    volume: Volume
+    threshold: float
+    overview: Meshes
+    boxes: Mapping[Side, FloatArray]
+    smallest_mm: float
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        ears = " and ".join(side.word for side in self.boxes)
+        return f"{ears.capitalize()} ear{'s' if len(self.boxes) > 1 else ''} at full resolution"
+
+    def run(self, progress: Progress) -> Meshes:
+        """Mesh the boxes."""
+        rest, ears = list(self.overview.parts), []
+        for n, box in enumerate(self.boxes.values()):
+            start, end = n / len(self.boxes), (n + 1) / len(self.boxes)
+            ear = _mesh(self, progress, start=start, end=end, box=box)
+            rest = [part.outside(ear.region) for part in rest]
+            ears.append(ear)
+        parts = tuple(part.prepare() for part in (*rest, *ears) if part.n_triangles)
+        return Meshes(parts, self.overview.quick)
+
+
+@dataclass(frozen=True, eq=False)
+class SaveMesh:
+    """Write the whole bone surface at full resolution."""
+
+    volume: Volume
+    threshold: float
+    path: Path
+    smallest_mm: float = SMALLEST_PART_MM
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Writing {self.path.name}"
+
+    def run(self, progress: Progress) -> Path:
+        """Mesh and write."""
+        _mesh(self, progress, end=0.9).save(self.path)
+        return self.path
+
+
+class _Meshing(Protocol):
+    """A job that meshes."""
+
+    @property
+    def volume(self) -> Volume: ...
+    @property
+    def threshold(self) -> float: ...
+    @property
+    def smallest_mm(self) -> float: ...
+
+
+def _mesh(job: _Meshing, progress: Progress, *, start: float = 0.0, end: float = 1.0, **how: Any) -> Surface:
+    """Mesh as one part, from `start` to `end`, of a job."""
+    load_modules("gp_labeler.imaging.islands")
+    told: Told = lambda fraction: progress(start + (end - start) * fraction)  # noqa: E731
+    how["smallest_mm"] = job.smallest_mm
+    return extract_isosurface(job.volume, job.threshold, progress=told, cancel=progress.cancelled, **how)
+
+
+def _mesh_if_any(job: _Meshing, progress: Progress, **how: Any) -> tuple[Surface, ...]:
+    """Mesh coarsely; where bone is too thin to be seen like that there is none."""
+    try:
+        return (_mesh(job, progress, **how),)
+    except GpError:
+        return ()
+
+
+@dataclass(frozen=True)
+class ReadMesh:
+    """Read a mesh."""
+
+    path: Path
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Reading {self.path.name}"
+
+    def run(self, progress: Progress) -> Any:
+        """Read."""
+        progress(0.0)
+        return read_mesh(self.path)

@@ -1,0 +1,23 @@
+"""What the models tell the user, and what was written to disk."""
+
+from __future__ import annotations
+
+from psygnal import Signal
+
+from gp_core.terminal import printable
+
+__all__ = ["Messages"]
+
+
+class Messages:
+    """Announces texts for the user, and files."""
+
+    said = Signal(str, str)
+    """Text, and ``info``, ``warning`` or ``error``."""
+    wrote = Signal(str, object)
+    """What was written, and its file: ``pose``, ``report``, ``path`` (to follow with the robot), ``atlas`` or
+    ``picture``; ``landmarks`` comes with the `ExportReport`."""
+
+    def say(self, text: str, level: str = "info") -> None:
+        """Tell the user something."""
+        self.said.emit(printable(text), level)

@@ -1,0 +1,141 @@
+"""The estimate of a side from its touches: settings, atlas, and the `Estimate` that belongs to them now."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from gp_core.atlas.atlas import Atlas
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import Specimen
+from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS
+from gp_core.pose.systematic_error import Systematic
+from gp_core.validation import check_option
+from gp_labeler.document.state import SpecimenState
+from gp_labeler.document.touch_edits import LeaveOutTouch
+from gp_labeler.models.estimate import REGISTRATIONS, Estimate, EstimateSettings, apart, make_estimate
+
+__all__ = ["PoseEstimator"]
+
+FEWEST_TOUCHES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """The estimate that was made last, and what it was made of."""
+
+    state: SpecimenState
+    chosen: EstimateSettings
+    side: Side
+    key: tuple[Any, ...]
+    estimate: Estimate | None
+
+    def is_of(self, state: SpecimenState, chosen: EstimateSettings, side: Side) -> bool:
+        """Whether nothing at all changed; asked dozens of times a touch."""
+        return self.state is state and self.chosen is chosen and self.side is side
+
+
+class PoseEstimator:
+    """Estimates the cochlea of a side when asked, and remembers it until something it is made of changes.
+
+    ``jrmpc`` is used only once `joint_ready`: the first one on a machine compiles for seconds, which is a
+    job's work.
+    """
+
+    def __init__(self) -> None:
+        self.settings = EstimateSettings()
+        self.joint_ready = False
+        self._atlas: Atlas | None = None
+        self._specimens: tuple[Specimen, ...] = ()
+        self._known: dict[Side, RigidTransform] = {}
+        self._made: _Made | None = None
+
+    def choose(self, **fields: Any) -> bool:
+        """Change settings, fields of `EstimateSettings`; return whether they differ.
+
+        Raises
+        ------
+        GpError
+            A value is not allowed.
+        """
+        settings = replace(self.settings, **fields)
+        noise = settings.probe_noise
+        if noise is not None and not 0 < noise < 20:
+            raise GpError(f"probe noise must lie between 0 and 20 mm, got {noise!r}")
+        Systematic(settings.shared_error)  # refuses what is not allowed
+        for method in settings.methods:
+            check_option(method, "method", METHODS)
+        check_option(settings.registration, "registration", REGISTRATIONS)
+        check_option(settings.round_window, "round window", ROUND_WINDOWS)
+        differs = settings != self.settings
+        if differs:
+            self.settings = settings
+        return differs
+
+    def use_atlas(self, atlas: Atlas, specimens: Sequence[Specimen] = ()) -> None:
+        """Take another atlas, with the labelled animals it was fitted to where they are known."""
+        self._atlas, self._specimens, self._made = atlas, tuple(specimens), None
+
+    def set_joint_ready(self) -> None:
+        """Say that JRMPC is compiled."""
+        self.joint_ready, self._made = True, None
+
+    def set_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
+        """Say how the tracker lies to the scan, where that is known otherwise than from points."""
+        self._known.pop(side, None)
+        if T_scan_tracker is not None:
+            self._known[side] = T_scan_tracker
+        self._made = None
+
+    def forget_registrations(self) -> None:
+        """Forget how the tracker lies to the scan: it is another scan."""
+        self._known.clear()
+        self._made = None
+
+    def waiting_text(self, state: SpecimenState) -> str:
+        """Return what is still wanting for an estimate, in words; empty where there is one."""
+        n = len(state.touched(self.settings.side).placed)
+        if n < FEWEST_TOUCHES:
+            more = FEWEST_TOUCHES - n
+            return f"{more} more touch{'' if more == 1 else 'es'} for an estimate"
+        return "Loading the atlas" if self._atlas is None else ""
+
+    def of_side(self, state: SpecimenState, side: Side) -> Estimate | None:
+        """Return the estimate of a side; None without an atlas or with fewer than three touches."""
+        chosen, made = self.settings, self._made
+        if made is not None and made.is_of(state, chosen, side):
+            return made.estimate
+        settings = replace(chosen, side=side)
+        if not self.joint_ready:
+            settings = replace(settings, methods=_without_joint(settings.methods))
+        key = (state.touches, state.skull, state.landmarks, settings)
+        estimate = made.estimate if made is not None and made.key == key else self._make(state, settings)
+        self._made = _Made(state, chosen, side, key, estimate)
+        return estimate
+
+    def without(self, state: SpecimenState, name: str) -> tuple[float, float] | None:
+        """Return by how much the pose moves, mm and degrees, if a touch is left out, or taken in again."""
+        current = self.of_side(state, self.settings.side)
+        touch = state.touches.get((self.settings.side, name))
+        if current is None or current.pose is None or touch is None or name not in current.atlas.codes:
+            return None
+        state = LeaveOutTouch(current.side, name, not touch.left_out).apply(state)
+        if len(state.touched(current.side).placed) < FEWEST_TOUCHES:
+            return None
+        settings = replace(current.settings, methods=(current.pose.method,))
+        other = make_estimate(state, settings, current.atlas, self._specimens).pose
+        mine = current.pose
+        return None if other is None else apart(mine.origin, mine.axis, other.origin, other.axis)
+
+    def _make(self, state: SpecimenState, settings: EstimateSettings) -> Estimate | None:
+        if self._atlas is None or len(state.touched(settings.side).placed) < FEWEST_TOUCHES:
+            return None
+        known = self._known.get(settings.side)
+        return make_estimate(state, settings, self._atlas, self._specimens, known=known)
+
+
+def _without_joint(methods: tuple[str, ...]) -> tuple[str, ...]:
+    return tuple(method for method in methods if method != "jrmpc") or ("robust",)
