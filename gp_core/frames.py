@@ -15,7 +15,7 @@ from gp_core.validation import FloatArray, as_points
 
 __all__ = ["FRAMES", "RigidTransform", "angle_between_deg", "cross_matrix", "mirror_x"]
 
-FRAMES = ("scan", "tracker", "cochlea", "window", "atlas")
+FRAMES = ("scan", "head", "tracker", "cochlea", "window", "atlas")
 
 _ORTHONORMAL_TOLERANCE = 1e-6
 

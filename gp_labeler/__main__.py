@@ -15,6 +15,7 @@ from gp_core.terminal import leave_output, plain_terminal
 from gp_labeler.export_command import run_export
 from gp_labeler.installation import explain_import
 from gp_labeler.mesh_command import run_mesh
+from gp_labeler.phantom_command import run_phantom
 from gp_labeler.plain_numbers import use_plain_numbers
 
 __all__ = ["main", "make_parser"]
@@ -25,6 +26,7 @@ _EXAMPLE = """examples:
   gp-labeler --demo                   the window with a synthetic head
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
+  gp-labeler phantom -o head.nrrd            a synthetic head with its truth; see gp-labeler phantom --help
   gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
   gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
   gp-labeler doctor                   what this machine has, and what it lacks
@@ -78,6 +80,8 @@ def _run(arguments: Sequence[str] | None) -> int:
     try:
         if given[:1] == ["mesh"]:
             return run_mesh(given[1:])
+        if given[:1] == ["phantom"]:
+            return run_phantom(given[1:])
         if given[:1] == ["export"]:
             return run_export(given[1:])
         if given[:1] == ["simulate-tracker"]:

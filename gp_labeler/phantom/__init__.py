@@ -1,5 +1,7 @@
-"""A synthetic guinea-pig head scan: the demo, the tutorial and the test scan."""
+"""Synthetic guinea-pig head scans with their truth: the demo, the tutorial, and the test scans."""
 
-from gp_labeler.phantom.phantom import Phantom, make_phantom, write_phantom
+from gp_labeler.phantom.files import save_phantom, write_phantom
+from gp_labeler.phantom.phantom import Phantom, make_phantom
+from gp_labeler.phantom.variation import SWITCHES, USUAL, HeadVariation
 
-__all__ = ["Phantom", "make_phantom", "write_phantom"]
+__all__ = ["SWITCHES", "USUAL", "HeadVariation", "Phantom", "make_phantom", "save_phantom", "write_phantom"]

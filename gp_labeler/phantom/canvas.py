@@ -121,6 +121,16 @@ class Canvas:
             out[k] = np.clip(np.rint(noisy), 0, 65535)
         return out
 
+    def part(self, axis: int, kept: slice) -> Canvas:
+        """Return the part of the canvas at some voxels along x (0), y (1) or z (2)."""
+        axes = [a[kept] if n == axis else a for n, a in enumerate(self.axes)]
+        index: list[slice] = [slice(None)] * 3
+        index[2 - axis] = kept
+        part = Canvas([a[0] for a in axes], [a[0] for a in axes], self.spacing, 0.0)
+        part.origin, part.axes = np.array([a[0] for a in axes]), axes
+        part.grey = np.ascontiguousarray(self.grey[tuple(index)])
+        return part
+
     @property
     def extent(self) -> FloatArray:
         """(2, 3) LPS mm: centres of the first and the last voxel."""

@@ -32,12 +32,16 @@ _RECESS = 0.85
 _LIMB = 0.24
 
 
-def paint_ear(canvas: Canvas, ear: Ear) -> None:
-    """Paint one ear, from the bone outside to the ossicles inside."""
+def paint_ear(canvas: Canvas, ear: Ear, thickness: float = 1.0) -> None:
+    """Paint one ear, from the bone outside to the ossicles inside.
+
+    The wall of the bulla grows outwards by the factor `thickness`: the cavity stays.
+    """
     cochlea, canal, cavity = Cochlea(ear), _canal(ear), _cavity(ear)
     recess = _recess(ear, cochlea)
     canals = _semicircular(ear)
-    outer = [inset(cavity, -_BULLA_WALL), inset(recess, -_BULLA_WALL), *_petrous(ear)]
+    wall = _BULLA_WALL * thickness
+    outer = [inset(cavity, -wall), inset(recess, -wall), *_petrous(ear)]
     canvas.paint(union([*outer, *(tube(line, 0.5) for line in canals)]), grey.BONE)
     canvas.paint(union([cavity, recess]), grey.AIR)
     depth = _canal_depth(ear, canal)

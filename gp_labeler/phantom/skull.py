@@ -46,10 +46,13 @@ def paint_skin(canvas: Canvas, head: HeadLayout) -> None:
         canvas.paint(ellipsoid(ear.at((13.0, 21.5, 5.8)), head.semi_axes(1.7, 2.1, 2.1)), grey.LENS)
 
 
-def paint_skull(canvas: Canvas, head: HeadLayout) -> None:
-    """Paint braincase and snout as one shell, the brain, the nose, and the openings."""
+def paint_skull(canvas: Canvas, head: HeadLayout, thickness: float = 1.0) -> None:
+    """Paint braincase and snout as one shell, the brain, the nose, and the openings.
+
+    The wall grows inwards by the factor `thickness`: its outer surface stays.
+    """
     outer = _skull(head)
-    inner = inset(outer, _SKULL_WALL * head.scale)
+    inner = inset(outer, _SKULL_WALL * thickness * head.scale)
     front, back = head.at((0, _CRIBRIFORM, 4)), head.at((0, _CRIBRIFORM - 1, 4))
     forward = unit(front - back)
     canvas.paint(outer, grey.BONE)

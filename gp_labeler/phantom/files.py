@@ -1,0 +1,142 @@
+"""A phantom on disk: the scan, and the truth beside it."""
+
+from __future__ import annotations
+
+import json
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from gp_core.disk import atomic_file, write_text
+from gp_core.errors import GpError
+from gp_core.io.markups import write_markups
+from gp_core.landmarks.features import Side
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.phantom.phantom import Phantom
+
+__all__ = ["save_phantom", "scan_name", "write_phantom"]
+
+_FORMATS = (".nrrd", ".nii.gz", ".nii", ".mha")
+
+
+def write_phantom(phantom: Phantom, directory: str | PathLike[str]) -> tuple[Path, Path, Path]:
+    """Write a phantom into a folder, by its own name, with its landmarks; see `save_phantom`.
+
+    Returns
+    -------
+    volume, left, right : Path
+        ``<name>.nrrd``, ``<name>_L.mrk.json``, ``<name>_R.mrk.json``; beside them ``<name>.truth.json``.
+
+    Raises
+    ------
+    GpError
+        The folder cannot be written to.
+    """
+    volume, _, left, right = save_phantom(
+        phantom, Path(directory) / f"{phantom.specimen.name}.nrrd", labelled=True
+    )
+    return volume, left, right
+
+
+def save_phantom(phantom: Phantom, path: str | PathLike[str], *, labelled: bool = False) -> tuple[Path, ...]:
+    """Write a phantom's scan, with the truth beside it.
+
+    Parameters
+    ----------
+    phantom : Phantom
+    path : path
+        ``.nrrd``, ``.nii.gz``, ``.nii`` or ``.mha``; folders are made.
+    labelled : bool
+        Also write the true landmarks as landmark JSON, one file a side, as if a person had labelled the scan.
+
+    Returns
+    -------
+    tuple of Path
+        The scan, ``<name>.truth.json``, and if labelled ``<name>_L.mrk.json`` and ``<name>_R.mrk.json``.
+
+    Raises
+    ------
+    GpError
+        The format is not known, or a file cannot be written.
+    """
+    scan = Path(path)
+    ending = next((e for e in _FORMATS if scan.name.lower().endswith(e)), None)
+    if ending is None:
+        raise GpError(
+            f"a phantom is written as {', '.join(_FORMATS)}", file=scan, remedy="Change the ending."
+        )
+    name = scan.name[: -len(ending)]
+    try:
+        scan.parent.mkdir(parents=True, exist_ok=True)
+        _write_volume(phantom.volume, scan)
+    except (OSError, RuntimeError) as error:
+        raise GpError(f"the phantom cannot be written ({error})", file=scan) from None
+    about = _about(phantom.volume, scan)
+    truth = scan.with_name(f"{name}.truth.json")
+    write_text(truth, json.dumps(_truth(phantom, about), indent=1) + "\n")
+    if not labelled:
+        return scan, truth
+    left, right = (scan.with_name(f"{name}_{side.value}.mrk.json") for side in Side)
+    for side, file in ((Side.LEFT, left), (Side.RIGHT, right)):
+        write_markups(file, phantom.specimen.side(side), specimen=name, volume=about)
+    return scan, truth, left, right
+
+
+def scan_name(path: Path) -> str:
+    """Return the name of a scan without its ending.
+
+    Raises
+    ------
+    GpError
+        No phantom is written in this format.
+    """
+    ending = next((e for e in _FORMATS if path.name.lower().endswith(e)), None)
+    if ending is None:
+        raise GpError(
+            f"a phantom is written as {', '.join(_FORMATS)}", file=path, remedy="Change the ending."
+        )
+    return path.name[: -len(ending)]
+
+
+def _about(volume: Volume, path: Path) -> dict[str, Any]:
+    return {
+        "name": path.name,
+        "size": list(volume.size),
+        "spacing": list(volume.spacing),
+        "checksum": volume.checksum,
+    }
+
+
+def _truth(phantom: Phantom, about: dict[str, Any]) -> dict[str, Any]:
+    """Return what is known of the phantom as JSON values."""
+    T_head_scan = phantom.T_head_scan
+    normal = T_head_scan.rotation[0]
+    return {
+        "schema": "gp-labeler phantom truth",
+        "version": 1,
+        "volume": about,
+        "seed": phantom.seed,
+        "varied": list(phantom.variation.names),
+        "variation": phantom.variation.as_json(),
+        "T_head_scan": T_head_scan.matrix.tolist(),
+        "midPlane": {"normal": normal.tolist(), "offset": -float(T_head_scan.translation[0])},
+        "mirroredSilently": phantom.variation.mirrored == "silent",
+        "landmarks": {
+            side.value: {code: landmarks[code].tolist() for code in landmarks.placed}
+            for side, landmarks in phantom.specimen.sides.items()
+        },
+    }
+
+
+def _write_volume(volume: Volume, path: Path) -> None:
+    import SimpleITK
+
+    image: Any = SimpleITK.GetImageFromArray(volume.array)
+    image.SetSpacing(volume.spacing)
+    image.SetOrigin(volume.origin.tolist())
+    image.SetDirection(volume.direction.ravel().tolist())
+    with atomic_file(path) as draft:
+        try:
+            SimpleITK.WriteImage(image, str(draft), useCompression=True)
+        except RuntimeError as error:
+            raise OSError(str(error).strip().splitlines()[-1]) from None
