@@ -24,6 +24,7 @@ import warnings
 from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import IO
 
 import fuzz_targets
 import numpy as np
@@ -35,6 +36,7 @@ __all__ = ["Result", "run"]
 
 MORE_MEMORY_BYTES = 1_500_000_000
 SLOWEST_SECONDS = 30.0
+LONGEST_WAIT_SECONDS = 600.0  # by the clock: the machine may be busy otherwise
 QT_SAYS = b"This plugin does not support propagateSizeHints()\n"  # of its own off-screen platform
 NAMES = (b"", b"", b"", b"", b" with blank", b"-\xff", b"-\x1b[31m", b"-\xc3\xa4", b"-\n", b"-=1")
 
@@ -96,7 +98,7 @@ def _worker(
     with os.fdopen(reading, "rb", buffering=0) as pipe:
         rest = b""
         while True:
-            ready, _, _ = select.select([pipe], [], [], 4 * SLOWEST_SECONDS)
+            ready = _awaited(pipe, pid)
             data = pipe.read(65536) if ready else b""
             if not data:
                 break
@@ -114,6 +116,23 @@ def _worker(
         _note(result, current, "?", "-1", "0", "0", how, folder=folder, keep=keep)
         return current + 1
     return cases.stop
+
+
+def _awaited(pipe: IO[bytes], pid: int) -> bool:
+    """Wait until a process says something; not for one that works for too long, or only waits itself."""
+    begun, worked = time.monotonic(), _seconds_of_work(pid)
+    while not select.select([pipe], [], [], SLOWEST_SECONDS)[0]:
+        if (
+            _seconds_of_work(pid) - worked > 2 * SLOWEST_SECONDS
+            or time.monotonic() - begun > LONGEST_WAIT_SECONDS
+        ):
+            return False
+    return True
+
+
+def _seconds_of_work(pid: int) -> float:
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def _died(status: int) -> str:

@@ -23,6 +23,12 @@ def _place(workspace: Workspace, code: str, side: Side = Side.LEFT, shift: float
     workspace.labels.place(place, How.MESH, side=side, code=code)
 
 
+def _wait_for_checks(workspace: Workspace) -> None:
+    """Let the checker have its say now: it works in the background, and changes the states of points."""
+    for side in Side:
+        workspace.labels.point_states(side)
+
+
 def _told(marks, ghosts, lines):
     return (
         [(m.key, m.position.tolist(), m.label, m.state, m.active) for m in marks],
@@ -57,12 +63,14 @@ def test_what_is_painted_follows(window, act) -> None:
     for code in ("CA", "CB", "RWA", "RWP"):
         _place(workspace, code)
     workspace.labels.set_active(Active(Side.LEFT, "OS" if act == "ghosts off" else "RWA"))
+    _wait_for_checks(workspace)
     before = []
     for view in slices:
         view.grab()
         before.append(view._painter._points)
         assert len(before[-1].marks) == 5, "the four, and CO"
     ACTS[act](workspace)
+    _wait_for_checks(workspace)
     wanted = _told(drawn_marks(workspace), drawn_ghosts(workspace), drawn_segments(workspace, DARK))
     marks, _, ghosts, lines = before[0]
     assert wanted != _told(marks, ghosts, lines), "the act shows, else this says nothing"
