@@ -153,6 +153,11 @@ class Backdrop:
         """Bring the picture back into the target, with its depths."""
         self._target.restore(self._kept)
 
+    def forget(self) -> None:
+        """Take it that no picture is kept any more."""
+        self._shown = self._work = self._work_for = None
+        self._fine, self._warm = False, -1
+
     def close(self) -> None:
         """Let go of everything."""
         self._work = None

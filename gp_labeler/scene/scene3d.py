@@ -257,6 +257,11 @@ class Scene3D:
         matrix = self.camera.viewpoint().matrix
         return Sight(matrix.tobytes(), self.target.size, look, self.bone.version)
 
+    def forget(self) -> None:
+        """Draw everything anew: the context of OpenGL in which pictures were kept is gone."""
+        self.target.forget()
+        self._backdrop.forget()
+
     def image(self, width: int | None = None, height: int | None = None) -> NDArray[np.uint8]:
         """Draw a frame, of another size where given, and return it, (h, w, 3)."""
         before = self.target.size

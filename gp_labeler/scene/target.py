@@ -41,6 +41,8 @@ class RenderTarget:
     def __init__(self, window: vtkRenderWindow) -> None:
         self._window: vtkRenderWindow | None = window
         self._kept: dict[str, tuple[tuple[int, int], Any]] = {}
+        self.n_forgotten = 0
+        """How often everything that was kept has been lost, see `forget`."""
         window.SetNumberOfLayers(2)
         window.SetAlphaBitPlanes(1)
 
@@ -85,6 +87,28 @@ class RenderTarget:
         """Width and height, device pixels."""
         width, height = self.window.GetSize()
         return max(width, 1), max(height, 1)
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it can be drawn into: a window of a widget cannot before its context is made."""
+        ready = getattr(self._window, "GetReadyForRendering", None)
+        return self._window is not None and (ready is None or bool(ready()))
+
+    @contextmanager
+    def unseen(self) -> Iterator[None]:
+        """Draw into the window of a widget without showing it, outside of what its toolkit paints."""
+        self.window.MakeCurrent()
+        self._gl.GetState().Reset()  # the toolkit has used OpenGL since: what VTK remembers of it is old
+        self.window.SetSwapBuffers(False)
+        try:
+            yield
+        finally:
+            self.window.SetSwapBuffers(True)
+
+    def forget(self) -> None:
+        """Drop all that was kept: it is gone with the context of OpenGL that it was kept in."""
+        self._kept.clear()
+        self.n_forgotten += 1
 
     def resize(self, width: int, height: int) -> None:
         """Take another size, device pixels."""
@@ -136,7 +160,7 @@ class RenderTarget:
         """Let go of the window and of what it holds on the graphics card."""
         if self._window is None:
             return
-        for _, store in self._kept.values():
+        for _, store in self._kept.values() if self.is_ready else ():
             store.ReleaseGraphicsResources(self._window)
         self._kept.clear()
         for renderer in self._renderers():

@@ -20,6 +20,7 @@ from gp_labeler.document.recovery import find_recoveries, unreadable_journals
 from gp_labeler.installation import check_display
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.plain_numbers import use_plain_numbers
+from gp_labeler.views.canvas_choice import choose_canvas, share_contexts
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.prompts import Prompts
@@ -50,6 +51,8 @@ def make_application() -> QApplication:
         os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
     check_display()
     QApplication.setHighDpiScaleFactorRoundingPolicy(Qt.HighDpiScaleFactorRoundingPolicy.PassThrough)
+    if _has_display():
+        share_contexts()
     app = QApplication(["gp-labeler"])
     _applications.append(app)
     use_plain_numbers()  # Qt has just taken the locale from the environment
@@ -77,6 +80,7 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
     dispatcher = QtDispatcher()
     workspace = Workspace(directory, dispatcher)
     memory = WindowState(None if directory is None else directory / "window.json")
+    choose_canvas(memory)
     window = MainWindow(workspace, memory)
     dispatcher.setParent(window)
     if atlas:

@@ -29,7 +29,9 @@ _FOLDED = {
     "tool": "Tools",
     "what": "Show",
     "text": "Text size",
+    "references": "Compare with",
     "cut": "Cut bone",
+    "canvas": "3D canvas",
     "estimate": "Method",
     "out": "Export and report",
 }

@@ -1,4 +1,4 @@
-"""The 3D view as a widget: the scene is drawn in memory and painted, so it needs no OpenGL of the display.
+"""The 3D view as a widget: the scene on a canvas, painted or native (`views.canvas`).
 
 What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over
 the last frame; points are drawn over a kept picture of the bone. While the bone is drawn anew, a little at a
@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from qtpy.QtCore import QEvent, QPointF, QSize, Qt, QTimer, Signal
+from qtpy.QtCore import QEvent, Qt, QTimer, Signal
 from qtpy.QtGui import (
     QEnterEvent,
-    QImage,
     QKeyEvent,
     QMouseEvent,
     QPainter,
@@ -33,8 +32,8 @@ from gp_labeler.scene.marks import GlyphSize
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.slices import SliceSource
-from gp_labeler.scene.target import RenderTarget
 from gp_labeler.views.bind import follow
+from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.fonts import text_scale
 from gp_labeler.views.greys import greys_of
@@ -78,6 +77,8 @@ class SceneView(QWidget):
     hovered = Signal(object)
     """(3,) scan position where a click would land, or None."""
     maximise_asked = Signal()
+    frame_drawn = Signal()
+    """A frame has been drawn; what only lies over it may be painted without."""
 
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
@@ -86,22 +87,19 @@ class SceneView(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self._workspace = workspace
-        self.scene = Scene3D(RenderTarget.offscreen())
+        self.canvas = make_canvas(self)
+        self.scene = Scene3D(self.canvas.target)
         workspace.meshes.scene = self.scene
         self._hand = Hand(workspace)
-        self._frame: QImage | None = None
         self._finished = False
         self._stale, self._points_old, self._fitted = True, True, False
         self._source: SliceSource | None = None
         self._slices_old = False
         self._hover: FloatArray | None = None
-        self._painted: QImage | None = None
         self._pointer: tuple[float, float] | None = None
         self._dragging = self._on_target = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
         self._fine_timer.timeout.connect(self._refine)
-        self._draw_timer = QTimer(self, interval=0, singleShot=True)
-        self._draw_timer.timeout.connect(self._draw)
         self.scene.camera.look(_FIRST_LOOK, (0, 0, 1))
         self._listen()
         self.take_theme()
@@ -118,10 +116,7 @@ class SceneView(QWidget):
         """
         self._stale = True
         self._fine_timer.start(_FINE_AFTER_MS if quick else 0)
-        if self._has_frame:
-            self._draw_timer.start()  # by itself: other views are painted first, this one once it is drawn
-        else:
-            self.update()
+        self.canvas.ask()
 
     @property
     def is_stale(self) -> bool:
@@ -175,7 +170,7 @@ class SceneView(QWidget):
     @property
     def is_up_to_date(self) -> bool:
         """Whether the scene as it is now has been painted."""
-        return not self._stale and self._frame is not None and self._painted is self._frame
+        return not self._stale and self.canvas.is_shown
 
     def pixel_at(self, position: FloatArray) -> tuple[float, float]:
         """Return the logical pixel at which a (3,) scan position is seen, for tests and scripts."""
@@ -233,7 +228,7 @@ class SceneView(QWidget):
         inside = volume is not None and bool(volume.contains(position[None])[0])
         if self._fitted and inside and not self._shows(position, 1.0):
             self.go_to(position)
-        self.update()
+        self.canvas.ask_over()
 
     def _shows(self, position: FloatArray, part: float) -> bool:
         """Whether a (3,) scan position lies in the middle part of the view, from 0 to 1."""
@@ -294,7 +289,7 @@ class SceneView(QWidget):
         if (drag is None) == self._dragging:  # the point leaves the picture, and is painted over it instead
             self._dragging = drag is not None
             self._show_points()
-        self.update()
+        self.canvas.ask_over()
 
     # Painting
 
@@ -302,14 +297,17 @@ class SceneView(QWidget):
         painter = QPainter(self)
         if not self._is_screen(painter):
             self.finish()
-        elif self._stale and not self._has_frame:
-            self._draw_frame(quick=True)
         elif self._stale:
-            self._draw_timer.start()  # by itself: the other views are painted in the same breath as this one
+            if self.canvas.paints_itself or self.canvas.has_frame:
+                self.canvas.ask()  # drawn by itself: other views are painted in the same breath as this one
+            else:
+                self.draw_frame()
+        self.canvas.paint(painter)
+        painter.end()
+
+    def paint_over(self, painter: QPainter) -> None:
+        """Paint what lies over the frame."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
-        if self._frame is not None:
-            painter.drawImage(QPointF(0, 0), self._frame)
-            self._painted = self._frame
         if self._workspace.scan.volume is not None:
             paint_crosshair(painter, self, self.scene, self._workspace.view.crosshair)
         paint_cut(painter, self, self._workspace.view.state.cut)
@@ -317,7 +315,6 @@ class SceneView(QWidget):
         paint_pointer(
             painter, self, self.scene, self._hover if drag is None else drag.position, drag is not None
         )
-        painter.end()
 
     def _is_screen(self, painter: QPainter) -> bool:
         """Whether a painter paints what is on the screen, and not a picture of it."""
@@ -328,51 +325,53 @@ class SceneView(QWidget):
         return store is not None and painter.paintEngine().paintDevice() is store.paintDevice()
 
     @property
-    def _has_frame(self) -> bool:
-        return self._frame is not None and self._frame.size() == self._pixels
-
-    @property
-    def _pixels(self) -> QSize:
+    def pixels(self) -> tuple[int, int]:
+        """Width and height, device pixels."""
         ratio = self.devicePixelRatioF()
-        return QSize(round(self.width() * ratio), round(self.height() * ratio))
+        return round(self.width() * ratio), round(self.height() * ratio)
 
     def finish(self) -> None:
         """Draw all that is still to be drawn, at once."""
-        if self._stale or not self._finished:
-            self._draw_frame(quick=False)
+        if (self._stale or not self._finished) and self.canvas.prepare():
+            with self.canvas.unseen():
+                self._draw(quick=False)
 
-    def _draw(self) -> None:
-        if self._stale and self.isVisible():
-            self._draw_frame(quick=True)
-            if self._pointer is not None:  # it may rest while what lies under it moves
-                self._point_at(*self._pointer)
-            self.update()
+    def draw_frame(self) -> None:
+        """Draw the scene as it is now, the bone coarsely where it is new; called by the canvas."""
+        if not (self._stale or self.canvas.paints_itself):
+            return
+        self._draw(quick=True)
+        if self._pointer is not None:  # it may rest while what lies under it moves
+            self._point_at(*self._pointer)
 
-    def _draw_frame(self, *, quick: bool) -> None:
+    def forget(self) -> None:
+        """Draw everything anew: what was kept on the graphics card is lost."""
+        self.scene.forget()
+        self._stale = True
+
+    def _draw(self, *, quick: bool) -> None:
         self._take_points()
         self._take_slices()
-        ratio = self.devicePixelRatioF()
-        self.scene.scale = ratio
-        self.scene.target.resize(self._pixels.width(), self._pixels.height())
+        self.scene.scale = self.devicePixelRatioF()
+        self.scene.target.resize(*self.pixels)
         self.scene.render(quick=quick)
-        pixels = self.scene.target.pixels()
-        height, width, _ = pixels.shape
-        frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888)
-        frame = frame.convertToFormat(QImage.Format.Format_RGB32)  # as the screen has it: painted at once
-        frame.setDevicePixelRatio(ratio)
-        self._frame, self._stale, self._finished = frame, False, self.scene.is_fine
+        self.canvas.take()
+        self._stale, self._finished = False, self.scene.is_fine
+        self.frame_drawn.emit()
         if not (self._finished or self._fine_timer.isActive()):
             self._fine_timer.start(0)
 
     def _refine(self) -> None:
         """Draw some more of the fine bone, behind what is shown; once it is done, show it."""
-        if self._stale:
+        if self._stale or not self.canvas.prepare():
             return  # the frame comes first; painting it goes on here
-        if not self.scene.advance(_SLICE_SECONDS):
+        with self.canvas.unseen():
+            done = self.scene.advance(_SLICE_SECONDS)
+        if not done:
             self._fine_timer.start(0)
         elif not self._finished:
             self._stale = True
-            self.update()
+            self.canvas.ask()
 
     # Mouse and keys
 
@@ -492,11 +491,12 @@ class SceneView(QWidget):
         if point is not None or self._hover is not None:
             self._hover = point
             self.hovered.emit(point)
-            self.update()
+            self.canvas.ask_over()
 
     # Life
 
     def resizeEvent(self, event: Any) -> None:  # noqa: D102, N802
+        self.canvas.resize()
         self.redraw()
         super().resizeEvent(event)
 
@@ -509,7 +509,7 @@ class SceneView(QWidget):
         """Let go of the scene; the widget shows its last frame from then on."""
         self._stale, self._finished = False, True
         self._fine_timer.stop()
-        self._draw_timer.stop()
         if self._source is not None:
             self._source.close()
         self.scene.close()
+        self.canvas.release()

@@ -15,6 +15,11 @@ from window_cases import PATIENCE_MS, Answers, ball_volume, close, settle
 
 from gp_labeler.imaging.volume import Volume
 
+if os.environ.get("GP_LABELER_CANVAS") == "native":  # before the application is made, as the program does
+    from gp_labeler.views.canvas_choice import share_contexts
+
+    share_contexts()
+
 
 class PatientBot(QtBot):
     """pytest-qt's own, which waits for what must come true however busy the machine is."""

@@ -156,7 +156,7 @@ def test_a_click_on_a_slice_in_3d_places_on_it_and_slices_hide_bone(window) -> N
     assert view.scene.slices.images == ()
 
 
-def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, window, monkeypatch) -> None:
+def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, window) -> None:
     view = window.grid.scene_view
     view.grab()
     scene = view.scene
@@ -170,11 +170,11 @@ def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, w
     scene.bone.show(scene.bone.surfaces, quick=scene.bone.surfaces)  # as with a mesh so large as to need one
     view.redraw()
     qtbot.waitUntil(lambda: scene.is_fine)
-    draw, fine = view._draw_frame, []
-    monkeypatch.setattr(view, "_draw_frame", lambda *, quick: (draw(quick=quick), fine.append(scene.is_fine)))
+    fine = []
+    view.frame_drawn.connect(lambda: fine.append(scene.is_fine))
     QTest.keyClick(view, Qt.Key.Key_Left)
-    qtbot.waitUntil(lambda: len(fine) == 2 and view._finished)
-    assert fine == [False, True], "the stand-in first"
+    qtbot.waitUntil(lambda: len(fine) > 1 and fine[-1])
+    assert not fine[0], "the stand-in first"
     QTest.keyClick(view, Qt.Key.Key_Left)
     view.grab()  # a picture is finished, however little time there was
     assert scene.is_fine
