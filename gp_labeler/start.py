@@ -1,14 +1,20 @@
-"""Where both commands begin: nothing heavy is imported yet, so Ctrl-C is one line from the start on."""
+"""Where both commands begin: nothing is imported yet, so Ctrl-C is one line from the start on."""
 
 from __future__ import annotations
 
 import os
-import signal
 import sys
-from collections.abc import Callable
-from importlib import import_module
-from types import FrameType
-from typing import Any
+
+TYPE_CHECKING = False  # `typing` and `signal` take as long to import as all the rest of this module
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from types import FrameType
+    from typing import Any
+
+try:
+    from _signal import SIGINT, signal  # type: ignore[import-not-found, unused-ignore]
+except ImportError:  # another Python
+    from signal import SIGINT, signal
 
 __all__ = ["core", "labeler"]
 
@@ -17,7 +23,7 @@ def core() -> int:
     """Run ``gp-core``."""
     before = _stop_at_once("gp-core")
     main = _main_of("gp_core.cli", "gp-core")
-    signal.signal(signal.SIGINT, before)
+    signal(SIGINT, before)
     return int(main())
 
 
@@ -30,6 +36,8 @@ def labeler() -> int:
 def _main_of(module: str, command: str) -> Callable[[], int]:
     """Return a command's main function, or one that says in a line that NumPy or the like is damaged."""
     try:
+        from importlib import import_module
+
         main: Callable[[], int] = import_module(module).main
     except ImportError as error:
         first = str(error).strip().splitlines()[0]
@@ -46,4 +54,4 @@ def _stop_at_once(command: str) -> Any:
         os.write(sys.__stderr__.fileno() if sys.__stderr__ else 2, f"{command}: stopped\n".encode())
         os._exit(130)
 
-    return signal.signal(signal.SIGINT, stop)
+    return signal(SIGINT, stop)

@@ -64,6 +64,11 @@ def run_map(
         ) from None
     except CancelledError:  # Dask cancels what it cannot reach any more
         raise _scheduler_gone() from None
+    except Exception as error:
+        if type(error).__name__ == "KilledWorker":  # of Dask, which is not imported here
+            remedy = "Start workers with more memory; a search with --checkpoint goes on where it was."
+            raise GpError("the Dask workers that took a part of this died", remedy=remedy) from None
+        raise
     finally:
         for future in futures:
             future.cancel()

@@ -2,8 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import subprocess
+import sys
 import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from pathlib import Path
 
 import pytest
 
@@ -78,3 +84,50 @@ def test_bad_choices_are_refused() -> None:
     with pytest.raises(GpError, match="no Dask scheduler answers at nowhere"):  # noqa: SIM117
         with open_executor(scheduler="nowhere://x"):
             pass
+
+
+def test_a_dask_scheduler_that_is_killed_is_one_line(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    words = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    with subprocess.Popen(
+        [sys.executable, *words, "--scheduler-file", str(file)],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    ) as scheduler:
+        try:
+            address = _address_in(file, scheduler)
+            with pytest.raises(GpError, match="the Dask scheduler is gone"):
+                _map_until_killed(address, scheduler)
+        finally:
+            scheduler.kill()
+    assert capfd.readouterr().err == ""
+
+
+def _map_until_killed(address: str, scheduler: subprocess.Popen[bytes]) -> None:
+    with open_executor(scheduler=address) as executor:
+        threading.Timer(0.2, scheduler.kill).start()  # while it waits: there are no workers
+        run_map(square, range(20), executor)
+
+
+def _address_in(file: Path, scheduler: subprocess.Popen[bytes]) -> str:
+    """Wait until a scheduler has written where it is."""
+    while scheduler.poll() is None:
+        with suppress(OSError, ValueError, KeyError):
+            return str(json.loads(file.read_text())["address"])
+        time.sleep(0.05)
+    raise AssertionError("no scheduler")
+
+
+class KilledWorker(Exception):  # noqa: N818 - Dask's name
+    """What Dask raises once a part has killed several workers."""
+
+
+def test_dask_workers_that_die_are_one_line() -> None:
+    def die_at_work(_: int) -> int:
+        raise KilledWorker
+
+    with ThreadPoolExecutor(1) as threads, pytest.raises(GpError, match=r"the Dask workers .* died"):
+        run_map(die_at_work, [1], threads)
