@@ -40,7 +40,7 @@ def new_check(atlas: Atlas) -> Check:
         found = check_side(landmarks, atlas)
         pairs = {frozenset(f.landmarks) for f in found.findings if f.kind == "exchanged"}
         doubted = {
-            code for f in found.findings if f.is_doubt and f.kind != "other side" for code in f.landmarks
+            code for f in found.findings if f.is_problem and f.kind != "other side" for code in f.landmarks
         }
         return found.is_other_side, pairs, doubted
 

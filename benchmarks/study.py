@@ -43,10 +43,10 @@ CO, CA = index_of("CO"), index_of("CA")
 
 def main() -> None:
     """Print the tables; fail where a result differs."""
-    animals = herd(N_ANIMALS)
+    animals = cohort(N_ANIMALS)
     print(f"{'case':<52}{'fits':>6}{'fast, ms/fit':>14}{'plain':>9}{'ratio':>7}{'off by':>9}")
     leave_one_out_case(animals)
-    search_case(herd(6))
+    search_case(cohort(6))
     simulation_case(animals)
     print(f"\na full search, {FULL_SEARCH} fits, at its own sizes:", end=" ")
     full = full_search_seconds(animals)
@@ -54,7 +54,7 @@ def main() -> None:
     growth()
 
 
-def herd(n: int) -> list[Specimen]:
+def cohort(n: int) -> list[Specimen]:
     """Draw animals."""
     rng = np.random.default_rng(0)
     atlas = Atlas.published()
@@ -168,7 +168,7 @@ def fit_ms(n_animals: int, features: Codes, iterations: int) -> float:
     """Return the time of one registration, ms."""
     probe = [code for code in PROBE if code in features]
     settings = JrmpcSettings(max_iterations=iterations, gamma=0.05, epsilon=1e-2)
-    folds = folds_of(herd(n_animals))
+    folds = folds_of(cohort(n_animals))
     _, seconds = timed(lambda: [fold.errors(features, probe, settings) for fold in folds], 3)
     return 1e3 * seconds / (2 * n_animals)
 

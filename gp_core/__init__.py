@@ -13,7 +13,7 @@ Examples
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
-from gp_core.atlas.label_check import Departure, Finding, SideCheck, check_side, check_specimen
+from gp_core.atlas.label_check import Deviation, Finding, SideCheck, check_side, check_specimen
 from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -38,9 +38,10 @@ from gp_core.pose.insertion_path import carry_path, read_path
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_core.pose.quality import PoseQuality, pose_quality
-from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
+from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
+from gp_core.registration.result import RegistrationResult
 from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.conditions import ConditionsReport, conditions, touch_conditions
 from gp_core.study.distances import DistanceTable, distances
@@ -51,6 +52,12 @@ from gp_core.study.simulation import SimulationReport, simulate
 from gp_core.study.subset_search import SearchReport, search_features
 
 __version__ = "0.1.0"
+
+FiducialRegistration = RegistrationResult
+"""Earlier name of `RegistrationResult`."""
+
+Departure = Deviation
+"""Earlier name of `Deviation`."""
 
 __all__ = [
     "CODES",
@@ -64,6 +71,7 @@ __all__ = [
     "ComparisonReport",
     "ConditionsReport",
     "Departure",
+    "Deviation",
     "DistanceTable",
     "Feature",
     "FiducialRegistration",
@@ -80,6 +88,7 @@ __all__ = [
     "PivotCalibration",
     "PoseGate",
     "PoseQuality",
+    "RegistrationResult",
     "RigidTransform",
     "ScanEvidence",
     "SearchReport",

@@ -1,4 +1,4 @@
-"""How commands take their words: a wrong one is refused in one line, as everything else is."""
+"""The argument parser of all commands: a wrong command line is rejected in one line."""
 
 from __future__ import annotations
 
@@ -11,9 +11,15 @@ __all__ = ["CommandParser"]
 
 
 class CommandParser(argparse.ArgumentParser):
-    """A parser that says what is wrong in one line, with status 2; its subcommands do the same."""
+    """A parser that reports errors in one line with status 2; its subcommands do the same."""
 
     def error(self, message: str) -> NoReturn:
-        """Say what is wrong and where the help is, then end."""
+        """Report what is wrong and where to find help, then exit with status 2.
+
+        Parameters
+        ----------
+        message : str
+            What argparse found.
+        """
         text = printable(" ".join(message.split()))
         self.exit(2, f"{self.prog.split()[0]}: {text}. See {self.prog} --help.\n")

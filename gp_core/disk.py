@@ -66,7 +66,22 @@ _protected: dict[tuple[int, int], str] = {}
 
 
 def check_file(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES) -> None:
-    """Raise `FileFormatError` unless there is a plain file of at most `max_bytes`; `what` it should be."""
+    """Check that a path is a plain file of acceptable size.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+    what : str
+        What it should be, for the message.
+    max_bytes : int
+        Largest size, bytes.
+
+    Raises
+    ------
+    FileFormatError
+        Missing, not a plain file, or too large.
+    """
     try:
         _check_kind(Path(path).stat(), path, what, max_bytes)
     except (OSError, ValueError) as error:
@@ -74,16 +89,21 @@ def check_file(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
 
 
 def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES) -> bytes:
-    """Return what a plain file holds.
+    """Return the content of a plain file.
 
     Parameters
     ----------
-    path : path
+    path : path-like
         The file.
     what : str
-        What it should be; stands in the message.
+        What it should be, for the message.
     max_bytes : int
         Size of the largest file that is read.
+
+    Returns
+    -------
+    bytes
+        The content.
 
     Raises
     ------
@@ -108,7 +128,20 @@ def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
 
 
 def read_head(path: AnyPath, n_bytes: int) -> bytes:
-    """Return the first bytes of a plain file, to tell its kind; none where it is no such file."""
+    """Return the first bytes of a plain file, to identify its format.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+    n_bytes : int
+        How many bytes at most.
+
+    Returns
+    -------
+    bytes
+        Empty where there is no readable plain file.
+    """
     with contextlib.suppress(OSError, ValueError):
         status = Path(path).stat()
         if stat.S_ISREG(status.st_mode):
@@ -118,7 +151,27 @@ def read_head(path: AnyPath, n_bytes: int) -> bytes:
 
 
 def read_json(path: AnyPath, *, what: str = "file", remedy: str | None = None) -> Any:
-    """Return what a JSON file holds; raises as `read_bytes` does, and where it is not JSON."""
+    """Return the content of a JSON file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    what : str
+        What it should be, for the message.
+    remedy : str, optional
+        What to do about a file that is not JSON.
+
+    Returns
+    -------
+    object
+        The parsed content.
+
+    Raises
+    ------
+    FileFormatError
+        As for `read_bytes`, or the file is not JSON.
+    """
     content = read_bytes(path, what=what)
     try:
         return json.loads(content)
@@ -157,31 +210,62 @@ def _unreadable(path: AnyPath, error: Exception) -> FileFormatError:
 
 
 def write_text(path: AnyPath, text: str) -> None:
-    """Write a text as UTF-8, whole or not at all; raises as `atomic_file` does."""
+    """Write a text as UTF-8, atomically.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    text : str
+        The content.
+
+    Raises
+    ------
+    GpError
+        As for `atomic_file`.
+    """
     write_bytes(path, text.encode("utf-8", errors="backslashreplace"))  # names may hold what is not UTF-8
 
 
 def write_bytes(path: AnyPath, content: bytes) -> None:
-    """Write a file whole or not at all; raises as `atomic_file` does."""
+    """Write a file atomically.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    content : bytes
+        The content.
+
+    Raises
+    ------
+    GpError
+        As for `atomic_file`.
+    """
     with atomic_file(path) as draft:
         draft.write_bytes(content)
 
 
 @contextmanager
 def atomic_file(path: AnyPath) -> Iterator[Path]:
-    """Let a file be written whole or not at all.
+    """Write a file atomically: completely, or not at all.
+
+    Parameters
+    ----------
+    path : path-like
+        The file to write.
 
     Yields
     ------
     Path
-        A draft beside it, with the same suffix: write it whole. It takes the name of the file afterwards,
-        unless an exception comes. For a device or a pipe it is copied to it.
+        A temporary file beside it, with the same suffix, to be written completely. It replaces the file
+        afterwards, unless an exception is raised. For a device or a pipe its content is copied there.
 
     Raises
     ------
     GpError
-        The folder is missing, the disk or its permissions refuse, or the file is protected. What was there
-        before is untouched.
+        The folder is missing, the disk or its permissions refuse, or the file is protected. The previous
+        content is then unchanged.
     """
     try:
         _refuse_protected(path)
@@ -206,14 +290,14 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
 
 
 def remove_drafts(folder: Path, name: str | None = None) -> None:
-    """Delete the drafts that killed programs left in a folder.
+    """Delete temporary files that killed programs left in a folder.
 
     Parameters
     ----------
     folder : Path
         Where.
     name : str, optional
-        Of this file only, and of others where the draft is old; by default of all.
+        Only those of this file, and old ones of others; by default all.
     """
     with contextlib.suppress(OSError), os.scandir(folder) as entries:
         for entry in entries:
@@ -287,7 +371,18 @@ def _remedy(error: Exception) -> str:
 
 
 def is_stream(path: AnyPath) -> bool:
-    """Whether a file is to be written to, and must not be replaced."""
+    """Whether a path is a device or pipe: written to, never replaced.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+
+    Returns
+    -------
+    bool
+        True for devices, pipes and descriptors such as ``/dev/stdout``.
+    """
     if _own_descriptor(path) is not None:
         return True
     with contextlib.suppress(OSError):
@@ -339,7 +434,18 @@ def _opened_stream(path: AnyPath) -> int:
 
 @contextmanager
 def protected_inputs(paths: Iterable[AnyPath] = ()) -> Iterator[None]:
-    """Let nothing be written over these files, also through links, and over those that `protect` adds."""
+    """Protect files from being overwritten, also through links, together with those that `protect` adds.
+
+    Parameters
+    ----------
+    paths : iterable of path-like
+        The files that a command reads.
+
+    Yields
+    ------
+    None
+        While they are protected.
+    """
     before = dict(_protected)
     try:
         for path in paths:
@@ -351,24 +457,41 @@ def protected_inputs(paths: Iterable[AnyPath] = ()) -> Iterator[None]:
 
 
 def protect(path: AnyPath) -> None:
-    """Let nothing be written over a file until the command ends."""
+    """Protect a file from being overwritten until the command ends.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    """
     found = _identity(path)
     if found is not None:
         _protected.setdefault(found, os.fspath(path))
 
 
 def is_protected(path: AnyPath) -> bool:
-    """Whether a file is one that the command reads."""
+    """Whether a file is an input of the command.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+
+    Returns
+    -------
+    bool
+        True also for links to such a file.
+    """
     return _identity(path) in _protected
 
 
 def _refuse_protected(path: AnyPath) -> None:
     if is_protected(path):
-        raise GpError("is read, and would be written over", file=path, remedy="Name another file.")
+        raise GpError("is an input, and would be overwritten", file=path, remedy="Name another file.")
 
 
 def _identity(path: AnyPath) -> tuple[int, int] | None:
-    """Return what tells a plain file from all others, whatever name it has; None where there is none."""
+    """Return device and inode of a plain file; None where there is none."""
     with contextlib.suppress(OSError, ValueError):
         status = Path(path).stat()
         if stat.S_ISREG(status.st_mode):

@@ -57,20 +57,36 @@ class FileFormatError(GpError):
 
 
 class FeatureError(GpError):
-    """A feature code is unknown, doubled, missing, or not fit for its use."""
+    """A feature code is unknown, duplicated, missing, or unsuitable for its use."""
 
 
 class GeometryError(GpError):
-    """Points do not determine what is asked of them (too few, collinear, not finite, out of scale)."""
+    """Points do not determine the requested result (too few, collinear, not finite, implausible size)."""
 
 
 class FrameError(GpError):
-    """Coordinates of different frames meet."""
+    """Coordinates of different frames are combined."""
 
 
 @contextmanager
 def blaming(file: str | PathLike[str]) -> Iterator[None]:
-    """Name a file in the errors that name no other, nor a specimen."""
+    """Add a file to errors that name neither a file nor a specimen.
+
+    Parameters
+    ----------
+    file : path-like
+        The file that is being processed.
+
+    Yields
+    ------
+    None
+        While the file is processed.
+
+    Raises
+    ------
+    GpError
+        The same error, with the file.
+    """
     try:
         yield
     except GpError as error:

@@ -22,7 +22,7 @@ _ORTHONORMAL_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class RigidTransform:
-    """A proper rigid motion from frame `src` to frame `dst`.
+    """A rigid transform (no reflection) from frame `src` to frame `dst`.
 
     Parameters
     ----------
@@ -62,7 +62,27 @@ class RigidTransform:
 
     @classmethod
     def from_parts(cls, rotation: ArrayLike, translation: ArrayLike, *, dst: str, src: str) -> RigidTransform:
-        """Make a transform of a (3, 3) rotation and a (3,) translation in mm."""
+        """Make a transform from a rotation and a translation.
+
+        Parameters
+        ----------
+        rotation : (3, 3) array_like
+            Rotation, det +1.
+        translation : (3,) array_like
+            Translation, mm.
+        dst, src : str
+            Frame names, destination first.
+
+        Returns
+        -------
+        RigidTransform
+            ``T_dst_src``.
+
+        Raises
+        ------
+        FrameError
+            The matrix is not a rotation.
+        """
         matrix = np.eye(4)
         matrix[:3, :3] = rotation
         matrix[:3, 3] = translation
@@ -70,7 +90,18 @@ class RigidTransform:
 
     @classmethod
     def identity(cls, *, dst: str, src: str) -> RigidTransform:
-        """Make the transform that leaves coordinates as they are."""
+        """Make the transform that leaves coordinates unchanged.
+
+        Parameters
+        ----------
+        dst, src : str
+            Frame names, destination first.
+
+        Returns
+        -------
+        RigidTransform
+            ``T_dst_src``.
+        """
         return cls(np.eye(4), dst, src)
 
     @property
@@ -84,18 +115,46 @@ class RigidTransform:
         return self.matrix[:3, 3]
 
     def apply(self, points: ArrayLike) -> FloatArray:
-        """Move (N, 3) points from `src` to `dst`; rows of NaN (missing) stay missing."""
+        """Transform points from `src` to `dst`.
+
+        Parameters
+        ----------
+        points : (N, 3) array_like, mm
+            Points in frame `src`; rows of NaN (missing) stay missing.
+
+        Returns
+        -------
+        (N, 3) array, mm
+            Points in frame `dst`.
+        """
         moved: FloatArray = as_points(points, "points", missing_allowed=True) @ self.rotation.T
         moved += self.translation
         return moved
 
     def apply_vector(self, vectors: ArrayLike) -> FloatArray:
-        """Turn vectors (..., 3) from `src` to `dst`."""
+        """Rotate vectors from `src` to `dst`.
+
+        Parameters
+        ----------
+        vectors : (..., 3) array_like
+            Vectors in frame `src`.
+
+        Returns
+        -------
+        (..., 3) array
+            Vectors in frame `dst`.
+        """
         turned: FloatArray = np.asarray(vectors, dtype=np.float64) @ self.rotation.T
         return turned
 
     def inverse(self) -> RigidTransform:
-        """Return ``T_src_dst``."""
+        """Return the inverse transform.
+
+        Returns
+        -------
+        RigidTransform
+            ``T_src_dst``.
+        """
         turned_back = self.rotation.T
         return RigidTransform.from_parts(
             turned_back, -turned_back @ self.translation, dst=self.src, src=self.dst
@@ -118,19 +177,52 @@ class RigidTransform:
 
 
 def mirror_x(points: ArrayLike) -> FloatArray:
-    """Mirror (N, 3) points in x: the explicit step between the right side and the stored left."""
+    """Mirror points in x: the explicit step between a right side and the stored left one.
+
+    Parameters
+    ----------
+    points : (N, 3) array_like, mm
+        Points; rows of NaN (missing) stay missing.
+
+    Returns
+    -------
+    (N, 3) array, mm
+        Mirrored points.
+    """
     mirrored: FloatArray = as_points(points, "points", missing_allowed=True) * np.array([-1.0, 1.0, 1.0])
     return mirrored
 
 
 def cross_matrix(vector: FloatArray) -> FloatArray:
-    """Return the (3, 3) matrix that maps v to ``vector × v``."""
+    """Return the matrix that maps v to ``vector × v``.
+
+    Parameters
+    ----------
+    vector : (3,) array
+        Any vector.
+
+    Returns
+    -------
+    (3, 3) array
+        Skew-symmetric.
+    """
     x, y, z = vector.tolist()
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def angle_between_deg(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the angles (...,) between vectors (..., 3), in degrees; exact for small angles too."""
+    """Return the angles between vectors, accurate for small angles too.
+
+    Parameters
+    ----------
+    first, second : (..., 3) arrays
+        Vectors, not zero.
+
+    Returns
+    -------
+    (...,) array
+        Angles, degrees.
+    """
     sine = np.linalg.norm(np.cross(first, second), axis=-1)
     cosine = np.sum(first * second, axis=-1)
     angle: FloatArray = np.degrees(np.arctan2(sine, cosine))

@@ -10,7 +10,17 @@ _PACKAGE = Path(__file__).resolve().parent
 
 
 def resource_path(name: str) -> Path:
-    """Return the path of the shipped file `name`, such as ``"features.json"``.
+    """Return the path of a shipped data file.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"features.json"``.
+
+    Returns
+    -------
+    pathlib.Path
+        Where it is.
 
     Raises
     ------

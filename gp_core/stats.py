@@ -1,4 +1,4 @@
-"""Quantiles of chi-square, without SciPy, whose start-up a command would wait for."""
+"""Quantiles of the chi-squared distribution, without importing SciPy, which would delay short commands."""
 
 from __future__ import annotations
 
@@ -9,7 +9,19 @@ NORMAL_95 = 1.6448536269514722
 
 
 def chi_square_share(freedom: float, normal: float) -> float:
-    """Return a quantile of chi-square over its degrees of freedom, by the same quantile of the normal.
+    """Return a quantile of the chi-squared distribution, divided by its degrees of freedom.
+
+    Parameters
+    ----------
+    freedom : float
+        Degrees of freedom.
+    normal : float
+        The same quantile of the standard normal distribution.
+
+    Returns
+    -------
+    float
+        The Wilson-Hilferty approximation.
 
     References
     ----------

@@ -1,7 +1,7 @@
-r"""What reaches a terminal: text without codes that would steer it.
+r"""Text that is safe to print: without escape sequences that could control a terminal.
 
-Names of files, animals and landmarks come from anywhere, and may hold escape sequences; a terminal would obey
-them. Control characters are shown instead, such as ``\x1b``.
+Names of files, animals and landmarks come from anywhere and may hold escape sequences, which a terminal would
+obey. Control characters are printed visibly instead, such as ``\x1b``.
 """
 
 from __future__ import annotations
@@ -22,7 +22,18 @@ _KEPT = "\n\t"
 
 
 def printable(text: str) -> str:
-    r"""Return a text with control characters shown as escapes; lines and tabs stay."""
+    """Return a text with control characters replaced by visible escapes; line breaks and tabs stay.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        Text that is safe to print.
+    """
     return _UNSEEN.sub(_escaped, text)
 
 
@@ -38,7 +49,13 @@ def _escaped(match: re.Match[str]) -> str:
 
 @contextmanager
 def plain_terminal() -> Iterator[None]:
-    """Let what is written to stdout and stderr hold no control characters."""
+    """Replace control characters in everything that is written to stdout and stderr.
+
+    Yields
+    ------
+    None
+        While the streams are filtered.
+    """
     before = sys.stdout, sys.stderr
     for stream in before:
         if isinstance(stream, io.TextIOWrapper):
@@ -51,14 +68,14 @@ def plain_terminal() -> Iterator[None]:
 
 
 def leave_output() -> None:
-    """Write no more to stdout, which nobody reads; Python would complain at its end."""
+    """Stop writing to stdout after its reader has closed it; otherwise Python would complain on exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _PlainStream:
-    """A text stream that shows control characters instead of passing them on.
+    """A text stream that replaces control characters instead of passing them on.
 
-    A carriage return may begin what is written: so a line of progress is written over.
+    A leading carriage return is kept, so that a progress line can overwrite itself.
     """
 
     def __init__(self, stream: TextIO) -> None:

@@ -1,4 +1,4 @@
-"""Small validators; each names the argument, what was got and what is allowed."""
+"""Small validators; each names the argument, the given value and the allowed ones."""
 
 from __future__ import annotations
 
@@ -24,9 +24,14 @@ def as_points(value: ArrayLike, name: str, *, missing_allowed: bool = False) -> 
     value : (N, 3) array_like
         Points, mm.
     name : str
-        What the caller calls them; stands in the message.
+        What the message calls them.
     missing_allowed : bool
-        Whether rows of NaN may stand for missing points. Infinite values never may.
+        Whether rows of NaN may mark missing points. Infinite values are never allowed.
+
+    Returns
+    -------
+    (N, 3) array
+        Points, mm.
 
     Raises
     ------
@@ -47,7 +52,22 @@ def as_points(value: ArrayLike, name: str, *, missing_allowed: bool = False) -> 
 
 
 def check_option(value: Any, name: str, allowed: Iterable[Any]) -> None:
-    """Raise `GpError` unless `value` is one of `allowed`."""
+    """Raise an error unless a value is one of the allowed ones.
+
+    Parameters
+    ----------
+    value : object
+        The given value.
+    name : str
+        What the message calls it.
+    allowed : iterable
+        The allowed values.
+
+    Raises
+    ------
+    GpError
+        It is none of them; the message suggests similar values.
+    """
     options = list(allowed)
     if value not in options:
         shown = ", ".join(str(o) for o in options)
@@ -55,6 +75,19 @@ def check_option(value: Any, name: str, allowed: Iterable[Any]) -> None:
 
 
 def near_matches(text: str, allowed: Iterable[Any]) -> str:
-    """Return ``" (did you mean A or B?)"``, or an empty string where nothing is near."""
+    """Return a suggestion of similar words for a message.
+
+    Parameters
+    ----------
+    text : str
+        The given word.
+    allowed : iterable
+        The allowed words.
+
+    Returns
+    -------
+    str
+        ``" (did you mean A or B?)"``, or an empty string where nothing is similar.
+    """
     near = get_close_matches(text.upper(), [str(a).upper() for a in allowed], n=3, cutoff=0.5)
     return f" (did you mean {' or '.join(near)}?)" if near else ""

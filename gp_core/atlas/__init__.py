@@ -1,1 +1,1 @@
-"""The atlas, and the poses estimated with it."""
+"""The atlas: mean shape of the labelled features and its variation; fitting it, and checking labels by it."""

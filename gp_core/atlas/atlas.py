@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.atlas.published import published_shape
-from gp_core.disk import read_json, write_text
+from gp_core.constants import DEFINING_FEATURES
+from gp_core.disk import read_head, read_json, write_text
 from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.landmarks.anatomy import cochlea_frame, cochlea_origin
 from gp_core.landmarks.features import CODES, FEATURES, check_codes, index_of
@@ -22,10 +23,7 @@ from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.validation import FloatArray
 
-__all__ = ["DEFINING", "SCHEMA_VERSION", "Atlas"]
-
-DEFINING = ("CA", "CB", "RWA", "RWP")
-"""The features that define the cochlea's pose; every atlas holds them."""
+__all__ = ["PLACED", "SCHEMA_VERSION", "Atlas", "is_atlas_file"]
 
 SCHEMA_VERSION = 1
 
@@ -33,15 +31,16 @@ PLACED = tuple(row.code for row in FEATURES if not row.computed)
 """The features an atlas may hold, in the table's order."""
 
 _LARGEST_VARIANCE_MM2 = 1e4
+_HEAD_BYTES = 1000
 
 _FIXED = {"frame": "atlas", "side": "L", "units": "mm"}
 
 
 @dataclass(frozen=True)
 class Atlas:
-    """A Gaussian shape of the placed features of a left side, in the CO frame of its mean.
+    """A Gaussian shape model of the placed features of a left side, in the CO frame of its mean.
 
-    CO is not among them: it is computed from the others. A right side is handled as the mirror image in x.
+    It excludes CO, which is computed from other features. A right side is handled as the mirror image in x.
 
     Parameters
     ----------
@@ -50,10 +49,11 @@ class Atlas:
     codes : tuple of str
         Features, in the table's order.
     mean : (n, 3) array, mm, atlas frame
+        Mean positions.
     covariance : (3 n, 3 n) array, mm^2, atlas frame
-        Of the deviations of all coordinates, feature by feature; of full rank, fit for weights.
+        Of the deviations of all coordinates, feature by feature; of full rank, suitable for weights.
     scatter : (3 n, 3 n) array, mm^2
-        The sample covariance as it was measured: unbiased, so fit for error bars, but hardly of full rank.
+        The sample covariance: unbiased, hence suitable for error bars, but hardly of full rank.
     n_samples : int
         Number of labelled sides behind it.
     specimens : tuple of str
@@ -62,7 +62,7 @@ class Atlas:
     Raises
     ------
     GpError
-        Shapes do not fit together, values are not finite, or CA, CB, RWA or RWP is missing.
+        Shapes do not match, values are not finite, or CA, CB, RWA or RWP is missing.
     """
 
     name: str
@@ -77,7 +77,7 @@ class Atlas:
         codes = check_codes(self.codes, "the atlas", allowed=PLACED)
         if list(codes) != sorted(codes, key=index_of):
             raise FeatureError(f"the features of atlas {self.name!r} are out of order: {' '.join(codes)}")
-        missing = [code for code in DEFINING if code not in codes]
+        missing = [code for code in DEFINING_FEATURES if code not in codes]
         if missing:
             raise FeatureError(f"the atlas {self.name!r} lacks {' '.join(missing)}, which define the cochlea")
         object.__setattr__(self, "codes", codes)
@@ -101,7 +101,7 @@ class Atlas:
         object.__setattr__(self, name, array)
 
     def _check_covariance(self, name: str, matrix: FloatArray, *, least: float) -> None:
-        """Refuse what is no covariance, or one that promises more than any labels can."""
+        """Check magnitude, symmetry and positive definiteness."""
         size = np.abs(matrix).max()
         if size > _LARGEST_VARIANCE_MM2:
             raise GpError(f"the {name} of atlas {self.name!r} is larger than any animals differ")
@@ -112,13 +112,29 @@ class Atlas:
 
     @staticmethod
     def published() -> Atlas:
-        """Return the atlas rebuilt from the published distance table (Figure 2 of the paper)."""
-        with _building:  # else two threads that ask at once get two of it
+        """Return the atlas rebuilt from the published distance table (Figure 2 of the paper).
+
+        Returns
+        -------
+        Atlas
+            The same object each time.
+        """
+        with _building:  # otherwise two threads could build it twice
             return _published()
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Atlas:
         """Read an atlas file.
+
+        Parameters
+        ----------
+        path : path-like
+            JSON, as `save` writes it.
+
+        Returns
+        -------
+        Atlas
+            Equal to the saved one to the last bit.
 
         Raises
         ------
@@ -163,7 +179,18 @@ class Atlas:
             ) from None
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the atlas as JSON; numbers keep every bit."""
+        """Write the atlas as JSON, with full precision.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         content = {
             "gpAtlas": SCHEMA_VERSION,
             "name": self.name,
@@ -187,24 +214,73 @@ class Atlas:
     @cached_property
     def cochlea_origin(self) -> FloatArray:
         """(3,) mean position of CO, mm: the origin of the atlas frame, up to rounding."""
-        return cochlea_origin(*(self.mean[self._row(code)] for code in DEFINING))
+        return cochlea_origin(*(self.mean[self._row(code)] for code in DEFINING_FEATURES))
 
     def rows(self, codes: Iterable[str]) -> FloatArray:
-        """Return the mean positions (n, 3) of features, mm."""
+        """Return the mean positions of features.
+
+        Parameters
+        ----------
+        codes : iterable of str
+            n features.
+
+        Returns
+        -------
+        (n, 3) array, mm
+            In the atlas frame.
+
+        Raises
+        ------
+        FeatureError
+            The atlas does not hold one of them.
+        """
         return self.mean[[self._row(code) for code in codes]]
 
     def variances(self, codes: Iterable[str]) -> FloatArray:
-        """Return the variance (n,) of features between animals, mean of the three coordinates, mm^2."""
+        """Return the variance of features between animals, averaged over the three coordinates.
+
+        Parameters
+        ----------
+        codes : iterable of str
+            n features.
+
+        Returns
+        -------
+        (n,) array, mm^2
+            Variance of one coordinate.
+        """
         diagonal = self.covariance.diagonal()[self.coordinates(codes)]
         mean: FloatArray = diagonal.reshape(-1, 3).mean(axis=1)
         return mean
 
     def cross_covariance(self, codes: Iterable[str], others: Iterable[str]) -> FloatArray:
-        """Return the covariance (3 n, 3 m) between the coordinates of two lists of features, mm^2."""
+        """Return the covariance between the coordinates of two lists of features.
+
+        Parameters
+        ----------
+        codes, others : iterables of str
+            n and m features.
+
+        Returns
+        -------
+        (3 n, 3 m) array, mm^2
+            Coordinates feature by feature.
+        """
         return self.covariance[np.ix_(self.coordinates(codes), self.coordinates(others))]
 
     def coordinates(self, codes: Iterable[str]) -> list[int]:
-        """Return the rows of `covariance` that belong to features, three each."""
+        """Return the rows of `covariance` that belong to features.
+
+        Parameters
+        ----------
+        codes : iterable of str
+            n features.
+
+        Returns
+        -------
+        list of int
+            3 n rows.
+        """
         return [3 * self._row(code) + c for code in codes for c in range(3)]
 
     def _row(self, code: str) -> int:
@@ -217,6 +293,22 @@ class Atlas:
     @cached_property
     def _index(self) -> dict[str, int]:
         return {code: row for row, code in enumerate(self.codes)}
+
+
+def is_atlas_file(path: str | PathLike[str]) -> bool:
+    """Whether a file identifies itself as an atlas; it may still be damaged.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+
+    Returns
+    -------
+    bool
+        False for folders, and for files that do not exist or cannot be read.
+    """
+    return b'"gpAtlas"' in read_head(path, _HEAD_BYTES)
 
 
 def _names(value: Any) -> tuple[str, ...]:

@@ -19,30 +19,31 @@ def fit_atlas(
     name: str | None = None,
     keep_doubtful: bool = False,
 ) -> Atlas:
-    """Fit an atlas to labelled specimens, both sides pooled through the mirror.
+    """Fit an atlas to labelled specimens; both sides are pooled by mirroring.
 
-    Labels that `gp_core.atlas.screening.screen_labels` doubts are left out, and their animals count little.
-    Where nothing is in doubt, this is `fit_plain_atlas`, to the bit.
+    Labels that `gp_core.atlas.screening.screen_labels` rejects are left out, and their animals get little
+    weight. Where no label is rejected, the result equals `fit_plain_atlas` to the last bit.
 
     Parameters
     ----------
     specimens : sequence of Specimen
-        One or both sides of each; features may be missing here and there.
+        One or both sides of each; some features may be missing.
     features : iterable of str, optional
         What the atlas holds; by default every placed feature that at least two sides have.
     name : str, optional
-        By default says how many specimens there are.
+        By default tells the number of specimens.
     keep_doubtful : bool
-        Believe all labels: `fit_plain_atlas`.
+        Use all labels: `fit_plain_atlas`.
 
     Returns
     -------
     Atlas
+        The fitted atlas.
 
     Raises
     ------
     GpError
-        As `fit_plain_atlas`, for what is left.
+        As for `fit_plain_atlas`, applied to the remaining labels.
     """
     if keep_doubtful:
         return fit_plain_atlas(specimens, features=features, name=name)
@@ -52,5 +53,20 @@ def fit_atlas(
 def fit_screened_atlas(
     screened: Screened, *, features: Iterable[str] | None = None, name: str | None = None
 ) -> Atlas:
-    """Fit an atlas to what `screen_labels` left, each animal with its weight; see `fit_atlas`."""
+    """Fit an atlas to screened labels, each animal with its weight; see `fit_atlas`.
+
+    Parameters
+    ----------
+    screened : Screened
+        What `gp_core.atlas.screening.screen_labels` returned.
+    features : iterable of str, optional
+        As for `fit_atlas`.
+    name : str, optional
+        As for `fit_atlas`.
+
+    Returns
+    -------
+    Atlas
+        The fitted atlas.
+    """
     return fit_weighted_atlas(screened.specimens, screened.weights, features, name)

@@ -1,7 +1,7 @@
-"""Generalised Procrustes: labelled sides aligned to their mean, and how they scatter about it.
+"""Generalised Procrustes analysis: labelled sides aligned to their mean, and their scatter about it.
 
-Every label counts alike, or with a weight of its own: that of an animal in doubt is small, and so is that
-of a label which does not fit the others (Student-t). Missing features are NaN.
+All labels have the same weight, or each its own: small for an animal with rejected labels, and for a label
+that does not fit the others (Student-t). Missing features are NaN.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.constants import CHI2_3_MEDIAN
 from gp_core.errors import GeometryError
 from gp_core.landmarks.anatomy import cochlea_frame
 from gp_core.landmarks.features import Side
@@ -23,15 +24,12 @@ __all__ = ["align_shapes", "covariances", "label_weights", "per_feature_covarian
 _MAX_ITERATIONS = 50
 _TOLERANCE_MM = 1e-9
 _LABELLING_SD_MM = 0.05
-"""Floor of a feature's scatter, mm: no hand labels finer than this, and no weight grows without bound."""
+"""Floor of a feature's scatter, mm: nobody labels more precisely, and it bounds the weights."""
 
 _NU = 4.0
-"""Degrees of freedom of the Student-t of a label's scatter."""
+"""Degrees of freedom of the Student-t distribution of a label's deviation."""
 
-_MEDIAN_CHI2 = 2.366
-"""Median of chi-square with 3 degrees of freedom."""
-
-_ROUNDS = 20
+_N_REWEIGHTED = 20
 
 
 def align_shapes(
@@ -42,18 +40,25 @@ def align_shapes(
     Parameters
     ----------
     shapes : (S, n, 3) array, mm
+        Points of S sides, as of left ones.
     codes : tuple of str
-        The n features, those that define the cochlea among them.
+        The n features, including those that define the cochlea.
     owners : sequence of str
-        Whose shapes they are, for messages.
+        Specimen and side of each shape, for messages.
     weights : (S, n) array, optional
-        How much each label counts for the mean; by default all alike.
+        Weight of each label in the mean; by default all equal.
 
     Returns
     -------
     mean : (n, 3) array, mm
         In its own CO frame.
     aligned : (S, n, 3) array, mm
+        The shapes, aligned to it.
+
+    Raises
+    ------
+    GeometryError
+        A shape has too few features in common with the others.
     """
     placed = ~np.isnan(shapes[:, :, 0])
     best = placed.sum(axis=1) if weights is None else np.where(placed, weights, 0.0).sum(axis=1)
@@ -69,15 +74,24 @@ def align_shapes(
         if moved < _TOLERANCE_MM:
             break
     T_cochlea_mean = cochlea_frame(_as_landmarks(mean, codes)).inverse()
-    turned = [T_cochlea_mean.apply(shape) for shape in aligned]
-    return T_cochlea_mean.apply(mean), np.array(turned)
+    rotated = [T_cochlea_mean.apply(shape) for shape in aligned]
+    return T_cochlea_mean.apply(mean), np.array(rotated)
 
 
 def label_weights(shapes: FloatArray, codes: tuple[str, ...], owners: Sequence[str]) -> FloatArray:
-    """Return how much each label agrees with the other shapes: 1 or more where it does, towards 0 where not.
+    """Return how well each label agrees with the other shapes: 1 or more where it does, towards 0 where not.
 
-    The scatter of each feature is a Student-t. The start is the shape that is nearest to most others, so that
-    a few wrong ones do not matter.
+    The scatter of each feature is modelled as Student-t. The start is the shape nearest to most others, so
+    that a few wrong ones do not matter.
+
+    Parameters
+    ----------
+    shapes : (S, n, 3) array, mm
+        Points of S sides, as of left ones.
+    codes : tuple of str
+        The n features.
+    owners : sequence of str
+        Specimen and side of each shape, for messages.
 
     Returns
     -------
@@ -93,11 +107,11 @@ def label_weights(shapes: FloatArray, codes: tuple[str, ...], owners: Sequence[s
     mean = _complete_start(shapes[_most_typical(shapes, placed)], shapes, placed, codes, owners)
     weights, precision = placed.astype(np.float64), np.ones(len(codes))
     variances: FloatArray | None = None
-    for _ in range(_ROUNDS):
+    for _ in range(_N_REWEIGHTED):
         aligned = _all_aligned(shapes, weights > 0, mean, precision * weights, codes, owners)
         squared = ((aligned - mean) ** 2).sum(axis=2)
         if variances is None:
-            variances = np.nanmedian(squared, axis=0) / _MEDIAN_CHI2 + _LABELLING_SD_MM**2
+            variances = np.nanmedian(squared, axis=0) / CHI2_3_MEDIAN + _LABELLING_SD_MM**2
         else:
             variances = np.nansum(weights * squared, axis=0) / (3 * placed.sum(axis=0)) + _LABELLING_SD_MM**2
         weights = np.where(placed, (_NU + 3) / (_NU + np.nan_to_num(squared) / variances), 0.0)
@@ -106,7 +120,7 @@ def label_weights(shapes: FloatArray, codes: tuple[str, ...], owners: Sequence[s
 
 
 def _most_typical(shapes: FloatArray, placed: NDArray[np.bool_]) -> int:
-    """Return the shape whose labels are nearest to those of the other shapes, in the median."""
+    """Return the shape with the smallest median distance to the other shapes."""
     off = []
     for shape, has in zip(shapes, placed, strict=True):
         apart = [_apart(shape, other, has & also) for other, also in zip(shapes, placed, strict=True)]
@@ -162,9 +176,9 @@ def _variances(deviations: FloatArray, placed: NDArray[np.bool_], weights: Float
 
 
 def _freedom(total: FloatArray, squares: FloatArray) -> FloatArray:
-    """Return by what to divide a weighted sum of squares about its mean: n - 1 where all weights are 1."""
+    """Return the divisor of a weighted sum of squares about its mean: n - 1 where all weights are 1."""
     freedom = total - squares / np.maximum(total, 1e-12)
-    return np.where(freedom > 1e-9, freedom, 1.0)  # of a single label nothing is known
+    return np.where(freedom > 1e-9, freedom, 1.0)  # a single label has no variance
 
 
 def _complete_start(
@@ -174,7 +188,7 @@ def _complete_start(
     codes: tuple[str, ...],
     owners: Sequence[str],
 ) -> FloatArray:
-    """Fill features that the first shape lacks from the shapes that have them, aligned to it."""
+    """Fill features that the first shape lacks from shapes that have them, aligned to it."""
     start = mean.copy()
     for row in np.flatnonzero(np.isnan(mean).any(axis=1)):
         known = np.isfinite(start).all(axis=1)
@@ -185,7 +199,7 @@ def _complete_start(
             rotation, translation = weighted_procrustes(shapes[donor][shared], start[shared], names=names)
         except GeometryError as error:
             raise GeometryError(
-                f"{codes[row]} cannot be put to the others: {error.problem}",
+                f"{codes[row]} cannot be placed among the others: {error.problem}",
                 specimen=owners[donor],
                 remedy="Label more features on each side.",
             ) from None
@@ -216,11 +230,27 @@ def _as_landmarks(points: FloatArray, codes: tuple[str, ...]) -> LandmarkSet:
 def covariances(
     deviations: FloatArray, animals: Sequence[int], weights: FloatArray | None = None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the sample covariance (3 n, 3 n) of deviations (S, n, 3), and the same shrunk.
+    """Return the sample covariance of deviations, and its shrunk version.
 
-    NaN marks missing features; `animals` (S,) says whose sides they are: the two sides of an animal are
-    alike, so animals, not sides, are what the shrinkage counts as independent. `weights` (S, n) as for
-    `align_shapes`.
+    Parameters
+    ----------
+    deviations : (S, n, 3) array, mm
+        Aligned shapes minus their mean; NaN where missing.
+    animals : sequence of int
+        The animal of each side. The two sides of an animal are correlated, so the shrinkage counts animals,
+        not sides, as independent.
+    weights : (S, n) array, optional
+        As for `align_shapes`.
+
+    Returns
+    -------
+    scatter, shrunk : (3 n, 3 n) arrays, mm^2
+        Coordinates feature by feature.
+
+    References
+    ----------
+    Schäfer and Strimmer, "A shrinkage approach to large-scale covariance matrix estimation", 2005
+    (target D). https://doi.org/10.2202/1544-6115.1175
     """
     flat = deviations.reshape(len(deviations), -1)
     known = np.isfinite(flat).astype(np.float64)
@@ -239,7 +269,7 @@ def covariances(
 
 
 def _shrinkage(unit: FloatArray, animals: NDArray[np.intp]) -> float:
-    """Return the share of the target that minimises the expected squared error of the correlations.
+    """Return the weight of the target that minimises the expected squared error of the correlations.
 
     `unit` (S, 3 n): deviations in units of each feature's own SD.
     """
@@ -255,7 +285,7 @@ def _shrinkage(unit: FloatArray, animals: NDArray[np.intp]) -> float:
 
 
 def _positive(covariance: FloatArray) -> FloatArray:
-    """Lift eigenvalues that pairwise-complete sums leave at or below zero."""
+    """Raise eigenvalues that pairwise-complete sums leave at or below zero."""
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
     floor = 1e-6 * values.max()
     lifted: FloatArray = (vectors * np.maximum(values, floor)) @ vectors.T
@@ -263,6 +293,17 @@ def _positive(covariance: FloatArray) -> FloatArray:
 
 
 def per_feature_covariance(covariance: FloatArray) -> FloatArray:
-    """Return the covariance with every feature on its own, its variance the same in all directions."""
+    """Return the covariance with independent features, each with the same variance in all directions.
+
+    Parameters
+    ----------
+    covariance : (3 n, 3 n) array, mm^2
+        Coordinates feature by feature.
+
+    Returns
+    -------
+    (3 n, 3 n) array, mm^2
+        Diagonal.
+    """
     variances = covariance.diagonal().reshape(-1, 3).mean(axis=1)
     return np.diag(np.repeat(variances, 3))

@@ -1,8 +1,8 @@
-"""Check labels: what is missing, exchanged, of the other side, or not where the atlas expects it.
+"""Check labels: missing, exchanged, of the other side, or not where the atlas expects them.
 
-The one checker of the shell, the window, the script, Python and the fit of an atlas. A whole side under the
+The one checker of the shell, the window, scripts, Python and the fit of an atlas. A side labelled under the
 name of the other, and exchanged names, are found by likelihood (`gp_core.atlas.label_likelihood`); a single
-label is held against where the other labels put it.
+label is compared with its prediction from the other labels.
 """
 
 from __future__ import annotations
@@ -16,7 +16,13 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM, WRONG_MM, LabelModel, Reading, best_reading
+from gp_core.atlas.label_likelihood import (
+    LABELLING_NOISE_MM,
+    WRONG_MM,
+    LabelHypothesis,
+    LabelModel,
+    best_hypothesis,
+)
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import FEATURES, Side, feature
@@ -25,29 +31,29 @@ from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.validation import FloatArray
 
 __all__ = [
-    "DOUBTFUL_SD",
+    "OUTLIER_SD",
     "SHARED_WRONG_MM",
-    "Departure",
+    "Deviation",
     "Finding",
     "SideCheck",
     "check_landmarks",
     "check_side",
     "check_specimen",
-    "departure",
-    "far",
+    "deviation",
+    "far_finding",
 ]
 
-DOUBTFUL_SD = 5.0
-"""Distance from the expected place, in standard deviations, beyond which a label is doubted."""
+OUTLIER_SD = 5.0
+"""Distance from the predicted position, in standard deviations, beyond which a label is an outlier."""
 
 OTHER_SIDE_ODDS = 0.015
 """Prior odds that a side is labelled under the name of the other."""
 
 FEWEST = 4
-"""With three labels or fewer, each of them fits wherever the others are."""
+"""Three labels or fewer cannot contradict each other."""
 
 SAME_PLACE_MM = 0.05
-"""Half a voxel: no two features are so close."""
+"""Half a voxel: no two features are that close."""
 
 SHARED_MM = 0.5
 """Up to here two labels of one point differ as labels do."""
@@ -56,31 +62,31 @@ SHARED_WRONG_MM = 1.0
 """From here on one of two labels of one point is wrong: 7 SD of the difference of two labels."""
 
 HEAD_MM = 40.0
-"""No two features of a head are farther apart."""
+"""No two features of a head are farther apart than this."""
 
 _LEAST_WIDTH = 0.1
-"""Of the width that the atlas gives the placed features: narrower, they are a heap or a line."""
+"""Fraction of the width in the atlas below which the placed features count as collinear."""
 
 NEAR_BONE_MM = 3.0
-"""A feature in the cochlea's spaces is nearer to some bone than this."""
+"""Largest distance from bone of a feature in the spaces of the cochlea."""
 
-_HARMLESS = ("missing", "suggested", "unseen", "unchecked")
+_NOT_PROBLEMS = ("missing", "suggested", "unseen", "unchecked")
 
 
 @dataclass(frozen=True, eq=False)
-class Departure:
-    """How far a label is from where the other labels of its side put it.
+class Deviation:
+    """Deviation of a label from where the other labels of its side predict it.
 
     Attributes
     ----------
     code : str
         Feature.
     distance : float
-        From the expected place, mm.
+        From the predicted position, mm.
     expected : (3,) array
-        That place, mm, in the frame of the labels.
+        Predicted position, mm, in the frame of the labels.
     covariance : (3, 3) array
-        Of that place, mm^2.
+        Of the predicted position, mm^2.
     n_sd : float
         The distance in standard deviations (Mahalanobis).
     """
@@ -92,9 +98,9 @@ class Departure:
     n_sd: float
 
     @property
-    def is_doubtful(self) -> bool:
-        """Whether a person should look at the label again."""
-        return self.n_sd > DOUBTFUL_SD
+    def is_outlier(self) -> bool:
+        """Whether a person should review the label."""
+        return self.n_sd > OUTLIER_SD
 
     @property
     def word(self) -> str:
@@ -111,7 +117,13 @@ class Departure:
         return f"{self.word} from where the atlas expects it"
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return the deviation for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         numbers = {"distance": self.distance, "n_sd": self.n_sd, "expected": self.expected.tolist()}
         return {"landmark": self.code, **numbers}
 
@@ -136,7 +148,7 @@ class Finding:
         What to do about it, one sentence.
     certainty : float or None
         For ``other side`` and ``exchanged``, its probability among the explanations that were considered.
-    departures : tuple of Departure
+    deviations : tuple of Deviation
         How far each of the landmarks is from where the others put it, for ``far`` and ``exchanged``.
     checked_by : str or None
         Who looked at all of these labels again and found them right, empty where no name is known; None
@@ -150,7 +162,7 @@ class Finding:
     text: str
     remedy: str = ""
     certainty: float | None = None
-    departures: tuple[Departure, ...] = ()
+    deviations: tuple[Deviation, ...] = ()
     checked_by: str | None = None
 
     @property
@@ -159,29 +171,46 @@ class Finding:
         return self.checked_by is not None
 
     @property
-    def is_doubt(self) -> bool:
-        """Whether it says that a label is wrong, not just that there is none or that it cannot be checked."""
-        return self.kind not in _HARMLESS
+    def is_problem(self) -> bool:
+        """Whether it says that a label is wrong, not merely that it is missing or cannot be checked."""
+        return self.kind not in _NOT_PROBLEMS
 
     @property
     def severity(self) -> float:
-        """Grows with how wrong the labels are, for sorting."""
-        if not self.is_doubt:
+        """Grows with how wrong the labels are; a sorting key."""
+        if not self.is_problem:
             return -1.0
-        farthest = max((away.n_sd for away in self.departures), default=0.0)
+        farthest = max((away.n_sd for away in self.deviations), default=0.0)
         return 1e6 * _RANKS.get(self.kind, 0) + farthest
 
     @property
     def word(self) -> str:
         """For a cell of a table, such as ``2.6 mm`` or ``exchanged``."""
-        return self.departures[0].word if self.kind == "far" else self.kind
+        return self.deviations[0].word if self.kind == "far" else self.kind
 
-    def departure_of(self, code: str) -> Departure | None:
-        """Return how far one of the landmarks is from where the others put it, where that is known."""
-        return next((away for away in self.departures if away.code == code), None)
+    def deviation_of(self, code: str) -> Deviation | None:
+        """Return the deviation of one of the landmarks, where it is known.
+
+        Parameters
+        ----------
+        code : str
+            A feature.
+
+        Returns
+        -------
+        Deviation or None
+            None where it was not compared.
+        """
+        return next((away for away in self.deviations if away.code == code), None)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return the finding for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "specimen": self.specimen,
             "side": self.side.value,
@@ -190,7 +219,7 @@ class Finding:
             "text": self.text,
             "remedy": self.remedy,
             "certainty": self.certainty,
-            "departures": [away.as_dict() for away in self.departures],
+            "departures": [away.as_dict() for away in self.deviations],
             "checked_by": self.checked_by,
         }
 
@@ -198,24 +227,24 @@ class Finding:
 _RANKS = {"other side": 5, "exchanged": 4, "duplicate": 3, "outside": 2, "off bone": 1}
 
 
-def _nothing() -> Mapping[str, Departure]:
+def _nothing() -> Mapping[str, Deviation]:
     return MappingProxyType({})
 
 
 @dataclass(frozen=True)
 class SideCheck:
-    """What the labels of one side look like.
+    """Result of the check of one side.
 
     Attributes
     ----------
     findings : tuple of Finding
         The worst first; missing labels last.
-    departures : mapping of str to Departure
-        Of every label that can be held against the others, in the table's order.
+    deviations : mapping of str to Deviation
+        Of every label that can be compared with the others, in the table's order.
     """
 
     findings: tuple[Finding, ...] = ()
-    departures: Mapping[str, Departure] = field(default_factory=_nothing)
+    deviations: Mapping[str, Deviation] = field(default_factory=_nothing)
 
     @property
     def is_other_side(self) -> bool:
@@ -223,11 +252,11 @@ class SideCheck:
         return any(finding.kind == "other side" for finding in self.findings)
 
     @property
-    def doubts(self) -> dict[str, Finding]:
-        """The worst finding of each label that is doubted, by feature."""
+    def problems(self) -> dict[str, Finding]:
+        """The worst finding of each label that may be wrong, by feature."""
         found: dict[str, Finding] = {}
         for finding in self.findings:
-            if finding.is_doubt:
+            if finding.is_problem:
                 for code in finding.landmarks:
                     found.setdefault(code, finding)
         return found
@@ -236,15 +265,21 @@ class SideCheck:
 def check_specimen(
     specimen: Specimen, atlas: Atlas, *, scan: Mapping[Side, ScanEvidence] | None = None
 ) -> list[Finding]:
-    """Return everything to look at in the labels of one animal, both sides.
+    """Return all findings on the labels of one animal, both sides.
 
     Parameters
     ----------
     specimen : Specimen
+        Its labels, mm.
     atlas : Atlas
-        What the labels are held against.
+        What the labels are compared with.
     scan : mapping of Side to ScanEvidence, optional
-        What the scan says of each side; by default what was kept with its labels.
+        Evidence from the scan on each side; by default what is stored with its labels.
+
+    Returns
+    -------
+    list of Finding
+        The worst of each side first.
     """
     found: list[Finding] = []
     for side, landmarks in specimen.sides.items():
@@ -254,7 +289,20 @@ def check_specimen(
 
 
 def check_landmarks(landmarks: LandmarkSet, atlas: Atlas) -> list[Finding]:
-    """Return everything to look at in the labels of one side; see `check_side`."""
+    """Return all findings on the labels of one side; see `check_side`.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        One side, mm.
+    atlas : Atlas
+        What the labels are compared with.
+
+    Returns
+    -------
+    list of Finding
+        The worst first.
+    """
     return list(check_side(landmarks, atlas).findings)
 
 
@@ -264,55 +312,86 @@ def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | Non
     Parameters
     ----------
     landmarks : LandmarkSet
-        In any frame, mm; from four placed features on they are held against the atlas.
+        In any frame, mm; from four placed features on they are compared with the atlas.
     atlas : Atlas
+        What the labels are compared with.
     scan : ScanEvidence, optional
-        What the scan says of the same labels: those off the bone are named, however few there are. By
-        default what was kept with the labels.
+        Evidence from the scan on the same labels: those off the bone are named, however few there are. By
+        default what is stored with the labels.
 
     Returns
     -------
     SideCheck
-        It takes 1 ms for a side in order and 10 ms for one that is not.
+        Computed in 1 ms for a side in order, and in 10 ms for one that is not.
     """
     scan = scan or landmarks.scan_evidence
     found = [*_duplicates(landmarks), *(() if scan is None else _against_scan(landmarks, scan))]
-    departures: dict[str, Departure] = {}
+    deviations: dict[str, Deviation] = {}
     codes = tuple(code for code in landmarks.placed if code in atlas.codes)
     try:
         _require_enough(landmarks, atlas, codes)
-        explained, departures = _explain(landmarks, atlas, codes)
+        explained, deviations = _explain(landmarks, atlas, codes)
         found += explained
     except GpError as error:
         text = f"positions not checked: {error.problem}"
         found.append(_finding(landmarks, "unchecked", (), text, error.remedy or ""))
     found = [_as_checked(finding, landmarks) for finding in found]
     found.sort(key=lambda finding: -finding.severity)
-    return SideCheck((*found, *_not_placed(landmarks)), MappingProxyType(departures))
+    return SideCheck((*found, *_not_placed(landmarks)), MappingProxyType(deviations))
 
 
 def _as_checked(finding: Finding, *sets: LandmarkSet) -> Finding:
-    """Say who looked at all labels of a finding again, and found them right."""
+    """Add who reviewed all labels of a finding and confirmed them."""
     names = {landmarks.checked.get(code) for landmarks in sets for code in finding.landmarks}
-    if not finding.is_doubt or not names or None in names:
+    if not finding.is_problem or not names or None in names:
         return finding
     who = ", ".join(sorted(name for name in names if name))
     return replace(finding, checked_by=who)
 
 
-def departure(code: str, position: FloatArray, expected: FloatArray, covariance: FloatArray) -> Departure:
-    """Hold a label (3,) against where it is expected, mm, known with a covariance (3, 3), mm^2."""
+def deviation(code: str, position: FloatArray, expected: FloatArray, covariance: FloatArray) -> Deviation:
+    """Compare a label with its predicted position.
+
+    Parameters
+    ----------
+    code : str
+        The feature.
+    position : (3,) array, mm
+        The label.
+    expected : (3,) array, mm
+        Its predicted position.
+    covariance : (3, 3) array, mm^2
+        Of the predicted position.
+
+    Returns
+    -------
+    Deviation
+        Distance in mm and in standard deviations.
+    """
     off = position - expected
     spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
     n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
-    return Departure(code, float(np.linalg.norm(off)), expected, covariance, n_sd)
+    return Deviation(code, float(np.linalg.norm(off)), expected, covariance, n_sd)
 
 
-def far(side: Side, away: Departure) -> Finding:
-    """Return the finding that a label is far from where it is expected."""
+def far_finding(side: Side, away: Deviation) -> Finding:
+    """Return the finding that a label is far from its predicted position.
+
+    Parameters
+    ----------
+    side : Side
+        Of the label.
+    away : Deviation
+        Of the label.
+
+    Returns
+    -------
+    Finding
+        Of kind ``far``.
+    """
     text = f"{away.text} ({away.n_sd:.0f} SD)" if away.distance <= HEAD_MM else away.text
     remedy = f"Look at {away.code} again; move it, or mark it as checked."
-    return Finding("", side, "far", (away.code,), text, remedy, departures=(away,))
+    return Finding("", side, "far", (away.code,), text, remedy, deviations=(away,))
 
 
 def _finding(
@@ -342,23 +421,23 @@ def _duplicates(landmarks: LandmarkSet) -> Iterator[Finding]:
 
 
 def _against_scan(landmarks: LandmarkSet, scan: ScanEvidence) -> Iterator[Finding]:
-    for code, away in scan.bone_distances.items():
+    for code, distance_mm in scan.bone_distances.items():
         if code not in landmarks or feature(code).computed:
             continue
-        distance = f"{away:.1f} mm" if np.isfinite(away) else "far"
+        distance = f"{distance_mm:.1f} mm" if np.isfinite(distance_mm) else "far"
         if code in scan.outside:
             text, remedy = f"{code} is outside the scan", f"Place {code} again, in the scan."
             yield _finding(landmarks, "outside", (code,), text, remedy)
-        elif feature(code).on_bone and away > scan.tolerance:
+        elif feature(code).on_bone and distance_mm > scan.tolerance:
             text, remedy = f"{code} is {distance} from bone", f"Place {code} on bone, or mark it as checked."
             yield _finding(landmarks, "off bone", (code,), text, remedy)
-        elif away > NEAR_BONE_MM:
+        elif distance_mm > NEAR_BONE_MM:
             text, remedy = f"{code} is {distance} from any bone: outside the head", f"Place {code} again."
             yield _finding(landmarks, "outside", (code,), text, remedy)
 
 
 def _require_enough(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]) -> None:
-    """Refuse labels that cannot be held against each other."""
+    """Reject labels that are too few, or collinear, to be compared with each other."""
     if len(codes) < FEWEST:
         raise GpError(
             f"at least {FEWEST} placed features are needed to check one against the rest, got {len(codes)}",
@@ -377,27 +456,27 @@ def _require_enough(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]
 
 def _explain(
     landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]
-) -> tuple[list[Finding], dict[str, Departure]]:
-    """Find the most probable reading of the labels; return what it says, and each label against the rest."""
+) -> tuple[list[Finding], dict[str, Deviation]]:
+    """Find the most probable hypothesis on the labels; return its findings, and all deviations."""
     model, labels, side = LabelModel(atlas, codes), landmarks.array(codes), landmarks.side
     own, other = (mirror_right(labels, named) for named in (side, side.other))
-    reading, price = best_reading(model, own), -2 * np.log(OTHER_SIDE_ODDS)
-    mirrored = best_reading(model, other, below=reading.cost - price)
-    surplus = mirrored.cost + price - reading.cost
+    hypothesis, price = best_hypothesis(model, own), -2 * np.log(OTHER_SIDE_ODDS)
+    mirrored = best_hypothesis(model, other, below=hypothesis.cost - price)
+    surplus = mirrored.cost + price - hypothesis.cost
     found = []
     if surplus < 0:
-        reading, side = mirrored, side.other
+        hypothesis, side = mirrored, side.other
         found.append(_other_side(landmarks, codes, certainty=float(1 / (1 + np.exp(surplus / 2)))))
-    departures = _departures(model, codes, labels, reading, side)
-    for (i, j), certainty in zip(reading.exchanged, reading.certainties, strict=True):
-        found.append(_exchanged(landmarks, departures, (codes[i], codes[j]), certainty))
+    deviations = _deviations(model, codes, labels, hypothesis, side)
+    for (i, j), certainty in zip(hypothesis.exchanged, hypothesis.certainties, strict=True):
+        found.append(_exchanged(landmarks, deviations, (codes[i], codes[j]), certainty))
     explained = {code for finding in found if finding.kind == "exchanged" for code in finding.landmarks}
     found += [
-        far(landmarks.side, away)
-        for away in departures.values()
-        if away.is_doubtful and away.code not in explained
+        far_finding(landmarks.side, away)
+        for away in deviations.values()
+        if away.is_outlier and away.code not in explained
     ]
-    return found, departures
+    return found, deviations
 
 
 def _other_side(landmarks: LandmarkSet, codes: tuple[str, ...], certainty: float) -> Finding:
@@ -407,24 +486,24 @@ def _other_side(landmarks: LandmarkSet, codes: tuple[str, ...], certainty: float
 
 
 def _exchanged(
-    landmarks: LandmarkSet, departures: Mapping[str, Departure], pair: tuple[str, str], certainty: float
+    landmarks: LandmarkSet, deviations: Mapping[str, Deviation], pair: tuple[str, str], certainty: float
 ) -> Finding:
     names = " and ".join(pair)
-    away = tuple(departures[code] for code in pair)
+    away = tuple(deviations[code] for code in pair)
     text, remedy = f"{names} look exchanged", f"Exchange the names of {names}."
-    return _finding(landmarks, "exchanged", pair, text, remedy, certainty=certainty, departures=away)
+    return _finding(landmarks, "exchanged", pair, text, remedy, certainty=certainty, deviations=away)
 
 
-def _departures(
-    model: LabelModel, codes: tuple[str, ...], labels: FloatArray, reading: Reading, side: Side
-) -> dict[str, Departure]:
-    """Hold each label (n, 3) against where the others put it, read as labels of this side."""
+def _deviations(
+    model: LabelModel, codes: tuple[str, ...], labels: FloatArray, hypothesis: LabelHypothesis, side: Side
+) -> dict[str, Deviation]:
+    """Compare each label (n, 3) with its prediction from the others, as labels of this side."""
     own_variances = np.full(len(codes), LABELLING_NOISE_MM**2)
-    own_variances[list(reading.wrong)] += WRONG_MM**2
-    rest = model.fit(reading.points, reading.wrong).leave_one_out(own_variances)
+    own_variances[list(hypothesis.wrong)] += WRONG_MM**2
+    rest = model.fit(hypothesis.points, hypothesis.wrong).leave_one_out(own_variances)
     flip = np.diag([-1.0, 1.0, 1.0]) if side is Side.RIGHT else np.eye(3)
     places = zip(codes, labels, rest.expected @ flip, flip @ rest.covariance @ flip, strict=True)
-    return {code: departure(code, *place) for code, *place in places}
+    return {code: deviation(code, *place) for code, *place in places}
 
 
 def _shared_points(specimen: Specimen) -> Iterator[Finding]:

@@ -6,8 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from gp_core.atlas.atlas import DEFINING, PLACED, Atlas
+from gp_core.atlas.atlas import PLACED, Atlas
 from gp_core.atlas.generalised_procrustes import align_shapes, covariances, label_weights
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import CODES, check_codes
@@ -20,7 +21,7 @@ __all__ = ["as_left", "fit_consensus", "fit_plain_atlas", "fit_weighted_atlas", 
 def fit_plain_atlas(
     specimens: Sequence[Specimen], *, features: Iterable[str] | None = None, name: str | None = None
 ) -> Atlas:
-    """Fit an atlas in which every label of every animal counts alike: what the study of the paper needs.
+    """Fit an atlas in which every label of every animal has the same weight, as the study of the paper needs.
 
     Parameters
     ----------
@@ -49,12 +50,24 @@ def fit_plain_atlas(
 
 
 def fit_consensus(specimens: Sequence[Specimen], *, name: str = "these animals") -> Atlas:
-    """Fit an atlas to what most animals agree on, wrong labels among them: not to keep, but to judge them by.
+    """Fit an atlas to the consensus of animals some of whose labels are wrong; only to check them against.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+    name : str
+        Of the atlas.
+
+    Returns
+    -------
+    Atlas
+        The robust consensus.
 
     Raises
     ------
     GpError
-        As `fit_plain_atlas`.
+        As for `fit_plain_atlas`.
     """
     owners, shapes, codes = _shapes_of(specimens, None)
     weights = label_weights(shapes, codes, owners)
@@ -72,6 +85,11 @@ def fit_weighted_atlas(
         As for `fit_plain_atlas`.
     of_animals : (n,) array
         Weight of each specimen; with ones, this is `fit_plain_atlas`.
+
+    Returns
+    -------
+    Atlas
+        The fitted atlas.
 
     Raises
     ------
@@ -121,10 +139,15 @@ def _fit_shapes(
 def left_shapes(specimens: Sequence[Specimen]) -> tuple[list[str], FloatArray]:
     """Return every labelled side as a left side.
 
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+
     Returns
     -------
     owners : list of str
-        Whose side it is, for messages.
+        Specimen and side, for messages.
     shapes : (S, 20, 3) array, mm
         Points in the table's order, right sides mirrored in x, NaN where missing.
     """
@@ -135,7 +158,18 @@ def left_shapes(specimens: Sequence[Specimen]) -> tuple[list[str], FloatArray]:
 
 
 def as_left(landmarks: LandmarkSet) -> FloatArray:
-    """Return the points (20, 3) of a set, mirrored in x if they are of a right side."""
+    """Return the points of a set, mirrored in x if they are of a right side.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        One side.
+
+    Returns
+    -------
+    (20, 3) array, mm
+        Points as of a left side.
+    """
     return mirror_right(landmarks.points, landmarks.side)
 
 
@@ -144,9 +178,9 @@ def _choose(shapes: FloatArray, features: Iterable[str] | None) -> tuple[str, ..
     common = tuple(code for code in PLACED if counts[CODES.index(code)] >= 2)
     wanted = common if features is None else check_codes(features, "the features of an atlas", allowed=CODES)
     chosen = tuple(code for code in CODES if code in wanted and code != "CO")
-    for code in (*DEFINING, *chosen):
+    for code in (*DEFINING_FEATURES, *chosen):
         if code not in common:
             raise FeatureError(
                 f"fewer than two sides have {code}", landmark=code, remedy="Label it in more specimens."
             )
-    return tuple(code for code in PLACED if code in {*chosen, *DEFINING})
+    return tuple(code for code in PLACED if code in {*chosen, *DEFINING_FEATURES})

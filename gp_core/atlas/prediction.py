@@ -1,11 +1,12 @@
-"""Where an atlas expects the features of a labelled side that are not placed."""
+"""Predict the features of a labelled side that are not placed."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GeometryError
 from gp_core.landmarks.anatomy import cochlea_origin, mirror_right
 from gp_core.landmarks.features import Side
@@ -16,7 +17,7 @@ from gp_core.validation import FloatArray
 __all__ = ["predict"]
 
 UNKNOWN_ANGLE_SD = np.pi / np.sqrt(3)
-"""Standard deviation of an angle of which nothing is known, rad."""
+"""Standard deviation of a uniformly distributed angle, rad."""
 
 
 def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray, FloatArray]]:
@@ -25,20 +26,21 @@ def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray,
     Parameters
     ----------
     atlas : Atlas
+        Mean shape and its variation.
     landmarks : LandmarkSet
-        At least three placed features that the atlas holds, not on one line, in any frame, mm.
+        At least three placed features that the atlas holds, not collinear, in any frame, mm.
 
     Returns
     -------
     dict of str to (mean (3,), covariance (3, 3))
-        In the frame of the landmarks, mm and mm^2; CO among them where it is not placed.
+        In the frame of the landmarks, mm and mm^2; includes CO where it is not placed.
 
     Raises
     ------
     FeatureError
         Fewer than three usable features.
     GeometryError
-        They lie on one line.
+        They are collinear.
     """
     known = _known(atlas, landmarks)
     fit = _fit(atlas, landmarks, known)
@@ -71,24 +73,24 @@ def _fit(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...]) -> NamedF
 def _given(
     atlas: Atlas, known: tuple[str, ...], fit: NamedFit, wanted: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean (m, 3) and covariance (3 m, 3 m) of other features, given the fitted ones; atlas frame."""
+    """Return conditional mean (m, 3) and covariance (3 m, 3 m) of other features; atlas frame."""
     noise = np.repeat(fit.noise**2 / fit.weights, 3)
     precision = np.linalg.inv(atlas.cross_covariance(known, known) + np.diag(noise))
     jacobian = fit.jacobian
     information = jacobian.T @ precision @ jacobian
-    _check_turn(information)
+    _check_rotation(information)
     shift = np.linalg.solve(information, jacobian.T @ precision @ fit.residual)
     cross = atlas.cross_covariance(wanted, known) @ precision
     prior = atlas.rows(wanted)
     motion = motion_jacobian(prior)
     mean = prior + (cross @ (fit.residual - jacobian @ shift) + motion @ shift).reshape(-1, 3)
-    lever = motion - cross @ jacobian
+    motion_left = motion - cross @ jacobian
     covariance = atlas.cross_covariance(wanted, wanted) - cross @ atlas.cross_covariance(known, wanted)
-    return mean, covariance + lever @ np.linalg.solve(information, lever.T)
+    return mean, covariance + motion_left @ np.linalg.solve(information, motion_left.T)
 
 
-def _check_turn(information: FloatArray) -> None:
-    """Refuse points that tell no more of the turn of the head than no points would.
+def _check_rotation(information: FloatArray) -> None:
+    """Reject points that tell no more about the orientation of the head than no points would.
 
     `information` (6, 6): of the translation, 1/mm^2, and the rotation, 1/rad^2.
     """
@@ -106,16 +108,16 @@ def _to_frame(
     mean: FloatArray, covariance: FloatArray, fit: NamedFit, side: Side
 ) -> tuple[FloatArray, FloatArray]:
     points = mirror_right(mean @ fit.rotation.T + fit.translation, side)
-    turn = np.kron(np.eye(len(mean)), fit.rotation)
+    rotation = np.kron(np.eye(len(mean)), fit.rotation)
     if side is Side.RIGHT:
-        turn = np.kron(np.eye(len(mean)), np.diag([-1.0, 1.0, 1.0])) @ turn
-    return points, turn @ covariance @ turn.T
+        rotation = np.kron(np.eye(len(mean)), np.diag([-1.0, 1.0, 1.0])) @ rotation
+    return points, rotation @ covariance @ rotation.T
 
 
 def _predict_origin(
     landmarks: LandmarkSet, found: dict[str, tuple[FloatArray, FloatArray]]
 ) -> tuple[FloatArray, FloatArray]:
-    """Return CO of the placed or predicted points that define it, and the spread of the least certain one."""
-    points = [landmarks[code] if code in landmarks else found[code][0] for code in DEFINING]
-    spreads = [found[code][1] for code in DEFINING if code in found] or [np.zeros((3, 3))]
+    """Return CO from placed or predicted points, and the covariance of the least certain of them."""
+    points = [landmarks[code] if code in landmarks else found[code][0] for code in DEFINING_FEATURES]
+    spreads = [found[code][1] for code in DEFINING_FEATURES if code in found] or [np.zeros((3, 3))]
     return cochlea_origin(*points), max(spreads, key=np.trace)

@@ -1,4 +1,4 @@
-"""The default atlas, rebuilt from published facts: the distance table of Usevitch et al. 2021, Figure 2."""
+"""The default atlas, rebuilt from a published table: the distances of Usevitch et al. 2021, Figure 2."""
 
 from __future__ import annotations
 
@@ -62,9 +62,14 @@ def published_shape() -> PublishedShape:
     """Rebuild mean positions and variances of the features from the published table alone.
 
     Positions come from multidimensional scaling: classical (Torgerson 1952, doi:10.1007/BF02288916), then
-    least squares on the distances, each weighted by how well the table knows it. Distances do not tell an
-    object from its mirror image; anatomy does: on a left side, with x towards CA and y towards the round
+    least squares on the distances, each weighted by its precision in the table. Distances do not distinguish
+    an object from its mirror image; anatomy does: on a left side, with x towards CA and y towards the round
     window, the dorsal bulla (DTL, DTM) lies at +z.
+
+    Returns
+    -------
+    PublishedShape
+        Mean, variances and number of sides.
     """
     mean, sd = published_distances()
     variances = _fit_variances(sd)

@@ -1,4 +1,4 @@
-"""An animal drawn from an atlas: both ears of one head, where the atlas alone says how animals differ."""
+"""Animals drawn from an atlas: both ears of one head, varying as the atlas describes."""
 
 from __future__ import annotations
 
@@ -20,37 +20,38 @@ _SHARED = tuple(f.code for f in FEATURES if f.shared)
 _MIDLINE = _SHARED[0]
 
 _SIDE_CORRELATION = 0.6
-"""How alike the two ears of one animal are in what sets them apart from the mean."""
+"""Correlation between the two ears of an animal in their deviations from the mean."""
 
 _DEGREES, _MEAN_MOVES = 30, 0.3
-"""Of `perturbed_atlas`: degrees of freedom of its covariance, and how far its mean moves, in SDs."""
+"""For `perturbed_atlas`: degrees of freedom of its covariance, and the shift of its mean in SDs."""
 
 _FARTHEST = 3.0
-"""Standard deviations: a coordinate drawn beyond is brought back, so that no head is a monster."""
+"""Draws are clipped at this many standard deviations."""
 
 _MIDLINE_NORMAL = (0.20, 0.98, 0.0)
-"""Normal of the mid-sagittal plane, outward, in the left CO frame: of skulls touched on both sides."""
+"""Outward normal of the mid-sagittal plane in the left CO frame, from skulls touched on both sides."""
 
 _PITCH = np.radians(16.0)
-"""How far a head with level cheek teeth is turned nose down from the CO frame's own z."""
+"""Nose-down pitch of a head with level cheek teeth, relative to z of the CO frame, rad."""
 
 
 def draw_animal(
     atlas: Atlas, *, rng: np.random.Generator, tilt_deg: float = 0.0, name: str = "drawn"
 ) -> Specimen:
-    """Draw an animal from the Gaussian shape of an atlas and hold its head as in a scanner.
+    """Draw an animal from the Gaussian shape of an atlas, its head positioned as in a scanner.
 
     The mid-sagittal plane is x = 0, the origin lies midway between the ears, the cheek teeth are level. The
-    two sides are alike but not the same; they share IN exactly, and CO is computed from the drawn points.
+    two sides are correlated but not the same; they share IN exactly, and CO is computed from the drawn
+    points.
 
     Parameters
     ----------
     atlas : Atlas
         Holds all 19 placed features.
     rng : numpy Generator
-        The source of chance.
+        Source of random numbers.
     tilt_deg : float
-        Standard deviation of a further turn of the head about each axis, degrees.
+        Standard deviation of a further rotation of the head about each axis, degrees.
     name : str
         Name of the specimen.
 
@@ -70,16 +71,41 @@ def draw_animal(
 
 
 def mean_animal(atlas: Atlas, *, name: str = "mean") -> Specimen:
-    """Return the symmetric animal that has the atlas' mean on both sides; see `draw_animal`."""
+    """Return the symmetric animal with the mean shape of the atlas on both sides; see `draw_animal`.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        Holds all 19 placed features.
+    name : str
+        Name of the specimen.
+
+    Returns
+    -------
+    Specimen
+        All 20 features on both sides, frame ``scan`` (LPS, mm).
+    """
     mean = atlas.rows(_PLACED)
     return _in_head(atlas, mean, mean, name)
 
 
 def perturbed_atlas(atlas: Atlas, *, rng: np.random.Generator) -> Atlas:
-    """Return an atlas that differs from another as that of a different small herd would.
+    """Return an atlas that differs from another as that of a different small cohort would.
 
-    The mean is moved by 0.3 standard deviations; the covariance is half the old one and half a Wishart draw
-    of 30 degrees of freedom about it, so that features vary together, as they do in real animals.
+    The mean moves by 0.3 standard deviations; the covariance is half the old one and half a Wishart draw of
+    30 degrees of freedom about it, so that features are correlated, as they are in real animals.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        The atlas to perturb.
+    rng : numpy Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    Atlas
+        The perturbed atlas.
     """
     size = len(atlas.covariance)
     root = np.linalg.cholesky(atlas.covariance + 1e-9 * np.eye(size))
@@ -91,6 +117,13 @@ def perturbed_atlas(atlas: Atlas, *, rng: np.random.Generator) -> Atlas:
 
 def draw_sides(atlas: Atlas, *, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
     """Draw the two ears of one animal.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        Holds all 19 placed features.
+    rng : numpy Generator
+        Source of random numbers.
 
     Returns
     -------
@@ -105,7 +138,7 @@ def draw_sides(atlas: Atlas, *, rng: np.random.Generator) -> tuple[FloatArray, F
     z[1] = _SIDE_CORRELATION * z[0] + np.sqrt(1 - _SIDE_CORRELATION**2) * z[1]
     left, right = np.clip(z, -_FARTHEST, _FARTHEST) @ root.T
     shared = [3 * _PLACED.index(code) + c for code in _SHARED for c in range(3)]
-    # the right ear given that its midline feature is the left one's: keeps the covariance of each side
+    # condition the right ear on the left one's midline feature; this preserves the covariance of each side
     gain = covariance[:, shared] @ np.linalg.pinv(covariance[np.ix_(shared, shared)])
     right = right + gain @ (left[shared] - right[shared])
     right[shared] = left[shared]
@@ -113,10 +146,10 @@ def draw_sides(atlas: Atlas, *, rng: np.random.Generator) -> tuple[FloatArray, F
 
 
 def _in_head(atlas: Atlas, left: FloatArray, right: FloatArray, name: str) -> Specimen:
-    """Put two ears, given as left ones, at equal distances on both sides of the mid-sagittal plane.
+    """Place two ears, given as left ones, at equal distances on both sides of the mid-sagittal plane.
 
-    An ear is turned, as little as may be, until its midline feature lies in the direction where the mean
-    head has it: that feature is far away, and its spread in the CO frame is mostly a turn of the cochlea.
+    Each ear is rotated minimally until its midline feature lies in the direction that it has in the mean
+    head: that feature is far away, and its scatter in the CO frame is mostly a rotation of the cochlea.
     """
     T_head_ear = _nominal_rotation()
     row = _PLACED.index(_MIDLINE)
@@ -125,13 +158,15 @@ def _in_head(atlas: Atlas, left: FloatArray, right: FloatArray, name: str) -> Sp
     aside = np.array([-np.linalg.norm(left[row]) * towards[0], 0.0, 0.0])
     sides = {}
     for side, shape in ((Side.LEFT, left), (Side.RIGHT, right)):
-        points = shape @ (_turn(T_head_ear @ shape[row], towards) @ T_head_ear).T + aside
-        points[row, 0] = 0.0  # so it is, but for rounding
+        points = shape @ (_minimal_rotation(T_head_ear @ shape[row], towards) @ T_head_ear).T + aside
+        points[row, 0] = 0.0  # zero but for rounding
         points = mirror_right(points, side)
         named = dict(zip(_PLACED, points, strict=True))
         sides[side] = LandmarkSet.from_mapping(named, side, frame="scan")
     shared = sides[Side.LEFT][_MIDLINE]
-    sides[Side.RIGHT] = sides[Side.RIGHT].with_point(_MIDLINE, shared)  # else it may differ in the last bit
+    sides[Side.RIGHT] = sides[Side.RIGHT].with_point(
+        _MIDLINE, shared
+    )  # otherwise it could differ in the last bit
     return Specimen(name, {side: with_cochlea_origin(landmarks) for side, landmarks in sides.items()})
 
 
@@ -144,8 +179,8 @@ def _nominal_rotation() -> FloatArray:
     return np.stack([lateral, cos * back - sin * up, sin * back + cos * up])
 
 
-def _turn(source: FloatArray, target: FloatArray) -> FloatArray:
-    """Return the smallest rotation (3, 3) that brings one direction to another, not opposite, one."""
+def _minimal_rotation(source: FloatArray, target: FloatArray) -> FloatArray:
+    """Return the smallest rotation (3, 3) that maps one direction to another; not for opposite ones."""
     a, b = source / np.linalg.norm(source), target / np.linalg.norm(target)
     axis = np.cross(a, b)
     cross = np.cross(np.eye(3), axis)
@@ -154,10 +189,10 @@ def _turn(source: FloatArray, target: FloatArray) -> FloatArray:
 
 
 def _tilted(specimen: Specimen, rotation_vector: FloatArray) -> Specimen:
-    """Turn the whole head about the origin by a (3,) rotation vector, radians."""
+    """Rotate the whole head about the origin by a (3,) rotation vector, rad."""
     from scipy.spatial.transform import Rotation
 
-    turn = Rotation.from_rotvec(rotation_vector).as_matrix()
-    T_scan_scan = RigidTransform.from_parts(turn, np.zeros(3), dst="scan", src="scan")
+    rotation = Rotation.from_rotvec(rotation_vector).as_matrix()
+    T_scan_scan = RigidTransform.from_parts(rotation, np.zeros(3), dst="scan", src="scan")
     sides = {side: landmarks.moved(T_scan_scan) for side, landmarks in specimen.sides.items()}
     return Specimen(specimen.name, sides)

@@ -1,8 +1,7 @@
-"""What of the labels of many animals an atlas is fitted to: not what is known to be wrong.
+"""Labels that an atlas is fitted to: those of many animals, without the ones known to be wrong.
 
 Every animal is checked by `gp_core.atlas.label_check` against the published atlas. Where that contradicts
-many labels of most sides, it is no atlas of such animals, and they are checked against what most of them
-agree on.
+many labels of most sides, the animals are of another kind, and they are checked against their own consensus.
 """
 
 from __future__ import annotations
@@ -24,30 +23,30 @@ from gp_core.validation import FloatArray
 __all__ = ["Screened", "mean_shared_points", "screen_labels"]
 
 DOUBTFUL_WEIGHT = 0.02
-"""How much an animal counts in which labels are left out: where one is wrong, others may be."""
+"""Weight of an animal with labels left out: where one is wrong, others may be."""
 
 _LEAVES_OUT = ("other side", "exchanged", "duplicate", "far", "shared point wrong")
 _FOREIGN = 0.25
-"""Where more of the labels of most sides are far from where an atlas has them, it is of other animals."""
+"""Fraction of outliers, on most sides, above which the animals are unlike the atlas."""
 
 _FEWEST_SIDES = 3
-"""That must have a feature elsewhere before that counts as their way to label it."""
+"""Number of sides that must have a feature elsewhere before that counts as the lab's convention."""
 
 
 @dataclass(frozen=True)
 class Screened:
-    """Labelled animals without the labels that are known to be wrong.
+    """Labelled animals without the labels known to be wrong.
 
     Attributes
     ----------
     specimens : tuple of Specimen
-        What is left of them; an animal of which too little is left is not among them.
+        The remaining labels; animals with too few of them are left out.
     weights : (n,) array
-        How much each of them counts.
+        Weight of each of these animals.
     findings : tuple of Finding
-        What the check of each animal found, the worst first.
+        Of the check of each animal, the worst first.
     notes : tuple of str
-        What else a person should know, one sentence each.
+        Further remarks for a person, one sentence each.
     """
 
     specimens: tuple[Specimen, ...]
@@ -56,13 +55,13 @@ class Screened:
     notes: tuple[str, ...] = ()
 
     @property
-    def doubts(self) -> tuple[Finding, ...]:
-        """Those of the findings that say that a label is wrong."""
-        return tuple(finding for finding in self.findings if finding.is_doubt)
+    def problems(self) -> tuple[Finding, ...]:
+        """The findings that say that a label is wrong."""
+        return tuple(finding for finding in self.findings if finding.is_problem)
 
     @property
     def left_out(self) -> tuple[Finding, ...]:
-        """Those of the findings whose labels are left out."""
+        """The findings whose labels are left out."""
         return tuple(finding for finding in self.findings if _is_left_out(finding))
 
 
@@ -72,16 +71,22 @@ def screen_labels(
     confirmed: Collection[tuple[str, Side, str]] = (),
     tell: Callable[[float], object] = lambda fraction: None,
 ) -> Screened:
-    """Check animals, and leave out labels that are exchanged, or beyond 5 SD from where they belong.
+    """Check animals, and leave out labels that are exchanged, or more than 5 SD from their prediction.
 
     Parameters
     ----------
     specimens : sequence of Specimen
+        Labelled animals.
     confirmed : collection of (str, Side, str)
-        Labels (animal, side, feature) that a person has looked at again and found right: they stay, as do
-        those whose provenance says so.
+        Labels (animal, side, feature) that a person has reviewed and confirmed: they stay, as do those whose
+        provenance says so.
     tell : callable
-        Receives the fraction done, and may raise to stop.
+        Receives the fraction done; it may raise to stop.
+
+    Returns
+    -------
+    Screened
+        The remaining labels, and the findings.
     """
     published = Atlas.published()
     found = []
@@ -92,14 +97,14 @@ def screen_labels(
     if _is_foreign(specimens, found):
         try:
             consensus = fit_consensus(specimens)
-        except GpError:  # too few of them: there is nothing else to hold them against
+        except GpError:  # too few of them for a consensus
             pass
         else:
             found = [_found(specimen, consensus, confirmed) for specimen in specimens]
             notes.append("These animals are unlike the published atlas: each is checked against the others.")
     else:
-        found, notes = _without_habits(specimens, found)
-    left = [_without(specimen, doubts) for specimen, doubts in zip(specimens, found, strict=True)]
+        found, notes = _without_conventions(specimens, found)
+    left = [_without(specimen, findings) for specimen, findings in zip(specimens, found, strict=True)]
     kept = [i for i, specimen in enumerate(left) if specimen.sides]
     weights = np.array([DOUBTFUL_WEIGHT if _leave_out(found[i]) else 1.0 for i in kept])
     return Screened(
@@ -111,7 +116,18 @@ def screen_labels(
 
 
 def mean_shared_points(specimen: Specimen) -> Specimen:
-    """Return an animal with the same IN on both sides: the mean of two labels that differ as labels do."""
+    """Return an animal with the same IN on both sides: the mean of two labels within the labelling error.
+
+    Parameters
+    ----------
+    specimen : Specimen
+        Its labels, mm.
+
+    Returns
+    -------
+    Specimen
+        Unchanged where the two labels differ by more, or are not in one frame.
+    """
     sides = dict(specimen.sides)
     frames = {side.frame for side in sides.values()}
     if len(sides) < 2 or len(frames) > 1 or "cochlea" in frames:  # which is another for each side
@@ -142,7 +158,7 @@ def _is_left_out(finding: Finding) -> bool:
 
 
 def _is_foreign(specimens: Sequence[Specimen], found: Sequence[Sequence[Finding]]) -> bool:
-    """Whether most sides have many labels far from where the atlas has them."""
+    """Whether most sides have many labels far from where the atlas predicts them."""
     foreign = []
     for specimen, findings in zip(specimens, found, strict=True):
         for side, landmarks in specimen.sides.items():
@@ -151,25 +167,27 @@ def _is_foreign(specimens: Sequence[Specimen], found: Sequence[Sequence[Finding]
     return sum(foreign) > len(foreign) / 2
 
 
-def _without_habits(
+def _without_conventions(
     specimens: Sequence[Specimen], found: Sequence[Sequence[Finding]]
 ) -> tuple[list[list[Finding]], list[str]]:
-    """Leave alone a feature that most sides have elsewhere: so it is labelled here."""
+    """Drop the findings on a feature that most sides have elsewhere: this lab labels it so."""
     labelled = Counter(
         code for specimen in specimens for side in specimen.sides.values() for code in side.placed
     )
     far = Counter(f.landmarks[0] for findings in found for f in findings if f.kind == "far")
-    habits = {code for code, n in far.items() if n >= _FEWEST_SIDES and n > labelled[code] / 2}
+    conventions = {code for code, n in far.items() if n >= _FEWEST_SIDES and n > labelled[code] / 2}
     notes = [
         f"{code} is far from its published place on {far[code]} of {labelled[code]} sides: it is kept."
-        for code in sorted(habits)
+        for code in sorted(conventions)
     ]
-    kept = [[f for f in findings if f.kind != "far" or f.landmarks[0] not in habits] for findings in found]
+    kept = [
+        [f for f in findings if f.kind != "far" or f.landmarks[0] not in conventions] for findings in found
+    ]
     return kept, notes
 
 
 def _without(specimen: Specimen, findings: Sequence[Finding]) -> Specimen:
-    """Return what is left of an animal."""
+    """Return the remaining labels of an animal."""
     if not _leave_out(findings):
         return specimen
     sides = {}

@@ -1,4 +1,4 @@
-"""``gp-core conditions``: how often the 95 % regions hold the truth, whatever goes wrong in a session."""
+"""``gp-core conditions``: coverage of the 95 % regions under everything that may go wrong in a session."""
 
 from __future__ import annotations
 
@@ -37,12 +37,18 @@ _HEADINGS = (
 
 
 def add(commands: Subparsers) -> None:
-    """Add the command."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     parser = add_command(
         commands,
         "conditions",
         run,
-        summary="measure how often the 95 % regions hold the truth, and how often side and names are told",
+        summary="measure the coverage of the 95 % regions, and how often wrong sides and names are detected",
         example="gp-core conditions --groups shared size --repeats 20 --json conditions.json",
     )
     add_names(parser)
@@ -67,7 +73,18 @@ def add(commands: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure, print, and write what was asked for."""
+    """Run ``gp-core conditions``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     specimens = labelled_specimens(args) if args.specimens else None
     with executor_of(args) as executor:
         report = conditions(
@@ -85,7 +102,18 @@ def run(args: argparse.Namespace) -> int:
 
 
 def condition_lines(report: ConditionsReport) -> Iterator[str]:
-    """Yield a table, in Markdown; of exchanged names the pairs whose region holds the truth least often."""
+    """Yield a Markdown table; of the exchanged names, only the pairs with the lowest coverage.
+
+    Parameters
+    ----------
+    report : ConditionsReport
+        What to print.
+
+    Yields
+    ------
+    str
+        A line of text.
+    """
     rows = [row.as_dict() for row in report.rows]
     yield report.animals
     yield ""

@@ -1,4 +1,4 @@
-"""The command line ``gp-core``: thin over the functions at the top of `gp_core`."""
+"""The command line ``gp-core``: a thin layer over the functions at the top of `gp_core`."""
 
 from __future__ import annotations
 
@@ -40,7 +40,13 @@ _COMMANDS = (
 
 
 def make_parser() -> argparse.ArgumentParser:
-    """Return the parser with all commands."""
+    """Return the parser with all commands.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        Of ``gp-core``.
+    """
     parser = CommandParser(
         prog="gp-core",
         description="Atlas of guinea-pig ear landmarks, and cochlea poses from touched points.",
@@ -55,12 +61,17 @@ def make_parser() -> argparse.ArgumentParser:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command.
 
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        By default those of the process.
+
     Returns
     -------
     int
-        0; 1 where a check found something to look at; 2 where the input is wrong, said in one line; 3 where a
-        pose was not written, since names or side look wrong; 130 where it was stopped and 141 where nobody
-        reads on, as shells have it.
+        Exit status: 0; 1 where a check found something; 2 where the input is wrong (reported in one line); 3
+        where a pose was not written because names or side look wrong; 130 after Ctrl-C, and 141 where the
+        reader of the output has gone, as in shells.
     """
     with plain_terminal():
         return _run(arguments)

@@ -1,4 +1,4 @@
-"""``gp-core estimate``: touched points in, the pose of the cochlea out."""
+"""``gp-core estimate``: the pose of the cochlea from touched points."""
 
 from __future__ import annotations
 
@@ -20,17 +20,18 @@ from gp_core.cli.options import (
     save_json,
     say,
 )
+from gp_core.constants import METHODS, MM_PER_DEGREE
 from gp_core.errors import GpError, blaming
 from gp_core.io import read_touches
 from gp_core.io.file_names import named_side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS, CochleaPose
+from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.estimate import estimate_pose
-from gp_core.pose.gate import PoseGate, against_writing
+from gp_core.pose.gate import PoseGate, reasons_against_writing
 from gp_core.pose.hypothesis_check import read_as, with_names_exchanged
 from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_before_centre, write_path
 from gp_core.pose.mixture import Hypothesis
-from gp_core.pose.next_touch import MM_A_DEGREE, TouchGain, gains
+from gp_core.pose.next_touch import TouchGain, gains
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.validation import FloatArray
 
@@ -40,20 +41,26 @@ HELD_BACK = 3
 """Status of a command that wrote no pose, since names or side look wrong."""
 
 _FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
-"""Options whose files carry a pose without its doubts."""
+"""Options whose files hold a pose without its states and warnings."""
 
 _OF_A_PATH = ("path_units", "path_side", "path_axes", "path_rows", "path_out")
 _AXES = "x,y,z"
 
-_TAKEN_FOR_SURE = 0.995
-"""Probability from which a reading that the program chose itself is beyond doubt."""
+_CERTAIN_ENOUGH = 0.995
+"""Probability from which on a hypothesis that the program chose itself is accepted."""
 
-_HARDLY = 0.03
-"""Part of the present error region below which a gain is not worth a touch."""
+_NEGLIGIBLE_GAIN = 0.03
+"""Fraction of the present error region below which a gain is not worth a touch."""
 
 
 def add(commands: Subparsers) -> None:
-    """Add the command."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     parser = add_command(
         commands,
         "estimate",
@@ -78,9 +85,9 @@ def add(commands: Subparsers) -> None:
         "--probe-noise",
         type=float,
         metavar="MM",
-        help="error of an ordinary touch; default: found from the touches",
+        help="error of an ordinary touch; default: estimated from the touches",
     )
-    _add_doubts(parser)
+    _add_ambiguity(parser)
     parser.add_argument(
         "--round-window",
         choices=ROUND_WINDOWS,
@@ -101,26 +108,26 @@ def add(commands: Subparsers) -> None:
     _add_path(parser)
 
 
-def _add_doubts(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("what may be wrong")
+def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("errors and ambiguity")
     group.add_argument(
         "--shared-error",
         type=float,
         default=DEFAULT_SHARED_ERROR_MM,
         metavar="MM",
-        help="RMS length of one offset that all touches share: tip calibration, tracker, soft tissue; it "
+        help="RMS length of an offset that all touches share (tip calibration, tracker, soft tissue); it "
         f"widens the region; default: {DEFAULT_SHARED_ERROR_MM:g}",
     )
     group.add_argument(
         "--exchange",
         type=_two_names,
         metavar="A,B",
-        help="give each of two touches the other's name before the estimate, such as RWA,RWP",
+        help="exchange the names of two touches before the estimate, such as RWA,RWP",
     )
     group.add_argument(
         "--take-best",
         action="store_true",
-        help="where the other side, or an exchange of two names, is likelier than what is given, take that",
+        help="if the other side, or an exchange of two names, is likelier than the given ones, use that",
     )
     group.add_argument(
         "--accept-warnings",
@@ -151,7 +158,18 @@ def _add_path(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Estimate, print, and write what was asked for."""
+    """Run ``gp-core estimate``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     path = _path_of(args)
     touches = read_touches(args.touches, args.side, names=lab_names(args))
     if args.exchange is not None:
@@ -169,20 +187,22 @@ def run(args: argparse.Namespace) -> int:
             if atlas is None
             else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
         )
-    doubtful = bool(against_writing(pose)) or (taken is not None and taken.probability < _TAKEN_FOR_SURE)
+    doubtful = bool(reasons_against_writing(pose)) or (
+        taken is not None and taken.probability < _CERTAIN_ENOUGH
+    )
     held_back = doubtful and not args.accept_warnings
     _write(args, pose, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
     if taken is not None:
         odds = f"{100 * taken.probability:.1f} %"
-        say(f"  ! taken as {taken.label}, which is likelier than what was given ({odds})")
-    for line in _asides(args, touches, pose, path, held_back=held_back):
+        say(f"  ! used as {taken.label}, which is likelier than the given names and side ({odds})")
+    for line in _remarks(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
     if held_back:
         say(f"  ! {_what_was_held_back(args, pose)}")
     elif doubtful:
-        say("  ! written although side or names are in doubt: --accept-warnings was given")
+        say("  ! written although side or names are ambiguous: --accept-warnings was given")
     return HELD_BACK if held_back else 0
 
 
@@ -214,7 +234,7 @@ def _estimated(
         )
 
     pose = estimate(touches)
-    best = pose.likelier_reading
+    best = pose.likelier_hypothesis
     if best is None or not args.take_best:
         return touches, pose, None
     touches = read_as(touches, best)
@@ -223,8 +243,8 @@ def _estimated(
 
 def _what_was_held_back(args: argparse.Namespace, pose: CochleaPose) -> str:
     why = (
-        " and ".join(reason.text for reason in against_writing(pose))
-        or "the reading taken is not beyond doubt"
+        " and ".join(reason.text for reason in reasons_against_writing(pose))
+        or "the hypothesis used is not certain enough"
     )
     files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
     what = f"not written: {' '.join(files)}, as {why}" if files else why
@@ -252,7 +272,7 @@ def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None,
             save(file)
 
 
-def _asides(
+def _remarks(
     args: argparse.Namespace,
     touches: LandmarkSet,
     pose: CochleaPose,
@@ -271,7 +291,7 @@ def _asides(
         yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
     for reason in PoseGate().reasons(pose, accepted=True):
         if reason.code in ("radius", "cone", "side unchecked", "names unchecked"):
-            yield f"! a robot link would hold this back: {reason.text}"
+            yield f"! a robot link would not send this pose: {reason.text}"
     if args.json or (not held_back and any((args.tfm, args.csv, args.path_out))):
         yield f"y of what was written points to the {pose.round_window} round window"
 
@@ -300,7 +320,22 @@ def _path_of(args: argparse.Namespace) -> FloatArray | None:
 
 
 def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain] = ()) -> Iterator[str]:
-    """Yield the lines of a short readable table, and what of `next_touches`, best first, gains most."""
+    """Yield a short readable table of a pose, and which further touch gains most.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        An estimate.
+    source : str
+        Where the touches come from.
+    next_touches : sequence of TouchGain
+        The best first.
+
+    Yields
+    ------
+    str
+        A line of text.
+    """
     yield f"Cochlea from {source}, {pose.side.word} side, method {pose.method}, atlas {pose.atlas}"
     yield ""
     yield from _position_lines(pose)
@@ -324,7 +359,7 @@ def _position_lines(pose: CochleaPose) -> Iterator[str]:
     yield f"  state         {pose.state}"
     if pose.shared_error is not None:
         yield f"  shared error  {pose.shared_error:g} mm, which the regions allow for"
-    if pose.has_parts:
+    if pose.is_multimodal:
         plain = f"{pose.plain_radius_95:.2f} mm and {np.degrees(pose.plain_cone_95):.1f} deg"
         yield f"  as named      95 % within {plain}; the region above is of several parts:"
         yield f"    {pose.probability:6.1%}  as named"
@@ -335,7 +370,7 @@ def _position_lines(pose: CochleaPose) -> Iterator[str]:
 
 def _advice(best: TouchGain) -> str:
     """Say what the best next touch gains, if anything to speak of."""
-    if best.worth < _HARDLY * (best.radius_95_now + MM_A_DEGREE * np.degrees(best.cone_95_now)):
+    if best.worth < _NEGLIGIBLE_GAIN * (best.radius_95_now + MM_PER_DEGREE * np.degrees(best.cone_95_now)):
         return "no other touch would gain much"
     return (
         f"touching {best.code} too would gain most: 95 % within about {best.radius_95:.2f} mm "

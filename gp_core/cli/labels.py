@@ -37,7 +37,13 @@ __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the commands."""
+    """Add the commands to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     fit = add_command(
         commands,
         "fit",
@@ -51,15 +57,15 @@ def add(commands: Subparsers) -> None:
     fit.add_argument(
         "--keep-doubtful",
         action="store_true",
-        help="believe labels that the check doubts, too; by default they are left out, and their animals "
-        "hardly count",
+        help="also use labels that the check rejects; by default they are left out, and their animals "
+        "get little weight",
     )
     add_json(fit)
     mat = add_command(
         commands,
         "import-mat",
         run_import_mat,
-        summary="turn the authors' labelled sets into landmark files",
+        summary="convert the authors' labelled sets to landmark files",
         example="gp-core import-mat sets_L.mat sets_R.mat -o labelled/",
     )
     mat.add_argument("left", metavar="CC_L.mat", help="sets of the left side, variable cc_L")
@@ -75,14 +81,25 @@ def add(commands: Subparsers) -> None:
     )
     add_specimens(check)
     check.add_argument(
-        "--side", choices=("L", "R"), help="side of one file that does not say it, in itself or by its name"
+        "--side", choices=("L", "R"), help="side of a single file whose content and name do not give it"
     )
     check.add_argument("--atlas", nargs="+", default=["published"], metavar="ATLAS", help="as for estimate")
     add_json(check)
 
 
 def run_fit(args: argparse.Namespace) -> int:
-    """Fit, write, and say what the atlas holds."""
+    """Run ``gp-core fit``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     check_ending(args.output, (".json",), "--output")
     specimens = labelled_specimens(args)
     screened = screen_labels(specimens)
@@ -110,13 +127,13 @@ def _say_screened(screened: Screened, *, kept: bool) -> None:
     for note in screened.notes:
         say(note)
     if screened.left_out and kept:
-        say("All of these labels were believed (--keep-doubtful).")
+        say("All of these labels were used (--keep-doubtful).")
     elif screened.left_out:
         n = len({finding.specimen for finding in screened.left_out})
         say(
             "Exchanged names and labels beyond 5 SD were left out; "
-            f"{_count(n, 'animal')} with such labels hardly {'count' if n > 1 else 'counts'}. "
-            "To believe them, add --keep-doubtful."
+            f"{_count(n, 'animal')} with such labels {'get' if n > 1 else 'gets'} little weight. "
+            "To use them, add --keep-doubtful."
         )
 
 
@@ -133,14 +150,36 @@ def _fit_report(atlas: Atlas, screened: Screened, *, kept: bool) -> dict[str, An
 
 
 def run_import_mat(args: argparse.Namespace) -> int:
-    """Convert and say what was written."""
+    """Run ``gp-core import-mat``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     written = import_mat(args.left, args.right, args.output, overwrite=args.replace)
     say(f"{len(written)} landmark files in {args.output}")
     return 0
 
 
 def run_check(args: argparse.Namespace) -> int:
-    """Print what there is to look at; status 1 where a label is doubtful."""
+    """Run ``gp-core check``: status 1 where a label needs attention.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     found = labellings(args) if args.side is None else [Labelling(_one_side(args))]
     atlas, others = read_atlas(args.atlas)
     n_of = Counter(each.specimen.name for each in found)
@@ -152,7 +191,7 @@ def run_check(args: argparse.Namespace) -> int:
     save_json(args.json, {name: [f.as_dict() for f in findings] for name, findings in report.items()})
     for name, findings in report.items():
         _say_findings(name, findings)
-    return int(any(f.is_doubt for findings in report.values() for f in findings))
+    return int(any(f.is_problem for findings in report.values() for f in findings))
 
 
 def _one_side(args: argparse.Namespace) -> Specimen:
@@ -167,14 +206,14 @@ def _one_side(args: argparse.Namespace) -> Specimen:
 
 
 def _atlas_for(specimen: Specimen, atlas: Atlas | None, others: list[Specimen] | None) -> Atlas:
-    """Return the atlas, fitted without the animal that is held against it."""
+    """Return the atlas, fitted without the animal that is checked."""
     return atlas or fit_atlas([other for other in others or [] if other.name != specimen.name])
 
 
 def _say_findings(name: str, findings: list[Finding]) -> None:
     say(f"{name}: {_verdict(findings)}")
     for finding in findings:
-        mark = "!" if finding.is_doubt else " "
+        mark = "!" if finding.is_problem else " "
         codes = " ".join(finding.landmarks) if len(finding.landmarks) < 3 else "all"
         said = f"Checked by {finding.checked_by or 'unnamed'}." if finding.is_checked else finding.remedy
         remedy = f". {said}" if said else ""
@@ -186,7 +225,7 @@ def _count(n: int, what: str) -> str:
 
 
 def _verdict(findings: list[Finding]) -> str:
-    doubtful = sum(f.is_doubt for f in findings)
+    doubtful = sum(f.is_problem for f in findings)
     absent = sum(f.kind in ("missing", "suggested", "unseen") for f in findings)
     if not findings:
         return "all labels placed, none doubtful"

@@ -1,4 +1,4 @@
-"""Options that several commands share, and how commands speak."""
+"""Options that several commands share, and their output."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from gp_core.atlas.atlas import Atlas
-from gp_core.disk import is_protected, is_stream, protected_inputs, read_head, write_text
+from gp_core.atlas.atlas import Atlas, is_atlas_file
+from gp_core.disk import is_protected, is_stream, protected_inputs, write_text
 from gp_core.errors import GpError
 from gp_core.io import Labelling, landmark_files, load_labellings, load_specimens, read_lab_names
 from gp_core.landmarks.labels import LabelNames
@@ -58,7 +58,26 @@ AtlasSource = tuple[Atlas | None, list[Specimen] | None]
 def add_command(
     commands: Subparsers, name: str, run: Callable[[argparse.Namespace], int], *, summary: str, example: str
 ) -> argparse.ArgumentParser:
-    """Add a command with its one-line summary and an example to the help."""
+    """Add a command with its one-line summary, and an example in its help.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``.
+    name : str
+        Name of the command.
+    run : callable
+        Takes the parsed options and returns the exit status.
+    summary : str
+        One line for the help.
+    example : str
+        A command line.
+
+    Returns
+    -------
+    argparse.ArgumentParser
+        The parser of the command.
+    """
     parser: argparse.ArgumentParser = commands.add_parser(
         name,
         help=summary.replace("%", "%%"),
@@ -71,7 +90,13 @@ def add_command(
 
 
 def add_specimens(parser: argparse.ArgumentParser) -> None:
-    """Add the labelled animals, one or more paths."""
+    """Add the labelled animals: one or more paths.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument(
         "specimens",
         nargs="+",
@@ -83,7 +108,13 @@ def add_specimens(parser: argparse.ArgumentParser) -> None:
 
 
 def add_labelling(parser: argparse.ArgumentParser) -> None:
-    """Add ``--observer NAME`` and ``--round N``."""
+    """Add ``--observer NAME`` and ``--round N``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument("--observer", metavar="NAME", help="use the labels of this observer alone")
     parser.add_argument(
         "--round",
@@ -95,26 +126,65 @@ def add_labelling(parser: argparse.ArgumentParser) -> None:
 
 
 def add_names(parser: argparse.ArgumentParser) -> None:
-    """Add ``--names FILE``."""
+    """Add ``--names FILE``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument(
         "--names",
         metavar="FILE",
-        help="a table of two columns, your own name of a point and the feature's code (CA, or CA_L)",
+        help="a table with two columns: your name of a point, and the feature's code (CA, or CA_L)",
     )
 
 
 def lab_names(args: argparse.Namespace) -> LabelNames | None:
-    """Return the names that ``--names`` gives; None without it."""
+    """Return the lab's own names from ``--names``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    LabelNames or None
+        None without the option.
+    """
     return None if args.names is None else read_lab_names(args.names)
 
 
 def labelled_specimens(args: argparse.Namespace) -> list[Specimen]:
-    """Return the animals of the command line, under the names that ``--names`` gives."""
+    """Return the animals of the command line, with the names of ``--names``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    list of Specimen
+        The labelled animals.
+    """
     return load_specimens(args.specimens, **_which(args))
 
 
 def labellings(args: argparse.Namespace) -> list[Labelling]:
-    """Return the same with each observer's labels, and each round's, apart."""
+    """Return the animals of the command line, with the labels of each observer and round apart.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    list of Labelling
+        One for each animal, observer and round.
+    """
     return load_labellings(args.specimens, **_which(args))
 
 
@@ -124,18 +194,34 @@ def _which(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add ``--json FILE``."""
+    """Add ``--json FILE``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument("--json", metavar="FILE", help="write the full result here")
 
 
 @contextmanager
 def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
-    """Refuse to write over what is read, under any name, or two results to one file, while a command runs.
+    """Protect the inputs of a command from its outputs, under any name, and its outputs from each other.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Yields
+    ------
+    None
+        While the command runs.
 
     Raises
     ------
     GpError
-        An output is an input, also one in a folder of landmark files, or two outputs are one file.
+        An output is an input, also one in a folder of landmark files, or two outputs are the same file.
     """
     with protected_inputs(_files_read(args)):
         written: dict[str, str] = {}
@@ -145,7 +231,7 @@ def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
                 continue
             path, option = os.path.realpath(word), f"--{name.replace('_', '-')}"
             if is_protected(word):
-                raise GpError(f"is read, and {option} would write over it", file=word, remedy=_ANOTHER)
+                raise GpError(f"is an input, and {option} would overwrite it", file=word, remedy=_ANOTHER)
             if path in written and not is_stream(word):
                 problem = f"would be written by {written[path]} and {option}"
                 raise GpError(problem, file=word, remedy=_ANOTHER)
@@ -155,7 +241,16 @@ def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
 
 
 def check_ending(word: str, endings: tuple[str, ...], option: str) -> None:
-    """Refuse the name of a file to write that ends as another kind of file does.
+    """Reject an output file whose suffix belongs to another format.
+
+    Parameters
+    ----------
+    word : str
+        The file name; a name without a suffix, or a stream, passes.
+    endings : tuple of str
+        Permitted suffixes.
+    option : str
+        For the message.
 
     Raises
     ------
@@ -185,7 +280,17 @@ def _words_read(args: argparse.Namespace) -> Iterator[str]:
 
 
 def read_atlas(words: list[str]) -> AtlasSource:
-    """Return the atlas that ``--atlas`` names, or the specimens it is to be fitted to.
+    """Return the atlas of ``--atlas``, or the specimens to fit it to.
+
+    Parameters
+    ----------
+    words : list of str
+        Values of the option.
+
+    Returns
+    -------
+    AtlasSource
+        The atlas, or the specimens.
 
     Raises
     ------
@@ -194,27 +299,46 @@ def read_atlas(words: list[str]) -> AtlasSource:
     """
     if words == ["published"]:
         return Atlas.published(), None
-    if len(words) == 1 and _is_atlas_file(words[0]):
+    if len(words) == 1 and _names_atlas_file(words[0]):
         return Atlas.load(words[0]), None
     return None, load_specimens(words)
 
 
-def _is_atlas_file(word: str) -> bool:
-    """Tell an atlas by what it holds, and what cannot be read by its name."""
-    path, name = Path(word), word.lower()
-    if path.is_dir():
+def _names_atlas_file(word: str) -> bool:
+    """Whether a word names an atlas, by its content, or else by the name of a file that cannot be read."""
+    name = word.lower()
+    if Path(word).is_dir():
         return False
-    if b'"gpAtlas"' in read_head(path, 1000):
+    if is_atlas_file(word):
         return True
     return name.endswith(".json") and not name.endswith(".mrk.json")
 
 
 def save_json(path: str | None, content: Any) -> None:
-    """Write a result where ``--json`` was given."""
+    """Write a result, if ``--json`` was given.
+
+    Parameters
+    ----------
+    path : str or None
+        Value of the option.
+    content : object
+        Plain values for JSON.
+
+    Raises
+    ------
+    GpError
+        The file cannot be written.
+    """
     if path is not None:
         write_text(path, json.dumps(content, indent=1) + "\n")
 
 
 def say(text: str = "") -> None:
-    """Write a line to the terminal."""
+    """Print a line.
+
+    Parameters
+    ----------
+    text : str
+        The line.
+    """
     sys.stdout.write(text + "\n")

@@ -31,7 +31,13 @@ __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the commands."""
+    """Add the commands to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     table = add_command(
         commands,
         "distances",
@@ -59,7 +65,18 @@ def add(commands: Subparsers) -> None:
 
 
 def run_distances(args: argparse.Namespace) -> int:
-    """Measure, print, and write what was asked for."""
+    """Run ``gp-core distances``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     table = distances(labelled_specimens(args))
     save_json(args.json, table.as_dict())
     if args.csv:
@@ -78,7 +95,18 @@ def _distance_lines(table: DistanceTable) -> Iterator[str]:
 
 
 def run_leave_one_out(args: argparse.Namespace) -> int:
-    """Estimate, print, and write what was asked for."""
+    """Run ``gp-core leave-one-out``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     training, probe = features_of(args)
     report = leave_one_out(
         labelled_specimens(args),

@@ -38,7 +38,13 @@ __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the commands."""
+    """Add the commands to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     drawn = add_command(
         commands,
         "simulate",
@@ -53,7 +59,7 @@ def add(commands: Subparsers) -> None:
         type=float,
         default=0.0,
         metavar="MM",
-        help="SD of the touch errors a coordinate; default: 0",
+        help="SD of the touch errors, mm a coordinate; default: 0",
     )
     add_method(drawn)
     add_features(drawn)
@@ -73,7 +79,7 @@ def add(commands: Subparsers) -> None:
         commands,
         "compare",
         run_compare,
-        summary="compare JRMPC and the robust method as touch errors rise",
+        summary="compare JRMPC and the robust method for increasing touch errors",
         example="gp-core compare --figure compare.png --csv compare.csv",
     )
     add_names(versus)
@@ -98,7 +104,18 @@ def add(commands: Subparsers) -> None:
 
 
 def run_simulate(args: argparse.Namespace) -> int:
-    """Simulate, print, and write what was asked for."""
+    """Run ``gp-core simulate``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     training, probe = features_of(args)
     physical = [error for file in args.physical for error in _physical_errors(file, args.method)]
     with executor_of(args) as executor:
@@ -132,7 +149,7 @@ def _physical_errors(file: str, method: str) -> list[tuple[float, float]]:
             if (row["registration"], row["method"]) == ("icp", method)
         ]
     except (ValueError, KeyError, TypeError, OverflowError):
-        raise FileFormatError("is no result of a physical test", file=file, remedy=remedy) from None
+        raise FileFormatError("is not the result of a physical test", file=file, remedy=remedy) from None
 
 
 def _simulation_lines(report: SimulationReport) -> Iterator[str]:
@@ -154,7 +171,18 @@ def _simulation_lines(report: SimulationReport) -> Iterator[str]:
 
 
 def run_compare(args: argparse.Namespace) -> int:
-    """Compare, print, and write what was asked for."""
+    """Run ``gp-core compare``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     specimens = labelled_specimens(args) if args.specimens else None
     with executor_of(args) as executor:
         report = compare(

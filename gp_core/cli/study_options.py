@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, EXTERNAL, PROBE, TRAINING, check_codes
-from gp_core.pose.cochlea_pose import METHODS
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings
 from gp_core.study.backward_elimination import Progress
 from gp_core.study.parallel import open_executor
@@ -41,7 +41,13 @@ SETTINGS = {"estimation": ESTIMATION, "defaults": DEFAULTS}
 
 
 def add_features(parser: argparse.ArgumentParser) -> None:
-    """Add ``--training`` and ``--probe``."""
+    """Add ``--training`` and ``--probe``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument(
         "--training",
         nargs="+",
@@ -57,7 +63,18 @@ def add_features(parser: argparse.ArgumentParser) -> None:
 
 
 def features_of(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the training and the probe features that were asked for."""
+    """Return the requested training and probe features.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    training, probe : tuple of str
+        By default the paper's.
+    """
     training = codes_of(args.training, "--training", TRAINING, CODES)
     return training, codes_of(args.probe, "--probe", PROBE, tuple(c for c in EXTERNAL if c in training))
 
@@ -65,7 +82,24 @@ def features_of(args: argparse.Namespace) -> tuple[tuple[str, ...], tuple[str, .
 def codes_of(
     words: list[str] | None, option: str, default: tuple[str, ...], everything: tuple[str, ...]
 ) -> tuple[str, ...]:
-    """Return the features an option names, apart by blanks or commas; ``all`` stands for `everything`."""
+    """Return the features that an option names, separated by blanks or commas.
+
+    Parameters
+    ----------
+    words : list of str or None
+        Values of the option.
+    option : str
+        For messages.
+    default : tuple of str
+        Without the option.
+    everything : tuple of str
+        What ``all`` stands for.
+
+    Returns
+    -------
+    tuple of str
+        Feature codes.
+    """
     if words is None:
         return default
     codes = [code for word in words for code in word.split(",") if code]
@@ -73,12 +107,26 @@ def codes_of(
 
 
 def add_method(parser: argparse.ArgumentParser) -> None:
-    """Add ``--method``."""
+    """Add ``--method``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument("--method", choices=METHODS, default="jrmpc", help="default: jrmpc, as in the paper")
 
 
 def add_settings(parser: argparse.ArgumentParser, default: str) -> None:
-    """Add the settings of JRMPC: one of two by name, and its three numbers."""
+    """Add the settings of JRMPC: one of two presets by name, and three numbers.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    default : str
+        Name of the default preset.
+    """
     group = parser.add_argument_group("settings of JRMPC")
     group.add_argument(
         "--settings",
@@ -94,26 +142,69 @@ def add_settings(parser: argparse.ArgumentParser, default: str) -> None:
 
 
 def settings_of(args: argparse.Namespace, default: JrmpcSettings) -> JrmpcSettings:
-    """Return the settings of JRMPC that were asked for."""
+    """Return the requested settings of JRMPC.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+    default : JrmpcSettings
+        Without the options.
+
+    Returns
+    -------
+    JrmpcSettings
+        The settings.
+    """
     named = default if args.settings is None else SETTINGS[args.settings]
     numbers = {name: getattr(args, name) for name in ("max_iterations", "gamma", "epsilon")}
     return replace(named, **{name: value for name, value in numbers.items() if value is not None})
 
 
 def add_seed(parser: argparse._ActionsContainer) -> None:
-    """Add ``--seed``."""
+    """Add ``--seed``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument("--seed", type=int, default=0, help="start of the random numbers; default: 0")
 
 
 def rng_of(args: argparse.Namespace) -> np.random.Generator:
-    """Return the source of chance that was asked for."""
+    """Return the requested random number generator.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    numpy Generator
+        Seeded.
+
+    Raises
+    ------
+    GpError
+        The seed is negative.
+    """
     if args.seed < 0:
         raise GpError(f"the seed must be 0 or more, got {args.seed}")
     return np.random.default_rng(args.seed)
 
 
 def add_workers(parser: argparse.ArgumentParser, *, default: int | None = None) -> None:
-    """Add ``--workers`` and ``--scheduler``."""
+    """Add ``--workers`` and ``--scheduler``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    default : int, optional
+        Default number of workers.
+    """
     shown = "one a core" if default is None else f"{default}"
     parser.add_argument(
         "--workers", type=int, default=default, metavar="N", help=f"processes to use; default: {shown}"
@@ -124,7 +215,18 @@ def add_workers(parser: argparse.ArgumentParser, *, default: int | None = None) 
 
 
 def executor_of(args: argparse.Namespace) -> AbstractContextManager[Executor | None]:
-    """Return what the study runs on, to be opened by ``with``."""
+    """Return the requested executor, to be opened by ``with``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    context manager
+        Of an executor, or of None where everything runs here.
+    """
     return open_executor(args.workers, args.scheduler)
 
 
@@ -161,12 +263,28 @@ def _duration(seconds: float) -> str:
 
 
 def add_figure(parser: argparse._ActionsContainer) -> None:
-    """Add ``--figure FILE``."""
+    """Add ``--figure FILE``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument("--figure", metavar="FILE", help="draw the result here (.png, .pdf or .svg)")
 
 
 def save_figure_of(path: str | None, drawing: str, *content: Any) -> None:
-    """Draw and write a figure where ``--figure`` was given; matplotlib is loaded only then."""
+    """Draw and write a figure, if ``--figure`` was given; matplotlib is imported only then.
+
+    Parameters
+    ----------
+    path : str or None
+        Value of the option.
+    drawing : str
+        Name of a function in `gp_core.study.figures`.
+    *content : object
+        Its arguments.
+    """
     if path is None:
         return
     from gp_core.study import figures

@@ -1,4 +1,4 @@
-"""``gp-core physical``: a touched skull against its own CT."""
+"""``gp-core physical``: a touched skull compared with its own CT."""
 
 from __future__ import annotations
 
@@ -24,12 +24,18 @@ __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the command."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     parser = add_command(
         commands,
         "physical",
         run,
-        summary="hold the estimate from touches of a skull against its CT",
+        summary="compare the estimate from touches of a skull with its CT",
         example="gp-core physical --touches skull.dat --ct-landmarks ct_R.mrk.json --side R --figure out.png",
     )
     parser.add_argument(
@@ -69,7 +75,18 @@ def add(commands: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Test, print, and write what was asked for."""
+    """Run ``gp-core physical``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     atlas, specimens = read_atlas(args.atlas)
     touches = read_touches(args.touches, args.side, unknown="extra", names=lab_names(args))
     rng = rng_of(args)
@@ -96,9 +113,9 @@ def _lines(report: PhysicalReport) -> Iterator[str]:
     yield ""
     yield "  registration  FRE mm  method   E_CO mm  E_MA deg"
     for registration in report.registrations:
-        for row in (row for row in report.rows if row.registration == registration.way):
+        for row in (row for row in report.rows if row.registration == registration.method):
             yield (
-                f"  {registration.way:<12}  {registration.fre_mm:6.3f}  {row.method:<7}  "
+                f"  {registration.method:<12}  {registration.fre_mm:6.3f}  {row.method:<7}  "
                 f"{row.e_co_mm:7.3f}  {row.e_ma_deg:8.2f}"
             )
     for warning in report.warnings:

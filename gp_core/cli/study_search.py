@@ -35,7 +35,13 @@ __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the command."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     parser = add_command(
         commands,
         "search",
@@ -57,10 +63,12 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "--nested",
         action="store_true",
-        help="hold each animal out before anything is chosen, and report its errors: the honest ones",
+        help="hold each animal out before features are selected, and report its errors, which are unbiased",
     )
     parser.add_argument(
-        "--checkpoint", metavar="FILE", help="keep results here as they come in; if it exists, go on from it"
+        "--checkpoint",
+        metavar="FILE",
+        help="store results here as they come in; if the file exists, resume from it",
     )
     add_settings(parser, "defaults")
     add_workers(parser)
@@ -69,7 +77,18 @@ def add(commands: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Search, print, and write what was asked for."""
+    """Run ``gp-core search``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     specimens = labelled_specimens(args)
     training = codes_of(args.training, "--training", CODES, CODES)
     search = nested_search if args.nested else search_features

@@ -1,4 +1,4 @@
-"""The command ``touches``: touches out of a recorded probe."""
+"""``gp-core touches``: touches extracted from a recorded probe."""
 
 from __future__ import annotations
 
@@ -21,12 +21,18 @@ __all__ = ["add", "add_transforms"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the command."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     parser = add_command(
         commands,
         "touches",
         run,
-        summary="make touches of a recorded probe: the places where its tip rested, in a named order",
+        summary="extract touches from a recorded probe: the places where its tip rested, in a given order",
         example="gp-core touches stylus.igs.mha --tip tip.json --order CL,MN,OS,RWA,RWP,LLI -o touches.csv",
     )
     parser.add_argument("recording", metavar="RECORDING", help="as for pivot")
@@ -41,7 +47,7 @@ def add(commands: Subparsers) -> None:
         "--order",
         default=",".join(PROBE),
         metavar="NAMES",
-        help="what was touched, in that order (default: %(default)s)",
+        help="what was touched, in this order (default: %(default)s)",
     )
     add_transforms(parser)
     parser.add_argument(
@@ -50,7 +56,13 @@ def add(commands: Subparsers) -> None:
 
 
 def add_transforms(parser: argparse.ArgumentParser) -> None:
-    """Add which transforms of a sequence are read."""
+    """Add the options that select transforms of a sequence.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
     parser.add_argument(
         "--transform", metavar="NAME", help="the probe's transform in a sequence, such as StylusToTracker"
     )
@@ -60,7 +72,18 @@ def add_transforms(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Find the touches, write them, and say where they are."""
+    """Run ``gp-core touches``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     check_ending(args.output, (".csv",), "--output")
     recording = read_recording(args.recording, transform=args.transform, reference=args.reference)
     names = [_touched_name(name) for name in args.order.split(",") if name.strip()]

@@ -1,4 +1,4 @@
-"""Commands on what a tracker sees: ``register`` it to a scan, ``pivot`` its probe."""
+"""Commands for a tracker: ``register`` it to a scan, and ``pivot`` to calibrate its probe."""
 
 from __future__ import annotations
 
@@ -16,19 +16,26 @@ from gp_core.io.tfm import tfm_text
 from gp_core.io.tracker_recordings import read_recording
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.sets import LandmarkSet
-from gp_core.registration.fiducials import FiducialRegistration, named_points, register_fiducials
+from gp_core.registration.fiducials import points_by_name, register_fiducials
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
+from gp_core.registration.result import RegistrationResult
 
 __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the commands."""
+    """Add the commands to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the commands are added.
+    """
     register = add_command(
         commands,
         "register",
         run_register,
-        summary="register touches to the labelled CT of the same head, by the names they share",
+        summary="register touches to the labelled CT of the same head, by common names",
         example="gp-core register touches.dat skull_R.mrk.json --side R --tfm tracker_to_scan.tfm",
     )
     register.add_argument(
@@ -45,7 +52,7 @@ def add(commands: Subparsers) -> None:
         commands,
         "pivot",
         run_pivot,
-        summary="find the tip of a probe from poses of its marker, recorded while it turned about its tip",
+        summary="calibrate the tip of a probe, from poses of its marker while it pivots about its tip",
         example="gp-core pivot poses.csv --json tip.json",
     )
     pivot.add_argument(
@@ -59,13 +66,26 @@ def add(commands: Subparsers) -> None:
 
 
 def run_register(args: argparse.Namespace) -> int:
-    """Register, print, and write what was asked for."""
+    """Run ``gp-core register``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     touches = read_touches(args.touches, args.side, unknown="extra", names=lab_names(args))
     ct = with_cochlea_origin(
         read_landmarks(args.ct_landmarks, side=args.side, unknown="extra", names=lab_names(args))
     )
     with blaming(f"{args.touches} and {args.ct_landmarks}"):
-        found = register_fiducials(named_points(touches), named_points(ct), dst=ct.frame, src=touches.frame)
+        found = register_fiducials(
+            points_by_name(touches), points_by_name(ct), dst=ct.frame, src=touches.frame
+        )
     content = found.as_dict() | _at_cochlea(found, ct)
     save_json(args.json, content)
     if args.tfm:
@@ -75,7 +95,7 @@ def run_register(args: argparse.Namespace) -> int:
     return 0
 
 
-def _at_cochlea(found: FiducialRegistration, ct: LandmarkSet) -> dict[str, Any]:
+def _at_cochlea(found: RegistrationResult, ct: LandmarkSet) -> dict[str, Any]:
     """Return the errors to expect at the labelled cochlea, None where it is not labelled."""
     target = ct["CO"][None]
     expected, bound = (
@@ -84,7 +104,7 @@ def _at_cochlea(found: FiducialRegistration, ct: LandmarkSet) -> dict[str, Any]:
     return {"tre_at_cochlea_mm": expected, "tre_95_at_cochlea_mm": bound}
 
 
-def _register_lines(found: FiducialRegistration, content: dict[str, Any]) -> Iterator[str]:
+def _register_lines(found: RegistrationResult, content: dict[str, Any]) -> Iterator[str]:
     transform = found.T_scan_tracker
     yield f"{transform.src.capitalize()} to {transform.dst} by {len(found.fiducials)} points"
     yield ""
@@ -96,7 +116,7 @@ def _register_lines(found: FiducialRegistration, content: dict[str, Any]) -> Ite
         yield "  the CT has no CA, CB, RWA and RWP: no error at the cochlea"
     else:
         yield (
-            f"  to expect at the cochlea (TRE)          {content['tre_at_cochlea_mm']:6.3f} mm"
+            f"  expected error at the cochlea (TRE)     {content['tre_at_cochlea_mm']:6.3f} mm"
             f"   below {content['tre_95_at_cochlea_mm']:.3f} mm with 95 %"
         )
     yield ""
@@ -108,7 +128,18 @@ def _register_lines(found: FiducialRegistration, content: dict[str, Any]) -> Ite
 
 
 def run_pivot(args: argparse.Namespace) -> int:
-    """Calibrate, print, and write what was asked for."""
+    """Run ``gp-core pivot``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     recording = read_recording(args.poses, transform=args.transform, reference=args.reference)
     with blaming(args.poses):
         found = calibrate_pivot(recording.poses)
@@ -127,7 +158,7 @@ def _pivot_lines(found: PivotCalibration, source: str) -> Iterator[str]:
     yield f"  tip in the marker's frame  {x:10.3f} {y:10.3f} {z:10.3f} mm   +- {error:.3f} mm"
     x, y, z = found.pivot
     yield f"  where it rested            {x:10.3f} {y:10.3f} {z:10.3f} mm   rms {found.rms_mm:.3f} mm"
-    yield f"  the marker turned {found.spread_deg:.1f} degrees rms in the direction that moved least"
+    yield f"  rotation of the marker {found.spread_deg:.1f} degrees rms about the axis that moved least"
     if found.unseen:
         yield f"  the marker was not seen in {len(found.unseen)} frames"
     for warning in found.warnings:

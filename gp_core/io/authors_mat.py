@@ -58,16 +58,21 @@ def import_mat(
     *,
     overwrite: bool = False,
 ) -> list[Path]:
-    """Write the authors' sets as landmark JSON, a file a side, and return the files.
+    """Write the authors' sets as landmark JSON, one file for each side.
 
     Parameters
     ----------
-    path_left, path_right : path
+    path_left, path_right : path-like
         The authors' sets of each side.
-    directory : path
-        Where to write; made if it is missing.
+    directory : path-like
+        Where to write; created if it is missing.
     overwrite : bool
-        Replace files of the same names, which may be somebody's corrected labels.
+        Replace files of the same names, which may hold somebody's corrected labels.
+
+    Returns
+    -------
+    list of pathlib.Path
+        The written files.
 
     Raises
     ------

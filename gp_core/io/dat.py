@@ -1,4 +1,4 @@
-"""The probe's touches, ``.dat``: rows of three numbers without names, told apart by their count."""
+"""The probe's touches, ``.dat``: rows of three numbers without names; their number tells the layout."""
 
 from __future__ import annotations
 
@@ -36,12 +36,29 @@ _LAYOUTS = {
 
 
 def skull_feature_names() -> tuple[str, ...]:
-    """Return the names of the eight skull features that register a touched skull to its CT."""
+    """Return the names of the eight skull features that register a touched skull to its CT.
+
+    Returns
+    -------
+    tuple of str
+        ``S1`` to ``S8``.
+    """
     return tuple(_SKULL)
 
 
 def is_sentinel(position: FloatArray) -> bool:
-    """Return whether the tracker wrote these (3,) coordinates for a point that it did not see."""
+    """Return whether coordinates mark a point that the tracker did not see.
+
+    Parameters
+    ----------
+    position : (3,) array
+        As read, mm.
+
+    Returns
+    -------
+    bool
+        True for the trackers' marks of a missing point.
+    """
     return bool((position == _SENTINELS_MM).all(axis=1).any())
 
 

@@ -40,11 +40,16 @@ _STATUSES = tuple(STATUS_WORDS.values())  # in the order of Slicer's numbers
 def read_fcsv(path: str | PathLike[str]) -> PointList:
     """Read a point list of Slicer 3 (``label,x,y,z,sel,vis``), 4 (14 columns) or 5 (two more, unnamed).
 
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
     Returns
     -------
     PointList
-        Positions in mm, LPS. A file that does not name its system is LPS, but RAS in the layout of
-        Slicer 3, as Slicer has it.
+        Positions in mm, LPS. A file that does not name its coordinate system is LPS, except in the layout of
+        Slicer 3, which is RAS, as in Slicer.
 
     Raises
     ------
@@ -101,11 +106,18 @@ def _markups_point(fields: list[str], number: int, flip_xy: bool, file: str | Pa
 
 
 def write_fcsv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
-    """Write a landmark set as Slicer 5 does: 16 columns, LPS, mm, to the last bit of every coordinate.
+    """Write a landmark set as Slicer 5 does: 16 columns, LPS, mm, with full precision.
 
-    The format has no place for specimen, side and frame; name the file ``<specimen>_L`` or ``_R``.
-    Points that are not placed stand at the origin with a status that says so, as Slicer has it; programs
-    that do not know the 15th column take them as placed, so prefer `write_markups`.
+    The format cannot store specimen, side and frame; name the file ``<specimen>_L`` or ``_R``. As in Slicer,
+    points that are not placed are written at the origin with a status that says so; programs that do not know
+    the 15th column take them as placed, so prefer `write_markups`.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    landmarks : LandmarkSet
+        One side, mm.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What a landmark file's name says: its kind, the specimen and the side."""
+"""What the name of a landmark file tells: the specimen, the side, and more."""
 
 from __future__ import annotations
 
@@ -32,9 +32,27 @@ _SIDE_WORDS = tuple(
 def landmark_file_name(
     specimen: str, side: Side, *, suggested: bool = False, observer: str = "", round_: int | None = None
 ) -> str:
-    """Return the name of the file that holds one side of a specimen, or what is only suggested there.
+    """Return the name of the file for one side of a specimen, or for its suggestions.
 
     With a round, it is the file of one of several labellings.
+
+    Parameters
+    ----------
+    specimen : str
+        Name of the animal.
+    side : Side
+        Which side.
+    suggested : bool
+        Whether the file holds suggestions only.
+    observer : str
+        Who labelled it.
+    round_ : int, optional
+        Which of the observer's labellings, from 1.
+
+    Returns
+    -------
+    str
+        A file name.
 
     Examples
     --------
@@ -48,28 +66,83 @@ def landmark_file_name(
 
 
 def labelling_named(path: str | PathLike[str], suffix: str) -> tuple[str, int]:
-    """Return observer and round that a file is named for, as ``GP01_AB_r2_L``; else no observer, and 1."""
+    """Return the observer and the round in the name of a file.
+
+    Parameters
+    ----------
+    path : path-like
+        Such as ``GP01_AB_r2_L.mrk.json``.
+    suffix : str
+        Its suffix, such as ``.mrk.json``.
+
+    Returns
+    -------
+    observer : str
+        Empty where the name has none.
+    round_ : int
+        1 where the name has none.
+    """
     match = _LABELLING.fullmatch(name_parts(path, suffix)[0])
     return (match["observer"], int(match["round"])) if match else ("", 1)
 
 
 def specimen_named(path: str | PathLike[str], suffix: str) -> str:
-    """Return the specimen that a file is named for: ``GP01`` for ``GP01_L`` and for ``GP01_AB_r2_L``."""
+    """Return the specimen in the name of a file.
+
+    Parameters
+    ----------
+    path : path-like
+        Such as ``GP01_AB_r2_L.mrk.json``.
+    suffix : str
+        Its suffix, such as ``.mrk.json``.
+
+    Returns
+    -------
+    str
+        ``GP01`` for ``GP01_L`` and for ``GP01_AB_r2_L``.
+    """
     name = name_parts(path, suffix)[0]
     match = _LABELLING.fullmatch(name)
     return match["specimen"] if match else name
 
 
 def is_named_suggested(path: str | PathLike[str], suffix: str) -> bool:
-    """Return whether a file is named as one that holds suggestions, such as ``GP01_L_suggested.mrk.json``."""
+    """Return whether a file is named as one that holds suggestions.
+
+    Parameters
+    ----------
+    path : path-like
+        Such as ``GP01_L_suggested.mrk.json``.
+    suffix : str
+        Its suffix, such as ``.mrk.json``.
+
+    Returns
+    -------
+    bool
+        Whether the name ends in ``suggested``.
+    """
     return _SUGGESTED_ENDING.search(Path(path).name[: -len(suffix)]) is not None
 
 
 def name_parts(path: str | PathLike[str], suffix: str) -> tuple[str, Side | None]:
-    """Return the specimen and the side that a file is named for; no side where the name tells none.
+    """Return the specimen and the side in the name of a file.
 
-    The side is a word of the name, wherever it stands: ``left`` or ``right``, else ``L`` or ``R``. A name
-    that has both tells none.
+    The side is a word of the name, at any position: ``left`` or ``right``, or else ``L`` or ``R``. A name
+    with both gives no side.
+
+    Parameters
+    ----------
+    path : path-like
+        A file.
+    suffix : str
+        Its suffix, such as ``.mrk.json``.
+
+    Returns
+    -------
+    specimen : str
+        The rest of the name.
+    side : Side or None
+        None where the name gives none.
 
     Examples
     --------
@@ -100,7 +173,17 @@ def _without(stem: str, word: re.Match[str]) -> str:
 
 
 def named_side(path: str | PathLike[str]) -> Side | None:
-    """Return the side that a word of a file's name tells, wherever it stands; None where it tells not one.
+    """Return the side in the name of a file.
+
+    Parameters
+    ----------
+    path : path-like
+        A file.
+
+    Returns
+    -------
+    Side or None
+        None where the name gives none, or both.
 
     Examples
     --------
@@ -113,7 +196,18 @@ def named_side(path: str | PathLike[str]) -> Side | None:
 
 
 def natural_key(name: str) -> tuple[tuple[int, str], ...]:
-    """Return a sorting key by which GP2 comes before GP10, in any case of letters."""
+    """Return a sorting key that puts GP2 before GP10 and ignores letter case.
+
+    Parameters
+    ----------
+    name : str
+        A name.
+
+    Returns
+    -------
+    tuple
+        The key.
+    """
     parts = re.split(r"([0-9]+)", name.casefold())
     # Odd parts are digits: without leading zeros, the longer one is the larger number.
     tidy = [part.lstrip("0") if i % 2 else part for i, part in enumerate(parts)]

@@ -1,4 +1,4 @@
-"""The ``gpLabeler`` object: what this program adds to a markups file, beside what 3D Slicer keeps there."""
+"""The ``gpLabeler`` object: what this program adds to a markups file of 3D Slicer."""
 
 from __future__ import annotations
 
@@ -55,7 +55,13 @@ class FileHeader:
     round: int = 1
 
     def as_json(self) -> dict[str, Any]:
-        """Return the object as it stands in the file."""
+        """Return the object as the file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON.
+        """
         content = {
             "schemaVersion": SCHEMA_VERSION,
             "specimen": self.specimen,
@@ -73,7 +79,19 @@ class FileHeader:
 
     @classmethod
     def from_json(cls, value: object, file: str | PathLike[str]) -> FileHeader:
-        """Make a header of the file's object; what is absent keeps its default.
+        """Build a header from the file's object; absent fields keep their defaults.
+
+        Parameters
+        ----------
+        value : object
+            The parsed object.
+        file : path-like
+            For messages.
+
+        Returns
+        -------
+        FileHeader
+            The header.
 
         Raises
         ------

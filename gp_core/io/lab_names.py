@@ -1,4 +1,4 @@
-"""A lab's own names of points: a table of two columns, their name and our code."""
+"""A lab's own names of points: a table with two columns, their name and our code."""
 
 from __future__ import annotations
 
@@ -19,20 +19,25 @@ _FORM = "Give two columns, their name and our code (CA, or CA_L), or a JSON obje
 
 
 def read_lab_names(path: str | PathLike[str]) -> LabelNames:
-    """Read which names a lab has for the features.
+    """Read a lab's own names of the features.
 
     Parameters
     ----------
-    path : path
+    path : path-like
         ``.csv``, ``.tsv`` or text: *their name*, *our code* in each row, with or without a header. ``.json``:
         an object of the same. An empty code leaves the point out.
+
+    Returns
+    -------
+    LabelNames
+        The names.
 
     Raises
     ------
     FileFormatError
         Not such a file.
     FeatureError
-        A code is unknown, or a name stands twice.
+        A code is unknown, or a name occurs twice.
     """
     pairs = _json_pairs(path) if Path(path).suffix.lower() == ".json" else _table_pairs(path)
     names = [name for name, _ in pairs]

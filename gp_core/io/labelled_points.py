@@ -1,4 +1,4 @@
-"""Labelled points as a file holds them, before the feature table is asked."""
+"""Labelled points as a file holds them, before they are matched to features."""
 
 from __future__ import annotations
 
@@ -115,9 +115,19 @@ class PointList:
         return frozenset(point.side for point in of_a_side or self.points if point.side is not None)
 
     def of_side(self, side: Side) -> PointList:
-        """Return the points of one side, and those that lie on both or tell none.
+        """Return the points of one side, including those of both sides or of no given side.
 
         A point of both sides (IN) that is given once, for either side, counts for both.
+
+        Parameters
+        ----------
+        side : Side
+            Which side.
+
+        Returns
+        -------
+        PointList
+            Those points.
 
         Raises
         ------
@@ -159,21 +169,26 @@ def labelled_point(
     description: str = "",
     flip_xy: bool = False,
 ) -> LabelledPoint:
-    """Make a point of what a file says.
+    """Build a point from the content of a file.
 
     Parameters
     ----------
     label, description : str
-        As read; stray blanks and carriage returns are tidied away.
+        As read; stray blanks and carriage returns are removed.
     coordinates : sequence
-        Three numbers or texts. Not looked at unless `status` says that the point is placed:
-        Slicer leaves the last position, or the origin, at points that are not.
+        Three numbers or texts. Ignored unless `status` says that the point is placed: Slicer keeps the last
+        position, or the origin, of points that are not.
     status : Status
-        How far the point is; a placed one without a position is one to do, as Slicer has it.
-    file : path
+        State of the point; a placed one without a position is still to do, as in Slicer.
+    file : path-like
         For messages.
     flip_xy : bool
         Whether the coordinates are RAS.
+
+    Returns
+    -------
+    LabelledPoint
+        Position in mm, LPS.
 
     Raises
     ------
@@ -195,7 +210,20 @@ def labelled_point(
 
 
 def as_suggested(point: LabelledPoint, source: str = "") -> LabelledPoint:
-    """Return a placed point as a suggestion; its description may say of what, else it is of `source`."""
+    """Return a placed point as a suggestion.
+
+    Parameters
+    ----------
+    point : LabelledPoint
+        Its description may name the source.
+    source : str
+        Otherwise this is the source.
+
+    Returns
+    -------
+    LabelledPoint
+        The suggestion.
+    """
     if point.position is None:
         return point
     said = _SUGGESTED.match(point.description)
@@ -206,9 +234,20 @@ def as_suggested(point: LabelledPoint, source: str = "") -> LabelledPoint:
 
 
 def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
-    """Return a set as a file is to hold it: every feature, in the table's order, then the extra points.
+    """Return the points of a set as a file holds them: all features in the table's order, then the others.
 
-    A feature that is only suggested is one to do: other programs would take its position as observed.
+    A feature that is only suggested is written as still to do: other programs would take its position as
+    observed.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        One side, mm.
+
+    Returns
+    -------
+    tuple of LabelledPoint
+        In the frame of the set.
     """
     observed = replace(landmarks, suggested={})
     positions = observed.as_mapping()
@@ -221,10 +260,20 @@ def points_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
 
 
 def suggestions_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
-    """Return the suggestions of a set as a file of their own is to hold them.
+    """Return the suggestions of a set as a separate file holds them.
 
-    Every feature is there, in the table's order. The suggested ones have positions, for 3D Slicer to show;
+    All features are there, in the table's order. The suggested ones have positions, for 3D Slicer to show;
     each description says that nobody has confirmed the point.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        One side, mm.
+
+    Returns
+    -------
+    tuple of LabelledPoint
+        In the frame of the set.
     """
     return tuple(_suggested_point(f, landmarks.suggested.get(f.code)) for f in FEATURES)
 
@@ -255,5 +304,16 @@ def _described(feature: Feature, landmarks: LandmarkSet) -> str:
 
 
 def is_computed(label: str) -> bool:
-    """Return whether a label is a feature that follows from others, not to be dragged about in Slicer."""
+    """Return whether a label names a computed feature, which must not be dragged in Slicer.
+
+    Parameters
+    ----------
+    label : str
+        A label.
+
+    Returns
+    -------
+    bool
+        True for CO.
+    """
     return any(feature.code == label and feature.computed for feature in FEATURES)

@@ -1,7 +1,6 @@
-"""The arrays of a MATLAB file of version 5 to 7.
+"""Read the arrays of a MATLAB file of version 5 to 7.
 
-SciPy reads these too, but a damaged file can end its process; here every length is checked before it is
-believed.
+SciPy reads these too, but a damaged file can crash its process; here every length is checked before use.
 
 References
 ----------
@@ -34,6 +33,11 @@ _COMPLEX = 0x0800
 
 def read_mat5(path: str | PathLike[str]) -> dict[str, FloatArray | None]:
     """Read the variables of a MATLAB file.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
 
     Returns
     -------

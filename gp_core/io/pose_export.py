@@ -22,10 +22,17 @@ AXIS_POINT_MM = 5.0
 
 
 def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:
-    """Write ``T_tracker_cochlea`` as four lines of four numbers, commas between them, and nothing else.
+    """Write ``T_tracker_cochlea`` as four comma-separated lines of four numbers, and nothing else.
 
-    Rows of the matrix as they are written down, mm; it acts on columns: its first column is the modiolar axis
-    CB->CA, its last one CO. Numbers keep every bit.
+    Rows of the matrix in mm; it acts on column vectors: its first column is the modiolar axis CB->CA, its
+    last one CO. Numbers have full precision.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    pose : CochleaPose
+        An estimate.
 
     Raises
     ------
@@ -38,9 +45,16 @@ def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:
 def write_landmarks(path: str | PathLike[str], pose: CochleaPose) -> None:
     """Write CO and a point of the axis as 3D Slicer markups: a point list, and the line between them.
 
-    The points are ``CO`` and ``axis``, `AXIS_POINT_MM` from it towards the apex. The coordinates are those of
-    the touches' frame, which ``gpLabeler`` in the file names; Slicer takes them for LPS. So a pose in a
-    tracker's frame shows up over a scan only under the registration of the two.
+    The points are ``CO`` and ``axis``, which lies `AXIS_POINT_MM` from CO towards the apex. The coordinates
+    are those of the touches' frame, which ``gpLabeler`` in the file names; Slicer takes them as LPS. So a
+    pose in a tracker's frame appears in a scan only after the registration of the two.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    pose : CochleaPose
+        An estimate.
 
     Raises
     ------

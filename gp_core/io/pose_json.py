@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.constants import METHODS
 from gp_core.errors import FileFormatError, GpError
 from gp_core.frames import FRAMES, RigidTransform
 from gp_core.io.text import shown
 from gp_core.io.text_files import read_text
 from gp_core.landmarks.features import Side
-from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS, CochleaPose
+from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.mixture import Hypothesis
 from gp_core.validation import FloatArray
 
@@ -26,6 +27,16 @@ _REMEDY = "Estimate the pose again."
 
 def read_pose(path: str | PathLike[str]) -> CochleaPose:
     """Read a pose that `CochleaPose.save` or ``gp-core estimate --json`` wrote, to the last bit.
+
+    Parameters
+    ----------
+    path : path-like
+        The JSON file.
+
+    Returns
+    -------
+    CochleaPose
+        Equal to the saved one.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Landmarks from any file: by its kind to points, by their labels to features."""
+"""Read landmarks from any file: points by the file's format, features by their labels."""
 
 from __future__ import annotations
 
@@ -165,13 +165,51 @@ def read_landmarks(
 def landmarks_of(
     points: PointList, *, side: Side | str | None = None, unknown: Unknown = "error"
 ) -> LandmarkSet:
-    """Make landmarks of one side of the points of a file; see `read_landmarks`."""
+    """Build the landmarks of one side from the points of a file; see `read_landmarks`.
+
+    Parameters
+    ----------
+    points : PointList
+        Of a file.
+    side : {"L", "R"}, optional
+        Which side; by default the one that the file gives.
+    unknown : {"error", "skip", "extra"}
+        What to do with labels that name no feature.
+
+    Returns
+    -------
+    LandmarkSet
+        In the frame of the file, mm.
+
+    Raises
+    ------
+    GpError
+        As for `read_landmarks`.
+    """
     chosen = _side_of(points, side)
     return _landmark_set(_one_side(points, chosen), chosen, points.frame, unknown)
 
 
 def sides_of(points: PointList, *, unknown: Unknown = "error") -> tuple[LandmarkSet, ...]:
-    """Make landmarks of each side that a file holds; see `read_landmarks`."""
+    """Build the landmarks of each side that a file holds; see `read_landmarks`.
+
+    Parameters
+    ----------
+    points : PointList
+        Of a file.
+    unknown : {"error", "skip", "extra"}
+        What to do with labels that name no feature.
+
+    Returns
+    -------
+    tuple of LandmarkSet
+        One or two sides, left first.
+
+    Raises
+    ------
+    GpError
+        As for `read_landmarks`.
+    """
     if len(points.sides) < 2:
         return (landmarks_of(points, unknown=unknown),)
     return tuple(landmarks_of(points, side=side, unknown=unknown) for side in Side)
@@ -224,7 +262,18 @@ def read_touches(
 
 
 def specimen_of(points: PointList) -> str:
-    """Return the specimen that a file names, in its ``gpLabeler`` object or by its name."""
+    """Return the specimen of a file, from its ``gpLabeler`` object or its name.
+
+    Parameters
+    ----------
+    points : PointList
+        Of a file.
+
+    Returns
+    -------
+    str
+        Name of the animal.
+    """
     name = points.header.specimen if points.header else None
     return name or specimen_named(points.source, _suffix(points.source))
 
@@ -376,14 +425,37 @@ def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:
 
 
 def unknown_labels(points: PointList) -> tuple[str, ...]:
-    """Return the labels of a file that name no feature and no skull feature, each once, in its order."""
+    """Return the labels of a file that name neither a feature nor a skull feature.
+
+    Parameters
+    ----------
+    points : PointList
+        Of a file.
+
+    Returns
+    -------
+    tuple of str
+        Each once, in the order of the file.
+    """
     known = set(points.header.extra) if points.header else set()
     strange = (p.label for p in points.points if p.label not in CODES and not is_skull_feature(p.label))
     return tuple(dict.fromkeys(label for label in strange if label not in known))
 
 
 def label_names(points: PointList, *, unknown: Unknown = "extra") -> list[str]:
-    """Return the names that the labels of a file stand for, in its order.
+    """Return the names that the labels of a file stand for.
+
+    Parameters
+    ----------
+    points : PointList
+        Of a file.
+    unknown : {"error", "skip", "extra"}
+        What to do with labels that name no feature.
+
+    Returns
+    -------
+    list of str
+        In the order of the file.
 
     Raises
     ------

@@ -284,7 +284,17 @@ def _files(paths: list[str | PathLike[str]]) -> list[Path]:
 
 
 def landmark_files(place: str | PathLike[str]) -> list[Path]:
-    """Return the landmark files of a folder, not deeper, or the one file that is named.
+    """Return the landmark files of a folder (not of its subfolders), or the given file.
+
+    Parameters
+    ----------
+    place : path-like
+        A folder or a file.
+
+    Returns
+    -------
+    list of pathlib.Path
+        In natural order.
 
     Raises
     ------

@@ -24,8 +24,13 @@ def read_stl(path: str | PathLike[str]) -> Surface:
 
     Parameters
     ----------
-    path : path
-        STL, whose coordinates are taken as mm.
+    path : path-like
+        STL; its coordinates are taken as mm.
+
+    Returns
+    -------
+    Surface
+        The triangles, mm.
 
     Raises
     ------

@@ -56,7 +56,7 @@ _SIDE_COLUMNS = ("side", "ear", "laterality")
 
 @dataclass(frozen=True)
 class _Columns:
-    """Where the values stand in a row."""
+    """Column of each value."""
 
     label: int
     axes: tuple[int, ...]
@@ -70,8 +70,13 @@ def read_table(path: str | PathLike[str]) -> PointList:
 
     With a header, columns are found by name: ``label`` (or ``name``, ``landmark``, ...); ``l,p,s``,
     ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``side``, ``defined``, ``status`` and
-    ``description``. Without one, the columns are name, x, y, z. Row names as R writes them, whose column has
+    ``description``. Without one, the columns are name, x, y, z. Row names as written by R, whose column has
     no name, are labels; the first line ``sep=;`` of a spreadsheet is understood.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
 
     Returns
     -------
@@ -111,12 +116,17 @@ def read_rows(
 
     Parameters
     ----------
-    path : path
+    path : path-like
         Text with commas, semicolons, tabs or blanks between the columns.
     aligned : bool
-        Whether many blanks are one, as where they align the columns; then no field can be empty.
+        Whether several blanks count as one, as where they align the columns; no field can then be empty.
     at_most : int
-        How many lines there may be.
+        Maximum number of lines.
+
+    Returns
+    -------
+    list of (int, list of str)
+        Line number and fields.
 
     Raises
     ------
@@ -214,11 +224,17 @@ def _status(word: str, defined: str, label: str, file: str | PathLike[str]) -> S
 
 
 def write_csv(path: str | PathLike[str], landmarks: LandmarkSet) -> None:
-    """Write a landmark set as Slicer's table, to the last bit of every coordinate.
+    """Write a landmark set as Slicer's table, with full precision.
 
-    One column is added, ``status``, since Slicer's ``defined`` does not tell *to do* from *cannot be seen*;
-    and where more is known of the labels, ``certainty``, ``observer``, ``time``, ``checked_by`` and ``note``.
-    The format has no place for specimen, side and frame; name the file ``<specimen>_L`` or ``_R``.
+    One column is added, ``status``, since Slicer's ``defined`` does not distinguish *to do* from *cannot be
+    seen*. The format cannot store specimen, side and frame; name the file ``<specimen>_L`` or ``_R``.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    landmarks : LandmarkSet
+        One side, mm.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""What the texts of all landmark files share: lines, fields, numbers, positions, coordinate systems."""
+"""Parsing of text shared by all landmark formats: lines, fields, numbers, positions, coordinate systems."""
 
 from __future__ import annotations
 
@@ -45,7 +45,24 @@ _FLIPS_XY = {"LPS": False, "1": False, "RAS": True, "0": True, "": False}
 
 
 def check_count(n: int, what: str, file: str | PathLike[str], *, at_most: int = MAX_POINTS) -> None:
-    """Raise `FileFormatError` where a file holds more than `at_most` of something."""
+    """Check that a file does not hold too many items.
+
+    Parameters
+    ----------
+    n : int
+        Number of items.
+    what : str
+        What they are, for the message.
+    file : path-like
+        For messages.
+    at_most : int
+        Maximum number.
+
+    Raises
+    ------
+    FileFormatError
+        There are more.
+    """
     if n > at_most:
         raise FileFormatError(
             f"holds {n} {what}, more than {at_most}", file=file, remedy=f"Give at most {at_most}."
@@ -53,13 +70,38 @@ def check_count(n: int, what: str, file: str | PathLike[str], *, at_most: int = 
 
 
 def shown(value: object) -> str:
-    """Return `value` as a message may show it: on one line, not too long."""
+    """Return a value as a message may show it.
+
+    Parameters
+    ----------
+    value : object
+        Any value.
+
+    Returns
+    -------
+    str
+        One line, shortened.
+    """
     text = str(value) if isinstance(value, (int, float)) and abs(value) < 1e300 else repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def split_lines(text: str, file: str | PathLike[str], *, at_most: int = MAX_POINTS) -> list[tuple[int, str]]:
-    r"""Return the numbered lines that are not blank; stray carriage returns go, whoever wrote them.
+    """Return the numbered lines that are not blank, without stray carriage returns.
+
+    Parameters
+    ----------
+    text : str
+        Content of a file.
+    file : path-like
+        For messages.
+    at_most : int
+        Maximum number of lines.
+
+    Returns
+    -------
+    list of (int, str)
+        Line number and line.
 
     Raises
     ------
@@ -73,7 +115,23 @@ def split_lines(text: str, file: str | PathLike[str], *, at_most: int = MAX_POIN
 
 
 def split_fields(line: str, delimiter: str, number: int, file: str | PathLike[str]) -> list[str]:
-    """Return the fields of a line, without blanks around them; quoted as in CSV.
+    """Return the fields of a line, without surrounding blanks; quoted as in CSV.
+
+    Parameters
+    ----------
+    line : str
+        A line.
+    delimiter : str
+        Between the fields.
+    number : int
+        Line number, for messages.
+    file : path-like
+        For messages.
+
+    Returns
+    -------
+    list of str
+        The fields.
 
     Raises
     ------
@@ -89,22 +147,67 @@ def split_fields(line: str, delimiter: str, number: int, file: str | PathLike[st
 
 
 def as_csv_cell(text: str) -> str:
-    """Return a text as a cell of a CSV file, which no spreadsheet takes for a formula."""
+    """Return a text as a cell of a CSV file that no spreadsheet takes as a formula.
+
+    Parameters
+    ----------
+    text : str
+        Any text.
+
+    Returns
+    -------
+    str
+        The cell.
+    """
     return f"'{text}" if text.lstrip("'").startswith(_FORMULA) else text
 
 
 def of_csv_cell(cell: str) -> str:
-    """Return the text that `as_csv_cell` made a cell of."""
+    """Return the text of a cell that `as_csv_cell` made.
+
+    Parameters
+    ----------
+    cell : str
+        A cell.
+
+    Returns
+    -------
+    str
+        The text.
+    """
     return cell[1:] if cell.startswith("'") and cell.lstrip("'").startswith(_FORMULA) else cell
 
 
 def rows_text(rows: FloatArray) -> str:
-    """Return rows of numbers (N, C) as lines, commas between the numbers, which keep every bit."""
+    """Return rows of numbers as comma-separated lines with full precision.
+
+    Parameters
+    ----------
+    rows : (N, C) array
+        Numbers.
+
+    Returns
+    -------
+    str
+        N lines.
+    """
     return "".join(f"{','.join(repr(float(n)) for n in row)}\n" for row in rows)
 
 
 def flips_xy(system: object, file: str | PathLike[str]) -> bool:
-    """Return whether x and y change sign on the way from a file's coordinate system to LPS.
+    """Return whether x and y change sign between a file's coordinate system and LPS.
+
+    Parameters
+    ----------
+    system : object
+        As the file names it.
+    file : path-like
+        For messages.
+
+    Returns
+    -------
+    bool
+        True for RAS.
 
     Raises
     ------
@@ -124,7 +227,21 @@ def flips_xy(system: object, file: str | PathLike[str]) -> bool:
 def parse_position(
     values: Sequence[object], *, file: str | PathLike[str], landmark: str
 ) -> FloatArray | None:
-    """Return the (3,) position that three numbers or texts give, mm, or None where all three are missing.
+    """Parse a position.
+
+    Parameters
+    ----------
+    values : sequence
+        Three numbers or texts, mm.
+    file : path-like
+        For messages.
+    landmark : str
+        For messages.
+
+    Returns
+    -------
+    (3,) array or None
+        None where all three are missing.
 
     Raises
     ------
@@ -148,7 +265,18 @@ def parse_position(
 
 
 def has_decimal_comma(value: object) -> bool:
-    """Return whether a text is a number as much of the world writes it, such as ``1,5``."""
+    """Return whether a text is a number with a decimal comma, such as ``1,5``.
+
+    Parameters
+    ----------
+    value : object
+        Any value.
+
+    Returns
+    -------
+    bool
+        False for other types.
+    """
     return isinstance(value, str) and _NUMBER_WITH_COMMA.fullmatch(value.strip()) is not None
 
 
@@ -157,7 +285,7 @@ def _is_missing(value: object) -> bool:
 
 
 def _number(value: object) -> float | None:
-    """Return a number, NaN where it is one in vain, None where it is none."""
+    """Parse a float (may be NaN or infinite); None if it is not numeric."""
     if isinstance(value, str):
         return float(value) if _NUMBER.fullmatch(value := value.strip()) else None
     if isinstance(value, bool) or not isinstance(value, (int, float)):

@@ -1,4 +1,4 @@
-"""The texts of landmark files: their encoding, and a reason where there is none."""
+"""Text files of landmarks: their encoding, with a reason where they cannot be read."""
 
 from __future__ import annotations
 
@@ -14,12 +14,22 @@ _WHAT = "landmark file"
 
 
 def read_text(path: str | PathLike[str]) -> str:
-    """Return the text of a file, of UTF-8 (or UTF-16 with its mark), without the byte-order mark.
+    """Return the text of a file in UTF-8 (or UTF-16 with a byte-order mark), without the byte-order mark.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+
+    Returns
+    -------
+    str
+        Not blank.
 
     Raises
     ------
     FileFormatError
-        Missing, no plain file, not readable, too large, empty or binary.
+        Missing, not a plain file, not readable, too large, empty or binary.
     """
     raw = disk.read_bytes(path, what=_WHAT)
     utf16 = raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE))
@@ -37,5 +47,16 @@ def read_text(path: str | PathLike[str]) -> str:
 
 
 def check_file(path: str | PathLike[str]) -> None:
-    """Raise `FileFormatError` unless there is a file, of a size that landmarks may have."""
+    """Check that there is a file of a size that landmarks may have.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+
+    Raises
+    ------
+    FileFormatError
+        As for `gp_core.disk.check_file`.
+    """
     disk.check_file(path, what=_WHAT)

@@ -32,7 +32,18 @@ def write_tfm(path: str | PathLike[str], T_dst_src: RigidTransform) -> None:
 
 
 def tfm_text(T_dst_src: RigidTransform) -> str:
-    """Return the text of an ITK transform file that 3D Slicer shows as `T_dst_src`."""
+    """Return the text of an ITK transform file that 3D Slicer shows as `T_dst_src`.
+
+    Parameters
+    ----------
+    T_dst_src : RigidTransform
+        Translation in mm.
+
+    Returns
+    -------
+    str
+        Content of a ``.tfm`` file.
+    """
     back = T_dst_src.inverse()
     numbers = " ".join(repr(float(n)) for n in (*back.rotation.ravel(), *back.translation))
     return (

@@ -68,7 +68,18 @@ class Recording:
 
 
 def is_sequence(path: str | PathLike[str]) -> bool:
-    """Return whether a file's header carries poses of frames."""
+    """Return whether a file's header contains poses of frames.
+
+    Parameters
+    ----------
+    path : path-like
+        Any file.
+
+    Returns
+    -------
+    bool
+        False for other files.
+    """
     return _FIELD.search(read_head(Path(path), 100_000)) is not None
 
 
@@ -79,22 +90,27 @@ def read_recording(
 
     Parameters
     ----------
-    path : path
+    path : path-like
         A sequence file of PLUS or 3D Slicer (``.igs.mha``, ``.mha``, ``.nrrd``, or its text header alone), or
         a table: see `read_marker_poses`.
     transform : str, optional
-        Name of the transform in a sequence, such as ``StylusToTracker``; needed where it holds several and
-        not exactly one of them is a stylus, probe or pointer.
+        Name of the transform in a sequence, such as ``StylusToTracker``; required where the sequence has
+        several and not exactly one of them is a stylus, probe or pointer.
     reference : str, optional
-        Name of the transform of a reference marker, such as ``ReferenceToTracker``: then the poses are in its
+        Name of the transform of a reference marker, such as ``ReferenceToTracker``: the poses are then in its
         frame.
+
+    Returns
+    -------
+    Recording
+        ``T_tracker_marker`` over time, mm.
 
     Raises
     ------
     FileFormatError
         Not such a file.
     GpError
-        The sequence holds no transform of that name, or several and none was named.
+        The sequence has no transform of that name, or several and none was named.
     """
     if not is_sequence(path):
         if transform or reference:
@@ -203,16 +219,21 @@ def _in_reference(T_tracker_reference: FloatArray, T_tracker_marker: FloatArray)
 def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
     """Read the poses of a marker from a table of numbers, with or without a header.
 
-    A row is a whole pose: the 16 numbers of its 4x4 matrix row by row (or column by column, which shows), or
-    the first 12, after a time stamp or not; or four rows of four are one. Under a header, quaternions
-    (``qw,qx,qy,qz`` or ``Q0,Qx,Qy,Qz``, with ``tx,ty,tz``) and NDI's angles (``Rz,Ry,Rx``, degrees) are found
-    by the names of the columns, and a column ``State`` tells where the marker was seen. Empty cells, NA and
-    NaN mean that it was not.
+    A row is a whole pose: the 16 numbers of its 4x4 matrix row by row (or column by column, which is
+    detected), or the first 12, after a time stamp or not; alternatively four rows of four make a pose. With a
+    header, quaternions (``qw,qx,qy,qz`` or ``Q0,Qx,Qy,Qz``, with ``tx,ty,tz``) and NDI's angles
+    (``Rz,Ry,Rx``, degrees) are found by the names of the columns, and a column ``State`` tells where the
+    marker was visible. Empty cells, NA and NaN mean that it was not.
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
 
     Returns
     -------
     (N, 4, 4) array
-        ``T_tracker_marker``, mm; NaN where it was not seen.
+        ``T_tracker_marker``, mm; NaN where the marker was not visible.
 
     Raises
     ------

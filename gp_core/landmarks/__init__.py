@@ -1,1 +1,1 @@
-"""Landmarks: the feature table, labelled sets, what is computed from them, and their files."""
+"""Landmarks: the feature table, labelled sets, and what is computed from them."""

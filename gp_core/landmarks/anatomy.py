@@ -1,7 +1,7 @@
-"""What is computed from landmarks: the cochlea origin and the two frames built on features.
+"""What is computed from landmarks: the cochlea origin and the frames built on features.
 
-The formulas follow Usevitch et al. 2021; where its words and its authors' numbers differ (the round-window
-frame), the numbers decide, see ``docs/method.md``.
+The formulas follow Usevitch et al. 2021. Where the paper's text and its authors' numbers differ (the
+round-window frame), the numbers decide; see ``docs/method.md``.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GeometryError
 from gp_core.frames import RigidTransform, mirror_x
 from gp_core.landmarks.features import EXTERNAL, Side
@@ -26,7 +27,6 @@ __all__ = [
     "with_cochlea_origin",
 ]
 
-_DEFINING = ("CA", "CB", "RWA", "RWP")
 _SMALLEST_MM = 1e-6
 
 
@@ -41,7 +41,7 @@ def cochlea_origin(ca: ArrayLike, cb: ArrayLike, rwa: ArrayLike, rwp: ArrayLike)
     Returns
     -------
     (..., 3) float array, mm
-        The point of the line CB-CA whose connection to the middle of RWA and RWP is perpendicular to it.
+        The point of the line CB-CA from which the middle of RWA and RWP lies perpendicular to the line.
 
     Raises
     ------
@@ -57,12 +57,22 @@ def cochlea_origin(ca: ArrayLike, cb: ArrayLike, rwa: ArrayLike, rwp: ArrayLike)
 
 
 def modiolar_axis(ca: ArrayLike, cb: ArrayLike) -> FloatArray:
-    """Return the unit vector (..., 3) from the cochlea base to its apex.
+    """Return the unit vector from the cochlea base to its apex.
+
+    Parameters
+    ----------
+    ca, cb : (..., 3) array_like, mm
+        Apex and base, in any one frame.
+
+    Returns
+    -------
+    (..., 3) float array
+        Unit vectors.
 
     Raises
     ------
     GeometryError
-        The two coincide.
+        CA and CB coincide.
     """
     axis = np.asarray(ca, dtype=np.float64) - np.asarray(cb, dtype=np.float64)
     length = np.linalg.norm(axis, axis=-1, keepdims=True)
@@ -77,10 +87,26 @@ def modiolar_axis(ca: ArrayLike, cb: ArrayLike) -> FloatArray:
 
 
 def with_cochlea_origin(landmarks: LandmarkSet) -> LandmarkSet:
-    """Return the set with CO computed where CA, CB, RWA and RWP are placed, and without CO elsewhere."""
-    if not all(code in landmarks for code in _DEFINING):
+    """Return the set with CO computed from CA, CB, RWA and RWP; without CO where one of them is missing.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        Landmarks of one side, mm.
+
+    Returns
+    -------
+    LandmarkSet
+        In the same frame.
+
+    Raises
+    ------
+    GeometryError
+        CA and CB coincide.
+    """
+    if not all(code in landmarks for code in DEFINING_FEATURES):
         return landmarks.with_point("CO", None)
-    return landmarks.with_point("CO", cochlea_origin(*(landmarks[code] for code in _DEFINING)))
+    return landmarks.with_point("CO", cochlea_origin(*(landmarks[code] for code in DEFINING_FEATURES)))
 
 
 def cochlea_frame(landmarks: LandmarkSet) -> RigidTransform:
@@ -88,6 +114,11 @@ def cochlea_frame(landmarks: LandmarkSet) -> RigidTransform:
 
     Origin CO; x towards CA on the left and away from it on the right; y from CO to the middle of the round
     window; z = x × y. So the two sides are mirror images of each other in x.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        Landmarks of one side, mm.
 
     Returns
     -------
@@ -101,7 +132,7 @@ def cochlea_frame(landmarks: LandmarkSet) -> RigidTransform:
     GeometryError
         The round window lies on the axis.
     """
-    ca, cb, rwa, rwp = landmarks.array(_DEFINING)
+    ca, cb, rwa, rwp = landmarks.array(DEFINING_FEATURES)
     origin = cochlea_origin(ca, cb, rwa, rwp)
     x = _sign(landmarks.side) * modiolar_axis(ca, cb)
     return axis_frame(origin, x, (rwa + rwp) / 2 - origin, dst=landmarks.frame, src="cochlea")
@@ -111,8 +142,13 @@ def round_window_frame(landmarks: LandmarkSet) -> RigidTransform:
     """Build the RW frame, which brings touched points near the CO frame.
 
     With p the foot of LLI on the line RWA-RWP: x = unit(RWA - RWP) on the left and its negative on the right,
-    y = unit(LLI - p), z = x × y, origin p - (LLI - p). The paper's words turn x and move the origin the other
-    way; this is what gives its authors' answers.
+    y = unit(LLI - p), z = x × y, origin p - (LLI - p). In the paper's text x and the origin have the opposite
+    sign; this definition reproduces its authors' results.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        Landmarks or touches of one side, mm.
 
     Returns
     -------
@@ -122,9 +158,9 @@ def round_window_frame(landmarks: LandmarkSet) -> RigidTransform:
     Raises
     ------
     FeatureError
-        RWA, RWP or LLI is not there.
+        RWA, RWP or LLI is not placed.
     GeometryError
-        The three lie on one line.
+        The three are collinear.
     """
     rwa, rwp, lli = landmarks.array(("RWA", "RWP", "LLI"))
     across = rwa - rwp
@@ -137,17 +173,40 @@ def round_window_frame(landmarks: LandmarkSet) -> RigidTransform:
 
 
 def mirror_right(points: FloatArray, side: Side) -> FloatArray:
-    """Return points (N, 3) of a left side as they are, those of a right one mirrored in x; there and back."""
+    """Mirror the points of a right side in x, and leave those of a left side; it is its own inverse.
+
+    Parameters
+    ----------
+    points : (N, 3) array, mm
+        Points of one side.
+    side : Side
+        Which side.
+
+    Returns
+    -------
+    (N, 3) array, mm
+        Points as of a left side.
+    """
     return points if side is Side.LEFT else mirror_x(points)
 
 
 def touched_features(touches: LandmarkSet) -> tuple[str, ...]:
     """Return the placed features of a set of touches.
 
+    Parameters
+    ----------
+    touches : LandmarkSet
+        Touched features.
+
+    Returns
+    -------
+    tuple of str
+        Codes, in the table's order.
+
     Raises
     ------
     FeatureError
-        One of them is no external feature, so that no probe can have touched it.
+        One of them is not an external feature, so no probe can have touched it.
     """
     for code in touches.placed:
         if code not in EXTERNAL:
@@ -166,17 +225,18 @@ def _sign(side: Side) -> float:
 def axis_frame(
     origin: FloatArray, axis: FloatArray, towards_y: FloatArray, *, dst: str, src: str
 ) -> RigidTransform:
-    """Build a right-handed frame on a point and an axis.
+    """Build a right-handed frame from a point and an axis.
 
     Parameters
     ----------
     origin : (3,) array, mm
+        Origin of the new frame.
     axis : (3,) array
         Direction of x.
     towards_y : (3,) array
         Direction of y, once made orthogonal to x.
     dst, src : str
-        Frame of the coordinates given, and name of the frame built.
+        Frame of the given coordinates, and name of the new frame.
 
     Returns
     -------

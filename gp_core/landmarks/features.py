@@ -38,6 +38,16 @@ class Side(str, Enum):
     def parse(cls, text: str | Side) -> Side:
         """Return the side that ``L``, ``R``, ``left`` or ``right`` names.
 
+        Parameters
+        ----------
+        text : str or Side
+            In any letter case.
+
+        Returns
+        -------
+        Side
+            The side.
+
         Raises
         ------
         FeatureError
@@ -64,7 +74,26 @@ class Side(str, Enum):
 class Feature:
     """One anatomical feature: a row of the feature table.
 
-    `on_bone` features lie on the surface of a bone or tooth; CA and CB lie in the cochlea's spaces.
+    Attributes
+    ----------
+    code : str
+        Short name, such as ``RWA``.
+    name : str
+        Full name.
+    definition : str
+        Where exactly it lies.
+    where : str
+        How to find it.
+    view : str
+        The view in which it is found.
+    external : bool
+        Whether a probe can touch it.
+    on_bone : bool
+        Whether it lies on the surface of a bone or tooth; CA and CB lie in the spaces of the cochlea.
+    shared : bool
+        Whether both sides have it in common (IN).
+    computed : bool
+        Whether it is computed from others (CO).
     """
 
     code: str
@@ -91,7 +120,18 @@ def _load_features() -> tuple[Feature, ...]:
 
 
 def named_set(name: str) -> tuple[str, ...]:
-    """Return a list of feature codes that the table names, such as ``"training"`` or ``"probe"``."""
+    """Return a list of feature codes that the table names.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``"training"`` or ``"probe"``.
+
+    Returns
+    -------
+    tuple of str
+        Codes, in the order of the table's list.
+    """
     sets = _table()["named_sets"]
     assert isinstance(sets, dict)
     return tuple(sets[name])
@@ -109,18 +149,44 @@ _INDEX = {code: i for i, code in enumerate(CODES)}
 
 
 def feature(code: str) -> Feature:
-    """Return the feature with this code (any case, spaces around it ignored).
+    """Return the feature with a given code.
+
+    Parameters
+    ----------
+    code : str
+        In any letter case; surrounding spaces are ignored.
+
+    Returns
+    -------
+    Feature
+        Its row of the table.
 
     Raises
     ------
     FeatureError
-        No such feature; near matches are named.
+        No such feature; the message suggests similar codes.
     """
     return FEATURES[index_of(code)]
 
 
 def index_of(code: str) -> int:
-    """Return the row of a feature in the table's order; see `feature`."""
+    """Return the row of a feature in the table's order.
+
+    Parameters
+    ----------
+    code : str
+        In any letter case; surrounding spaces are ignored.
+
+    Returns
+    -------
+    int
+        Row, from 0 to 19.
+
+    Raises
+    ------
+    FeatureError
+        No such feature; the message suggests similar codes.
+    """
     key = code.strip().upper()
     if key not in _INDEX:
         raise FeatureError(
@@ -139,13 +205,18 @@ def check_codes(
     Parameters
     ----------
     codes : iterable of str
-        What was asked for.
+        The requested codes.
     name : str
-        What the caller calls them; stands in the message.
+        What the message calls them.
     allowed : iterable of str, optional
-        The features that may be named, by default all 20.
+        The permitted features; by default all 20.
     at_least : int
-        How many there must be.
+        Required number.
+
+    Returns
+    -------
+    tuple of str
+        Codes as the table spells them.
 
     Raises
     ------

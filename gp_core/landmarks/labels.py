@@ -1,4 +1,4 @@
-"""Labels of points: what they name, on which side, and when two of them name one point."""
+"""Labels of points: what they name, on which side, and when two of them name the same point."""
 
 from __future__ import annotations
 
@@ -25,38 +25,85 @@ _WITH_SIDE = (
 
 
 class ParsedLabel(NamedTuple):
-    """What a label names: the name as it is kept, and the side that the label tells, if it tells one."""
+    """What a label names: the stored name, and the side, if the label tells one."""
 
     name: str
     side: Side | None = None
 
 
 def is_skull_feature(label: str) -> bool:
-    """Whether a label names one of the skull's registration features, ``S1``, ``S2``, ..."""
+    """Whether a label names one of the skull's registration features, ``S1``, ``S2``, ...
+
+    Parameters
+    ----------
+    label : str
+        A label, in any letter case.
+
+    Returns
+    -------
+    bool
+        True for S and a number of one or two digits.
+    """
     return _SKULL_FEATURE.fullmatch(label) is not None
 
 
 def tidy_label(label: str) -> str:
-    """Return a label as it is kept: features and skull features in capitals, blanks tidied."""
+    """Return a label as it is stored: features and skull features in capitals, single blanks.
+
+    Parameters
+    ----------
+    label : str
+        As typed, or read from a file.
+
+    Returns
+    -------
+    str
+        The stored form.
+    """
     text = " ".join(label.split())
     return text.upper() if text.upper() in CODES or is_skull_feature(text) else text
 
 
 def same_label(one: str, other: str) -> bool:
-    """Whether two labels name one point, as ``Bolt`` and ``bolt`` do."""
+    """Whether two labels name the same point, as ``Bolt`` and ``bolt`` do.
+
+    Parameters
+    ----------
+    one, other : str
+        Labels.
+
+    Returns
+    -------
+    bool
+        Letter case and blanks do not count.
+    """
     return tidy_label(one).casefold() == tidy_label(other).casefold()
 
 
 def parse_label(label: str) -> ParsedLabel:
-    """Return what a label names, and the side that stands before or behind the name of a feature.
+    """Return what a label names, and the side before or after the name of a feature.
 
     Only names of features and of skull features carry a side: ``Bolt_L`` is a name of its own.
 
+    Parameters
+    ----------
+    label : str
+        As typed, or read from a file.
+
+    Returns
+    -------
+    ParsedLabel
+        Name and side.
+
     Examples
     --------
-    >>> parse_label("ca_L"), parse_label("right RWA"), parse_label("Bolt_L")
-    (ParsedLabel(name='CA', side=<Side.LEFT: 'L'>), ParsedLabel(name='RWA', side=<Side.RIGHT: 'R'>), ParsedLabel(name='Bolt_L', side=None))
-    """  # noqa: E501 - a doctest cannot be wrapped
+    >>> parse_label("ca_L")
+    ParsedLabel(name='CA', side=<Side.LEFT: 'L'>)
+    >>> parse_label("right RWA")
+    ParsedLabel(name='RWA', side=<Side.RIGHT: 'R'>)
+    >>> parse_label("Bolt_L")
+    ParsedLabel(name='Bolt_L', side=None)
+    """
     text = tidy_label(label)
     if _is_known(text):
         return ParsedLabel(text)
@@ -73,18 +120,18 @@ def _is_known(name: str) -> bool:
 
 @dataclass(frozen=True)
 class LabelNames:
-    """The names that a lab has for points, and the codes that stand for them here.
+    """A lab's own names of points, and the feature codes that they stand for.
 
     Parameters
     ----------
     codes : mapping of str to str
-        A feature's code, with a side (``CA_L``) or without one, by the lab's own name; an empty text for a
+        For each of the lab's names, a feature's code, with a side (``CA_L``) or without; an empty text for a
         point that is left out. Letter case and blanks of the lab's names do not count.
 
     Raises
     ------
     FeatureError
-        A code is unknown, or one name stands twice.
+        A code is unknown, or a name occurs twice.
     """
 
     codes: Mapping[str, str]
@@ -111,11 +158,33 @@ class LabelNames:
         return _key(label) in self.codes
 
     def leaves_out(self, label: str) -> bool:
-        """Whether a point is not to be taken."""
+        """Whether a point is to be left out.
+
+        Parameters
+        ----------
+        label : str
+            The lab's name of the point.
+
+        Returns
+        -------
+        bool
+            True where the lab's table gives it an empty code.
+        """
         return self.codes.get(_key(label)) == ""
 
     def translate(self, label: str) -> str:
-        """Return the code that stands for a label, or the label itself."""
+        """Return the code that stands for a label, or the label itself.
+
+        Parameters
+        ----------
+        label : str
+            The lab's name of the point.
+
+        Returns
+        -------
+        str
+            A feature's code, perhaps with a side.
+        """
         return self.codes.get(_key(label)) or label
 
 

@@ -1,4 +1,4 @@
-"""Whether landmarks are in millimetres: told from the published distances between features."""
+"""Whether landmarks are in millimetres, judged by the published distances between features."""
 
 from __future__ import annotations
 
@@ -50,20 +50,20 @@ def _pairs(codes: tuple[str, ...]) -> tuple[IndexArray, IndexArray, FloatArray]:
 def check_plausible_size(
     landmarks: LandmarkSet, file: str | PathLike[str] | None = None, *, strict: bool = False
 ) -> None:
-    """Refuse landmarks that are a power of ten too small or too large for a guinea pig.
+    """Reject landmarks whose size is a power of ten too small or too large for a guinea pig.
 
-    The size is the median, over all pairs of placed features, of their distance by the published mean
-    distance (Usevitch et al. 2021, Figure 2). Fewer than three pairs pass.
+    The size is the median ratio, over all pairs of placed features, of their distance to the published mean
+    distance (Usevitch et al. 2021, Figure 2). Fewer than three pairs always pass.
 
     Parameters
     ----------
     landmarks : LandmarkSet
-        Landmarks of one side, in any frame.
-    file : path, optional
+        Landmarks of one side, in any frame, mm.
+    file : path-like, optional
         Where they come from, for the message.
     strict : bool
-        Refuse whatever is more than two and a half times off, powers of ten or not: what no pose should be
-        estimated from.
+        Reject any size off by a factor of more than 2.5, power of ten or not: no pose should be estimated
+        from it.
 
     Raises
     ------

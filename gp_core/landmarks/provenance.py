@@ -91,7 +91,13 @@ class LabelProvenance:
         return f"checked by {self.checked_by or _UNNAMED}" if self.checked else ""
 
     def as_json(self) -> dict[str, Any]:
-        """Return it for a file; what is not known has no key."""
+        """Return the provenance for a file; unknown items have no key.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON.
+        """
         texts = {key: value for name, key in _TEXTS.items() if (value := getattr(self, name))}
         found = {**self.more, **texts}
         if self.certainty is not None:
@@ -100,7 +106,17 @@ class LabelProvenance:
 
     @classmethod
     def from_json(cls, content: Mapping[str, Any]) -> LabelProvenance:
-        """Make it of what a file says.
+        """Build the provenance from the content of a file.
+
+        Parameters
+        ----------
+        content : mapping
+            As `as_json` returns it.
+
+        Returns
+        -------
+        LabelProvenance
+            The provenance.
 
         Raises
         ------
@@ -117,7 +133,23 @@ class LabelProvenance:
 
 
 def described(text: str, provenance: LabelProvenance | None, observer: str = "", round_: int = 1) -> str:
-    """Return a description for 3D Slicer, which keeps that alone of what is known of a label.
+    """Return a description for 3D Slicer, which stores nothing else about a label.
+
+    Parameters
+    ----------
+    text : str
+        Plain description.
+    provenance : LabelProvenance or None
+        What is known of the label.
+    observer : str
+        Of the whole side, where the label has none of its own.
+    round_ : int
+        Which of the observer's labellings, from 1.
+
+    Returns
+    -------
+    str
+        The text, followed by the provenance in brackets.
 
     Examples
     --------
@@ -138,9 +170,23 @@ def described(text: str, provenance: LabelProvenance | None, observer: str = "",
 
 
 def without_description(text: str) -> tuple[str, LabelProvenance | None, int]:
-    """Take apart what `described` made: the text, what is known of the label, and the round.
+    """Split a description that `described` made.
 
-    A text that holds no such words comes back as it is, with None and round 1.
+    A text without such brackets is returned as it is, with None and round 1.
+
+    Parameters
+    ----------
+    text : str
+        A description.
+
+    Returns
+    -------
+    text : str
+        Plain description.
+    provenance : LabelProvenance or None
+        What is known of the label.
+    round_ : int
+        Which of the observer's labellings.
     """
     match = _BLOCK.search(text)
     if match is None:

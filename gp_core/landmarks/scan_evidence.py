@@ -1,4 +1,4 @@
-"""What a scan says of labels: how far they are from bone. Measured where the scan is; see `gp_labeler`."""
+"""Evidence from the scan on labels: their distance from bone. It is measured by `gp_labeler`."""
 
 from __future__ import annotations
 
@@ -21,20 +21,20 @@ Position = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ScanEvidence:
-    """What a scan says of the labels of one side.
+    """Evidence from the scan on the labels of one side.
 
     Attributes
     ----------
     bone_distances : mapping of str to float
         Distance of each placed feature from the nearest bone, mm; 0 in bone, infinite where there is none.
     tolerance : float
-        What a feature on bone may be away from it, mm: a voxel, or 0.3 mm.
+        Permitted distance of a bony feature from bone, mm: a voxel, or 0.3 mm.
     outside : frozenset of str
         Features that lie outside the scan.
     positions : mapping of str to (3,) tuple
-        Where each feature was when it was measured, mm, in the frame of the labels.
+        Position of each feature when it was measured, mm, in the frame of the labels.
     threshold : float or None
-        Grey value where bone begins.
+        Grey value of the bone surface.
     """
 
     bone_distances: Mapping[str, float]
@@ -44,7 +44,18 @@ class ScanEvidence:
     threshold: float | None = None
 
     def of(self, points: Mapping[str, FloatArray]) -> ScanEvidence | None:
-        """Return what still holds of named points (3,): of those that are where they were measured."""
+        """Return the evidence that still holds: of points that are where they were measured.
+
+        Parameters
+        ----------
+        points : mapping of str to (3,) array
+            Present positions, mm, in the frame of the labels.
+
+        Returns
+        -------
+        ScanEvidence or None
+            None where nothing holds.
+        """
         kept = {
             code
             for code, place in self.positions.items()
@@ -58,12 +69,29 @@ class ScanEvidence:
         return replace(self, bone_distances=distances, positions=positions, outside=self.outside & kept)
 
     def moved(self, T_dst_src: RigidTransform) -> ScanEvidence:
-        """Return it for labels that were moved as a whole, into another frame."""
+        """Return the evidence for labels that were moved as a whole into another frame.
+
+        Parameters
+        ----------
+        T_dst_src : RigidTransform
+            From the frame of the labels.
+
+        Returns
+        -------
+        ScanEvidence
+            In the frame `dst`.
+        """
         places = {code: T_dst_src.apply(np.array([place]))[0] for code, place in self.positions.items()}
         return replace(self, positions={code: _position(place.tolist()) for code, place in places.items()})
 
     def as_json(self) -> dict[str, Any]:
-        """Return it as it stands in a file; a distance is null where no bone was found."""
+        """Return the evidence as a file holds it; a distance is null where no bone was found.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON, mm.
+        """
         points = {
             code: {
                 "distance": self.bone_distances[code] if math.isfinite(self.bone_distances[code]) else None,
@@ -76,12 +104,22 @@ class ScanEvidence:
 
     @classmethod
     def from_json(cls, content: Any) -> ScanEvidence:
-        """Make it of what stands in a file.
+        """Build the evidence from the content of a file.
+
+        Parameters
+        ----------
+        content : object
+            As `as_json` returns it.
+
+        Returns
+        -------
+        ScanEvidence
+            In the frame of the file.
 
         Raises
         ------
         ValueError
-            It does not stand there as `as_json` writes it.
+            The content has another form.
         """
         try:
             points = content["points"]

@@ -23,7 +23,7 @@ __all__ = ["LandmarkSet", "Specimen", "Status"]
 
 
 class Status(str, Enum):
-    """How far a landmark is; all values but ``suggested`` are the words of 3D Slicer's ``positionStatus``.
+    """The state of a landmark; all values but ``suggested`` are words of 3D Slicer's ``positionStatus``.
 
     Only a placed landmark is an observation: a person has placed or confirmed it.
     """
@@ -40,10 +40,10 @@ def _nothing() -> Mapping[str, Any]:
 
 @dataclass(frozen=True)
 class LandmarkSet:
-    """The landmarks of one side of one head; never changed in place.
+    """The landmarks of one side of one head; immutable.
 
-    `points`, `placed`, ``in``, `array`, iteration and everything else that means *observation* leave out what
-    is only suggested. `suggested` alone holds those, until `confirmed` makes observations of them.
+    `points`, `placed`, ``in``, `array`, iteration and everything else that means *observation* exclude points
+    that are only suggested. `suggested` alone holds those, until `confirmed` turns them into observations.
 
     Parameters
     ----------
@@ -56,15 +56,15 @@ class LandmarkSet:
     unseen : frozenset of str
         Features that were looked for and cannot be seen (Slicer's ``missing``).
     extra : mapping of str to (3,) array
-        Named points beside the 20 features, such as the skull features of a physical test, mm.
+        Further named points, such as the skull features of a physical test, mm.
     suggested : mapping of str to Suggestion
-        Where features that are to do are suggested, in the same frame, in the table's order. Once a feature
-        is placed or unseen, a person has decided, and its suggestion is dropped.
+        Suggestions for features that are not labelled yet, in the same frame, in the table's order. Once a
+        feature is placed or unseen, a person has decided, and its suggestion is dropped.
     scan_evidence : ScanEvidence, optional
-        How far the points are from bone, as measured in the scan; dropped for a point that is moved.
+        Distances of the points from bone, as measured in the scan; dropped for a point that is moved.
     provenance : mapping of str to LabelProvenance
         What is known of each placed or unseen feature beside its position: observer, time, certainty, note,
-        who checked it; dropped for a point that is placed anew.
+        who checked it; dropped for a point that is placed again.
     observer : str
         Who labelled this side; empty where nobody said.
     round : int
@@ -120,14 +120,41 @@ class LandmarkSet:
 
     @classmethod
     def empty(cls, side: Side | str, *, frame: str = "scan") -> LandmarkSet:
-        """Make a set with nothing placed."""
+        """Make a set with no landmark placed.
+
+        Parameters
+        ----------
+        side : {"L", "R"}
+            Side of the head.
+        frame : str
+            Frame of the positions to come.
+
+        Returns
+        -------
+        LandmarkSet
+            All positions are NaN.
+        """
         return cls(np.full((len(CODES), 3), np.nan), Side.parse(side), frame)
 
     @classmethod
     def from_mapping(
         cls, points: Mapping[str, ArrayLike], side: Side | str, *, frame: str = "scan"
     ) -> LandmarkSet:
-        """Make a set of named points.
+        """Make a set from named points.
+
+        Parameters
+        ----------
+        points : mapping of str to (3,) array_like
+            Positions by feature code, mm.
+        side : {"L", "R"}
+            Side of the head.
+        frame : str
+            Frame of the positions.
+
+        Returns
+        -------
+        LandmarkSet
+            With these points placed.
 
         Raises
         ------
@@ -161,7 +188,13 @@ class LandmarkSet:
         return iter(self.placed)
 
     def keys(self) -> tuple[str, ...]:
-        """Return what it can be asked for, so that ``dict(landmarks)`` holds every position."""
+        """Return the placed features, so that ``dict(landmarks)`` holds every position.
+
+        Returns
+        -------
+        tuple of str
+            Codes, in the table's order.
+        """
         return self.placed
 
     @property
@@ -171,7 +204,18 @@ class LandmarkSet:
         return tuple(code for code, absent in zip(CODES, missing, strict=True) if not absent)
 
     def status(self, code: str) -> Status:
-        """Return how far a feature is."""
+        """Return the state of a feature.
+
+        Parameters
+        ----------
+        code : str
+            A feature.
+
+        Returns
+        -------
+        Status
+            Placed, unseen, suggested or to do.
+        """
         if code in self:
             return Status.PLACED
         code = feature(code).code
@@ -180,12 +224,33 @@ class LandmarkSet:
         return Status.SUGGESTED if code in self.suggested else Status.TO_DO
 
     def as_mapping(self, codes: Iterable[str] | None = None) -> dict[str, FloatArray]:
-        """Return the placed positions by code; of `codes` only, where given."""
+        """Return the placed positions by code.
+
+        Parameters
+        ----------
+        codes : iterable of str, optional
+            Only these features.
+
+        Returns
+        -------
+        dict of str to (3,) array, mm
+            In the frame of the set.
+        """
         wanted = self.placed if codes is None else tuple(codes)
         return {code: self[code] for code in wanted if code in self}
 
     def array(self, codes: Iterable[str]) -> FloatArray:
-        """Return the positions of `codes` as an (n, 3) array, in the order asked.
+        """Return the positions of features, in the requested order.
+
+        Parameters
+        ----------
+        codes : iterable of str
+            Features.
+
+        Returns
+        -------
+        (n, 3) array, mm
+            In the frame of the set.
 
         Raises
         ------
@@ -206,7 +271,20 @@ class LandmarkSet:
         return self.points[rows]
 
     def with_point(self, code: str, position: ArrayLike | None) -> LandmarkSet:
-        """Return a copy with one feature placed, or cleared where `position` is None; its suggestion goes."""
+        """Return a copy with one feature placed or cleared; its suggestion is dropped.
+
+        Parameters
+        ----------
+        code : str
+            A feature.
+        position : (3,) array_like or None
+            In the frame of the set, mm; None clears it.
+
+        Returns
+        -------
+        LandmarkSet
+            The changed copy.
+        """
         points = self.points.copy()
         points[index_of(code)] = np.nan if position is None else _position(position, code)
         code = feature(code).code
@@ -215,12 +293,33 @@ class LandmarkSet:
         return replace(self, points=points, unseen=self.unseen - {code}, suggested=others, provenance=about)
 
     def with_unseen(self, code: str) -> LandmarkSet:
-        """Return a copy in which one feature is marked as one that cannot be seen."""
+        """Return a copy with one feature marked as not visible.
+
+        Parameters
+        ----------
+        code : str
+            A feature.
+
+        Returns
+        -------
+        LandmarkSet
+            The changed copy.
+        """
         cleared = self.with_point(code, None)
         return replace(cleared, unseen=cleared.unseen | {feature(code).code})
 
     def with_provenance(self, provenance: Mapping[str, LabelProvenance]) -> LandmarkSet:
-        """Return a copy in which more is known of these features, where they are placed or unseen.
+        """Return a copy with provenance added to features, where they are placed or unseen.
+
+        Parameters
+        ----------
+        provenance : mapping of str to LabelProvenance
+            By feature.
+
+        Returns
+        -------
+        LandmarkSet
+            The changed copy.
 
         Raises
         ------
@@ -231,11 +330,21 @@ class LandmarkSet:
 
     @property
     def checked(self) -> Mapping[str, str]:
-        """Features that a person looked at again and found right, and who that was (empty: unnamed)."""
+        """Features that a person has reviewed and confirmed, and by whom (empty: unnamed)."""
         return {code: about.checked_by for code, about in self.provenance.items() if about.checked}
 
     def with_suggestions(self, suggestions: Mapping[str, Suggestion]) -> LandmarkSet:
-        """Return a copy with these suggestions, in this set's frame, where the feature is still to do.
+        """Return a copy with suggestions for features that are not labelled yet.
+
+        Parameters
+        ----------
+        suggestions : mapping of str to Suggestion
+            In the frame of the set.
+
+        Returns
+        -------
+        LandmarkSet
+            The changed copy.
 
         Raises
         ------
@@ -245,7 +354,17 @@ class LandmarkSet:
         return replace(self, suggested={**self.suggested, **suggestions})
 
     def confirmed(self, codes: Iterable[str]) -> LandmarkSet:
-        """Return a copy in which suggestions are observations, for a person has looked and agrees.
+        """Return a copy in which suggestions have become observations, since a person has confirmed them.
+
+        Parameters
+        ----------
+        codes : iterable of str
+            The confirmed features.
+
+        Returns
+        -------
+        LandmarkSet
+            The changed copy.
 
         Raises
         ------
@@ -263,6 +382,16 @@ class LandmarkSet:
 
     def moved(self, T_dst_src: RigidTransform) -> LandmarkSet:
         """Return the set in another frame.
+
+        Parameters
+        ----------
+        T_dst_src : RigidTransform
+            From this set's frame.
+
+        Returns
+        -------
+        LandmarkSet
+            In the frame `dst`.
 
         Raises
         ------
@@ -333,6 +462,16 @@ class Specimen:
 
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side.
+
+        Parameters
+        ----------
+        side : {"L", "R"}
+            Which side.
+
+        Returns
+        -------
+        LandmarkSet
+            Its landmarks.
 
         Raises
         ------

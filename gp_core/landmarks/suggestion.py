@@ -1,4 +1,4 @@
-"""A suggestion: where something expects a landmark that no person has looked at yet."""
+"""A suggestion: the expected position of a landmark that no person has confirmed yet."""
 
 from __future__ import annotations
 
@@ -51,7 +51,18 @@ class Suggestion:
             object.__setattr__(self, "radius_95", _radius(self.radius_95))
 
     def moved(self, T_dst_src: RigidTransform) -> Suggestion:
-        """Return the suggestion in another frame."""
+        """Return the suggestion in another frame.
+
+        Parameters
+        ----------
+        T_dst_src : RigidTransform
+            From the frame of the suggestion.
+
+        Returns
+        -------
+        Suggestion
+            In the frame `dst`.
+        """
         x, y, z = T_dst_src.apply(np.array([self.position]))[0].tolist()
         return replace(self, position=(x, y, z))
 

@@ -17,26 +17,26 @@ from gp_core.io.pose_export import write_csv, write_landmarks
 from gp_core.io.tfm import write_tfm
 from gp_core.landmarks.features import Side
 from gp_core.pose.covariance import cone_95, radius_95
-from gp_core.pose.mixture import UNDECIDED, Hypothesis, axis_part, holding_radius, origin_part
+from gp_core.pose.mixture import UNDECIDED, Hypothesis, axis_part, mixture_radius_95, origin_part
 from gp_core.validation import FloatArray, check_option
 
-__all__ = ["METHODS", "READING_STATES", "ROUND_WINDOWS", "CochleaPose"]
+__all__ = ["HYPOTHESIS_STATES", "ROUND_WINDOWS", "CochleaPose"]
 
-METHODS = ("robust", "jrmpc")
 ROUND_WINDOWS = ("touched", "expected")
-"""Whose round window y of the cochlea frame points to: the touched one, or the one of the fitted atlas."""
+"""Which round window y of the cochlea frame points to: the touched one, or that of the fitted atlas."""
 
-READING_STATES = ("clear", "undecided", "wrong", "unchecked")
-"""Whether the touches can be read otherwise: no; perhaps; another reading fits far better; nobody looked."""
+HYPOTHESIS_STATES = ("clear", "undecided", "wrong", "unchecked")
+"""Other hypotheses: all ruled out; some not ruled out; one fits far better; not checked by the method."""
 
 
 @dataclass(frozen=True)
 class CochleaPose:
-    """Where a cochlea is and how it is turned, in the frame of the touches.
+    """Position and orientation of a cochlea, in the frame of the touches.
 
     Attributes
     ----------
     side : Side
+        Side of the head.
     method : str
         ``robust`` or ``jrmpc``.
     atlas : str
@@ -49,27 +49,27 @@ class CochleaPose:
     residuals : dict of str to float
         Distance of each touched point from the registered mean, mm.
     suspects : tuple of str
-        Touched points that do not fit the others.
+        Touched points that contradict the others.
     warnings : tuple of str
-        What the user should know before trusting the pose.
+        What the user should know before using the pose.
     probe_noise : float or None
-        Scale of the touch errors that was found or given, mm a coordinate.
+        Scale of the touch errors that was estimated or given, mm a coordinate.
     T_touches_atlas : RigidTransform or None
         The registered atlas, for a left side; for a right side, from the atlas mirrored in x.
     round_window : str
-        Of which round window the middle is: ``touched`` or ``expected``.
+        Which round window y points to: ``touched`` or ``expected``.
     swapped : (str, str) or None
-        Two touched features that look, or may be, as if each had the other's name.
+        Two touched features whose names look, or may be, exchanged.
     side_state, names_state : str
-        Of `READING_STATES`: whether the touches may be those of the other ear, and whether two of them may
-        each have the other's name. Only a pose of which both are ``clear`` is for a robot; see
+        One of `HYPOTHESIS_STATES`: whether the touches may be those of the other ear, and whether the names
+        of two of them may be exchanged. Only a pose with both ``clear`` is for a robot; see
         `gp_core.pose.gate.PoseGate`.
     shared_error : float or None
         RMS length of the offset common to all touches that the regions allow for, mm; None: not considered.
     probability : float
-        Of the touches as they are named, among all readings of them.
+        Of the touches as they are named, among all hypotheses.
     hypotheses : tuple of Hypothesis
-        Other readings that are not ruled out, the likeliest first.
+        Other hypotheses that are not ruled out, the likeliest first.
     """
 
     side: Side
@@ -91,8 +91,8 @@ class CochleaPose:
     hypotheses: tuple[Hypothesis, ...] = ()
 
     def __post_init__(self) -> None:
-        check_option(self.side_state, "state of the side", READING_STATES)
-        check_option(self.names_state, "state of the names", READING_STATES)
+        check_option(self.side_state, "state of the side", HYPOTHESIS_STATES)
+        check_option(self.names_state, "state of the names", HYPOTHESIS_STATES)
 
     @property
     def origin(self) -> FloatArray:
@@ -111,52 +111,58 @@ class CochleaPose:
 
     @property
     def state(self) -> str:
-        """Both states in words, such as ``side undecided, names clear``."""
+        """Both states, such as ``side undecided, names clear``."""
         return f"side {self.side_state}, names {self.names_state}"
 
     @cached_property
     def radius_95(self) -> float:
-        """Radius of the ball about the origin that holds the true CO with 95 %, whatever the reading, mm."""
+        """Radius of the ball about the origin that contains CO with 95 %, over all hypotheses, mm."""
         if not self.hypotheses:
             return self.plain_radius_95
-        return holding_radius([origin_part(p, o, self.origin, c) for p, o, _, c in self._readings()])
+        return mixture_radius_95([origin_part(p, o, self.origin, c) for p, o, _, c in self._all_hypotheses()])
 
     @cached_property
     def cone_95(self) -> float:
-        """Half-angle of the cone that holds the true axis with 95 %, whatever the reading, rad."""
+        """Half-angle of the cone that contains the true axis with 95 %, over all hypotheses, rad."""
         if not self.hypotheses:
             return self.plain_cone_95
-        parts = [axis_part(p, a, self.axis, c) for p, _, a, c in self._readings()]
-        return min(holding_radius(parts), np.pi)
+        parts = [axis_part(p, a, self.axis, c) for p, _, a, c in self._all_hypotheses()]
+        return min(mixture_radius_95(parts), np.pi)
 
     @property
     def plain_radius_95(self) -> float:
-        """The radius where the touches are taken as they are named, mm."""
+        """The 95 % radius if the touches are named correctly, mm."""
         return radius_95(self.covariance)
 
     @property
     def plain_cone_95(self) -> float:
-        """The cone where the touches are taken as they are named, rad."""
+        """The 95 % cone if the touches are named correctly, rad."""
         return cone_95(self.covariance, self.axis)
 
     @property
-    def has_parts(self) -> bool:
-        """Whether the 95 % region is of several parts, one a reading that is not ruled out."""
+    def is_multimodal(self) -> bool:
+        """Whether the 95 % region covers other hypotheses that are not ruled out."""
         return any(h.probability >= UNDECIDED for h in self.hypotheses)
 
     @property
-    def likelier_reading(self) -> Hypothesis | None:
-        """The other reading that is likelier than the touches as they are named; None where none is."""
+    def likelier_hypothesis(self) -> Hypothesis | None:
+        """A hypothesis that is likelier than the touches as they are named; None if there is none."""
         best = next(iter(self.hypotheses), None)
         return best if best is not None and best.probability > self.probability else None
 
-    def _readings(self) -> Iterator[tuple[float, FloatArray, FloatArray, FloatArray]]:
+    def _all_hypotheses(self) -> Iterator[tuple[float, FloatArray, FloatArray, FloatArray]]:
         yield self.probability, self.origin, self.axis, self.covariance
         for h in self.hypotheses:
             yield h.probability, h.origin, h.axis, h.covariance
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the pose as the JSON file holds it; lengths in mm, angles in degrees."""
+        """Return the pose as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "gpPose": 1,
             "method": self.method,
@@ -189,17 +195,61 @@ class CochleaPose:
         }
 
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the pose as JSON."""
+        """Write the pose as JSON.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
 
     def save_tfm(self, path: str | PathLike[str]) -> None:
-        """Write the pose as an ITK transform file; see `gp_core.io.tfm.write_tfm`."""
+        """Write the pose as an ITK transform file; see `gp_core.io.tfm.write_tfm`.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         write_tfm(path, self.transform_to_touches)
 
     def save_csv(self, path: str | PathLike[str]) -> None:
-        """Write the 4x4 matrix as plain numbers; see `gp_core.io.pose_export.write_csv`."""
+        """Write the 4x4 matrix as plain numbers; see `gp_core.io.pose_export.write_csv`.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         write_csv(path, self)
 
     def save_landmarks(self, path: str | PathLike[str]) -> None:
-        """Write CO and axis as Slicer markups; see `gp_core.io.pose_export.write_landmarks`."""
+        """Write CO and axis as Slicer markups; see `gp_core.io.pose_export.write_landmarks`.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         write_landmarks(path, self)

@@ -1,4 +1,4 @@
-"""From the covariance of a pose to a radius and a cone, and how a cochlea's frame follows its points."""
+"""From the covariance of a pose to a radius and a cone, and the derivative of the cochlea frame."""
 
 from __future__ import annotations
 
@@ -14,25 +14,35 @@ __all__ = ["cochlea_jacobian", "cone_95", "radius_95"]
 
 
 def radius_95(covariance: FloatArray) -> float:
-    """Return the radius (mm) of the ball that holds the origin with 95 %.
+    """Return the radius of the ball that contains the origin with 95 % probability.
 
     Parameters
     ----------
     covariance : (6, 6) array
         Of origin (mm) and rotation vector (rad).
+
+    Returns
+    -------
+    float
+        Radius, mm.
     """
     return _norm_quantile(covariance[:3, :3])
 
 
 def cone_95(covariance: FloatArray, axis: FloatArray) -> float:
-    """Return the half-angle (rad) of the cone that holds the axis with 95 %.
+    """Return the half-angle of the cone that contains the axis with 95 % probability.
 
     Parameters
     ----------
     covariance : (6, 6) array
         Of origin (mm) and rotation vector (rad).
     axis : (3,) array
-        Unit axis in the same frame; turning about it does not move it.
+        Unit axis in the same frame; rotation about it does not move it.
+
+    Returns
+    -------
+    float
+        Half-angle, rad.
     """
     across = np.eye(3) - np.outer(axis, axis)
     return min(_norm_quantile(across @ covariance[3:, 3:] @ across), np.pi)
@@ -41,8 +51,8 @@ def cone_95(covariance: FloatArray, axis: FloatArray) -> float:
 def _norm_quantile(covariance: FloatArray) -> float:
     """95 % quantile of the length of a Gaussian vector.
 
-    The squared length is taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946,
-    doi:10.2307/3002019).
+    The squared length is approximated by a scaled chi-squared distribution of the same mean and variance
+    (Satterthwaite 1946, doi:10.2307/3002019).
     """
     mean = float(np.trace(covariance))
     if mean <= 0:
@@ -52,11 +62,12 @@ def _norm_quantile(covariance: FloatArray) -> float:
 
 
 def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: FloatArray) -> FloatArray:
-    """Return how the cochlea frame follows the four points that define it.
+    """Return the derivative of the cochlea frame with respect to the four points that define it.
 
     Parameters
     ----------
     ca, cb, rwa, rwp : (3,) arrays, mm
+        The defining features.
 
     Returns
     -------
@@ -69,16 +80,16 @@ def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: Float
     x = spiral / length
     share = float(spiral @ middle) / squared  # of the way from CB to CA at which CO lies
     to_window = middle - share * spiral
-    along, turn_x = x[:, None] * x, cross_matrix(x)
+    along, cross_x = x[:, None] * x, cross_matrix(x)
     across = np.eye(3) - along
     origin_of_ca = x[:, None] * (to_window / length) + share * across
-    turn_of_ca = turn_x / length
-    lean = x[:, None] * (turn_x @ (to_window / float(to_window @ to_window)))
+    rotation_of_ca = cross_x / length
+    tilt = x[:, None] * (cross_x @ (to_window / float(to_window @ to_window)))
     jacobian = np.empty((2, 3, 4, 3))  # of what, its coordinate, by which point, its coordinate
     jacobian[0, :, 0] = origin_of_ca
     jacobian[0, :, 1] = across - origin_of_ca
     jacobian[0, :, 2] = jacobian[0, :, 3] = along / 2
-    jacobian[1, :, 0] = turn_of_ca - share * lean
-    jacobian[1, :, 1] = (share - 1) * lean - turn_of_ca
-    jacobian[1, :, 2] = jacobian[1, :, 3] = lean / 2
+    jacobian[1, :, 0] = rotation_of_ca - share * tilt
+    jacobian[1, :, 1] = (share - 1) * tilt - rotation_of_ca
+    jacobian[1, :, 2] = jacobian[1, :, 3] = tilt / 2
     return jacobian.reshape(6, 12)

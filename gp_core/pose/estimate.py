@@ -8,11 +8,12 @@ from numpy.typing import ArrayLike
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
+from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS, CochleaPose
+from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.jrmpc_estimator import estimate_jrmpc
 from gp_core.pose.robust import estimate_robust
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
@@ -39,45 +40,46 @@ def estimate_pose(
     Parameters
     ----------
     touches : mapping of str to (3,) array_like, or LandmarkSet
-        Position of each touched feature in the tracker's frame, mm; three or more, not on one line.
+        Position of each touched feature in the tracker's frame, mm; three or more, not collinear.
     side : {"L", "R"}
         Side of the head.
     atlas : Atlas, optional
-        By default the one fitted to `specimens`, or the published one. Not used by ``jrmpc``.
+        By default fitted to `specimens`, or else the published one. Not used by ``jrmpc``.
     method : {"robust", "jrmpc"}
         ``robust`` uses the names of the points; ``jrmpc`` is the paper's method and needs `specimens`.
     specimens : sequence of Specimen, optional
         Labelled animals.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+        Scale of an ordinary touch error, mm a coordinate; by default estimated from the touches.
     round_window : {"touched", "expected"}
-        What y of the frame points to: the middle of the touched RWA and RWP, as the authors' robot had it,
-        where both are touched and fit; or that of the fitted atlas, nearer the truth where touches are rough.
+        What y of the frame points to: the middle of the touched RWA and RWP, as for the authors' robot, where
+        both are touched and fit; or that of the fitted atlas, which is more accurate where touches are rough.
         Origin and axis are the same.
     shared_error : float
         RMS length of one offset common to all touches of the session, mm, in the frame of the touches: from
         the covariance of the pivot calibration, the tracker's data sheet, soft tissue under the tip. It
-        widens the regions and moves nothing. With 0, touches err independently, and animals are like those
-        of the atlas.
+        widens the regions and does not change the estimate. With 0, touch errors are assumed independent, and
+        animals like those of the atlas.
     times : mapping of str to float, optional
-        When each feature was touched, s. Where all have a time, a drift over the session is looked for.
+        When each feature was touched, s. Where all have a time, a drift over the session is estimated.
 
     Returns
     -------
     CochleaPose
+        In the frame of the touches.
 
     Raises
     ------
     GpError
-        Touches that no pose can be made of, or a method without what it needs.
+        No pose can be estimated from the touches, or the method lacks what it needs.
 
     Examples
     --------
     >>> atlas = Atlas.published()
     >>> touched = {code: atlas[code] for code in ("CL", "LLI", "MN", "OS", "RWA", "RWP")}
     >>> pose = estimate_pose(touched, "L")
-    >>> bool(np.linalg.norm(pose.origin) < 1e-6)
-    True
+    >>> pose.suspects, bool(abs(pose.origin).max() < 1e-6)
+    ((), True)
     """
     check_option(method, "method", METHODS)
     check_option(round_window, "round window", ROUND_WINDOWS)

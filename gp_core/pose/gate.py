@@ -1,7 +1,7 @@
 """Whether a pose may be sent to a robot, and if not, why not.
 
-One rule for the window, the shell, a script and Python. It knows nothing of files or networks: the caller
-says whether a person has accepted the pose, and how old the last valid reading of the reference marker is.
+One rule for the window, the shell, scripts and Python. It knows nothing of files or networks: the caller says
+whether a person has accepted the pose, and how old the last valid measurement of the reference marker is.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.pose.cochlea_pose import CochleaPose
 
-__all__ = ["GateReason", "PoseGate", "against_writing", "doubt_about"]
+__all__ = ["GateReason", "PoseGate", "reasons_against_writing", "reasons_of_ambiguity"]
 
 
 @dataclass(frozen=True)
@@ -78,23 +78,29 @@ class PoseGate:
     def reasons(
         self, pose: CochleaPose | None, *, accepted: bool, reference_age_s: float | None = None
     ) -> tuple[GateReason, ...]:
-        """Return every reason to hold a pose back, the gravest first; empty where it may be sent.
+        """Return every reason to hold a pose back, the most serious first; empty where it may be sent.
 
         Parameters
         ----------
         pose : CochleaPose or None
+            The current estimate, if there is one.
         accepted : bool
-            Whether a person accepted this very pose: since touches, atlas and settings last changed.
+            Whether a person accepted this very pose, after touches, atlas and settings last changed.
         reference_age_s : float, optional
-            Time since the last valid reading of the reference marker, s; infinite where there was none yet.
-            None where the pose does not hang on a reference marker.
+            Time since the last valid measurement of the reference marker, s; infinite before the first one.
+            None where the pose does not depend on a reference marker.
+
+        Returns
+        -------
+        tuple of GateReason
+            Each with a code for programs and a text for people.
         """
         if pose is None:
             return (GateReason("no pose", "there is no estimate"),)
         return tuple(self._reasons(pose, accepted, reference_age_s))
 
     def _reasons(self, pose: CochleaPose, accepted: bool, age: float | None) -> Iterator[GateReason]:
-        yield from doubt_about(pose)
+        yield from reasons_of_ambiguity(pose)
         radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
         if not radius <= self.max_radius_mm:
             yield GateReason("radius", f"the 95 % radius is {radius:.2f} mm, above {self.max_radius_mm:g} mm")
@@ -108,8 +114,19 @@ class PoseGate:
             yield GateReason("stale", _stale(age, self.max_age_s))
 
 
-def doubt_about(pose: CochleaPose) -> Iterator[GateReason]:
-    """Yield what speaks against the side and the names of a pose: what no limit and no person overrules."""
+def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
+    """Yield the reasons against the side and the names of a pose, which no limit and no person can override.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        An estimate.
+
+    Yields
+    ------
+    GateReason
+        One for the side, and one for the names, where they are not clear.
+    """
     other = pose.side.other.word
     words = {
         "wrong": ("wrong side", f"the touches look like those of the {other} ear"),
@@ -127,12 +144,22 @@ def doubt_about(pose: CochleaPose) -> Iterator[GateReason]:
         yield GateReason(*words[pose.names_state])
 
 
-def against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
-    """Return why a pose is not written for a robot: its side or names look wrong, or are undecided.
+def reasons_against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
+    """Return why a pose must not be written for a robot: its side or names look wrong, or are undecided.
 
-    A method that checks neither finds nothing against it.
+    A method that checks neither gives no reason.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        An estimate.
+
+    Returns
+    -------
+    tuple of GateReason
+        Empty where it may be written.
     """
-    return tuple(reason for reason in doubt_about(pose) if not reason.code.endswith("unchecked"))
+    return tuple(reason for reason in reasons_of_ambiguity(pose) if not reason.code.endswith("unchecked"))
 
 
 def _pair(pose: CochleaPose) -> str:

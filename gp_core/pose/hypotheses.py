@@ -1,13 +1,14 @@
-"""Other readings of the same touches: the other ear, and the names of two touches exchanged, with odds.
+"""Alternative hypotheses on the same touches: the other ear, or two names exchanged; with their odds.
 
-Each reading is fitted like the one as named, and weighed by prior times marginal likelihood. In that, the
-pose is integrated out by Laplace's method, the scale of the touch errors and the weight of each touch over
-grids: the noise model is that of `gp_core.registration.named_points`, with the same prior of its scale.
+Each hypothesis is fitted like the touches as named, and weighted by prior times marginal likelihood. The
+marginal likelihood integrates the pose out by Laplace's method, and the scale of the touch errors and the
+weight of each touch over grids: the noise model is that of `gp_core.registration.named_points`, with the same
+prior of its scale.
 
-The priors are rates of human slips. Choosing the wrong one of several like things by their labels alone
-happens in about 3 of 1000 choices (Swain and Guttmann, "Handbook of human reliability analysis",
-NUREG/CR-1278, 1983); six touches are six choices, so 2 % for all exchanges together. The side is one choice,
-but left and right of a head change with the view of it: ten times that rate, 3 %.
+The priors are rates of human error. Selecting the wrong one of several similar items by their labels alone
+happens in about 3 of 1000 selections (Swain and Guttmann, "Handbook of human reliability analysis",
+NUREG/CR-1278, 1983); six touches are six selections, hence 2 % for all exchanges together. The side is one
+selection, but left and right of a head swap with the view: ten times that rate, 3 %.
 """
 
 from __future__ import annotations
@@ -24,30 +25,30 @@ from gp_core.frames import mirror_x
 from gp_core.registration.named_points import (
     NamedFit,
     TouchModel,
+    approximate_neg_log_posterior,
     best_exchange,
-    careful_misfit,
     fit_named_points,
-    quick_misfit,
+    gaussian_deviance,
 )
 from gp_core.registration.student_t_fit import NU, PRIOR_WEIGHT, TYPICAL_NOISE_MM
 from gp_core.validation import FloatArray
 
-__all__ = ["Reading", "log_evidence", "readings"]
+__all__ = ["FittedHypothesis", "fit_hypotheses", "log_evidence"]
 
 _EXCHANGE_PRIOR = 0.02
 _SIDE_PRIOR = 0.03
 
 _FEW_TOUCHES = 4
-"""Up to so many, even touches that fit well may be exchanged."""
+"""With so few touches, even a good fit may have two names exchanged."""
 
 _LEAST = 1e-3
-"""Probability below which a reading is dropped."""
+"""Probability below which a hypothesis is dropped."""
 
-_WORTH_A_FIT = 16.0
-"""Misfit above that of the names as given beyond which an exchange is not fitted to the end."""
+_PRUNE_ABOVE = 16.0
+"""Excess negative log posterior above which an exchange is not fitted to convergence."""
 
-_NO_CHANCE = 25.0
-"""Difference in -2 log likelihood of careful touches beyond which the other ear is not looked at."""
+_PRUNE_SIDE_ABOVE = 25.0
+"""Difference in deviance of careful touches above which the other ear is not fitted."""
 
 _N_SIGMA, _N_WEIGHTS = 9, 10
 _SIGMA2 = np.geomspace(0.02, 2.0, _N_SIGMA) ** 2
@@ -59,18 +60,19 @@ _NOISE2 = _SIGMA2[:, None, None] / _WEIGHTS
 
 
 @dataclass(frozen=True)
-class Reading:
-    """One reading of the touches.
+class FittedHypothesis:
+    """One hypothesis on the touches, with its fit.
 
     Attributes
     ----------
     mirrored : bool
-        Whether they are read as those of the other ear.
+        Whether the touches are taken as those of the other ear.
     exchanged : (int, int) or None
-        Rows of the touches that have each other's name.
+        Rows of the two touches whose names are exchanged.
     fit : NamedFit
+        Of the touches under this hypothesis.
     probability : float
-        Those of all readings that are kept add up to 1.
+        The probabilities of all hypotheses that are kept add up to 1.
     """
 
     mirrored: bool
@@ -79,16 +81,22 @@ class Reading:
     probability: float
 
 
-def readings(model: TouchModel, points: FloatArray, fit: NamedFit) -> tuple[Reading, ...]:
-    """Return the touches as named, and after that every other reading not ruled out, the likeliest first.
+def fit_hypotheses(model: TouchModel, points: FloatArray, fit: NamedFit) -> tuple[FittedHypothesis, ...]:
+    """Return the touches as named, then every other hypothesis that is not ruled out, the likeliest first.
 
     Parameters
     ----------
     model : TouchModel
+        Of the touched features.
     points : (n, 3) array, mm
         The touches, as of a left side.
     fit : NamedFit
-        Of them as they are named.
+        Of the touches as they are named.
+
+    Returns
+    -------
+    tuple of FittedHypothesis
+        The first is the touches as named.
     """
     n = len(points)
     found: list[tuple[bool, tuple[int, int] | None, NamedFit, float]] = [
@@ -102,20 +110,23 @@ def readings(model: TouchModel, points: FloatArray, fit: NamedFit) -> tuple[Read
     logs = np.array([prior + log_evidence(model, other) for _, _, other, prior in found])
     odds = np.exp(logs - logs.max())
     odds /= odds.sum()
-    all_readings = [
-        Reading(side, pair, other, float(p)) for (side, pair, other, _), p in zip(found, odds, strict=True)
+    fitted = [
+        FittedHypothesis(side, pair, other, float(p))
+        for (side, pair, other, _), p in zip(found, odds, strict=True)
     ]
-    named, *others = all_readings
+    named, *others = fitted
     kept = sorted((r for r in others if r.probability >= _LEAST), key=lambda r: -r.probability)
     return named, *kept
 
 
 def _is_surely_this_side(model: TouchModel, points: FloatArray, fit: NamedFit) -> bool:
-    """Whether careful touches leave the other ear no chance; saves fitting it."""
-    if fit.rough:
+    """Whether careful touches rule out the other ear; saves fitting it."""
+    if fit.fits_poorly:
         return False
-    worse = careful_misfit(model, mirror_x(points), fit.noise) - careful_misfit(model, points, fit.noise)
-    return worse > _NO_CHANCE
+    worse = gaussian_deviance(model, mirror_x(points), fit.noise) - gaussian_deviance(
+        model, points, fit.noise
+    )
+    return worse > _PRUNE_SIDE_ABOVE
 
 
 def _fitted(model: TouchModel, points: FloatArray) -> NamedFit | None:
@@ -128,30 +139,36 @@ def _fitted(model: TouchModel, points: FloatArray) -> NamedFit | None:
 def _exchanges(
     model: TouchModel, points: FloatArray, fit: NamedFit
 ) -> Iterator[tuple[tuple[int, int], NamedFit]]:
-    """Yield two rows and the fit with their names exchanged, where that may be as good as the names given."""
+    """Yield two rows, and the fit with their names exchanged, where that may fit equally well."""
     n = len(points)
-    if n > _FEW_TOUCHES and not fit.rough:
+    if n > _FEW_TOUCHES and not fit.fits_poorly:
         return
-    limit = fit.misfit + _WORTH_A_FIT
+    limit = fit.neg_log_posterior + _PRUNE_ABOVE
     if best_exchange(model, points, fit, limit)[2] > limit:
         return
     for i, j in combinations(range(n), 2):
         exchanged = points.copy()
         exchanged[[i, j]] = points[[j, i]]
-        if quick_misfit(model, exchanged, fit.turn) <= limit:
+        if approximate_neg_log_posterior(model, exchanged, fit.quaternion) <= limit:
             other = _fitted(model, exchanged)
             if other is not None:
                 yield (i, j), other
 
 
 def log_evidence(model: TouchModel, fit: NamedFit) -> float:
-    """Return the logarithm of the marginal likelihood of a reading, up to a constant of the touches.
+    """Return the logarithm of the marginal likelihood of a hypothesis, up to a constant of the touches.
 
     Parameters
     ----------
     model : TouchModel
+        Of the touched features.
     fit : NamedFit
-        Of the reading.
+        Of the touches under the hypothesis.
+
+    Returns
+    -------
+    float
+        The log evidence.
     """
     squared = fit.squared_residuals[:, None]
     if model.noise is None:

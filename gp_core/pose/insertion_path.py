@@ -1,4 +1,4 @@
-"""An insertion path drawn in the cochlea, carried to where an estimated cochlea is."""
+"""An insertion path, planned in the cochlea frame and moved to an estimated cochlea."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from gp_core.validation import FloatArray, as_points, check_option
 
 __all__ = [
     "UNITS",
+    "angle_about",
     "carry_path",
     "read_path",
     "rows_before_centre",
-    "turn_about",
     "winding_side",
     "write_path",
 ]
 
 UNITS = {"m": 1e3, "cm": 10.0, "mm": 1.0, "um": 1e-3}
-"""Units that a path may be in, and how many mm they are."""
+"""Units that a path may be in, in mm."""
 
 _SMALLEST_MM = 0.5
 _NEAREST_MM = 5.0
 _FARTHEST_MM = 300.0
 _ON_AXIS_MM = 0.05
 _CENTRE_MM = 1e-3
-_TELLING_TURN = 4.0
-"""Turn about the axis, rad, from which a path shows the side of its ear; past the axis goes at most pi."""
+_LEAST_WINDING = 4.0
+"""Winding angle, rad, from which on a path shows the side of its ear; a straight one gives at most pi."""
 _CLEARLY = 1.25
 
 _MIRROR_Z = np.array([1.0, 1.0, -1.0])
@@ -49,27 +49,28 @@ def read_path(
 
     Parameters
     ----------
-    path : path
+    path : path-like
         Text with commas, semicolons, tabs or blanks between the columns.
     units : {"m", "cm", "mm", "um"}
-        What its numbers are in. There is no default: a path of the wrong size is driven into bone.
+        Unit of its numbers. There is no default: a path of the wrong size would be driven into bone.
     axes : str
         Which of the file's axes is the x (modiolar axis, towards the apex), y (towards the round window) and
-        z of the cochlea frame, such as ``"z,-y,x"``. Right-handed: a mirror is the business of `carry_path`.
+        z of the cochlea frame, such as ``"z,-y,x"``. Right-handed; mirroring is left to `carry_path`.
     rows : int, optional
-        How many rows to read, where others follow that are no path.
+        How many rows to read, where rows follow that do not belong to the path.
 
     Returns
     -------
     (N, 3) array, mm, cochlea frame
+        Points of the path.
 
     Raises
     ------
     FileFormatError
         Not such a table.
     GpError
-        Numbers that are no path in a cochlea in this unit (the likely unit is named), a path that winds about
-        another axis than x, or axes that are none.
+        In this unit, the numbers are no path in a cochlea (the likely unit is named); the path winds about
+        another axis than x; or the axes are invalid.
     """
     check_option(units, "units of the path", UNITS)
     turn = _as_rotation(axes)
@@ -86,27 +87,30 @@ def read_path(
 
 
 def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> FloatArray:
-    """Return a path where the pose has its cochlea.
+    """Move a path to the cochlea of a pose.
 
-    The frame of a pose has x along the axis CB->CA and y towards the round window on both sides, so of two
-    ears that are mirror images x and y correspond, and z = x × y is reversed. Hence a path of the other ear
+    The frame of a pose has x along the axis CB->CA and y towards the round window on both sides; so for two
+    ears that are mirror images, x and y correspond, and z = x × y is reversed. Hence a path for the other ear
     is mirrored in z.
 
     Parameters
     ----------
     path : (N, 3) array_like, mm, cochlea frame
+        Points of the path.
     pose : CochleaPose
+        An estimate.
     path_side : {"L", "R"}
-        The ear that the path was drawn for; may differ from the side of the pose.
+        The ear that the path was planned for; may differ from the side of the pose.
 
     Returns
     -------
     (N, 3) array, mm, the frame of the touches
+        The moved path.
 
     Raises
     ------
     GpError
-        Not points, or a path that winds as in an ear of the other side than was said.
+        Not points, or the path winds as in an ear of the other side.
     """
     points, side = as_points(path, "path"), Side.parse(path_side)
     wound = winding_side(points)
@@ -119,35 +123,53 @@ def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> 
 
 
 def rows_before_centre(path: ArrayLike) -> int | None:
-    """Return how many points come before one that is CO itself, where no path can be; None without such.
+    """Return how many points precede one that is CO itself, where no path can be.
 
     Parameters
     ----------
     path : (N, 3) array_like, mm, cochlea frame
+        Points of the path.
+
+    Returns
+    -------
+    int or None
+        None where no point is CO.
     """
     at_centre = np.flatnonzero(np.linalg.norm(as_points(path, "path"), axis=1) < _CENTRE_MM)
     return int(at_centre[0]) if len(at_centre) and at_centre[0] > 1 else None
 
 
 def winding_side(path: ArrayLike) -> Side | None:
-    """Return the side of the ear in which a path winds as the cochlea does, None where it hardly winds.
+    """Return the side of the ear whose cochlea winds as a path does.
 
-    On its way to the apex a left cochlea turns clockwise about x as seen from the apex: from the round window
-    (y) away from the vestibule, which lies at +z of the left ear's frame.
+    On its way to the apex, a left cochlea turns clockwise about x as seen from the apex: from the round
+    window (y) away from the vestibule, which lies at +z in the frame of the left ear.
 
     Parameters
     ----------
     path : (N, 3) array_like, mm, cochlea frame
         From the base to the apex. Points on the axis do not count.
+
+    Returns
+    -------
+    Side or None
+        None where the path hardly winds.
     """
-    turn = turn_about(as_points(path, "path"), 0)
-    if abs(turn) < _TELLING_TURN:
+    turn = angle_about(as_points(path, "path"), 0)
+    if abs(turn) < _LEAST_WINDING:
         return None
     return Side.LEFT if turn < 0 else Side.RIGHT
 
 
 def write_path(path: str | PathLike[str], points: FloatArray) -> None:
-    """Write points as lines of three plain numbers, mm, commas between them; they keep every bit.
+    """Write points as comma-separated lines of three plain numbers in mm, with full precision.
+
+    Parameters
+    ----------
+    path : path-like
+        Where to write.
+    points : (N, 3) array
+        Points, mm.
 
     Raises
     ------
@@ -197,7 +219,7 @@ def _as_rotation(axes: str) -> FloatArray:
 
 
 def _check_size(raw: FloatArray, units: str, file: str | PathLike[str]) -> None:
-    """Refuse a path that does not come near a cochlea, or is lost in it."""
+    """Raise `GpError` for a path that does not come near the cochlea, or is tiny in it."""
     if _is_plausible(UNITS[units] * raw):
         return
     likely = [unit for unit, mm in UNITS.items() if _is_plausible(mm * raw)]
@@ -218,8 +240,8 @@ def _is_plausible(points: FloatArray) -> bool:
 
 
 def _check_axis(points: FloatArray, file: str | PathLike[str]) -> None:
-    about_x, *others = (abs(turn_about(points, axis)) for axis in range(3))
-    if max(others) > max(_TELLING_TURN, _CLEARLY * about_x):
+    about_x, *others = (abs(angle_about(points, axis)) for axis in range(3))
+    if max(others) > max(_LEAST_WINDING, _CLEARLY * about_x):
         raise GpError(
             "the path winds about another axis than x, the modiolar axis of the cochlea frame",
             file=file,
@@ -228,8 +250,21 @@ def _check_axis(points: FloatArray, file: str | PathLike[str]) -> None:
         )
 
 
-def turn_about(points: FloatArray, axis: int) -> float:
-    """Return the angle through which a path (N, 3), mm, goes about an axis (0 to 2), rad, right-handed."""
+def angle_about(points: FloatArray, axis: int) -> float:
+    """Return the angle through which a path winds about an axis.
+
+    Parameters
+    ----------
+    points : (N, 3) array, mm
+        Points of the path.
+    axis : {0, 1, 2}
+        x, y or z.
+
+    Returns
+    -------
+    float
+        Angle, rad, right-handed.
+    """
     first, second = points[:, (axis + 1) % 3], points[:, (axis + 2) % 3]
     off_axis = np.hypot(first, second) > _ON_AXIS_MM
     angles = np.arctan2(second[off_axis], first[off_axis])

@@ -1,4 +1,4 @@
-"""The paper's estimator: the touched points join the labelled animals in one JRMPC registration."""
+"""The paper's estimator: the touched points are registered jointly with the labelled animals by JRMPC."""
 
 from __future__ import annotations
 
@@ -36,7 +36,19 @@ class TrainingSide:
 
 
 def training_sides(specimens: Sequence[Specimen], side: Side) -> list[TrainingSide]:
-    """Return this side of the specimens, each moved into its own CO frame.
+    """Return one side of all specimens, each moved into its own CO frame.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+    side : Side
+        Which side.
+
+    Returns
+    -------
+    list of TrainingSide
+        One for each specimen that has this side.
 
     Raises
     ------
@@ -65,7 +77,24 @@ def register_with_training(
     features: Iterable[str] = TRAINING,
     settings: JrmpcSettings = ESTIMATION,
 ) -> JrmpcResult:
-    """Register points touched (n, 3), in the RW frame, with the training sides; the probe is the last set."""
+    """Register touched points jointly with the training sides.
+
+    Parameters
+    ----------
+    training : sequence of TrainingSide
+        Labelled sides, CO frame, mm.
+    probe : (n, 3) array, mm, RW frame
+        Touched points; they are the last set of the result.
+    features : iterable of str
+        Training features.
+    settings : JrmpcSettings
+        Of the registration.
+
+    Returns
+    -------
+    JrmpcResult
+        Poses of the training sides, then of the probe.
+    """
     codes = tuple(features)
     sets = [_labelled(side, codes) for side in training]
     return jrmpc(
@@ -98,18 +127,24 @@ def estimate_jrmpc(
     Parameters
     ----------
     touches : LandmarkSet
-        External features, RWA, RWP and LLI among them, mm.
+        External features, including RWA, RWP and LLI, mm.
     specimens : sequence of Specimen
         Labelled animals.
     features : iterable of str
         Training features.
     settings : JrmpcSettings
+        Of the registration.
 
     Returns
     -------
     CochleaPose
-        The covariance is the scatter of the registered training animals about their mean; JRMPC says nothing
-        of the touch errors.
+        Its covariance is the scatter of the registered training animals about their mean; JRMPC does not
+        model touch errors.
+
+    Raises
+    ------
+    GpError
+        No specimens, too few of this side, or touches that lack RWA, RWP or LLI.
 
     References
     ----------

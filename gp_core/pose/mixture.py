@@ -1,4 +1,4 @@
-"""Several readings of the same touches at once, and the region around one pose that holds them all."""
+"""95 % regions over several hypotheses on the same touches."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_core.validation import FloatArray
 
-__all__ = ["UNDECIDED", "Hypothesis", "Part", "axis_part", "holding_radius", "origin_part"]
+__all__ = ["UNDECIDED", "Hypothesis", "MixturePart", "axis_part", "mixture_radius_95", "origin_part"]
 
 UNDECIDED = 0.005
-"""Probability of another reading from which it is not ruled out."""
+"""Probability from which on another hypothesis is not ruled out."""
 
 _SHARE = 0.95
 _STEPS = 60
@@ -24,18 +24,18 @@ _STEPS = 60
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Another reading of the touches: of the other ear, or with the names of two exchanged.
+    """An alternative hypothesis on the touches: the other ear, or the names of two touches exchanged.
 
     Attributes
     ----------
     side : Side
-        The ear that the touches are read as.
+        The ear under this hypothesis.
     exchanged : (str, str) or None
         The two features whose names are exchanged.
     probability : float
-        Of this reading, given the touches; those of all readings together add up to 1.
+        Of this hypothesis, given the touches; the probabilities of all hypotheses add up to 1.
     transform_to_touches : RigidTransform
-        ``T_tracker_cochlea`` of this reading, as of a pose.
+        ``T_tracker_cochlea`` under this hypothesis, as in `CochleaPose`.
     covariance : (6, 6) array
         Of the origin (mm) and of a small rotation vector (rad), in the frame of the touches.
     """
@@ -57,7 +57,13 @@ class Hypothesis:
         return self.transform_to_touches.rotation[:, 0]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the reading as the JSON file of a pose holds it, mm."""
+        """Return the hypothesis as the JSON file of a pose holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON, mm and rad.
+        """
         return {
             "side": self.side.value,
             "exchanged": None if self.exchanged is None else list(self.exchanged),
@@ -68,22 +74,23 @@ class Hypothesis:
 
     @property
     def label(self) -> str:
-        """A few words, such as ``RWA and RWP exchanged``."""
+        """A short description, such as ``RWA and RWP exchanged``."""
         if self.exchanged is None:
             return f"the {self.side.word} ear"
         return f"{' and '.join(self.exchanged)} exchanged"
 
 
-class Part(NamedTuple):
-    """How far from the shown pose the truth may be under one reading.
+class MixturePart(NamedTuple):
+    """Distribution of the true pose, relative to the reported one, under one hypothesis.
 
     Attributes
     ----------
     probability : float
+        Of the hypothesis.
     offset : (n,) array
-        From the shown pose to that of the reading.
+        From the reported pose to that of the hypothesis.
     covariance : (n, n) array
-        About the latter.
+        About the pose of the hypothesis.
     """
 
     probability: float
@@ -91,47 +98,92 @@ class Part(NamedTuple):
     covariance: FloatArray
 
 
-def origin_part(probability: float, origin: FloatArray, shown: FloatArray, covariance: FloatArray) -> Part:
-    """Return the part of an origin (3,) in mm, its pose's covariance (6, 6), about the shown origin."""
-    return Part(probability, origin - shown, covariance[:3, :3])
+def origin_part(
+    probability: float, origin: FloatArray, shown: FloatArray, covariance: FloatArray
+) -> MixturePart:
+    """Return the distribution of the origin, relative to the reported one, under one hypothesis.
+
+    Parameters
+    ----------
+    probability : float
+        Of the hypothesis.
+    origin, shown : (3,) arrays, mm
+        The origin of the hypothesis, and the reported one.
+    covariance : (6, 6) array
+        Of the pose of the hypothesis; mm and rad.
+
+    Returns
+    -------
+    MixturePart
+        In mm.
+    """
+    return MixturePart(probability, origin - shown, covariance[:3, :3])
 
 
-def axis_part(probability: float, axis: FloatArray, shown: FloatArray, covariance: FloatArray) -> Part:
-    """Return the part of an axis, a unit (3,), as a rotation vector in rad from the shown axis."""
+def axis_part(probability: float, axis: FloatArray, shown: FloatArray, covariance: FloatArray) -> MixturePart:
+    """Return the distribution of the axis, as a rotation vector from the reported one, under one hypothesis.
+
+    Parameters
+    ----------
+    probability : float
+        Of the hypothesis.
+    axis, shown : (3,) arrays
+        The unit axis of the hypothesis, and the reported one.
+    covariance : (6, 6) array
+        Of the pose of the hypothesis; mm and rad.
+
+    Returns
+    -------
+    MixturePart
+        In rad.
+    """
     across = np.cross(shown, axis)
     sine = float(np.linalg.norm(across))
     angle = math.atan2(sine, float(shown @ axis))
-    if sine < 1e-12:  # the same direction, or the opposite one, which any turn across reaches
+    if sine < 1e-12:  # the same direction, or the opposite one, which a rotation about any normal reaches
         across, sine = np.cross(shown, np.eye(3)[np.abs(shown).argmin()]), 1.0
     flat = np.eye(3) - np.outer(axis, axis)
-    return Part(probability, across * (angle / sine), flat @ covariance[3:, 3:] @ flat)
+    return MixturePart(probability, across * (angle / sine), flat @ covariance[3:, 3:] @ flat)
 
 
-def holding_radius(parts: Sequence[Part]) -> float:
-    """Return the least distance from the shown pose within which the truth is with 95 %.
+def mixture_radius_95(parts: Sequence[MixturePart]) -> float:
+    """Return the smallest distance from the reported pose that contains the truth with 95 % probability.
 
-    Of a single part about the shown pose it is `gp_core.pose.covariance.radius_95`. Where a reading other
-    than the first, the shown one, is not ruled out, it reaches far enough for 95 % of that one alone too: the
-    union of their regions lies within.
+    For a single part about the reported pose it equals `gp_core.pose.covariance.radius_95`. Every hypothesis
+    that is not ruled out must also be contained with 95 % on its own: the union of their regions lies within.
+
+    Parameters
+    ----------
+    parts : sequence of MixturePart
+        One for each hypothesis; the first is the reported one.
+
+    Returns
+    -------
+    float
+        In the unit of the parts.
 
     Notes
     -----
-    A squared distance is taken as a scaled chi-square of the same mean and variance (Satterthwaite 1946,
-    doi:10.2307/3002019), and its cube root as normal (Wilson and Hilferty 1931, doi:10.1073/pnas.17.12.684).
+    A squared distance is approximated by a scaled chi-squared distribution of the same mean and variance
+    (Satterthwaite 1946, doi:10.2307/3002019), and its cube root by a normal one (Wilson and Hilferty 1931,
+    doi:10.1073/pnas.17.12.684).
     """
-    laws = [_squared_distance(part) for part in parts]
+    distributions = [_squared_distance(part) for part in parts]
     least = [
-        _quantile([(1.0, law)])
-        for part, law in zip(parts, laws, strict=True)
+        _quantile([(1.0, distribution)])
+        for part, distribution in zip(parts, distributions, strict=True)
         if part is parts[0] or part.probability >= UNDECIDED
     ]
     total = sum(part.probability for part in parts)
-    shares = [(part.probability / total, law) for part, law in zip(parts, laws, strict=True)]
+    shares = [
+        (part.probability / total, distribution)
+        for part, distribution in zip(parts, distributions, strict=True)
+    ]
     return max(*least, _quantile(shares), 0.0)
 
 
-def _squared_distance(part: Part) -> tuple[float, float]:
-    """Return mean, and degrees of freedom, of the squared distance as a scaled chi-square."""
+def _squared_distance(part: MixturePart) -> tuple[float, float]:
+    """Return mean, and degrees of freedom, of the squared distance as a scaled chi-squared variable."""
     square = float(part.offset @ part.offset)
     mean = square + float(np.trace(part.covariance))
     along = float(part.offset @ part.covariance @ part.offset)
@@ -140,7 +192,7 @@ def _squared_distance(part: Part) -> tuple[float, float]:
 
 
 def _quantile(shares: Sequence[tuple[float, tuple[float, float]]]) -> float:
-    """Return the distance within which a mixture of such squared distances is with 95 %, by bisection."""
+    """Return the 95 % quantile of the distance under a mixture of such squared distances, by bisection."""
     low, high = 0.0, 1.0
     largest = max(mean for _, (mean, _) in shares)
     high = 8 * math.sqrt(largest) if math.isfinite(largest) else math.inf
@@ -148,15 +200,15 @@ def _quantile(shares: Sequence[tuple[float, tuple[float, float]]]) -> float:
         return high
     for _ in range(_STEPS):
         middle = (low + high) / 2
-        if sum(share * _within(middle, law) for share, law in shares) < _SHARE:
+        if sum(share * _within(middle, distribution) for share, distribution in shares) < _SHARE:
             low = middle
         else:
             high = middle
     return high
 
 
-def _within(distance: float, law: tuple[float, float]) -> float:
-    mean, freedom = law
+def _within(distance: float, distribution: tuple[float, float]) -> float:
+    mean, freedom = distribution
     if math.isinf(freedom):
         return 1.0 if distance * distance >= mean else 0.0
     spread = 2 / (9 * freedom)

@@ -1,4 +1,4 @@
-"""What one more touch would gain: the error to expect of the pose after it."""
+"""What one more touch would gain: the expected error of the pose after it."""
 
 from __future__ import annotations
 
@@ -7,32 +7,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.constants import MM_PER_DEGREE
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import EXTERNAL, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.covariance import cone_95, radius_95
 from gp_core.pose.robust import defining_points, pose_covariance, touch_model
-from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM, Systematic
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM, SystematicError
 from gp_core.registration.named_points import NamedFit, TouchModel, fit_named_points
 
-__all__ = ["MM_A_DEGREE", "TouchGain", "gains"]
-
-MM_A_DEGREE = 0.2
-"""Worth of a degree of axis error in mm of origin error: the paper's, in its total error E_T."""
+__all__ = ["TouchGain", "gains"]
 
 
 @dataclass(frozen=True)
 class TouchGain:
-    """What the pose is expected to be worth once a feature is touched too.
+    """Expected region of the pose once one more feature is touched.
 
     Attributes
     ----------
     code : str
         The feature.
     radius_95 : float
-        Radius about the origin that would hold the true one with 95 %, mm.
+        95 % radius about the origin with this touch, mm.
     cone_95 : float
-        Half-angle about the axis that would hold the true one with 95 %, rad.
+        95 % half-angle about the axis with this touch, rad.
     radius_95_now, cone_95_now : float
         The same without it.
     """
@@ -45,9 +43,9 @@ class TouchGain:
 
     @property
     def worth(self) -> float:
-        """How much less error to expect, mm: of the origin, and 0.2 mm for each degree of the axis."""
+        """Expected reduction of the error, mm: of the origin, plus 0.2 mm for each degree of the axis."""
         turn = float(np.degrees(self.cone_95_now - self.cone_95))
-        return self.radius_95_now - self.radius_95 + MM_A_DEGREE * turn
+        return self.radius_95_now - self.radius_95 + MM_PER_DEGREE * turn
 
 
 def gains(
@@ -59,9 +57,9 @@ def gains(
 ) -> tuple[TouchGain, ...]:
     """Return what each external feature not yet touched would gain, the best first.
 
-    The new touch is supposed to be an ordinary one where the atlas has the feature; its error and the
-    animal's shape go through the estimate linearly, as for the region of the pose itself. With an atlas
-    whose features vary together, a touch can do harm, since the estimate weighs features one by one; its
+    The new touch is assumed to be an ordinary one, where the atlas has the feature; its error and the
+    animal's shape propagate linearly through the estimate, as for the region of the pose itself. With an
+    atlas of correlated features a touch can do harm, since the estimate weights features independently; its
     worth is then negative.
 
     Parameters
@@ -69,15 +67,21 @@ def gains(
     touches : LandmarkSet
         At least three external features, in any frame, mm.
     atlas : Atlas
+        Mean shape and its variation.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+        Scale of an ordinary touch error, mm a coordinate; by default estimated from the touches.
     shared_error : float
-        As of `gp_core.pose.estimate.estimate_pose`.
+        As for `gp_core.pose.estimate.estimate_pose`, mm.
+
+    Returns
+    -------
+    tuple of TouchGain
+        One for each feature.
 
     Raises
     ------
     FeatureError, GeometryError
-        Touches that no pose can be made of; see `gp_core.pose.robust.estimate_robust`.
+        No pose can be estimated from the touches; see `gp_core.pose.robust.estimate_robust`.
 
     Examples
     --------
@@ -88,7 +92,7 @@ def gains(
     """
     model = touch_model(touches, atlas, probe_noise)
     fit = fit_named_points(model, mirror_right(touches.array(model.codes), touches.side))
-    systematic = Systematic(shared_error)
+    systematic = SystematicError(shared_error)
     radius, cone = _regions(atlas, model, fit, systematic)
     found = []
     for code in EXTERNAL:
@@ -98,8 +102,10 @@ def gains(
     return tuple(sorted(found, key=lambda gain: -gain.worth))
 
 
-def _regions(atlas: Atlas, model: TouchModel, fit: NamedFit, systematic: Systematic) -> tuple[float, float]:
-    """Return radius and cone of the pose that a fit gives; both are the same in the mirror."""
+def _regions(
+    atlas: Atlas, model: TouchModel, fit: NamedFit, systematic: SystematicError
+) -> tuple[float, float]:
+    """Return radius and cone of the pose of a fit; both are the same in the mirror image."""
     defining = defining_points(atlas, model, fit)
     covariance = pose_covariance(atlas, model, fit, defining, Side.LEFT, systematic)
     axis = fit.rotation @ (defining[0] - defining[1])

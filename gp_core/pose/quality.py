@@ -1,4 +1,4 @@
-"""How far an estimated pose can be trusted, in one plain word."""
+"""How far an estimated pose can be trusted, in one word."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _POOR_MM, _POOR_DEG = 1.5, 25.0
 
 @dataclass(frozen=True)
 class PoseQuality:
-    """A verdict on an estimate, before anybody looked at it.
+    """A rating of an estimate, before anybody has reviewed it.
 
     Attributes
     ----------
@@ -37,18 +37,27 @@ class PoseQuality:
 
 
 def pose_quality(pose: CochleaPose) -> PoseQuality:
-    """Return how far a pose can be trusted, from its side and names, its 95 % region and its warnings.
+    """Rate a pose by its side and names, its 95 % region and its warnings.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        An estimate.
+
+    Returns
+    -------
+    PoseQuality
+        Level, label and reason.
 
     Examples
     --------
-    >>> from gp_core.atlas.atlas import Atlas
-    >>> from gp_core.pose.cochlea_pose import estimate_pose
+    >>> from gp_core import Atlas, estimate_pose
     >>> atlas = Atlas.published()
     >>> touched = {code: atlas[code] for code in ("CL", "IN", "LLI", "MN", "OS", "RWA", "RWP")}
     >>> pose_quality(estimate_pose(touched, "L", atlas)).word
     'Good'
     """
-    if (found := _doubtful_reading(pose)) is not None:
+    if (found := _ambiguity(pose)) is not None:
         return found
     radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
     if radius > _POOR_MM or cone > _POOR_DEG:
@@ -64,8 +73,8 @@ def pose_quality(pose: CochleaPose) -> PoseQuality:
     return PoseQuality("good", "Good", "The touches agree, and are as many as a sure pose needs.")
 
 
-def _doubtful_reading(pose: CochleaPose) -> PoseQuality | None:
-    """Return the verdict on touches that may be of the other side, or under other names."""
+def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
+    """Return the rating of touches that may be of the other side, or wrongly named."""
     if pose.side_state == "wrong":
         return PoseQuality("danger", "Check the side", "The touches look like those of the other ear.")
     if pose.names_state == "wrong":

@@ -1,4 +1,4 @@
-"""Touches out of a recorded probe: the places where its tip rested, in the order of their names."""
+"""Touches extracted from a recorded probe: the places where its tip rested, in the order of their names."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from gp_core.validation import FloatArray
 __all__ = ["recorded_touches", "resting_places"]
 
 _RADIUS_MM = 1.0
-"""A tip that rests stays within this of where it is on average."""
+"""A resting tip stays within this distance of its mean position."""
 
 _REST_S = 0.5
 _FEWEST = 8
-"""The shortest rest that is a touch: seconds, and readings where the recording holds no times."""
+"""Shortest rest that is a touch: seconds, or samples where the recording has no times."""
 
 _AWAY_MM = 3.0
-"""Two rests are one touch where the tip stayed within this between them."""
+"""Two rests are one touch if the tip stayed within this distance between them."""
 
 _SHORTEST_TIP_MM = 1.0
 
@@ -36,23 +36,23 @@ def recorded_touches(
     recording : Recording
         ``T_tracker_marker`` over time.
     tip_offset : (3,) array_like
-        The tip in the marker's frame, mm; zeros where the recorded poses are of the tip itself.
+        The tip in the marker's frame, mm; zeros where the recorded poses are those of the tip itself.
     names : sequence of str
         What was touched, in the order of the touches.
 
     Returns
     -------
     dict of str to (3,) array
-        Mean position of the tip during each rest, mm, tracker frame.
+        Median position of the tip during each rest, mm, tracker frame.
 
     Raises
     ------
     GpError
         The tip offset is not three numbers.
     FeatureError
-        A name stands twice.
+        A name occurs twice.
     GeometryError
-        The tip rested more or less often than there are names.
+        The number of rests differs from the number of names.
     """
     double = next((name for name in names if list(names).count(name) > 1), None)
     if double is not None:
@@ -68,7 +68,19 @@ def recorded_touches(
 
 
 def resting_places(recording: Recording, tip_offset: ArrayLike) -> FloatArray:
-    """Return the (N, 3) places where the tip rested for half a second or longer, mm, in the order of time.
+    """Return the places where the tip rested for half a second or longer.
+
+    Parameters
+    ----------
+    recording : Recording
+        ``T_tracker_marker`` over time.
+    tip_offset : (3,) array_like
+        The tip in the marker's frame, mm.
+
+    Returns
+    -------
+    (N, 3) array, mm, tracker frame
+        In the order of time.
 
     Raises
     ------
@@ -88,7 +100,7 @@ def resting_places(recording: Recording, tip_offset: ArrayLike) -> FloatArray:
     left = 0
     for first, end in _rests(tips):
         if _is_long(recording, first, end):
-            margin = (end - first) // 5  # the tip comes to rest, and leaves
+            margin = (end - first) // 5  # the tip arrives, and leaves
             place = np.median(tips[first + margin : end - margin], axis=0)
             if not places or _was_away(tips[left:end], places[-1]):
                 places.append(place)
@@ -97,12 +109,12 @@ def resting_places(recording: Recording, tip_offset: ArrayLike) -> FloatArray:
 
 
 def _was_away(tips: FloatArray, place: FloatArray) -> bool:
-    """Whether the tip left a place, or was not seen for a while."""
+    """Whether the tip left a place, or was not visible for a while."""
     return bool((~(np.linalg.norm(tips - place, axis=1) <= _AWAY_MM)).any())
 
 
 def _rests(tips: FloatArray) -> Iterator[tuple[int, int]]:
-    """Yield the longest spans (first, end) of tips that stay together; unseen ones end a span."""
+    """Yield the longest spans (first, end) in which the tip stays together; a lost marker ends a span."""
     first = 0
     while first < len(tips):
         end = first

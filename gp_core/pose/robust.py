@@ -1,4 +1,4 @@
-"""The project's own estimator: named points, pose and shape together, robust to a mistouch."""
+"""The robust estimator: named points, pose and shape together, insensitive to an outlying touch."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from itertools import compress
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.atlas import Atlas
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.anatomy import axis_frame, cochlea_origin, mirror_right, touched_features
@@ -17,10 +18,10 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.covariance import cochlea_jacobian
-from gp_core.pose.hypotheses import Reading, readings
-from gp_core.pose.hypothesis_check import decide, reading_warnings
+from gp_core.pose.hypotheses import FittedHypothesis, fit_hypotheses
+from gp_core.pose.hypothesis_check import hypothesis_states, hypothesis_warnings
 from gp_core.pose.mixture import Hypothesis
-from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM, Systematic
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM, SystematicError
 from gp_core.registration.named_points import (
     NamedFit,
     TouchModel,
@@ -34,16 +35,16 @@ __all__ = ["defining_points", "estimate_robust", "locate_robust", "pose_covarian
 
 _SUSPECT_WEIGHT = 0.2
 _SUSPECT_SQUARED = 20.0
-"""Squared deviation from where the others put a touch, over its variance; 1 ordinary one of 6000 is above."""
+"""Squared Mahalanobis distance from where the others predict a touch; 1 ordinary touch of 6000 exceeds it."""
 
-_ENOUGH_TO_TELL = 5
-"""Touches from which a mistouch can be told from an unusual animal."""
+_ENOUGH_TOUCHES = 5
+"""Number of touches from which on an outlier can be distinguished from an unusual animal."""
 
-_MUCH_BETTER = 6.0
-"""Difference in log posterior, odds of 400 to 1, from which two names are said to be exchanged."""
+_EXCHANGE_GAIN = 6.0
+"""Difference in log posterior (odds of 400 to 1) from which on two names are reported as exchanged."""
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0])
-_MIRROR_POSE = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the other sign
+_MIRROR_POSE = np.array([-1.0, 1.0, 1.0, 1.0, -1.0, -1.0])  # a rotation vector mirrors with the opposite sign
 
 
 def estimate_robust(
@@ -61,29 +62,35 @@ def estimate_robust(
     touches : LandmarkSet
         At least three external features, in any frame, mm.
     atlas : Atlas
+        Mean shape and its variation.
     probe_noise : float, optional
-        Scale of an ordinary touch error, mm a coordinate; by default found from the touches.
+        Scale of an ordinary touch error, mm a coordinate; by default estimated from the touches.
     shared_error : float
         RMS length of one offset that all touches share, mm; see `gp_core.pose.systematic_error`.
     times : mapping of str to float, optional
-        When each feature was touched, s; then a drift is looked for.
+        When each feature was touched, s; if all have a time, a drift is estimated.
+
+    Returns
+    -------
+    CochleaPose
+        In the frame of the touches.
 
     Raises
     ------
     FeatureError
         Too few features, or one that no probe can touch.
     GeometryError
-        The touches lie on one line.
+        The touches are collinear.
     """
     compile_if_repeated()
     model = touch_model(touches, atlas, probe_noise)
     points = mirror_right(touches.array(model.codes), touches.side)
-    systematic = Systematic(shared_error, _elapsed(times, model))
+    systematic = SystematicError(shared_error, _elapsed(times, model))
     fit = fit_named_points(model, points)
-    named, *others = readings(model, points, fit)
-    better = _better_exchanged(model, fit, others) if fit.rough else None
+    named, *others = fit_hypotheses(model, points, fit)
+    better = _better_exchanged(model, fit, others) if fit.fits_poorly else None
     suspects = _suspects(model, fit)
-    frame, covariance = _posed(atlas, model, fit, touches, systematic)
+    frame, covariance = _frame_and_covariance(atlas, model, fit, touches, systematic)
     pose = CochleaPose(
         side=touches.side,
         method="robust",
@@ -96,9 +103,9 @@ def estimate_robust(
         T_touches_atlas=_atlas_in_touches(fit, touches),
         shared_error=shared_error,
         probability=named.probability,
-        hypotheses=tuple(_hypothesis(atlas, model, reading, touches, systematic) for reading in others),
+        hypotheses=tuple(_hypothesis(atlas, model, hypothesis, touches, systematic) for hypothesis in others),
     )
-    decided = replace(pose, **decide(pose, better))
+    decided = replace(pose, **hypothesis_states(pose, better))
     return replace(decided, warnings=tuple(_warnings(fit, decided)))
 
 
@@ -109,34 +116,52 @@ def _elapsed(times: Mapping[str, float] | None, model: TouchModel) -> list[float
     return [float(times[code]) for code in model.codes]
 
 
-def _posed(
-    atlas: Atlas, model: TouchModel, fit: NamedFit, touches: LandmarkSet, systematic: Systematic
+def _frame_and_covariance(
+    atlas: Atlas, model: TouchModel, fit: NamedFit, touches: LandmarkSet, systematic: SystematicError
 ) -> tuple[RigidTransform, FloatArray]:
-    """Return ``T_touches_cochlea`` and its (6, 6) covariance of a fit."""
+    """Return ``T_touches_cochlea`` of a fit, and its (6, 6) covariance."""
     defining = defining_points(atlas, model, fit)
     covariance = pose_covariance(atlas, model, fit, defining, touches.side, systematic)
     return _cochlea_in_touches(defining, fit, touches), covariance
 
 
 def _hypothesis(
-    atlas: Atlas, model: TouchModel, reading: Reading, touches: LandmarkSet, systematic: Systematic
+    atlas: Atlas,
+    model: TouchModel,
+    hypothesis: FittedHypothesis,
+    touches: LandmarkSet,
+    systematic: SystematicError,
 ) -> Hypothesis:
-    side = touches.side.other if reading.mirrored else touches.side
-    frame, covariance = _posed(atlas, model, reading.fit, replace(touches, side=side), systematic)
+    side = touches.side.other if hypothesis.mirrored else touches.side
+    frame, covariance = _frame_and_covariance(
+        atlas, model, hypothesis.fit, replace(touches, side=side), systematic
+    )
     pair = None
-    if reading.exchanged is not None:
-        i, j = reading.exchanged
+    if hypothesis.exchanged is not None:
+        i, j = hypothesis.exchanged
         pair = model.codes[i], model.codes[j]
-    return Hypothesis(side, pair, reading.probability, frame, covariance)
+    return Hypothesis(side, pair, hypothesis.probability, frame, covariance)
 
 
 def locate_robust(touches: LandmarkSet, atlas: Atlas) -> RigidTransform:
-    """Return ``T_touches_cochlea`` of `estimate_robust` alone, for studies of thousands of touches.
+    """Return ``T_touches_cochlea`` of `estimate_robust` alone, for studies with thousands of touches.
+
+    Parameters
+    ----------
+    touches : LandmarkSet
+        At least three external features, in any frame, mm.
+    atlas : Atlas
+        Mean shape and its variation.
+
+    Returns
+    -------
+    RigidTransform
+        ``T_touches_cochlea``.
 
     Raises
     ------
     FeatureError, GeometryError
-        As `estimate_robust` does.
+        As for `estimate_robust`.
     """
     compile_if_repeated()
     model = touch_model(touches, atlas, None)
@@ -145,14 +170,28 @@ def locate_robust(touches: LandmarkSet, atlas: Atlas) -> RigidTransform:
 
 
 def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -> TouchModel:
-    """Return what the atlas says of the touched features, after checking that they can be used.
+    """Return the atlas's prediction for the touched features, after checking that they can be used.
+
+    Parameters
+    ----------
+    touches : LandmarkSet
+        Touched features, mm.
+    atlas : Atlas
+        Mean shape and its variation.
+    probe_noise : float or None
+        Scale of an ordinary touch error, mm a coordinate; None: to be estimated.
+
+    Returns
+    -------
+    TouchModel
+        For those touched features that the atlas holds.
 
     Raises
     ------
     FeatureError
         Too few features, or one that no probe can touch.
     GpError
-        `probe_noise` is no positive number.
+        `probe_noise` is not a positive number.
     """
     if probe_noise is not None and not (np.isfinite(probe_noise) and probe_noise > 0):
         raise GpError(f"probe noise must be a positive number of mm, got {probe_noise!r}")
@@ -168,20 +207,35 @@ def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -
 
 
 def defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArray:
-    """Return the expected CA, CB, RWA, RWP (4, 3) of this animal, mm, in the atlas frame."""
+    """Return the expected CA, CB, RWA and RWP of this animal, in the atlas frame.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        Mean shape and its variation.
+    model : TouchModel
+        Of the touched features.
+    fit : NamedFit
+        Of the touches.
+
+    Returns
+    -------
+    (4, 3) array, mm
+        In the atlas frame.
+    """
     shape = _shape_of_residual(model, fit) @ fit.residual
-    return atlas.rows(DEFINING) + shape.reshape(-1, 3)
+    return atlas.rows(DEFINING_FEATURES) + shape.reshape(-1, 3)
 
 
 def _shape_of_residual(model: TouchModel, fit: NamedFit) -> FloatArray:
-    """Return (12, 3 n): the part of each residual taken as the animal's own shape, at the defining points."""
-    gain = np.zeros((len(DEFINING), 3, len(model.codes), 3))
-    for row, code in enumerate(DEFINING):
+    """Return (12, 3 n): the fraction of each residual due to the animal's shape, at the defining points."""
+    gain = np.zeros((len(DEFINING_FEATURES), 3, len(model.codes), 3))
+    for row, code in enumerate(DEFINING_FEATURES):
         if code in model.codes:
             column = model.codes.index(code)
             share = model.variances[column] * fit.precision[3 * column]
             gain[row, (0, 1, 2), column, (0, 1, 2)] = share
-    return gain.reshape(3 * len(DEFINING), -1)
+    return gain.reshape(3 * len(DEFINING_FEATURES), -1)
 
 
 def _cochlea_in_touches(defining: FloatArray, fit: NamedFit, touches: LandmarkSet) -> RigidTransform:
@@ -204,32 +258,50 @@ def pose_covariance(
     fit: NamedFit,
     defining: FloatArray,
     side: Side,
-    systematic: Systematic,
+    systematic: SystematicError,
 ) -> FloatArray:
-    """Return the (6, 6) covariance of the cochlea frame: origin (mm), rotation vector (rad).
-
-    `defining` are the `defining_points`, `systematic` what is added beyond independent errors.
+    """Return the covariance of the cochlea frame.
 
     Near the solution the estimate is linear in the residuals, so its error is a linear map of the animal's
-    shape and of the touch errors. The shape enters with all its correlations as measured: features taken one
-    by one, which is what gives the estimate its weights, would promise too much.
+    shape and of the touch errors. The shape enters with all its measured correlations: treating features as
+    independent, as the weights of the estimate do, would make the region too small.
+
+    Parameters
+    ----------
+    atlas : Atlas
+        Mean shape and its variation.
+    model : TouchModel
+        Of the touched features.
+    fit : NamedFit
+        Of the touches.
+    defining : (4, 3) array, mm, atlas frame
+        The `defining_points`.
+    side : Side
+        Side of the head.
+    systematic : SystematicError
+        What is added beyond independent errors.
+
+    Returns
+    -------
+    (6, 6) array
+        Of the origin (mm) and of a rotation vector (rad), in the frame of the touches.
     """
     jacobian = fit.jacobian
-    pull = (fit.precision[:, None] * jacobian).T
-    pose_of_residual = np.linalg.solve(pull @ jacobian, pull)
+    weighted = (fit.precision[:, None] * jacobian).T
+    pose_of_residual = np.linalg.solve(weighted @ jacobian, weighted)
     shape_of_residual = _shape_of_residual(model, fit)
-    lever = motion_jacobian(defining) - shape_of_residual @ jacobian
-    points_of_residual = shape_of_residual + lever @ pose_of_residual
+    motion = motion_jacobian(defining) - shape_of_residual @ jacobian
+    points_of_residual = shape_of_residual + motion @ pose_of_residual
     to_frame = (fit.rotation @ cochlea_jacobian(*defining).reshape(2, 3, -1)).reshape(6, -1)
     if side is Side.RIGHT:
         to_frame *= _MIRROR_POSE[:, None]
     of_touches = to_frame @ points_of_residual
     of_shape = np.zeros((6, len(atlas.scatter)))
-    of_shape[:, atlas.coordinates(DEFINING)] = to_frame
+    of_shape[:, atlas.coordinates(DEFINING_FEATURES)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
     covariance = of_shape @ atlas.scatter @ of_shape.T
     variances = np.maximum(
-        _touch_variances(fit, systematic.odd_squared), systematic.noise_floor(len(model.codes)) ** 2
+        _touch_variances(fit, systematic.outlier_squared), systematic.noise_floor(len(model.codes)) ** 2
     )
     covariance += (of_touches * variances) @ of_touches.T
     covariance += systematic.covariance(atlas, fit, of_touches, of_shape)
@@ -237,14 +309,16 @@ def pose_covariance(
     return symmetric
 
 
-def _touch_variances(fit: NamedFit, odd_squared: float) -> FloatArray:
-    """Return (3 n,) variances of the touched coordinates; suspect and odd ones are as wrong as they look."""
+def _touch_variances(fit: NamedFit, outlier_squared: float) -> FloatArray:
+    """Return (3 n,) variances of the touched coordinates; outliers get the variance that they show."""
     variances = fit.touch_variances
-    odd = _suspicious(fit)
-    if len(odd) >= _ENOUGH_TO_TELL:
-        odd |= fit.against_others.squared > odd_squared
-    if odd.any():
-        variances = np.where(odd, np.maximum(fit.against_others.error_variance, variances), variances)
+    outlying = _is_suspect(fit)
+    if len(outlying) >= _ENOUGH_TOUCHES:
+        outlying |= fit.leave_one_out_residuals.squared > outlier_squared
+    if outlying.any():
+        variances = np.where(
+            outlying, np.maximum(fit.leave_one_out_residuals.error_variance, variances), variances
+        )
     return np.repeat(variances, 3)
 
 
@@ -253,33 +327,39 @@ def _residuals(model: TouchModel, fit: NamedFit) -> dict[str, float]:
     return dict(zip(model.codes, lengths.tolist(), strict=True))
 
 
-def _suspicious(fit: NamedFit) -> NDArray[np.bool_]:
-    """Mark touches (n,) that the fit set aside, or that only a most unusual animal would explain."""
-    marks: NDArray[np.bool_] = fit.against_others.squared > _SUSPECT_SQUARED
+def _is_suspect(fit: NamedFit) -> NDArray[np.bool_]:
+    """Mark touches (n,) that the fit down-weighted, or that only a very unusual animal would explain."""
+    marks: NDArray[np.bool_] = fit.leave_one_out_residuals.squared > _SUSPECT_SQUARED
     return marks | (fit.weights < _SUSPECT_WEIGHT)
 
 
 def _suspects(model: TouchModel, fit: NamedFit) -> tuple[str, ...]:
-    return tuple(compress(model.codes, _suspicious(fit).tolist()))
+    return tuple(compress(model.codes, _is_suspect(fit).tolist()))
 
 
-def _better_exchanged(model: TouchModel, fit: NamedFit, others: Sequence[Reading]) -> tuple[str, str] | None:
+def _better_exchanged(
+    model: TouchModel, fit: NamedFit, others: Sequence[FittedHypothesis]
+) -> tuple[str, str] | None:
     """Return two features whose exchange fits much better than the names as given, and than the other ear."""
-    best = min(others, key=lambda other: other.fit.misfit, default=None)
-    if best is None or best.exchanged is None or best.fit.misfit > fit.misfit - _MUCH_BETTER:
+    best = min(others, key=lambda other: other.fit.neg_log_posterior, default=None)
+    if (
+        best is None
+        or best.exchanged is None
+        or best.fit.neg_log_posterior > fit.neg_log_posterior - _EXCHANGE_GAIN
+    ):
         return None
     i, j = best.exchanged
     return model.codes[i], model.codes[j]
 
 
 def _warnings(fit: NamedFit, pose: CochleaPose) -> Iterator[str]:
-    yield from reading_warnings(pose)
+    yield from hypothesis_warnings(pose)
     if pose.suspects and pose.names_state != "wrong":
         names = " and ".join(pose.suspects)
         verb, it = ("does", "it") if len(pose.suspects) == 1 else ("do", "them")
         yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
     n = len(fit.weights)
-    if n < _ENOUGH_TO_TELL and not pose.suspects:
-        yield f"only {n} points: a mistouch cannot be told from an unusual animal"
+    if n < _ENOUGH_TOUCHES and not pose.suspects:
+        yield f"only {n} points: a mistouch cannot be distinguished from an unusual animal"
     if not fit.converged:
-        yield "the fit did not settle; check the touches"
+        yield "the fit did not converge; check the touches"

@@ -1,18 +1,18 @@
-"""Errors that touches share, and what else an atlas cannot know: how they widen the region of a pose.
+"""Systematic errors: errors that all touches share, and animals unlike the atlas; how they widen the region.
 
-Independent errors of touches average out and show in their residuals; what all touches share does neither.
-A tip that was calibrated wrongly, tissue under the tip, a reference marker that drifts or was knocked: each
-moves all touches of a session by nearly the same offset. Its size is not found from the touches, it is given,
-as the *shared error*: the RMS length of that offset. It carries the whole pose with it; and as no such error
-is the same at every touch, part of its variance is taken as different from touch to touch.
+Independent touch errors average out and show in the residuals; an error that all touches share does neither.
+A tip that was calibrated wrongly, soft tissue under the tip, a reference marker that drifted or was knocked:
+each moves all touches of a session by nearly the same offset. Its size cannot be estimated from the touches;
+the user gives it as the *shared error*, the RMS length of that offset. It moves the whole pose; and because
+no such error is exactly the same at every touch, part of its variance is taken as different from touch to
+touch.
 
-The same goes for an animal of unusual size: an atlas of some grown animals hardly says how much the size of
-guinea pigs differs. A factor of size with a wide prior is therefore weighed against the touches, and what
-they show of it beyond chance widens the region. Where touches carry times, an offset that grows with time is
-looked for alike.
+Likewise for an animal of unusual size: an atlas of a few adult animals hardly knows how much the size of
+guinea pigs varies. A scale factor with a wide prior is therefore estimated, and what the touches show of it
+beyond chance widens the region. Where touches carry times, a linear drift is treated in the same way.
 
-With a shared error of 0 none of this is added: then animals are like those behind the atlas, and touches err
-independently.
+With a shared error of 0 nothing of this is added: animals are then assumed to be like those of the atlas, and
+touch errors to be independent.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.constants import CHI2_3_95
 from gp_core.errors import GpError
 from gp_core.registration.named_points import NamedFit
 from gp_core.validation import FloatArray
 
-__all__ = ["DEFAULT_SHARED_ERROR_MM", "Systematic"]
+__all__ = ["DEFAULT_SHARED_ERROR_MM", "SystematicError"]
 
 DEFAULT_SHARED_ERROR_MM = 0.2
 """RMS length of the offset of a well calibrated probe on a well fixed reference, mm."""
@@ -36,36 +37,36 @@ DEFAULT_SHARED_ERROR_MM = 0.2
 _LARGEST_MM = 20.0
 
 _WITHIN = 0.04
-"""Part of the variance of the shared error that differs from touch to touch and does not show as noise."""
+"""Fraction of the variance of the shared error that varies from touch to touch."""
 
 _SIZE_SCATTER = 0.06
-"""Standard deviation of the size of animals beyond those of an atlas, as a factor."""
+"""Standard deviation of the size of animals beyond the variation in an atlas, as a factor."""
 
 _CHANCE = 3.0
-"""Squared deviations, over their variance, that ordinary animals of an atlas show in their size."""
+"""Squared Mahalanobis distance of the size that animals of an atlas ordinarily reach."""
 
-_ODD_SQUARED, _ODD_SQUARED_SHARED = 7.814727903251179, 5.0
+_ODD_SQUARED_SHARED = 5.0
 
 _FLOOR_MM = {3: 0.2, 4: 0.15}
-"""Noise, mm a coordinate, that so few touches cannot show: their fit leaves too little over."""
+"""Smallest noise assumed, mm a coordinate: so few touches leave too few residuals to estimate it."""
 
 
 @dataclass(frozen=True)
-class Systematic:
-    """What is added to the region of a pose beyond independent errors of touches.
+class SystematicError:
+    """What is added to the region of a pose beyond independent touch errors.
 
     Parameters
     ----------
     shared_error : float
-        RMS length of one offset that all touches of a session share, mm, in the frame of the touches. 0:
-        none, and nothing else of this module either.
+        RMS length of one offset that all touches of a session share, mm, in the frame of the touches. 0
+        switches off everything in this module.
     elapsed : sequence of float, optional
         When each touch was made, s, in the order of the model's features.
 
     Raises
     ------
     GpError
-        The shared error is no number from 0 to 20 mm, or a time is no number.
+        The shared error is not a number from 0 to 20 mm, or a time is not a number.
     """
 
     shared_error: float = DEFAULT_SHARED_ERROR_MM
@@ -78,31 +79,49 @@ class Systematic:
             raise GpError("the times of touches must be numbers of seconds")
 
     def noise_floor(self, n_touches: int) -> float:
-        """Return the least noise, mm a coordinate, that the region of so many touches is made with."""
+        """Return the smallest noise that the region is computed with.
+
+        Parameters
+        ----------
+        n_touches : int
+            Number of touches.
+
+        Returns
+        -------
+        float
+            Noise, mm a coordinate.
+        """
         return _FLOOR_MM.get(n_touches, 0.0) if self.shared_error > 0 else 0.0
 
     @property
-    def odd_squared(self) -> float:
-        """From where on a touch counts as uncertain as it looks: its squared deviation over its variance.
+    def outlier_squared(self) -> float:
+        """Squared Mahalanobis distance from which on a touch gets the variance that its deviation shows.
 
-        Of ordinary touches that is chi-square of 3 degrees: 1 of 20 is above the larger value, 1 of 6 above
-        the smaller one, which holds more of the mistouches that pull the pose after them.
+        For ordinary touches it is chi-squared with 3 degrees of freedom: 1 of 20 exceeds the larger value, 1
+        of 6 the smaller one, which catches more of the outliers that pull the pose towards themselves.
         """
-        return _ODD_SQUARED if self.shared_error == 0 else _ODD_SQUARED_SHARED
+        return CHI2_3_95 if self.shared_error == 0 else _ODD_SQUARED_SHARED
 
     def covariance(
         self, atlas: Atlas, fit: NamedFit, of_touches: FloatArray, of_shape: FloatArray
     ) -> FloatArray:
-        """Return the (6, 6) covariance to be added: origin (mm), rotation vector (rad).
+        """Return the covariance to be added.
 
         Parameters
         ----------
         atlas : Atlas
+            Mean shape and its variation.
         fit : NamedFit
+            Of the touches.
         of_touches : (6, 3 n) array
-            How the pose follows the touches.
+            Derivative of the pose with respect to the touches.
         of_shape : (6, m) array
-            How far a pose is off, by the shape of the animal, all coordinates of the atlas.
+            Derivative of the pose error with respect to the animal's shape, for all coordinates of the atlas.
+
+        Returns
+        -------
+        (6, 6) array
+            Of the origin (mm) and of a rotation vector (rad).
         """
         if self.shared_error == 0:
             return np.zeros((6, 6))
@@ -114,8 +133,8 @@ class Systematic:
     def _nuisances(
         self, atlas: Atlas, fit: NamedFit, of_touches: FloatArray, of_shape: FloatArray
     ) -> FloatArray:
-        """Return what the size of the animal and a drift do to the pose, as far as the touches show them."""
-        larger = fit.points.ravel() - fit.residual  # how the touched features move as the animal grows
+        """Return the effect of the animal's size and of a drift on the pose, as the touches show it."""
+        larger = fit.points.ravel() - fit.residual  # displacement of the touched features as the animal grows
         touched, moved = [larger], [of_shape @ atlas.mean.ravel()]
         prior = [_SIZE_SCATTER**2]
         ramp = self._ramp()
@@ -133,13 +152,13 @@ class Systematic:
         for block, chance in ((slice(0, 1), _CHANCE), (slice(1, None), 1.0)):
             part = mean[block]
             squared = float(part @ np.linalg.solve(spread[block, block], part)) if part.size else 0.0
-            if squared > chance * part.size:  # beyond chance: James and Stein's estimate, positive part
+            if squared > chance * part.size:  # beyond chance: positive-part James-Stein estimate
                 moved_by = effect[:, block] @ part
                 shown += (1 - chance * part.size / squared) * np.outer(moved_by, moved_by)
         return shown
 
     def _ramp(self) -> FloatArray | None:
-        """Return how far along its way a drift is at each touch, about the mean; None without times."""
+        """Return the elapsed fraction of the session at each touch, about the mean; None without times."""
         if self.elapsed is None:
             return None
         times = np.array(self.elapsed, dtype=np.float64)

@@ -1,6 +1,6 @@
-"""The cochlea frame turned about its axis, so that y points to the round window as it was touched.
+"""The cochlea frame rotated about its axis, so that y points to the round window as it was touched.
 
-The robot of Usevitch et al. 2021 was given that frame. Origin and axis stay those of the estimate.
+The robot of Usevitch et al. 2021 used that frame. Origin and axis stay those of the estimate.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _EDGES = ("RWA", "RWP")
 
 
 def towards_touched_window(pose: CochleaPose, touches: LandmarkSet) -> CochleaPose:
-    """Turn a pose about its axis: y to the middle of the touched RWA and RWP, made orthogonal to the axis.
+    """Rotate a pose about its axis: y towards the middle of the touched RWA and RWP, orthogonal to the axis.
 
     Parameters
     ----------
@@ -34,8 +34,8 @@ def towards_touched_window(pose: CochleaPose, touches: LandmarkSet) -> CochleaPo
     Returns
     -------
     CochleaPose
-        Its `round_window` is ``touched``; the pose as it was where RWA or RWP was not touched, is suspect or
-        looks exchanged with another feature, or their middle lies on the axis.
+        Its `round_window` is ``touched``. The pose is unchanged where RWA or RWP was not touched, is suspect
+        or looks exchanged with another feature, or where their middle lies on the axis.
     """
     doubtful = {*pose.suspects, *(pose.swapped or ())}
     if pose.swapped is not None and set(pose.swapped) == set(_EDGES):
@@ -45,21 +45,22 @@ def towards_touched_window(pose: CochleaPose, touches: LandmarkSet) -> CochleaPo
     to_window = touches.array(_EDGES).mean(axis=0) - pose.origin
     frame = pose.transform_to_touches
     try:
-        turned = axis_frame(pose.origin, pose.axis, to_window, dst=frame.dst, src=frame.src)
+        rotated = axis_frame(pose.origin, pose.axis, to_window, dst=frame.dst, src=frame.src)
     except GeometryError:
         return pose
-    covariance = _turned_covariance(pose, turned, to_window)
-    return replace(pose, transform_to_touches=turned, covariance=covariance, round_window="touched")
+    covariance = _rotated_covariance(pose, rotated, to_window)
+    return replace(pose, transform_to_touches=rotated, covariance=covariance, round_window="touched")
 
 
-def _turned_covariance(pose: CochleaPose, turned: RigidTransform, to_window: FloatArray) -> FloatArray:
-    """Return the (6, 6) covariance of a frame whose turn about x comes from two touches.
+def _rotated_covariance(pose: CochleaPose, rotated: RigidTransform, to_window: FloatArray) -> FloatArray:
+    """Return the (6, 6) covariance of a frame whose rotation about x comes from two touches.
 
-    With r and h the parts of `to_window` along y and x, that turn is (z·(dm - dCO) + h y·dtheta) / r; the
-    middle of the window is then off by its touches' errors dm alone. These are taken as independent of the
-    pose's, which share them: on the safe side, by a fifth in simulated animals touched to 0.15 mm.
+    With r and h the components of `to_window` along y and x, that rotation is (z·(dm - dCO) + h y·dtheta) /
+    r; the middle of the window then errs by its touches' errors dm alone. They are taken as independent of
+    the errors of the pose, although both share them: conservative, by a fifth for simulated animals touched
+    to 0.15 mm.
     """
-    x, y, z = turned.rotation.T
+    x, y, z = rotated.rotation.T
     h, r = x @ to_window, y @ to_window
     follow = np.eye(6)
     follow[3:, 3:] -= np.outer(x, x)

@@ -1,4 +1,4 @@
-"""How kernels are compiled: once a machine, wherever Numba finds a folder that keeps them."""
+"""How kernels are compiled: once on each machine, wherever Numba finds a writable cache folder."""
 
 from __future__ import annotations
 
@@ -19,22 +19,35 @@ _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 def compiled(
     signature: str | None = None, *, cache: bool = False, **options: Any
 ) -> Callable[[_Kernel], _Kernel]:
-    """Return the decorator that compiles a kernel free of the interpreter lock.
+    """Return a decorator that compiles a kernel and releases the global interpreter lock while it runs.
 
-    With a `signature` it is compiled at once, without one when it is first called. With `cache` the machine
-    code is kept for the next process; where the installation and the user's folders are read-only, it is
-    compiled anew in each.
+    With a `signature`, compilation happens at once; without one, at the first call. With `cache`, the machine
+    code is cached for the next process; where no cache folder is writable, each process compiles it again.
+
+    Parameters
+    ----------
+    signature : str, optional
+        Numba signature, such as ``"float64(float64)"``.
+    cache : bool
+        Whether to cache the machine code.
+    **options
+        Passed to `numba.njit`.
+
+    Returns
+    -------
+    callable
+        The decorator.
     """
 
     def decorate(kernel: _Kernel) -> _Kernel:
         if cache:
-            # Numba asks whether the kernel's own file has changed; the name it is kept by tells of others.
+            # Numba checks only the kernel's own file for changes; the digest in the name covers the others.
             kernel.__qualname__ += f"_{_digest(kernel)}"
-            with suppress(RuntimeError):  # Numba's word for: no folder to keep it in
-                kept: _Kernel = _njit(signature, cache=True, **options)(kernel)
-                return kept
-        passing: _Kernel = _njit(signature, **options)(kernel)
-        return passing
+            with suppress(RuntimeError):  # how Numba says that no cache folder is writable
+                cached: _Kernel = _njit(signature, cache=True, **options)(kernel)
+                return cached
+        uncached: _Kernel = _njit(signature, **options)(kernel)
+        return uncached
 
     return decorate
 
@@ -44,16 +57,16 @@ def compiled_together(
     names: Mapping[str, Any],
     signatures: Mapping[str, str] | None = None,
 ) -> dict[str, Any]:
-    """Compile plain functions such that they call each other compiled; they themselves stay as they are.
+    """Compile plain functions so that they call each other compiled; the originals stay as they are.
 
     Parameters
     ----------
     kernels : iterable of functions of one module
-        Each after those it calls.
+        Each after those that it calls.
     names : mapping
-        What else they call or read: the names of their module, with what is compiled already.
+        What else they use: the names of their module, with those already compiled.
     signatures : mapping, optional
-        Of those that are compiled at once, and kept for the next process.
+        Of those that are compiled at once and cached for the next process.
 
     Returns
     -------
@@ -78,21 +91,23 @@ def _digest(kernel: Callable[..., Any]) -> str:
     """Return a short digest of the files that a kernel is made of."""
     digest = hashlib.sha256()
     for file in sorted(_files(kernel)):
-        with suppress(OSError):  # an application frozen into one file has none: Numba looks at that one
+        with suppress(OSError):  # a frozen application has no source files: Numba checks the executable
             digest.update(Path(file).read_bytes())
     return digest.hexdigest()[:12]
 
 
 def _files(kernel: Callable[..., Any]) -> set[str]:
-    """Return this file, which says how, and those of this package whose functions the kernel has at hand."""
+    """Return this file, and the files of this package whose functions the kernel can call."""
     files = {__file__}
-    waiting: list[Any] = [kernel]
-    while waiting:
-        function = waiting.pop()
+    pending: list[Any] = [kernel]
+    while pending:
+        function = pending.pop()
         if function.__code__.co_filename not in files:
             files.add(function.__code__.co_filename)
-            at_hand = (getattr(value, "py_func", value) for value in function.__globals__.values())
-            waiting += [
-                f for f in at_hand if isinstance(f, FunctionType) and str(f.__module__).startswith("gp_core.")
+            callable_from = (getattr(value, "py_func", value) for value in function.__globals__.values())
+            pending += [
+                f
+                for f in callable_from
+                if isinstance(f, FunctionType) and str(f.__module__).startswith("gp_core.")
             ]
     return files

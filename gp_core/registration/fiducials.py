@@ -1,149 +1,28 @@
-"""Register a tracker to a scan by named points, and say what error that leaves at a target."""
+"""Register a tracker to a scan by named points, with rejection of outliers."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.errors import GeometryError, GpError
-from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.procrustes import RigidFit, fit_rigid, rms_without_each
-from gp_core.stats import NORMAL_95, chi_square_share
+from gp_core.registration.result import RegistrationResult
 from gp_core.validation import FloatArray, as_points
 
-__all__ = ["FiducialRegistration", "named_points", "register_fiducials"]
+__all__ = ["points_by_name", "register_fiducials"]
 
 _FEWEST = 3
-_FEWEST_TO_DOUBT = 6
-_TELLING = 0.5
-"""A point is wrong if the others fit twice as well without it; of eight good ones, 0.3 % are called so."""
+_FEWEST_TO_REJECT = 6
+_OUTLIER_RMS_RATIO = 0.5
+"""A point is an outlier if leaving it out halves the RMS. False-positive rate 0.3 % with 8 points."""
 
 _EXACT_MM = 1e-6
-_FEW = 6
-
-
-@dataclass(frozen=True)
-class FiducialRegistration:
-    """A rigid registration by named points.
-
-    Attributes
-    ----------
-    T_scan_tracker : RigidTransform
-        From the touched points to those of the scan; its own frames are those that were asked for.
-    names : tuple of str
-        The points in both lists.
-    residuals_mm : dict of str to float
-        Distance of each from its fellow after registration, mm.
-    fre_mm : float
-        Fiducial registration error: root mean square of the residuals, but for the suspects'.
-    suspects : tuple of str
-        Points that the others contradict; they have no part in the transform.
-    fiducials : (n, 3) array
-        The points that made the transform, in the scan, mm.
-    """
-
-    T_scan_tracker: RigidTransform
-    names: tuple[str, ...]
-    residuals_mm: dict[str, float]
-    fre_mm: float
-    suspects: tuple[str, ...]
-    fiducials: FloatArray = field(repr=False)
-
-    @property
-    def fle_mm(self) -> float:
-        """Expected error of one point (fiducial localisation error, root mean square), mm.
-
-        Both lists' errors together. The fit uses up part of it: FLE^2 = FRE^2 n / (n - 2).
-        """
-        n = len(self.fiducials)
-        return float(self.fre_mm * np.sqrt(n / (n - 2)))
-
-    @property
-    def fle_95_mm(self) -> float:
-        """What that error stays below with 95 %, mm; far above `fle_mm` where points are few.
-
-        The sum of squared residuals is chi-square with 3 n - 6 degrees of freedom; its quantile is
-        Wilson and Hilferty's (1931, doi:10.1073/pnas.17.12.684), a little on the safe side with three points.
-        """
-        freedom = 3 * len(self.fiducials) - 6
-        return float(self.fle_mm / chi_square_share(freedom, -NORMAL_95) ** 0.5)
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What to know before trusting the registration."""
-        found = [f"{name} does not fit the other points: left out" for name in self.suspects]
-        n = len(self.fiducials)
-        if n < _FEW:
-            factor = self.fle_95_mm / self.fle_mm if self.fle_mm else 1.0
-            found.append(
-                f"only {n} points: a wrong one cannot be told, and the true error may well be "
-                f"{factor:.1f} times the expected one"
-                if factor > 1
-                else f"only {n} points: a wrong one cannot be told"
-            )
-        return tuple(found)
-
-    def tre_mm(self, points: ArrayLike) -> FloatArray:
-        """Return the target registration error to expect (root mean square) at points of the scan.
-
-        TRE^2(r) = FLE^2 / n (1 + 1/3 sum_k d_k^2 / f_k^2), with d_k the distance of the target from the
-        k-th principal axis of the fiducials, and f_k the root mean square distance of the fiducials from it.
-        Errors are taken as independent and alike in all directions.
-
-        Parameters
-        ----------
-        points : (N, 3) array_like, mm, scan frame
-
-        Returns
-        -------
-        (N,) array, mm
-
-        Raises
-        ------
-        GpError
-            Not points.
-
-        References
-        ----------
-        Fitzpatrick, West and Maurer, "Predicting error in rigid-body point-based registration", IEEE TMI
-        17(5), 1998. https://doi.org/10.1109/42.736021
-        """
-        return self.fle_mm * self._error_shares(points)
-
-    def tre_95_mm(self, points: ArrayLike) -> FloatArray:
-        """Return the same (N,) with the error of the points at its upper 95 % bound, `fle_95_mm`."""
-        return self.fle_95_mm * self._error_shares(points)
-
-    def _error_shares(self, points: ArrayLike) -> FloatArray:
-        """Return TRE / FLE at each point."""
-        targets = as_points(points, "targets")
-        centre = self.fiducials.mean(axis=0)
-        _, _, axes = np.linalg.svd(self.fiducials - centre, full_matrices=False)
-        own, theirs = (_squared_from_axes(cloud - centre, axes) for cloud in (self.fiducials, targets))
-        shares: FloatArray = np.sqrt((1 + (theirs / own.mean(axis=0)).sum(axis=1) / 3) / len(own))
-        return shares
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the registration as the JSON file holds it."""
-        transform = self.T_scan_tracker
-        return {
-            "gpRegistration": 1,
-            "destination": transform.dst,
-            "source": transform.src,
-            "transform": transform.matrix.tolist(),
-            "fre_mm": self.fre_mm,
-            "fle_mm": self.fle_mm,
-            "fle_95_mm": self.fle_95_mm,
-            "residuals_mm": self.residuals_mm,
-            "suspect": list(self.suspects),
-            "warnings": list(self.warnings),
-        }
 
 
 def register_fiducials(
@@ -152,8 +31,8 @@ def register_fiducials(
     *,
     dst: str = "scan",
     src: str = "tracker",
-) -> FiducialRegistration:
-    """Register points by the names they have in common; one that the others contradict is left out.
+) -> RegistrationResult:
+    """Register points by the names they have in common; outliers are left out.
 
     Parameters
     ----------
@@ -161,6 +40,11 @@ def register_fiducials(
         Named points in the tracker and in the scan, mm. Names in one of them only do not count.
     dst, src : str
         Frames of `scan` and of `touches`.
+
+    Returns
+    -------
+    RegistrationResult
+        The transform, its residuals, and which points were left out.
 
     Raises
     ------
@@ -181,19 +65,30 @@ def register_fiducials(
     suspects = _suspects(pairs)
     kept = [i for i in range(len(names)) if i not in suspects]
     fit = pairs.fit(kept)
-    lengths = np.linalg.norm(fit.transform.apply(pairs.touched) - pairs.aims, axis=1)
-    return FiducialRegistration(
+    lengths = np.linalg.norm(fit.transform.apply(pairs.touched) - pairs.targets, axis=1)
+    return RegistrationResult(
         T_scan_tracker=fit.transform,
         names=names,
         residuals_mm=dict(zip(names, lengths.tolist(), strict=True)),
         fre_mm=fit.rms,
         suspects=tuple(names[i] for i in suspects),
-        fiducials=pairs.aims[kept],
+        fiducials=pairs.targets[kept],
     )
 
 
-def named_points(landmarks: LandmarkSet) -> dict[str, FloatArray]:
-    """Return every point of a set by its name, features and others; not CO, which is only computed."""
+def points_by_name(landmarks: LandmarkSet) -> dict[str, FloatArray]:
+    """Return every placed point of a set by its name, features and others; without CO, which is computed.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        Landmarks of one side, mm.
+
+    Returns
+    -------
+    dict of str to (3,) array, mm
+        In the frame of the set.
+    """
     placed = landmarks.as_mapping(code for code in landmarks.placed if not feature(code).computed)
     return {**placed, **landmarks.extra}
 
@@ -204,24 +99,24 @@ class _Pairs:
 
     names: tuple[str, ...]
     touched: FloatArray
-    aims: FloatArray
+    targets: FloatArray
     dst: str
     src: str
 
     def fit(self, kept: Sequence[int]) -> RigidFit:
         names = [self.names[i] for i in kept]
-        return fit_rigid(self.touched[kept], self.aims[kept], names=names, dst=self.dst, src=self.src)
+        return fit_rigid(self.touched[kept], self.targets[kept], names=names, dst=self.dst, src=self.src)
 
 
 def _suspects(pairs: _Pairs) -> list[int]:
-    """Return the points without which the others fit much better, worst first."""
+    """Return the points without which the others fit much better, the worst first."""
     kept = list(range(len(pairs.names)))
     found: list[int] = []
     rms = pairs.fit(kept).rms
-    while len(kept) >= _FEWEST_TO_DOUBT and rms > _EXACT_MM:
-        without = rms_without_each(pairs.touched[kept], pairs.aims[kept])
+    while len(kept) >= _FEWEST_TO_REJECT and rms > _EXACT_MM:
+        without = rms_without_each(pairs.touched[kept], pairs.targets[kept])
         best = int(without.argmin())
-        if without[best] > _TELLING * rms:
+        if without[best] > _OUTLIER_RMS_RATIO * rms:
             break
         found.append(kept.pop(best))
         rms = without[best]
@@ -258,10 +153,3 @@ def _rows(points: Mapping[str, ArrayLike], names: Sequence[str], frame: str) -> 
                 remedy="Leave the point out if it was not seen.",
             ) from None
     return rows
-
-
-def _squared_from_axes(arms: FloatArray, axes: FloatArray) -> FloatArray:
-    """Return the squared distance (N, 3) of arms (N, 3) from each of the lines along three unit axes."""
-    along = (arms @ axes.T) ** 2
-    squared: FloatArray = along.sum(axis=1, keepdims=True) - along
-    return squared

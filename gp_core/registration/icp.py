@@ -1,4 +1,4 @@
-"""Iterative closest point: points without names to other points, or to a surface."""
+"""Iterative closest point: register unnamed points to other points, or to a surface."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _FEWEST_POINTS = 3
 
 @dataclass(frozen=True)
 class IcpResult:
-    """A rigid motion found by iterative closest point.
+    """A rigid transform found by iterative closest point.
 
     Attributes
     ----------
@@ -31,8 +31,9 @@ class IcpResult:
     distances : (N,) array
         From each moved source point to the nearest point of the target, mm.
     rms : float
-        Root of their mean square, mm.
+        Their root mean square, mm.
     n_iterations : int
+        Iterations that were run.
     converged : bool
         Whether the last iteration moved no point by more than the tolerance.
     """
@@ -54,28 +55,34 @@ def icp(
     max_iterations: int = 500,
     tolerance: float = 1e-6,
 ) -> IcpResult:
-    """Register points to a target without knowing which belongs to which.
+    """Register points to a target without known correspondence.
 
     Parameters
     ----------
     source : (N, 3) array_like
-        Points in frame `src`, mm; at least three, not on one line.
+        Points in frame `src`, mm; at least three, not collinear.
     target : Cloud or Surface
-        In frame `dst`.
+        In frame `dst`, mm.
     start : RigidTransform, optional
-        ``T_dst_src`` to start from. By default the centroids and principal axes are laid on each other in all
-        24 ways, and the best result stands: good for whole sets of points, not for points on a part of a
+        ``T_dst_src`` to start from. By default the centroids and principal axes are superimposed in all 24
+        proper ways, and the best result is returned: good for whole point sets, not for points on part of a
         surface.
     dst, src : str
         Frame names, destination first.
     max_iterations : int
+        Maximum number of iterations from each start.
     tolerance : float
-        Largest motion of a point, mm, at which the iteration counts as settled.
+        Largest motion of a point, mm, at which the iteration counts as converged.
+
+    Returns
+    -------
+    IcpResult
+        The transform and its residuals.
 
     Raises
     ------
     GeometryError
-        The points, or the points nearest to them, lie on one line.
+        The points, or the points nearest to them, are collinear.
     FrameError
         `start` is between other frames.
 
@@ -102,7 +109,7 @@ def icp(
     ]
     if not results:
         raise GeometryError(
-            "the points nearest to the source lie on one line and leave the turn about it open",
+            "the points nearest to the source lie on one line and leave the signed_permutation about it open",
             remedy="Start nearer to the answer, or touch points farther apart.",
         )
     return min(results, key=lambda result: result.rms)
@@ -113,37 +120,37 @@ def _icp_from(
 ) -> IcpResult | None:
     """Iterate from one start; None where the nearest points determine no rotation."""
     transform, moved = start, start.apply(points)
-    aims = target.nearest(moved)
+    nearest = target.nearest(moved)
     converged = False
-    for iteration in range(1, max_iterations + 1):  # noqa: B007  (its last value is part of the answer)
+    for iteration in range(1, max_iterations + 1):  # noqa: B007  (its last value is part of the result)
         try:
-            rotation, translation = weighted_procrustes(points, aims)
+            rotation, translation = weighted_procrustes(points, nearest)
         except GeometryError:
             return None
         transform = RigidTransform.from_parts(rotation, translation, dst=start.dst, src=start.src)
         previous, moved = moved, transform.apply(points)
-        aims = target.nearest(moved)
+        nearest = target.nearest(moved)
         converged = bool(np.abs(moved - previous).max() <= tolerance)
         if converged:
             break
-    distances = np.linalg.norm(moved - aims, axis=1)
+    distances = np.linalg.norm(moved - nearest, axis=1)
     return IcpResult(transform, distances, float(np.sqrt(np.mean(distances**2))), iteration, converged)
 
 
 def _starts(points: FloatArray, target: FloatArray, dst: str, src: str) -> Iterator[RigidTransform]:
-    """Yield the 24 proper ways to lay the principal axes of two sets on each other, centroid on centroid."""
-    centre, aim = points.mean(axis=0), target.mean(axis=0)
-    axes, aim_axes = _principal_axes(points - centre), _principal_axes(target - aim)
+    """Yield the 24 proper ways to superimpose the principal axes of two point sets, centroid on centroid."""
+    centre, target_centre = points.mean(axis=0), target.mean(axis=0)
+    axes, target_axes = _principal_axes(points - centre), _principal_axes(target - target_centre)
     for order, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
-        turn = np.zeros((3, 3))
-        turn[range(3), order] = signs
-        rotation = aim_axes @ turn @ axes.T
+        signed_permutation = np.zeros((3, 3))
+        signed_permutation[range(3), order] = signs
+        rotation = target_axes @ signed_permutation @ axes.T
         if np.linalg.det(rotation) > 0:
-            yield RigidTransform.from_parts(rotation, aim - rotation @ centre, dst=dst, src=src)
+            yield RigidTransform.from_parts(rotation, target_centre - rotation @ centre, dst=dst, src=src)
 
 
 def _principal_axes(centred: FloatArray) -> FloatArray:
-    """Return the directions of largest, middle and least spread in columns."""
+    """Return the directions of largest, middle and smallest spread in columns."""
     _, vectors = np.linalg.eigh(centred.T @ centred)
     axes: FloatArray = vectors[:, ::-1]
     return axes

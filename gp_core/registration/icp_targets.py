@@ -1,4 +1,4 @@
-"""What points are registered to by iterative closest point: other points, or a surface."""
+"""Targets of iterative closest point: a point cloud or a surface."""
 
 from __future__ import annotations
 
@@ -17,23 +17,39 @@ _SMALLEST_AREA_MM2 = 1e-12
 
 
 class Target(Protocol):
-    """What points are registered to."""
+    """What points can be registered to."""
 
     @property
     def points(self) -> FloatArray:
-        """(V, 3) points that say where it lies and how it is oriented, mm."""
+        """(V, 3) points that give its position and orientation, mm."""
 
     def nearest(self, points: FloatArray) -> FloatArray:
-        """Return the nearest point (N, 3) of the target to each of (N, 3), mm."""
+        """Return the nearest point of the target to each point.
+
+        Parameters
+        ----------
+        points : (N, 3) array
+            Points, mm.
+
+        Returns
+        -------
+        (N, 3) array, mm
+            Nearest points.
+        """
 
 
 class Cloud:
-    """A set of points as a target.
+    """A point cloud as a target.
 
     Parameters
     ----------
     points : (V, 3) array_like, mm
         At least three.
+
+    Raises
+    ------
+    GeometryError
+        Fewer than three points.
     """
 
     def __init__(self, points: ArrayLike) -> None:
@@ -46,11 +62,22 @@ class Cloud:
 
     @property
     def points(self) -> FloatArray:
-        """(V, 3) the points, mm."""
+        """(V, 3) points, mm."""
         return self._points
 
     def nearest(self, points: FloatArray) -> FloatArray:
-        """Return the nearest point (N, 3) of the set to each of (N, 3), mm."""
+        """Return the nearest point of the cloud to each point.
+
+        Parameters
+        ----------
+        points : (N, 3) array
+            Points, mm.
+
+        Returns
+        -------
+        (N, 3) array, mm
+            Nearest points.
+        """
         _, index = self._tree.query(points)
         found: FloatArray = self._points[index]
         return found
@@ -62,8 +89,9 @@ class Surface:
     Parameters
     ----------
     vertices : (V, 3) array_like, mm
+        Corners of the triangles.
     triangles : (T, 3) array_like of int
-        Rows of `vertices`; triangles of no area are passed over.
+        Rows of `vertices`; triangles of zero area are ignored.
 
     Raises
     ------
@@ -80,14 +108,24 @@ class Surface:
 
     @property
     def points(self) -> FloatArray:
-        """(T, 3) the middles of the triangles, mm."""
+        """(T, 3) centroids of the triangles, mm."""
         return self._centres
 
     def nearest(self, points: FloatArray) -> FloatArray:
-        """Return the nearest point (N, 3) of the surface to each of (N, 3), mm.
+        """Return the nearest point of the surface to each point.
 
-        A triangle can be nearer than the best so far only if its middle is nearer than that plus its radius,
-        so triangles are searched by size, each size with a radius of its own.
+        A triangle can be nearer than the best so far only if its centroid is nearer than that plus its
+        radius. So triangles are grouped by size, each group with a search radius of its own.
+
+        Parameters
+        ----------
+        points : (N, 3) array
+            Points, mm.
+
+        Returns
+        -------
+        (N, 3) array, mm
+            Nearest points.
         """
         best = np.full(len(points), np.inf)
         found = np.empty_like(points)
@@ -137,7 +175,10 @@ def _as_corners(vertices: FloatArray, triangles: ArrayLike) -> FloatArray:
 
 
 def _by_size(centres: FloatArray, radii: FloatArray) -> list[tuple[Any, NDArray[np.intp], float]]:
-    """Return trees of the middles of triangles of like size: tree, which triangles, their largest radius."""
+    """Return search trees over the centroids of triangles of similar size.
+
+    Each is (tree, which triangles, largest radius).
+    """
     from scipy.spatial import cKDTree
 
     sizes = np.floor(np.log2(radii)).astype(int)
@@ -162,7 +203,7 @@ def _nearest_in_triangles(points: FloatArray, corners: FloatArray) -> FloatArray
 
 
 def _foot_in_plane(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Return the foot (P, 3) of each point on the plane of its triangle, NaN where it lies outside of it."""
+    """Return the perpendicular foot (P, 3) of each point on the plane of its triangle; NaN if outside it."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(first, second)
     offset = points - corners[:, 0]

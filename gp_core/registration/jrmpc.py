@@ -7,7 +7,6 @@ The inner loops are compiled (`gp_core.registration.jrmpc_kernels`) and loaded o
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GeometryError, GpError
+from gp_core.processors import n_cores
 from gp_core.validation import FloatArray, as_points
 
 __all__ = ["DEFAULTS", "ESTIMATION", "JrmpcBatch", "JrmpcResult", "JrmpcSettings", "jrmpc", "jrmpc_batch"]
@@ -26,7 +26,7 @@ __all__ = ["DEFAULTS", "ESTIMATION", "JrmpcBatch", "JrmpcResult", "JrmpcSettings
 _FEWEST_POINTS = 3
 _SIZES = (1e-30, 1e30)
 _LEAST_GAMMA = 1e-12
-_AT_REST = 1e-13
+_STATIONARY = 1e-13
 """Largest relative change of an iteration after which the rest would move nothing beyond 1e-9."""
 _CONVERGED = 1e-6
 _TABLE = 32768
@@ -110,7 +110,17 @@ class JrmpcResult:
     converged: bool
 
     def moved(self, point_sets: Sequence[ArrayLike]) -> list[FloatArray]:
-        """Return points (N, 3) of each set, registered or not, in the common frame.
+        """Return the points of each set in the common frame.
+
+        Parameters
+        ----------
+        point_sets : sequence of (N_j, 3) array_like
+            One list of points for each registered set, mm; any points of that set's frame.
+
+        Returns
+        -------
+        list of (N_j, 3) array, mm
+            The moved points.
 
         Raises
         ------
@@ -159,22 +169,27 @@ def jrmpc(
 ) -> JrmpcResult:
     """Register point sets jointly, whatever their number and sizes.
 
-    Each set starts unturned, its centroid on the centroid of the centres; the variances start at the squared
-    diagonal of the box around everything. Memory grows with points + centres, not with their product. Large
-    problems run on all cores.
+    Each set starts unrotated, with its centroid on the centroid of the centres; the variances start at the
+    squared diagonal of the box around everything. Memory grows with points + centres, not with their product.
+    Large problems run on all cores.
 
     Parameters
     ----------
     point_sets : sequence of (N_j, 3) array_like
         Points of each set, mm; at least three a set.
     centres : (K, 3) array_like, optional
-        Where the centres start, mm; by default one a set, at its centroid.
+        Initial centres, mm; by default one for each set, at its centroid.
     max_iterations : int
         See `JrmpcSettings`.
     gamma : float, optional
         See `JrmpcSettings`.
     epsilon : float
-        See `JrmpcSettings`.
+        See `JrmpcSettings`, mm^2.
+
+    Returns
+    -------
+    JrmpcResult
+        Poses, centres and variances.
 
     Raises
     ------
@@ -210,10 +225,10 @@ def jrmpc(
 
 
 def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettings = DEFAULTS) -> JrmpcBatch:
-    """Run JRMPC on many small problems whose sets are of the same sizes, with one centre a set.
+    """Run JRMPC on many small problems whose sets have the same sizes, with one centre for each set.
 
-    Each answer is that of `jrmpc` on the same sets with ``centres=None``. The work is compiled, runs on one
-    core and lets other threads run, so a study spreads its batches over threads or processes as it likes.
+    Each result equals that of `jrmpc` on the same sets with ``centres=None``. The work is compiled, runs on
+    one core and releases the interpreter lock, so a study can spread its batches over threads or processes.
 
     Parameters
     ----------
@@ -222,7 +237,12 @@ def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettin
     sizes : sequence of int
         How many points each of the M sets has; their sum is P.
     settings : JrmpcSettings
-        See there.
+        Iterations, outlier ratio and variance floor.
+
+    Returns
+    -------
+    JrmpcBatch
+        The results, problem first.
 
     Raises
     ------
@@ -246,7 +266,7 @@ def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettin
         settings.epsilon,
         problem.size,
         settings.max_iterations,
-        _AT_REST,
+        _STATIONARY,
         iterations,
         change,
     )
@@ -330,7 +350,7 @@ def _run_one(problem: _Problem, settings: JrmpcSettings) -> tuple[FloatArray, fl
         def expect(i: int) -> None:
             kernels.expect(moved, pieces, shares[i], centres, problem.beta[0], tables[i], inverse, moments)
 
-        while len(objective) < settings.max_iterations and change > _AT_REST:
+        while len(objective) < settings.max_iterations and change > _STATIONARY:
             kernels.move(points, problem.starts, poses, moved)
             do_all(expect, range(len(shares)))
             objective.append(float(np.log(inverse).sum()))
@@ -344,8 +364,8 @@ def _run_one(problem: _Problem, settings: JrmpcSettings) -> tuple[FloatArray, fl
 def _shares(
     blocks: NDArray[np.uint64], work: int
 ) -> Iterator[tuple[list[NDArray[np.uint64]], Callable[[Callable[[int], None], range], object]]]:
-    """Share blocks out among threads where it is worth while; also yield what calls a function on each."""
-    workers = min(_n_cores(), len(blocks) - 1) if work >= _WORTH_THREADS else 1
+    """Split blocks among threads where it is worth while; also yield a function that maps over the parts."""
+    workers = min(n_cores(), len(blocks) - 1) if work >= _WORTH_THREADS else 1
     if workers == 1:
         yield [blocks], lambda function, which: list(map(function, which))
         return
@@ -425,11 +445,6 @@ def _check_sizes(size: FloatArray) -> None:
             f"the point sets have no usable extent, got {size[~good][0]:.3g}",
             remedy="Check that the points differ and that their unit is mm.",
         )
-
-
-def _n_cores() -> int:
-    usable = getattr(os, "sched_getaffinity", None)
-    return len(usable(0)) if usable else os.cpu_count() or 1
 
 
 def _kernels() -> Any:

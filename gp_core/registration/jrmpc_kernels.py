@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from gp_core.registration.compiling import compiled
 from gp_core.registration.rotation import Matrix3, Quaternion
-from gp_core.registration.rotation_compiled import as_matrix, least_turn, product
+from gp_core.registration.rotation_compiled import as_matrix, minimal_rotation, product
 from gp_core.validation import FloatArray
 
 __all__ = ["expect", "maximise", "move", "run_batch"]
@@ -62,10 +62,20 @@ _from_bits: Any = intrinsic(_to_float)
 
 @compiled(fastmath=_EXACT, cache=True)
 def exp_negative(u: float) -> float:
-    """Compute exp(u) for u <= 0 to one unit in the last place, without branches; 0 below -708.
+    """Compute exp(u) to one unit in the last place, without branches; 0 below -708.
 
     With u = n ln 2 + r, a polynomial of degree 11 with the least worst error on |r| <= ln 2 / 2 gives exp(r),
     and n is added to the exponent bits.
+
+    Parameters
+    ----------
+    u : float
+        Not positive.
+
+    Returns
+    -------
+    float
+        exp(u).
     """
     held = max(u, _LOWEST)
     shifted = held * _LOG2_E + _ROUND
@@ -243,7 +253,7 @@ def _pose_step(
     `motion` receives the step (3, 4) in common coordinates.
     """
     x, y, z, dx, dy, dz = _weighted_means(moments, j, centres)
-    turn = least_turn(_covariance(moments, j, centres, x, y, z))
+    turn = minimal_rotation(_covariance(moments, j, centres, x, y, z))
     _write_rotation(turn, motion)
     for a in range(3):
         motion[a, 3] = -(motion[a, 0] * (x + dx) + motion[a, 1] * (y + dy) + motion[a, 2] * (z + dz))
@@ -364,7 +374,19 @@ def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: f
 
 @compiled(fastmath=_EXACT, cache=True)
 def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: FloatArray) -> None:
-    """Write the points (3, P) of all sets under their poses (M, 7); set j starts at ``starts[j]``."""
+    """Write the points of all sets under their poses.
+
+    Parameters
+    ----------
+    points : (3, P) array, mm
+        Each set about its own centroid.
+    starts : (M + 1,) array of uint64
+        Set j begins at ``starts[j]``.
+    poses : (M, 7) array
+        Quaternion, w first, and translation, mm.
+    moved : (3, P) array, mm
+        Out: the moved points.
+    """
     rotation = np.empty((3, 3))
     for j in range(poses.shape[0]):
         _write_rotation((poses[j, 0], poses[j, 1], poses[j, 2], poses[j, 3]), rotation)

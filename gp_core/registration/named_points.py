@@ -4,19 +4,20 @@ Model, in the atlas frame (left side). The point touched at feature j is
 
     y_j = R (mu_j + s_j + e_j) + t,    s_j ~ N(0, v_j I),    e_j ~ Student-t(nu, sigma),
 
-where s_j is how this animal's feature differs from the mean, with the variance v_j the atlas gives it, and
-e_j is the error of the touch. A Student-t is a Gaussian of variance sigma^2 / w_j whose weight w_j is itself
-unknown, so a mistouch talks itself out of the fit. Expectation conditional maximisation: the weights and
-sigma from the expected squared errors, then the pose by weighted Procrustes with the shape integrated out.
+where s_j is the deviation of this animal's feature from the mean, with the variance v_j that the atlas gives
+it, and e_j is the error of the touch. A Student-t distribution is a Gaussian of variance sigma^2 / w_j whose
+weight w_j is itself unknown, so an outlying touch is down-weighted. The fit is by expectation conditional
+maximisation: first the weights and sigma from the expected squared errors, then the pose by weighted
+Procrustes with the shape integrated out.
 
-Correlations between features are left out of the weights on purpose: learned from some twenty sides, they
-made the estimates of held-out animals worse (docs/method.md). They enter the error bars, in `gp_core.pose`.
+The weights deliberately ignore correlations between features: learned from about twenty sides, they made the
+estimates of held-out animals worse (docs/method.md). Correlations do enter the error bars, in `gp_core.pose`.
 
 The iterations run in `gp_core.registration.student_t_fit`: compiled, once
-`gp_core.registration.student_t_fit_compiled` has been imported, and until then as plain Python, to the same
-numbers. A process that estimates once, such as the
-shell command, would wait longer for the compiled code than it saves, so the second estimate loads it
-(`compile_if_repeated`). A window or a tracker that must not wait imports that module beforehand, in a thread.
+`gp_core.registration.student_t_fit_compiled` has been imported, and until then as plain Python, with the same
+results. Loading the compiled code takes longer than it saves in a process that estimates only once, such as
+the shell command; so the second estimate loads it (`compile_if_repeated`). A window or a tracker that must
+not wait imports that module beforehand, in a thread.
 
 References
 ----------
@@ -39,30 +40,30 @@ import numpy as np
 
 from gp_core.errors import GeometryError
 from gp_core.registration import student_t_fit
-from gp_core.registration.procrustes import surely_no_line, weighted_procrustes
+from gp_core.registration.procrustes import certainly_not_collinear, weighted_procrustes
 from gp_core.registration.student_t_fit import NU, POSE_SIZE, PRIOR_WEIGHT, TOLERANCE, TYPICAL_NOISE_MM
 from gp_core.validation import FloatArray
 
 __all__ = [
-    "AgainstOthers",
+    "LeaveOneOutResiduals",
     "NamedFit",
     "TouchModel",
+    "approximate_neg_log_posterior",
     "best_exchange",
-    "careful_misfit",
     "compile_if_repeated",
     "fit_named_points",
+    "gaussian_deviance",
     "motion_jacobian",
-    "quick_misfit",
 ]
 
-_NO_TURN = (1.0, 0.0, 0.0, 0.0)
+_IDENTITY = (1.0, 0.0, 0.0, 0.0)
 
 _COMPILED = "gp_core.registration.student_t_fit_compiled"
 _ESTIMATES = count()
 
 _MAX_ITERATIONS = 500
-_DOUBTFUL_WEIGHT = 0.5
-_LEFT_OUT = 1e-3
+_OUTLIER_WEIGHT = 0.5
+_START_WEIGHT_LEFT_OUT = 1e-3
 _NEWTON_STEPS = 6
 _QUICK_ITERATIONS = 6
 _TINY = 1e-300
@@ -70,15 +71,16 @@ _TINY = 1e-300
 
 @dataclass(frozen=True)
 class TouchModel:
-    """What the atlas says of the points that are touched.
+    """What the atlas predicts for the touched points.
 
     Parameters
     ----------
     codes : tuple of str
         Their features.
     mean : (n, 3) array, mm, atlas frame
+        Mean positions.
     variances : (n,) array, mm^2
-        Between animals, a coordinate.
+        Variance between animals of one coordinate of each feature.
     noise : float or None
         Scale of the touch errors, mm a coordinate; None: estimated with the pose.
     """
@@ -90,8 +92,10 @@ class TouchModel:
 
 
 @dataclass(frozen=True)
-class AgainstOthers:
-    """Touches held against where the others alone would put them, along the principal axes of that spread.
+class LeaveOneOutResiduals:
+    """Deviation of each touch from where the other touches alone predict it.
+
+    Along the principal axes of the uncertainty of that prediction.
 
     Attributes
     ----------
@@ -109,16 +113,13 @@ class AgainstOthers:
 
     @cached_property
     def squared(self) -> FloatArray:
-        """(n,) squared deviation over its variance: of ordinary touches, chi-square of 3 degrees."""
+        """(n,) squared Mahalanobis distances: chi-squared with 3 degrees of freedom for ordinary touches."""
         squared: FloatArray = (self.deviations / (self.variances + self.noise**2)).sum(axis=1)
         return squared
 
     @property
     def error_variance(self) -> FloatArray:
-        """(n,) variance of its own error that would make each deviation an average one, mm^2 a coordinate.
-
-        Newton's method on the inverse of `squared`, which is nearly linear in that variance.
-        """
+        """(n,) error variance that would make the deviation of each touch average, mm^2 a coordinate."""
         variance = np.full(len(self.deviations), self.noise**2)
         for _ in range(_NEWTON_STEPS):
             spread = self.variances + variance[:, None]
@@ -134,29 +135,29 @@ class NamedFit:
 
     Attributes
     ----------
-    turn : (4,) array
+    quaternion : (4,) array
         `rotation` as a unit quaternion, w first.
     rotation, translation : (3, 3), (3,) arrays
         The atlas in the frame of the touches, ``y = rotation @ x + translation``, mm.
     points : (n, 3) array, mm
-        The touches, brought into the atlas frame.
+        The touches, moved into the atlas frame.
     residual : (3 n,) array, mm
         Touch minus mean.
     weights : (n,) array
-        About 1 for an ordinary touch, towards 0 for one that does not fit.
+        About 1 for an ordinary touch, towards 0 for an outlier.
     noise : float
         Scale sigma of the touch errors, mm.
     noise_estimated : bool
-        Whether it was found from the touches.
+        Whether it was estimated from the touches.
     precision : (3 n,) array
         Inverse variance of `residual` with these weights.
-    misfit : float
-        Negative log posterior up to a constant; lower is better among readings of the same touches.
+    neg_log_posterior : float
+        Negative log posterior up to a constant; the lower, the better, among hypotheses on the same touches.
     converged : bool
-        False where the iterations ran out first.
+        False where the maximum number of iterations was reached first.
     """
 
-    turn: FloatArray
+    quaternion: FloatArray
     rotation: FloatArray
     translation: FloatArray
     points: FloatArray
@@ -165,18 +166,18 @@ class NamedFit:
     noise: float
     noise_estimated: bool
     precision: FloatArray
-    misfit: float
+    neg_log_posterior: float
     converged: bool
 
     @property
-    def doubtful(self) -> bool:
-        """Whether a touch was half set aside."""
-        return bool(self.weights.min() < _DOUBTFUL_WEIGHT)
+    def has_outlier(self) -> bool:
+        """Whether the fit gave some touch less than half of its weight."""
+        return bool(self.weights.min() < _OUTLIER_WEIGHT)
 
     @property
-    def rough(self) -> bool:
+    def fits_poorly(self) -> bool:
         """Whether the touches fit worse than careful ones do."""
-        return self.doubtful or self.noise > 3 * TYPICAL_NOISE_MM
+        return self.has_outlier or self.noise > 3 * TYPICAL_NOISE_MM
 
     @cached_property
     def squared_residuals(self) -> FloatArray:
@@ -190,49 +191,51 @@ class NamedFit:
         return motion_jacobian(self.points)
 
     @cached_property
-    def against_others(self) -> AgainstOthers:
-        """Each touch held against where the others alone would put it.
+    def leave_one_out_residuals(self) -> LeaveOneOutResiduals:
+        """The deviation of each touch from where the other touches alone predict it.
 
-        Without a touch that pulls the pose after it, such as a far one, its error would show in full: the
-        residual is brought to what it would be without the touch, by the linear algebra of leaving one out.
+        A touch with high leverage, such as a distant one, pulls the pose towards itself and hides its own
+        error. The residual that it would have without its own influence follows from the usual leave-one-out
+        algebra.
         """
         jacobian = self.jacobian.reshape(-1, 3, 6)
         precision = self.precision[::3]
         variances = 1 / precision - self.noise**2 / self.weights
         covariance = np.linalg.inv((self.precision[:, None] * self.jacobian).T @ self.jacobian)
         of_pose = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
-        # where a touch alone holds the pose, hardly anything is left to be inverted, and all is possible
+        # the factor keeps the matrix invertible where one touch alone determines the pose
         release = np.linalg.inv((1 + 1e-9) * np.eye(3) - precision[:, None, None] * of_pose)
-        away = release @ self.residual.reshape(-1, 3, 1)
+        deviation = release @ self.residual.reshape(-1, 3, 1)
         spread, axes = np.linalg.eigh(of_pose @ release)
-        deviations = (axes.transpose(0, 2, 1) @ away)[..., 0] ** 2
-        return AgainstOthers(deviations, spread + variances[:, None], self.noise)
+        deviations = (axes.transpose(0, 2, 1) @ deviation)[..., 0] ** 2
+        return LeaveOneOutResiduals(deviations, spread + variances[:, None], self.noise)
 
     @cached_property
     def touch_variances(self) -> FloatArray:
         """(n,) variance of each touch, mm^2 a coordinate.
 
-        A Student-t varies more than its scale says, and a scale found from few touches is itself unsure.
+        The variance of a Student-t exceeds its squared scale, and a scale estimated from few touches is
+        itself uncertain.
         """
         freedom = 3 * len(self.weights) - 6 + PRIOR_WEIGHT
-        unsure = freedom / (freedom - 2) if self.noise_estimated else 1.0
-        variances: FloatArray = unsure * NU / (NU - 2) * self.noise**2 / self.weights
+        inflation = freedom / (freedom - 2) if self.noise_estimated else 1.0
+        variances: FloatArray = inflation * NU / (NU - 2) * self.noise**2 / self.weights
         return variances
 
 
 def compile_if_repeated() -> None:
-    """Load the compiled kernels if this is the second estimate of the process, and no thread is at it yet."""
+    """Load the compiled kernels at the second estimate of the process, unless a thread is loading them."""
     if next(_ESTIMATES) == 1 and _COMPILED not in sys.modules:
-        with suppress(ImportError):  # then plain Python has to do
+        with suppress(ImportError):  # then plain Python is used
             importlib.import_module(_COMPILED)
 
 
-class _Settled(NamedTuple):
-    """What `gp_core.registration.student_t_fit.settle` makes of one reading of the touches."""
+class _StudentTFit(NamedTuple):
+    """Result of `gp_core.registration.student_t_fit.fit_student_t` for one assignment of names to touches."""
 
     sigma2: float
     change: float
-    misfit: float
+    neg_log_posterior: float
     weights: FloatArray
     precision: FloatArray
     points: FloatArray
@@ -242,109 +245,145 @@ class _Settled(NamedTuple):
 def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     """Fit the atlas to touched points.
 
-    A mistouch can hold a fit in a wrong place, so where one touch is doubted, the fit is also started
-    without each touch in turn, and the best of these stands.
+    An outlying touch can trap the fit in a local optimum. So where some touch is down-weighted, the fit is
+    also started without each touch in turn, and the best of the results is returned.
 
     Parameters
     ----------
     model : TouchModel
+        Mean and variances of the touched features.
     touches : (n, 3) array, mm
         In any frame of the atlas's handedness; row j is feature j of the model.
+
+    Returns
+    -------
+    NamedFit
+        Pose, weights and scale of the touch errors.
 
     Raises
     ------
     GeometryError
-        Fewer than three touches, touches on one line, or touches that no pose brings near the atlas.
+        Fewer than three touches, collinear touches, or touches that no pose brings near the atlas.
     """
-    if not (surely_no_line(model.mean) and surely_no_line(touches)):
+    if not (certainly_not_collinear(model.mean) and certainly_not_collinear(touches)):
         weighted_procrustes(model.mean, touches, names=model.codes)  # for its guards
-    settled = _settle(model, touches, model.noise)
-    if not math.isfinite(settled.misfit):
+    solution = _fit_student_t(model, touches, model.noise)
+    if not math.isfinite(solution.neg_log_posterior):
         weighted_procrustes(model.mean, touches, names=model.codes)
         raise GeometryError(
             "no pose brings these points near the atlas", remedy="Check units, names and coordinates."
         )
     n = len(touches)
-    if n > 3 and settled.weights.min() < _DOUBTFUL_WEIGHT:
-        starts = np.where(np.eye(n, dtype=bool), _LEFT_OUT, 1.0)
-        others = (_settle(model, touches, model.noise, weights=start, turn=settled.pose) for start in starts)
-        settled = min((settled, *others), key=lambda other: other.misfit)
-    return _as_fit(model, settled)
+    if n > 3 and solution.weights.min() < _OUTLIER_WEIGHT:
+        starts = np.where(np.eye(n, dtype=bool), _START_WEIGHT_LEFT_OUT, 1.0)
+        others = (
+            _fit_student_t(model, touches, model.noise, weights=start, quaternion=solution.pose)
+            for start in starts
+        )
+        solution = min((solution, *others), key=lambda other: other.neg_log_posterior)
+    return _as_fit(model, solution)
 
 
 def best_exchange(
     model: TouchModel, touches: FloatArray, fit: NamedFit, below: float
 ) -> tuple[int, int, float]:
-    """Find the two touches whose names, exchanged, make the best fit.
+    """Find the two touches that fit best with their names exchanged.
 
     Parameters
     ----------
     model : TouchModel
+        Mean and variances of the touched features.
     touches : (n, 3) array, mm
+        Row j is feature j of the model.
     fit : NamedFit
         Of the touches as they are named.
     below : float
-        Misfit below which an exchange is of interest.
+        Negative log posterior below which an exchange is of interest.
 
     Returns
     -------
     i, j : int
         Their rows.
-    misfit : float
-        Of the fit to the touches so read; infinite where no exchange comes near `below`.
+    neg_log_posterior : float
+        Of the fit with these two exchanged; infinite where no exchange comes near `below`.
     """
-    buffers = _buffers(model, touches, None, fit.turn)
-    i, j, misfit = _run("best_exchange", *buffers, model.noise or 0.0, _MAX_ITERATIONS, below)
-    return int(i), int(j), misfit
+    buffers = _buffers(model, touches, None, fit.quaternion)
+    i, j, neg_log_posterior = _run("best_exchange", *buffers, model.noise or 0.0, _MAX_ITERATIONS, below)
+    return int(i), int(j), neg_log_posterior
 
 
-def careful_misfit(model: TouchModel, reading: FloatArray, noise: float) -> float:
-    """Return -2 log likelihood, up to a constant, of a reading whose touch errors are Gaussian of this scale.
+def gaussian_deviance(model: TouchModel, touches: FloatArray, noise: float) -> float:
+    """Return the deviance (-2 log likelihood, up to a constant) for Gaussian touch errors of a given scale.
 
-    Cheap; tells the readings of careful touches apart, which one rough touch already upsets.
-    """
-    settled = _settle(model, reading, noise, n_iterations=0)
-    squared = ((settled.points.reshape(-1, 3) - model.mean) ** 2).sum(axis=1)
-    return float(settled.precision @ squared)
-
-
-def quick_misfit(model: TouchModel, touches: FloatArray, turn: FloatArray) -> float:
-    """Return about what the misfit of a reading will be, after a few iterations from a given turn.
-
-    Early on, the misfit is hardly ever above the one that a fit settles at.
+    Cheap. It separates hypotheses on careful touches well; a single rough touch upsets it.
 
     Parameters
     ----------
     model : TouchModel
+        Mean and variances of the touched features.
     touches : (n, 3) array, mm
-    turn : (4,) array
-        A quaternion to start from.
+        Row j is feature j of the model.
+    noise : float
+        Scale of the touch errors, mm a coordinate.
+
+    Returns
+    -------
+    float
+        The deviance; the lower, the better.
     """
-    return _settle(model, touches, model.noise, turn=turn, n_iterations=_QUICK_ITERATIONS).misfit
+    solution = _fit_student_t(model, touches, noise, n_iterations=0)
+    squared = ((solution.points.reshape(-1, 3) - model.mean) ** 2).sum(axis=1)
+    return float(solution.precision @ squared)
 
 
-def _settle(
+def approximate_neg_log_posterior(model: TouchModel, touches: FloatArray, quaternion: FloatArray) -> float:
+    """Return approximately the negative log posterior that a fit will reach, after a few iterations.
+
+    In early iterations it is hardly ever above its value at convergence.
+
+    Parameters
+    ----------
+    model : TouchModel
+        Mean and variances of the touched features.
+    touches : (n, 3) array, mm
+        Row j is feature j of the model.
+    quaternion : (4,) array
+        Rotation to start from, w first.
+
+    Returns
+    -------
+    float
+        Negative log posterior, up to a constant.
+    """
+    return _fit_student_t(
+        model, touches, model.noise, quaternion=quaternion, n_iterations=_QUICK_ITERATIONS
+    ).neg_log_posterior
+
+
+def _fit_student_t(
     model: TouchModel,
     touches: FloatArray,
     noise: float | None,
     *,
     weights: FloatArray | None = None,
-    turn: FloatArray | None = None,
+    quaternion: FloatArray | None = None,
     n_iterations: int = _MAX_ITERATIONS,
-) -> _Settled:
-    """Settle one reading from given weights and a given turn, by default ordinary ones and none."""
-    buffers = _buffers(model, touches, weights, turn)
+) -> _StudentTFit:
+    """Run the fit from given weights and a given rotation; by default from weights of 1 and the identity."""
+    buffers = _buffers(model, touches, weights, quaternion)
     _, _, _, weights, precision, points, _, pose = buffers
-    return _Settled(*_run("settle", *buffers, noise or 0.0, n_iterations), weights, precision, points, pose)
+    return _StudentTFit(
+        *_run("fit_student_t", *buffers, noise or 0.0, n_iterations), weights, precision, points, pose
+    )
 
 
 def _buffers(
-    model: TouchModel, touches: FloatArray, weights: FloatArray | None, turn: FloatArray | None
+    model: TouchModel, touches: FloatArray, weights: FloatArray | None, quaternion: FloatArray | None
 ) -> tuple[FloatArray, ...]:
     """Return the buffers that the kernels work on, in their order."""
     n = len(touches)
     pose = np.zeros(POSE_SIZE)
-    pose[:4] = _NO_TURN if turn is None else turn[:4]
+    pose[:4] = _IDENTITY if quaternion is None else quaternion[:4]
     return (
         np.ascontiguousarray(model.mean).reshape(-1),
         np.ascontiguousarray(model.variances),
@@ -358,7 +397,7 @@ def _buffers(
 
 
 def _run(kernel: str, *arguments: FloatArray | float) -> tuple[float, float, float]:
-    """Run a kernel: compiled, if the compiled ones are there."""
+    """Run a kernel: compiled, if the compiled module is loaded."""
     compiled = getattr(sys.modules.get(_COMPILED), kernel, None)  # none yet while another thread imports it
     result: tuple[float, float, float]
     if compiled is not None:
@@ -372,20 +411,20 @@ def _run(kernel: str, *arguments: FloatArray | float) -> tuple[float, float, flo
     return result
 
 
-def _as_fit(model: TouchModel, settled: _Settled) -> NamedFit:
-    points = settled.points.reshape(-1, 3)
+def _as_fit(model: TouchModel, solution: _StudentTFit) -> NamedFit:
+    points = solution.points.reshape(-1, 3)
     return NamedFit(
-        turn=settled.pose[:4],
-        rotation=settled.pose[7:].reshape(3, 3),
-        translation=settled.pose[4:7],
+        quaternion=solution.pose[:4],
+        rotation=solution.pose[7:].reshape(3, 3),
+        translation=solution.pose[4:7],
         points=points,
         residual=(points - model.mean).ravel(),
-        weights=settled.weights,
-        noise=settled.sigma2**0.5,
+        weights=solution.weights,
+        noise=solution.sigma2**0.5,
         noise_estimated=model.noise is None,
-        precision=np.repeat(settled.precision, 3),
-        misfit=settled.misfit,
-        converged=settled.change < TOLERANCE,
+        precision=np.repeat(solution.precision, 3),
+        neg_log_posterior=solution.neg_log_posterior,
+        converged=solution.change < TOLERANCE,
     )
 
 
@@ -395,6 +434,7 @@ def motion_jacobian(points: FloatArray) -> FloatArray:
     Parameters
     ----------
     points : (n, 3) array, mm, atlas frame
+        Points.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Where the tip of a probe is, from its marker's poses while the tip rests in one place."""
+"""Pivot calibration: the tip of a probe, from the poses of its marker while the tip rests in one place."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _FEWEST = 10
 _LEAST_SPREAD_DEG = 5.0
 _MOST_LEFT_OUT = 0.5
 _OUTLYING = 5.0
-"""Distance over its scale from which a frame is bad; good frames exceed it once in 70 000."""
+"""Distance over its scale from which a frame is an outlier; good frames exceed it once in 70 000."""
 
 _MAXWELL_MEDIAN = 1.5382  # of the length of a Gaussian vector of scale one
 _EXACT_MM = 1e-6
@@ -45,19 +45,20 @@ class PivotCalibration:
     tip_offset : (3,) array
         The tip in the marker's frame, mm.
     pivot : (3,) array
-        The place that the tip rested in, in the tracker's frame, mm.
+        The fixed point that the tip rested in, in the tracker's frame, mm.
     rms_mm : float
-        Root mean square distance of the tip from that place, over the frames that count.
+        Root mean square distance of the tip from the pivot, over the frames used.
     covariance : (3, 3) array
-        Of the tip offset, mm^2, if the errors of the frames are independent and alike in all directions.
+        Of the tip offset, mm^2, if the errors of the frames are independent and isotropic.
     spread_deg : float
-        How far the marker turned, root mean square about its mean, in the direction that moved least.
+        Rotation of the marker about its mean orientation, root mean square, in the direction that moved
+        least.
     n_frames : int
-        Frames given.
+        Number of frames given.
     left_out : tuple of int
-        Frames that the others contradict, or that are no rigid motion.
+        Frames that contradict the others, or that are no rigid transform.
     unseen : tuple of int
-        Frames with numbers that are not finite: the marker was not seen.
+        Frames with numbers that are not finite: the marker was not visible.
     """
 
     tip_offset: FloatArray
@@ -76,7 +77,7 @@ class PivotCalibration:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What to know before trusting the tip."""
+        """What to know before using the tip."""
         found = []
         if self.left_out:
             found.append(f"{len(self.left_out)} of {self.n_frames} frames do not fit the others: left out")
@@ -88,7 +89,13 @@ class PivotCalibration:
         return tuple(found)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the calibration as the JSON file holds it."""
+        """Return the calibration as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "gpPivot": 1,
             "tip_offset_mm": self.tip_offset.tolist(),
@@ -105,15 +112,21 @@ class PivotCalibration:
 
 
 def calibrate_pivot(T_tracker_marker: ArrayLike) -> PivotCalibration:
-    """Find the tip of a probe that was turned about its resting tip.
+    """Find the tip of a probe that was rotated about its resting tip.
 
-    In every frame R_i tip + t_i = pivot; both are found by linear least squares at once (the "algebraic one
-    step" of the comparison). Bad frames are first held down by their weights, then left out by name.
+    In every frame, R_i tip + t_i = pivot; linear least squares solves for both at once (the "algebraic one
+    step" method of the reference). Bad frames are first down-weighted, then excluded and listed.
 
     Parameters
     ----------
     T_tracker_marker : (N, 4, 4) array_like
-        Poses of the marker in the tracker's frame, mm; ten or more. Frames of NaN were not seen.
+        Poses of the marker in the tracker's frame, mm; ten or more. Frames of NaN: the marker was not
+        visible.
+
+    Returns
+    -------
+    PivotCalibration
+        Tip and pivot with their errors.
 
     Raises
     ------
@@ -170,9 +183,9 @@ def calibrate_pivot(T_tracker_marker: ArrayLike) -> PivotCalibration:
 
 
 def _check_plausible(poses: FloatArray, tip: FloatArray, pivot: FloatArray) -> None:
-    """Refuse poses in metres, and those of the tracker in the marker's frame.
+    """Reject poses in metres, and poses of the tracker in the marker's frame.
 
-    These fit as well the other way round, with tip and pivot exchanged, so only their lengths tell.
+    The latter fit equally well, with tip and pivot exchanged; only the lengths reveal them.
     """
     if np.abs(poses[:, :3, 3]).max() < _NO_TRACKER_MM:
         raise GeometryError(
@@ -189,7 +202,7 @@ def _check_plausible(poses: FloatArray, tip: FloatArray, pivot: FloatArray) -> N
 
 
 def _tip_covariance(rotations: FloatArray, rms: float) -> FloatArray:
-    """Return the covariance of the least-squares tip; 3 n residuals pay for the six numbers found."""
+    """Return the covariance of the least-squares tip, with 3 n - 6 degrees of freedom."""
     n, mean = len(rotations), rotations.mean(axis=0)
     information = np.einsum("nij,nik->jk", rotations, rotations) - n * mean.T @ mean
     covariance: FloatArray = n * rms**2 / (3 * n - 6) * np.linalg.inv(information)
@@ -207,7 +220,7 @@ def _as_poses(value: ArrayLike) -> FloatArray:
 
 
 def _is_rigid(poses: FloatArray) -> NDArray[np.bool_]:
-    """Return (N,): which matrices are rotations with translations, as well as trackers round them."""
+    """Return (N,): which matrices are rigid transforms, up to the rounding of trackers."""
     with np.errstate(invalid="ignore", over="ignore"):
         rotations = poses[:, :3, :3]
         off = np.abs(rotations.transpose(0, 2, 1) @ rotations - np.eye(3)).max(axis=(1, 2))
@@ -246,14 +259,14 @@ def _check_frames(poses: FloatArray, kept: NDArray[np.bool_], seen: NDArray[np.b
 
 
 def _spread_deg(rotations: FloatArray) -> float:
-    """Return how far the direction fixed to the marker that turns least does turn about its mean, rms."""
+    """Return the rms rotation, about its mean, of the marker-fixed direction that rotates least."""
     mean = rotations.mean(axis=0)
     shortest = 1 - np.linalg.svd(mean, compute_uv=False)[0] ** 2
     return float(np.degrees(np.arcsin(np.sqrt(np.clip(shortest, 0, 1)))))
 
 
 def _reweighted_residuals(poses: FloatArray, sound: NDArray[np.bool_]) -> FloatArray:
-    """Return the distances from the solution of least sum of distances, which bad frames hardly pull."""
+    """Return the distances from the solution with the smallest sum of distances: robust to bad frames."""
     weights = sound.astype(np.float64)
     for _ in range(_N_REWEIGHTED):
         _, _, residuals = _solve(poses, weights)

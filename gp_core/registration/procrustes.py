@@ -1,4 +1,4 @@
-"""The rigid motion between two lists of corresponding points (weighted Procrustes)."""
+"""The rigid transform between two lists of corresponding points (weighted Procrustes)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,14 @@ from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray, as_points
 
-__all__ = ["RigidFit", "align", "fit_rigid", "rms_without_each", "surely_no_line", "weighted_procrustes"]
+__all__ = [
+    "RigidFit",
+    "align",
+    "certainly_not_collinear",
+    "fit_rigid",
+    "rms_without_each",
+    "weighted_procrustes",
+]
 
 COLLINEAR = 1e-3
 """Width over length below which points count as one line: 1 µm a mm, finer than any touch or voxel."""
@@ -22,7 +29,7 @@ _AMBIGUOUS = 1e-9
 
 @dataclass(frozen=True)
 class RigidFit:
-    """A rigid motion fitted to corresponding points.
+    """A rigid transform fitted to corresponding points.
 
     Parameters
     ----------
@@ -60,6 +67,11 @@ def fit_rigid(
         Frame names, destination first.
     names : sequence of str, optional
         Names of the points, for messages.
+
+    Returns
+    -------
+    RigidFit
+        The transform and its residuals.
 
     Raises
     ------
@@ -119,45 +131,68 @@ def weighted_procrustes(
     Umeyama, "Least-squares estimation of transformation parameters between two point patterns",
     IEEE TPAMI 13(4), 1991. https://doi.org/10.1109/34.88573
     """
-    points, aims = as_points(source, "source"), as_points(target, "target")
-    if points.shape != aims.shape:
-        raise GpError(f"source and target must hold as many points, got {len(points)} and {len(aims)}")
+    points, targets = as_points(source, "source"), as_points(target, "target")
+    if points.shape != targets.shape:
+        raise GpError(f"source and target must hold as many points, got {len(points)} and {len(targets)}")
     shares = _as_weights(weights, len(points))
-    _check_rank(points, aims, shares, _as_names(names, len(points)))
-    return align(points, aims, shares)
+    _check_rank(points, targets, shares, _as_names(names, len(points)))
+    return align(points, targets, shares)
 
 
-def align(points: FloatArray, aims: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Do what `weighted_procrustes` does, for points already known to be sound and not on one line."""
-    shares = weights / weights.sum()
-    point_centre, aim_centre = shares @ points, shares @ aims
-    covariance = (aims - aim_centre).T @ (shares[:, None] * (points - point_centre))
-    rotation = _nearest_rotation(covariance)
-    return rotation, aim_centre - rotation @ point_centre
-
-
-def rms_without_each(points: FloatArray, aims: FloatArray) -> FloatArray:
-    """Return the registration error (N,), mm, of all pairs but one, each left out in turn.
-
-    It is infinite where the others determine no rotation.
+def align(points: FloatArray, targets: FloatArray, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Do what `weighted_procrustes` does, for points already known to be finite and not collinear.
 
     Parameters
     ----------
-    points, aims : (N, 3) array
+    points, targets : (N, 3) array
+        Corresponding points, mm.
+    weights : (N,) array
+        Not negative, not all zero.
+
+    Returns
+    -------
+    rotation : (3, 3) array
+        Proper rotation, det +1.
+    translation : (3,) array
+        Translation, mm.
+
+    Raises
+    ------
+    GeometryError
+        Many rotations fit equally well.
+    """
+    shares = weights / weights.sum()
+    source_centre, target_centre = shares @ points, shares @ targets
+    covariance = (targets - target_centre).T @ (shares[:, None] * (points - source_centre))
+    rotation = _nearest_rotation(covariance)
+    return rotation, target_centre - rotation @ source_centre
+
+
+def rms_without_each(points: FloatArray, targets: FloatArray) -> FloatArray:
+    """Return the registration error of all pairs but one, each left out in turn.
+
+    Parameters
+    ----------
+    points, targets : (N, 3) array
         Corresponding points, known to be finite, mm.
+
+    Returns
+    -------
+    (N,) array, mm
+        Infinite where the other pairs determine no rotation.
     """
     n = len(points)
     others = np.nonzero(~np.eye(n, dtype=bool))[1].reshape(n, n - 1)
-    moving, fixed = (cloud[others] - cloud[others].mean(axis=1, keepdims=True) for cloud in (points, aims))
+    moving, fixed = (cloud[others] - cloud[others].mean(axis=1, keepdims=True) for cloud in (points, targets))
     left, spread, right = np.linalg.svd(fixed.transpose(0, 2, 1) @ moving)
     sign = np.where(np.linalg.det(left @ right) > 0, 1.0, -1.0)
-    is_open = spread[:, 1] + sign * spread[:, 2] <= _AMBIGUOUS * spread[:, 0]
-    for centred, cloud in ((moving, points), (fixed, aims)):
-        is_open |= _are_lines(centred, float(np.abs(cloud).max()))
+    is_ambiguous = spread[:, 1] + sign * spread[:, 2] <= _AMBIGUOUS * spread[:, 0]
+    for centred, cloud in ((moving, points), (fixed, targets)):
+        is_ambiguous |= _are_collinear(centred, float(np.abs(cloud).max()))
     left[:, :, 2] *= sign[:, None]
     off = moving @ (left @ right).transpose(0, 2, 1) - fixed
     rms: FloatArray = np.sqrt((off**2).sum(axis=(1, 2)) / (n - 1))
-    rms[is_open] = np.inf
+    rms[is_ambiguous] = np.inf
     return rms
 
 
@@ -174,7 +209,7 @@ def _nearest_rotation(covariance: FloatArray) -> FloatArray:
     return rotation
 
 
-def _check_rank(points: FloatArray, aims: FloatArray, weights: FloatArray, names: tuple[str, ...]) -> None:
+def _check_rank(points: FloatArray, targets: FloatArray, weights: FloatArray, names: tuple[str, ...]) -> None:
     counts = np.flatnonzero(weights > 0)
     which = ", ".join(names[i] for i in counts[:12]) + (", ..." if len(counts) > 12 else "")
     if len(counts) < 3:
@@ -182,34 +217,47 @@ def _check_rank(points: FloatArray, aims: FloatArray, weights: FloatArray, names
             f"a rigid fit needs at least three points, got {len(counts)}" + (f": {which}" if which else ""),
             remedy="Add points that do not lie on one line.",
         )
-    for label, cloud in (("source", points), ("target", aims)):
-        if _is_line(cloud[counts], weights[counts]):
+    for label, cloud in (("source", points), ("target", targets)):
+        if _is_collinear(cloud[counts], weights[counts]):
             raise GeometryError(
-                f"the {label} points lie on one line and leave the turn about it open: {which}",
+                f"the {label} points lie on one line, so the rotation about it is undetermined: {which}",
                 remedy="Add a point away from that line.",
             )
 
 
-def _is_line(points: FloatArray, weights: FloatArray) -> bool:
+def _is_collinear(points: FloatArray, weights: FloatArray) -> bool:
     centred = points - weights @ points / weights.sum()
     rounded = float(np.sqrt(weights.mean())) * float(np.abs(points).max())
-    return bool(_are_lines((np.sqrt(weights)[:, None] * centred)[None], rounded)[0])
+    return bool(_are_collinear((np.sqrt(weights)[:, None] * centred)[None], rounded)[0])
 
 
-def _are_lines(centred: FloatArray, largest: float) -> NDArray[np.bool_]:
-    """Return which of M clouds (M, N, 3) about 0 are lines, where no coordinate was above `largest`."""
+def _are_collinear(centred: FloatArray, largest: float) -> NDArray[np.bool_]:
+    """Return which of M centred point sets (M, N, 3) are collinear.
+
+    No original coordinate exceeds `largest`.
+    """
     length, width, _ = np.linalg.svd(centred, compute_uv=False).T
-    # Coincident points leave rounding only, as wide as long: hold them against the coordinates too.
+    # Coincident points leave only rounding, as wide as long: compare with the coordinates as well.
     rounding = 1e-13 * float(np.sqrt(centred.shape[1])) * largest
     lines: NDArray[np.bool_] = width <= np.maximum(COLLINEAR * length, rounding)
     return lines
 
 
-def surely_no_line(points: FloatArray) -> bool:
-    """Return whether points (N, 3) span a plane at least; cheap, and false where it takes a closer look.
+def certainly_not_collinear(points: FloatArray) -> bool:
+    """Return whether points surely span a plane: cheap, and False where only a closer look could tell.
 
     With the squared lengths of the three principal axes as a, b, c, it compares ab + ac + bc to the square of
     their sum: on a line b and c are 0, and up to `COLLINEAR` not above its square.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+        Points, mm.
+
+    Returns
+    -------
+    bool
+        True only if the points are not collinear.
     """
     if len(points) < 3:
         return False

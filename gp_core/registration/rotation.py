@@ -1,6 +1,6 @@
-"""The rotation that brings points onto points best, in plain numbers.
+"""The optimal rotation between two sets of points, in plain numbers.
 
-Plain Python that Numba can compile; `gp_core.registration.rotation_compiled` does, for the kernels of JRMPC
+Plain Python that Numba can compile; `gp_core.registration.rotation_compiled` does so for the kernels of JRMPC
 (`gp_core.registration.jrmpc_kernels`) and of the robust fit (`gp_core.registration.student_t_fit_compiled`).
 Rotations are unit quaternions, w first.
 """
@@ -10,59 +10,90 @@ from __future__ import annotations
 import math
 from typing import TypeAlias
 
-__all__ = ["NO_TURN", "TURNS", "Matrix3", "Quaternion", "as_matrix", "best_turn", "least_turn", "product"]
+__all__ = [
+    "IDENTITY",
+    "ROTATIONS",
+    "Matrix3",
+    "Quaternion",
+    "as_matrix",
+    "minimal_rotation",
+    "optimal_rotation",
+    "product",
+]
 
 Quaternion: TypeAlias = tuple[float, float, float, float]
 Matrix3: TypeAlias = tuple[float, float, float, float, float, float, float, float, float]
 Symmetric4: TypeAlias = tuple[float, float, float, float, float, float, float, float, float, float]
 
-NO_TURN = (1.0, 0.0, 0.0, 0.0)
+IDENTITY = (1.0, 0.0, 0.0, 0.0)
 """The identity."""
 
-_OPEN = 1e-10  # relative gap below which a rotation is not determined
-_SETTLED = 1e-14  # squared angle of a Newton step whose successor would be below rounding
+_UNDETERMINED = 1e-10  # relative gap below which a rotation is not determined
+_CONVERGED_ANGLE2 = 1e-14  # squared angle of a Newton step after which the next would be below rounding
 _NEWTON_STEPS = 12
 _SQUARINGS = 40
-_SQUARINGS_OF_TIES = 24  # each doubles the difference that rounding has made between eigenvectors that tie
-_ALIGNED = 1.0 - 1e-6  # trace of the square of a matrix of trace 1: nothing but its top eigenvector is left
+_SQUARINGS_OF_TIES = 24  # each doubles the rounding difference between eigenvalues that tie
+_ALIGNED = 1.0 - 1e-6  # trace of the square of a matrix of trace 1: only the top eigenvector is left
 
 
-def best_turn(h: Matrix3, start: Quaternion) -> Quaternion:
-    """Return the rotation R that makes trace(R^T h) largest, by Newton's method on rotations.
+def optimal_rotation(h: Matrix3, start: Quaternion) -> Quaternion:
+    """Return the rotation R that maximises trace(R^T h), by Newton's method on rotations.
 
-    That the matrix of the last step is positive definite proves the maximum to be the global one, since all
-    other stationary rotations are saddles or minima. Where one is not, Newton starts again from Horn's
-    eigenvector; where none is again, the rotation is open, and the answer is not a number.
+    A positive definite Hessian in the last step proves that the maximum is the global one, since all other
+    stationary rotations are saddles or minima. Where the Hessian is not positive definite, Newton restarts
+    from Horn's eigenvector; where that fails too, the rotation is under-determined.
+
+    Parameters
+    ----------
+    h : 9 floats
+        The (3, 3) cross-covariance, row by row: sum of w (target - centre) (source - centre)^T.
+    start : Quaternion
+        Where Newton's method starts.
+
+    Returns
+    -------
+    Quaternion
+        Of the rotation; NaN where it is under-determined.
     """
     scale = _size(h)
-    turn, fresh = start, False
+    quaternion, restarted = start, False
     for _ in range(_NEWTON_STEPS):
-        definite, x, y, z = _newton_step(h, as_matrix(turn), _OPEN * scale)
+        definite, x, y, z = _newton_step(h, as_matrix(quaternion), _UNDETERMINED * scale)
         if definite:
-            turn = product((1.0, 0.5 * x, 0.5 * y, 0.5 * z), turn)
-            if x * x + y * y + z * z < _SETTLED:
+            quaternion = product((1.0, 0.5 * x, 0.5 * y, 0.5 * z), quaternion)
+            if x * x + y * y + z * z < _CONVERGED_ANGLE2:
                 break
-        elif fresh:
+        elif restarted:
             return math.nan, math.nan, math.nan, math.nan
         else:
-            turn, fresh = _top(_horn(h, scale, _SQUARINGS)), True
-    return turn
+            quaternion, restarted = _top(_horn(h, scale, _SQUARINGS)), True
+    return quaternion
 
 
-def least_turn(h: Matrix3) -> Quaternion:
-    """Return the rotation R that makes trace(R^T h) largest; of many, the one nearest to no turn.
+def minimal_rotation(h: Matrix3) -> Quaternion:
+    """Return the rotation R that maximises trace(R^T h); among several, the one nearest to the identity.
 
-    Horn's matrix, squared, tends to the projector on the eigenvectors that tie; its first row is what that
-    makes of no turn.
+    Repeated squaring of Horn's matrix converges to the projector onto the eigenvectors with the largest
+    eigenvalue; the first row of that projector is the projection of the identity.
+
+    Parameters
+    ----------
+    h : 9 floats
+        The (3, 3) cross-covariance, row by row.
+
+    Returns
+    -------
+    Quaternion
+        Of the rotation, always finite.
     """
-    turn = best_turn(h, NO_TURN)
-    if not math.isnan(turn[0]):
-        return turn
+    quaternion = optimal_rotation(h, IDENTITY)
+    if not math.isnan(quaternion[0]):
+        return quaternion
     scale = _size(h)
     if scale == 0.0:
-        return NO_TURN
+        return IDENTITY
     n = _horn(h, scale, _SQUARINGS_OF_TIES)
-    return product(NO_TURN, (n[0], n[1], n[2], n[3])) if n[0] > _OPEN else _top(n)
+    return product(IDENTITY, (n[0], n[1], n[2], n[3])) if n[0] > _UNDETERMINED else _top(n)
 
 
 def _size(h: Matrix3) -> float:
@@ -101,12 +132,12 @@ def _newton_step(h: Matrix3, r: Matrix3, least: float) -> tuple[bool, float, flo
 
 
 def _horn(h: Matrix3, scale: float, n_squarings: int) -> Symmetric4:
-    """Square Horn's (4, 4) matrix until nothing but its top eigenvector is left, or those that tie.
+    """Square Horn's (4, 4) matrix until only its top eigenvector, or those that tie with it, are left.
 
     Horn, J. Opt. Soc. Am. A 4(4), 1987. https://doi.org/10.1364/JOSAA.4.000629
     """
     xx, xy, xz, yx, yy, yz, zx, zy, zz = h
-    shift = 2.0 * scale  # no eigenvalue is below its negative: so the top one is the largest in size too
+    shift = 2.0 * scale  # makes all eigenvalues positive, so that the top one is the largest in magnitude
     n = (
         shift + xx + yy + zz,
         zy - yz,
@@ -131,12 +162,12 @@ def _top(n: Symmetric4) -> Quaternion:
     a, b, c, d, e, f, g, i, k, m = n
     top = max(a, e, i, m)
     if a == top:
-        return product(NO_TURN, (a, b, c, d))
+        return product(IDENTITY, (a, b, c, d))
     if e == top:
-        return product(NO_TURN, (b, e, f, g))
+        return product(IDENTITY, (b, e, f, g))
     if i == top:
-        return product(NO_TURN, (c, f, i, k))
-    return product(NO_TURN, (d, g, k, m))
+        return product(IDENTITY, (c, f, i, k))
+    return product(IDENTITY, (d, g, k, m))
 
 
 def _squared(n: Symmetric4) -> Symmetric4:
@@ -160,7 +191,18 @@ def _squared(n: Symmetric4) -> Symmetric4:
 
 
 def product(a: Quaternion, b: Quaternion) -> Quaternion:
-    """Multiply two quaternions and make the product unit: the turn b, then the turn a."""
+    """Multiply two quaternions and normalise the product: first the rotation b, then the rotation a.
+
+    Parameters
+    ----------
+    a, b : Quaternion
+        Factors, w first.
+
+    Returns
+    -------
+    Quaternion
+        The unit product.
+    """
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     w = aw * bw - ax * bx - ay * by - az * bz
@@ -171,14 +213,35 @@ def product(a: Quaternion, b: Quaternion) -> Quaternion:
     return w * size, x * size, y * size, z * size
 
 
-def as_matrix(turn: Quaternion) -> Matrix3:
-    """Return the rotation matrix of a unit quaternion, row by row."""
-    w, x, y, z = turn
+def as_matrix(quaternion: Quaternion) -> Matrix3:
+    """Return the rotation matrix of a unit quaternion, row by row.
+
+    Parameters
+    ----------
+    quaternion : Quaternion
+        Of unit length, w first.
+
+    Returns
+    -------
+    Matrix3
+        The (3, 3) matrix, row by row.
+    """
+    w, x, y, z = quaternion
     x2, y2, z2 = 2.0 * x, 2.0 * y, 2.0 * z
     wx, wy, wz, xx, xy, xz = w * x2, w * y2, w * z2, x * x2, x * y2, x * z2
     yy, yz, zz = y * y2, y * z2, z * z2
     return 1.0 - yy - zz, xy - wz, xz + wy, xy + wz, 1.0 - xx - zz, yz - wx, xz - wy, yz + wx, 1.0 - xx - yy
 
 
-TURNS = (_size, product, as_matrix, _squared, _horn, _top, _newton_step, best_turn, least_turn)
+ROTATIONS = (
+    _size,
+    product,
+    as_matrix,
+    _squared,
+    _horn,
+    _top,
+    _newton_step,
+    optimal_rotation,
+    minimal_rotation,
+)
 """All functions of this module, each after those it calls."""

@@ -1,14 +1,14 @@
-"""`gp_core.registration.rotation`, compiled into whatever kernel calls it; importing this loads Numba."""
+"""`gp_core.registration.rotation`, compiled into every kernel that calls it; importing it loads Numba."""
 
 from __future__ import annotations
 
 from gp_core.registration import rotation
 from gp_core.registration.compiling import compiled_together
 
-__all__ = ["as_matrix", "best_turn", "least_turn", "product"]
+__all__ = ["as_matrix", "minimal_rotation", "optimal_rotation", "product"]
 
-_KERNELS = compiled_together(rotation.TURNS, vars(rotation))
+_KERNELS = compiled_together(rotation.ROTATIONS, vars(rotation))
 as_matrix = _KERNELS["as_matrix"]
-best_turn = _KERNELS["best_turn"]
-least_turn = _KERNELS["least_turn"]
+optimal_rotation = _KERNELS["optimal_rotation"]
+minimal_rotation = _KERNELS["minimal_rotation"]
 product = _KERNELS["product"]

@@ -1,10 +1,8 @@
-"""Register a touched skull to its CT: by names, by ICP as in the paper, or to the surface of the bone."""
+"""Register a touched skull to its CT: by names, by ICP as in the paper, or to the bone surface."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,79 +13,62 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.icp import icp
 from gp_core.registration.icp_targets import Cloud, Surface
+from gp_core.registration.result import RegistrationResult
 from gp_core.validation import FloatArray, as_points
 
-__all__ = ["SkullRegistration", "register_by_icp", "register_by_names", "register_to_surface"]
+__all__ = ["register_by_icp", "register_by_names", "register_to_surface"]
 
 _FEWEST = 3
 
 
-@dataclass(frozen=True)
-class SkullRegistration:
-    """A touched skull registered to its CT.
+def register_by_names(touches: LandmarkSet, ct: LandmarkSet) -> RegistrationResult:
+    """Register the skull features by their names; outliers are left out.
 
-    Attributes
+    Parameters
     ----------
-    way : str
-        ``names``, ``icp`` or ``surface``.
-    T_scan_tracker : RigidTransform
-    fre_mm : float
-        Fiducial registration error: root mean square distance between the touched features and those of the
-        same names in the CT, of all but the suspects; of ``surface``, from the touches to the bone.
-    residuals_mm : dict of str to float
-        The distance of each feature.
-    suspects : tuple of str
-        Features that the others contradict; left out by ``names``, kept by ``icp``, as in the paper.
-    """
+    touches, ct : LandmarkSet
+        With the skull features in `extra`, mm; tracker and scan frame.
 
-    way: str
-    T_scan_tracker: RigidTransform
-    fre_mm: float
-    residuals_mm: dict[str, float]
-    suspects: tuple[str, ...] = ()
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return the registration as the JSON file holds it."""
-        return {
-            "way": self.way,
-            "T_scan_tracker": self.T_scan_tracker.matrix.tolist(),
-            "fre_mm": self.fre_mm,
-            "residuals_mm": self.residuals_mm,
-            "suspect": list(self.suspects),
-        }
-
-
-def register_by_names(touches: LandmarkSet, ct: LandmarkSet) -> SkullRegistration:
-    """Register the skull features by their names; a feature that the others contradict is left out.
+    Returns
+    -------
+    RegistrationResult
+        ``T_scan_tracker``, method ``names``.
 
     Raises
     ------
     GpError
-        Fewer than three features in common, or on one line.
+        Fewer than three features in common, or collinear ones.
     """
     names, touched, labelled = _common(touches, ct)
-    found = register_fiducials(
-        dict(zip(names, touched, strict=True)), dict(zip(names, labelled, strict=True))
-    )
-    return SkullRegistration("names", found.T_scan_tracker, found.fre_mm, found.residuals_mm, found.suspects)
+    return register_fiducials(dict(zip(names, touched, strict=True)), dict(zip(names, labelled, strict=True)))
 
 
-def register_by_icp(touches: LandmarkSet, ct: LandmarkSet) -> SkullRegistration:
+def register_by_icp(touches: LandmarkSet, ct: LandmarkSet) -> RegistrationResult:
     """Register the skull features by iterative closest point, without their names, as the paper does.
+
+    Parameters
+    ----------
+    touches, ct : LandmarkSet
+        With the skull features in `extra`, mm; tracker and scan frame.
+
+    Returns
+    -------
+    RegistrationResult
+        ``T_scan_tracker``, method ``icp``.
 
     Raises
     ------
     GpError
-        Fewer than three features in common, or on one line.
+        Fewer than three features in common, or collinear ones.
     """
     names, touched, labelled = _common(touches, ct)
     found = icp(touched, Cloud(labelled), dst="scan", src="tracker")
     residuals = _residuals(found.transform, names, touched, labelled)
     rms = float(np.sqrt(np.mean(np.square(list(residuals.values())))))
-    return SkullRegistration("icp", found.transform, rms, residuals)
+    return RegistrationResult(found.transform, tuple(names), residuals, rms, fiducials=labelled, method="icp")
 
 
-def register_to_surface(points: ArrayLike, bone: Surface, start: RigidTransform) -> SkullRegistration:
+def register_to_surface(points: ArrayLike, bone: Surface, start: RigidTransform) -> RegistrationResult:
     """Register points touched anywhere on the bone to its surface.
 
     Parameters
@@ -97,13 +78,18 @@ def register_to_surface(points: ArrayLike, bone: Surface, start: RigidTransform)
     bone : Surface
         From the CT, mm, scan frame.
     start : RigidTransform
-        ``T_scan_tracker`` within some millimetres and ten degrees, such as `register_by_names` of a few
-        features gives.
+        ``T_scan_tracker`` to within some millimetres and ten degrees, such as `register_by_names` gives for a
+        few features.
+
+    Returns
+    -------
+    RegistrationResult
+        ``T_scan_tracker``, method ``surface``.
 
     Raises
     ------
     GeometryError
-        Fewer than three points, or on one line.
+        Fewer than three points, or collinear ones.
     """
     touched = as_points(np.reshape(points, (-1, 3)), "points on the bone")
     if len(touched) < _FEWEST:
@@ -114,7 +100,14 @@ def register_to_surface(points: ArrayLike, bone: Surface, start: RigidTransform)
         )
     found = icp(touched, bone, start=start, dst=start.dst, src=start.src)
     residuals = {f"point {i + 1}": distance for i, distance in enumerate(found.distances.tolist())}
-    return SkullRegistration("surface", found.transform, found.rms, residuals)
+    return RegistrationResult(
+        found.transform,
+        tuple(residuals),
+        residuals,
+        found.rms,
+        fiducials=found.transform.apply(touched),
+        method="surface",
+    )
 
 
 def _common(touches: LandmarkSet, ct: LandmarkSet) -> tuple[list[str], FloatArray, FloatArray]:

@@ -1,12 +1,12 @@
 """The inner loop of the fit to named points, in plain Python that Numba can compile.
 
-There is one source and two ways to run it, to the same answers: as it stands, which needs no start-up and
-takes some milliseconds, and compiled by `gp_core.registration.student_t_fit_compiled`, which takes half a
-second to load and then a fortieth of the time. `gp_core.registration.named_points` says which is run when.
+One source runs in two ways with the same results: as it stands, with no start-up time, in a few milliseconds;
+or compiled by `gp_core.registration.student_t_fit_compiled`, which takes half a second to load and then runs
+forty times faster. `gp_core.registration.named_points` decides which.
 
-So everything here is a number or a one-dimensional buffer, a memoryview in the one case and an array in the
-other, with x, y, z of each point in a row. Nothing is raised to a power, and nothing but an overflow divides
-by zero, where the two would differ.
+Therefore everything here is a number or a one-dimensional buffer (a memoryview in plain Python, an array when
+compiled) with x, y, z of each point in a row. Powers are avoided, and nothing but an overflow divides by
+zero, because the two would differ there.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import math
 from collections.abc import MutableSequence
 from typing import TypeAlias
 
-from gp_core.registration.rotation import as_matrix, best_turn
+from gp_core.registration.rotation import as_matrix, optimal_rotation
 
 __all__ = [
     "KERNELS",
@@ -25,7 +25,7 @@ __all__ = [
     "TOLERANCE",
     "TYPICAL_NOISE_MM",
     "best_exchange",
-    "settle",
+    "fit_student_t",
 ]
 
 Buffer: TypeAlias = MutableSequence[float]
@@ -33,19 +33,19 @@ Vector: TypeAlias = tuple[float, float, float]
 Symmetric3: TypeAlias = tuple[float, float, float, float, float, float]
 
 TYPICAL_NOISE_MM = 0.05
-"""Scale of a careful touch, mm a coordinate, to which the estimate of sigma is drawn."""
+"""Scale of a careful touch, mm a coordinate: the prior of sigma."""
 
 NU = 4.0
 """Degrees of freedom of a touch error."""
 
 PRIOR_WEIGHT = 2.0
-"""How many coordinates the prior of sigma is worth."""
+"""Weight of the prior of sigma, in coordinates."""
 
 POSE_SIZE = 16
 """Quaternion (4), translation (3), rotation matrix row by row (9)."""
 
 TOLERANCE = 1e-5
-"""Change of a weight, and relative change of the squared scale, below which a fit has settled."""
+"""Change of a weight, and relative change of the squared scale, below which a fit has converged."""
 
 _STRIDE, _LONGEST_STRIDE = 2.0, 8.0
 _NEAR = 0.1  # step of the logarithm of the squared scale
@@ -53,10 +53,10 @@ _SCREENING_ITERATIONS = 3
 _SLACK = 4.0
 
 
-def settle(
+def fit_student_t(
     mean: Buffer,
     variances: Buffer,
-    reading: Buffer,
+    touches: Buffer,
     weights: Buffer,
     precision: Buffer,
     points: Buffer,
@@ -65,29 +65,28 @@ def settle(
     noise: float,
     n_iterations: int,
 ) -> tuple[float, float, float]:
-    """Find pose, weights and scale of one reading of the touches; `named_points` explains the model.
+    """Find pose, weights and scale for one assignment of names to touches; `named_points` explains the model.
 
     Parameters
     ----------
-    mean, reading : (3 n,)
+    mean, touches : (3 n,)
         Mean of the atlas, and the touches, mm.
     variances : (n,)
-        Of the features between animals, mm^2 a coordinate.
+        Variances of the features between animals, mm^2 a coordinate.
     weights : (n,)
-        In: where to start. Out: about 1 for an ordinary touch, towards 0 for one that does not fit.
+        In: start values. Out: about 1 for an ordinary touch, towards 0 for an outlier.
     precision, points, errors : (n,), (3 n,), (n,)
-        Out: inverse variances of the touches, the touches brought into the atlas frame, expected squared
-        touch errors.
+        Out: inverse variances of the touches, the touches in the atlas frame, expected squared touch errors.
     pose : (16,)
         In: a quaternion to start from. Out: quaternion, translation (mm), rotation matrix row by row.
     noise : float
-        Scale of the touch errors, mm; 0: to be found.
+        Scale of the touch errors, mm; 0: to be estimated.
     n_iterations : int
-        Iterations at most.
+        Maximum number of iterations.
 
     Returns
     -------
-    sigma2, change, misfit : float
+    sigma2, change, neg_log_posterior : float
         Squared scale of the touch errors (mm^2), largest change that one more iteration would make,
         negative log posterior.
     """
@@ -95,14 +94,14 @@ def settle(
     sigma2 = noise * noise if given else TYPICAL_NOISE_MM * TYPICAL_NOISE_MM
     change, shift, stride = math.inf, 0.0, _STRIDE
     for iteration in range(n_iterations + 1):
-        total = _weigh(variances, weights, sigma2, precision)
-        centre, touched = _mean_of(mean, precision, total), _mean_of(reading, precision, total)
-        _turn(mean, centre, reading, touched, precision, total, pose)
-        _bring(reading, touched, pose, centre, points)
-        change = _expect(mean, centre, weights, sigma2, total, precision, points, errors)
+        total = _update_precision(variances, weights, sigma2, precision)
+        centre, touch_centre = _mean_of(mean, precision, total), _mean_of(touches, precision, total)
+        _update_rotation(mean, centre, touches, touch_centre, precision, total, pose)
+        _to_atlas_frame(touches, touch_centre, pose, centre, points)
+        change = _expected_errors(mean, centre, weights, sigma2, total, precision, points, errors)
         if not given:
-            last, shift = shift, _shift(errors, sigma2)
-            stride = _next_stride(stride, last, shift)
+            previous, shift = shift, _log_scale_step(errors, sigma2)
+            stride = _next_stride(stride, previous, shift)
             change = max(change, abs(shift))
         if change < TOLERANCE or iteration == n_iterations:
             break
@@ -111,14 +110,16 @@ def settle(
         sigma2 *= math.exp(stride * shift)
     for a in range(3):
         r = 7 + 3 * a
-        pose[4 + a] = touched[a] - (pose[r] * centre[0] + pose[r + 1] * centre[1] + pose[r + 2] * centre[2])
-    return sigma2, change, _misfit(mean, variances, weights, precision, points, sigma2, given)
+        pose[4 + a] = touch_centre[a] - (
+            pose[r] * centre[0] + pose[r + 1] * centre[1] + pose[r + 2] * centre[2]
+        )
+    return sigma2, change, _neg_log_posterior(mean, variances, weights, precision, points, sigma2, given)
 
 
 def best_exchange(
     mean: Buffer,
     variances: Buffer,
-    reading: Buffer,
+    touches: Buffer,
     weights: Buffer,
     precision: Buffer,
     points: Buffer,
@@ -128,21 +129,24 @@ def best_exchange(
     n_iterations: int,
     below: float,
 ) -> tuple[float, float, float]:
-    """Settle the reading with every two of its touches exchanged; parameters as of `settle`, and `below`.
+    """Fit the touches with every pair of names exchanged, and return the best pair.
 
-    Few iterations tell most exchanges off: early on, the misfit is hardly ever above the one it settles at,
-    and never by `_SLACK` in some thousands of real and drawn touches.
+    A few iterations reject most exchanges: in early iterations the negative log posterior is hardly ever
+    above its value at convergence, and never by `_SLACK` in some thousands of real and simulated sets of
+    touches.
 
     Parameters
     ----------
+    mean, variances, touches, weights, precision, points, errors, pose, noise, n_iterations
+        As for `fit_student_t`.
     below : float
-        Misfit below which an exchange is of interest.
+        Negative log posterior below which an exchange is of interest.
 
     Returns
     -------
     i, j : float
-        The touches whose exchange settles best.
-    misfit : float
+        The touches whose exchange fits best.
+    neg_log_posterior : float
         With them exchanged; infinite where none comes near `below`.
     """
     n = len(variances)
@@ -151,30 +155,30 @@ def best_exchange(
     start = (pose[0], pose[1], pose[2], pose[3])
     for i in range(n):
         for j in range(i + 1, n):
-            _exchange(reading, i, j)
-            misfit = below + _SLACK
+            _exchange(touches, i, j)
+            neg_log_posterior = below + _SLACK
             for n_most in (_SCREENING_ITERATIONS, n_iterations):
-                if misfit > below + _SLACK:
+                if neg_log_posterior > below + _SLACK:
                     break
                 for k in range(n):
                     weights[k] = 1.0
                 pose[0], pose[1], pose[2], pose[3] = start
-                _, _, misfit = settle(
-                    mean, variances, reading, weights, precision, points, errors, pose, noise, n_most
+                _, _, neg_log_posterior = fit_student_t(
+                    mean, variances, touches, weights, precision, points, errors, pose, noise, n_most
                 )
-            if misfit < least:
-                least, first, second = misfit, i, j
-            _exchange(reading, i, j)
+            if neg_log_posterior < least:
+                least, first, second = neg_log_posterior, i, j
+            _exchange(touches, i, j)
     return 1.0 * first, 1.0 * second, least
 
 
-def _exchange(reading: Buffer, i: int, j: int) -> None:
+def _exchange(touches: Buffer, i: int, j: int) -> None:
     for a in range(3):
-        reading[3 * i + a], reading[3 * j + a] = reading[3 * j + a], reading[3 * i + a]
+        touches[3 * i + a], touches[3 * j + a] = touches[3 * j + a], touches[3 * i + a]
 
 
-def _weigh(variances: Buffer, weights: Buffer, sigma2: float, precision: Buffer) -> float:
-    """Write the inverse variance of each touch, the shape integrated out, and return their sum."""
+def _update_precision(variances: Buffer, weights: Buffer, sigma2: float, precision: Buffer) -> float:
+    """Write the inverse variance of each touch, with the shape integrated out, and return their sum."""
     total = 0.0
     for j in range(len(variances)):
         p = 1.0 / (variances[j] + sigma2 / weights[j])
@@ -193,25 +197,25 @@ def _mean_of(points: Buffer, precision: Buffer, total: float) -> Vector:
     return x / total, y / total, z / total
 
 
-def _turn(
+def _update_rotation(
     mean: Buffer,
     centre: Vector,
-    reading: Buffer,
-    touched: Vector,
+    touches: Buffer,
+    touch_centre: Vector,
     precision: Buffer,
     total: float,
     pose: Buffer,
 ) -> None:
-    """Turn the mean to the touches, both about their weighted centres (weighted Procrustes)."""
+    """Rotate the mean to the touches, both about their weighted centres (weighted Procrustes)."""
     cx, cy, cz = centre
-    tx, ty, tz = touched
+    tx, ty, tz = touch_centre
     xx = xy = xz = yx = yy = yz = zx = zy = zz = 0.0
     for j in range(len(precision)):
         share = precision[j] / total
         x, y, z = mean[3 * j] - cx, mean[3 * j + 1] - cy, mean[3 * j + 2] - cz
-        u = share * (reading[3 * j] - tx)
-        v = share * (reading[3 * j + 1] - ty)
-        w = share * (reading[3 * j + 2] - tz)
+        u = share * (touches[3 * j] - tx)
+        v = share * (touches[3 * j + 1] - ty)
+        w = share * (touches[3 * j + 2] - tz)
         xx += u * x
         xy += u * y
         xz += u * z
@@ -221,27 +225,29 @@ def _turn(
         zx += w * x
         zy += w * y
         zz += w * z
-    turn = best_turn((xx, xy, xz, yx, yy, yz, zx, zy, zz), (pose[0], pose[1], pose[2], pose[3]))
-    pose[0], pose[1], pose[2], pose[3] = turn
-    rotation = as_matrix(turn)
+    quaternion = optimal_rotation((xx, xy, xz, yx, yy, yz, zx, zy, zz), (pose[0], pose[1], pose[2], pose[3]))
+    pose[0], pose[1], pose[2], pose[3] = quaternion
+    rotation = as_matrix(quaternion)
     for i in range(9):
         pose[7 + i] = rotation[i]
 
 
-def _bring(reading: Buffer, touched: Vector, pose: Buffer, centre: Vector, points: Buffer) -> None:
+def _to_atlas_frame(
+    touches: Buffer, touch_centre: Vector, pose: Buffer, centre: Vector, points: Buffer
+) -> None:
     """Write the touches in the atlas frame."""
-    tx, ty, tz = touched
+    tx, ty, tz = touch_centre
     cx, cy, cz = centre
     r0, r1, r2, r3, r4 = pose[7], pose[8], pose[9], pose[10], pose[11]
     r5, r6, r7, r8 = pose[12], pose[13], pose[14], pose[15]
-    for i in range(0, len(reading), 3):
-        x, y, z = reading[i] - tx, reading[i + 1] - ty, reading[i + 2] - tz
+    for i in range(0, len(touches), 3):
+        x, y, z = touches[i] - tx, touches[i + 1] - ty, touches[i + 2] - tz
         points[i] = r0 * x + r3 * y + r6 * z + cx
         points[i + 1] = r1 * x + r4 * y + r7 * z + cy
         points[i + 2] = r2 * x + r5 * y + r8 * z + cz
 
 
-def _expect(
+def _expected_errors(
     mean: Buffer,
     centre: Vector,
     weights: Buffer,
@@ -251,11 +257,7 @@ def _expect(
     points: Buffer,
     errors: Buffer,
 ) -> float:
-    """Write the expected squared error of each touch, and return the largest change of a weight by it.
-
-    The pose uses up part of each touch's precision. With the pose taken about the weighted centre,
-    translation and rotation separate, and the rotation's information is the inertia tensor of the points.
-    """
+    """Write the expected squared error of each touch, and return the largest change of a weight."""
     cx, cy, cz = centre
     ixx, ixy, ixz, iyy, iyz, izz = _inverse(_inertia(points, centre, precision))
     trace = ixx + iyy + izz
@@ -263,7 +265,7 @@ def _expect(
     for j in range(len(precision)):
         px, py, pz = points[3 * j], points[3 * j + 1], points[3 * j + 2]
         x, y, z = px - cx, py - cy, pz - cz
-        through_turn = (
+        through_rotation = (
             (x * x + y * y + z * z) * trace
             - (ixx * x * x + iyy * y * y + izz * z * z)
             - 2.0 * (ixy * x * y + ixz * x * z + iyz * y * z)
@@ -271,7 +273,7 @@ def _expect(
         x, y, z = px - mean[3 * j], py - mean[3 * j + 1], pz - mean[3 * j + 2]
         p, w = precision[j], weights[j]
         noise = sigma2 / w
-        squared = x * x + y * y + z * z + 3.0 / total + through_turn
+        squared = x * x + y * y + z * z + 3.0 / total + through_rotation
         error = noise * noise * p * p * squared + 3.0 * noise * (1.0 - noise * p)
         errors[j] = error
         step = abs((NU + 3.0) / (NU + error / sigma2) - w)
@@ -310,28 +312,24 @@ def _inverse(n: Symmetric3) -> Symmetric3:
     )
 
 
-def _shift(errors: Buffer, sigma2: float) -> float:
-    """Return by how much the logarithm of the squared scale should change, by the expected errors."""
+def _log_scale_step(errors: Buffer, sigma2: float) -> float:
+    """Return the change of the logarithm of the squared scale that the expected errors suggest."""
     total = PRIOR_WEIGHT * TYPICAL_NOISE_MM * TYPICAL_NOISE_MM
     for k in range(len(errors)):
         total += (NU + 3.0) / (NU + errors[k] / sigma2) * errors[k]
     return math.log(total / ((PRIOR_WEIGHT + 3.0 * len(errors)) * sigma2))
 
 
-def _next_stride(stride: float, last: float, shift: float) -> float:
-    """Return how many times its step the scale shall take, after its last step and the present one.
-
-    It would creep where the touches leave open what is shape and what is error: near its rest the stride
-    grows while the steps agree, and shrinks when they turn. On the way there a long one could miss the rest.
-    """
+def _next_stride(stride: float, previous: float, shift: float) -> float:
+    """Return the over-relaxation factor of the next step of the scale."""
     if abs(shift) > _NEAR:
         return _STRIDE
-    if last * shift > 0.0:
+    if previous * shift > 0.0:
         return min(1.3 * stride, _LONGEST_STRIDE)
     return max(0.5 * stride, 1.0)
 
 
-def _misfit(
+def _neg_log_posterior(
     mean: Buffer,
     variances: Buffer,
     weights: Buffer,
@@ -340,7 +338,7 @@ def _misfit(
     sigma2: float,
     given: bool,
 ) -> float:
-    """Return the negative log posterior: shape and touch errors, each by its own law, and their scale."""
+    """Return the negative log posterior of shapes, touch errors and their scale."""
     shape = touch = 0.0
     for j in range(len(weights)):
         x, y, z = (
@@ -352,26 +350,26 @@ def _misfit(
         noise = sigma2 / weights[j]
         shape += variances[j] * squared
         touch += math.log1p(noise * noise * squared / (NU * sigma2))
-    misfit = 0.5 * (shape + (NU + 3.0) * touch)
+    neg_log_posterior = 0.5 * (shape + (NU + 3.0) * touch)
     if given:
-        return misfit
+        return neg_log_posterior
     freedom = PRIOR_WEIGHT + 3.0 * len(weights)
     prior = PRIOR_WEIGHT * TYPICAL_NOISE_MM * TYPICAL_NOISE_MM / sigma2
-    return misfit + 0.5 * (freedom * math.log(sigma2) + prior)
+    return neg_log_posterior + 0.5 * (freedom * math.log(sigma2) + prior)
 
 
 KERNELS = (
-    _turn,
-    _weigh,
+    _update_rotation,
+    _update_precision,
     _mean_of,
-    _bring,
+    _to_atlas_frame,
     _inertia,
     _inverse,
-    _expect,
-    _shift,
+    _expected_errors,
+    _log_scale_step,
     _next_stride,
-    _misfit,
-    settle,
+    _neg_log_posterior,
+    fit_student_t,
     _exchange,
     best_exchange,
 )

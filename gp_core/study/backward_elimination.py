@@ -1,4 +1,4 @@
-"""Backward elimination of features, over anything that can score a choice of them."""
+"""Backward elimination of features, for any score of a feature subset."""
 
 from __future__ import annotations
 
@@ -42,12 +42,33 @@ class Problem(Protocol):
         """How many sides are estimated for one score."""
 
     def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        """Return what gives E_T of probe features, with these training features."""
+        """Return the function that scores probe features, given training features.
+
+        Parameters
+        ----------
+        training : tuple of str
+            Training features.
+
+        Returns
+        -------
+        callable
+            From probe features to E_T.
+        """
 
 
 @dataclass(frozen=True)
 class ProbeStep:
-    """The best probe features of one number, and their E_T."""
+    """The best probe features of one number, for given training features.
+
+    Attributes
+    ----------
+    n : int
+        Number of probe features.
+    features : tuple of str
+        The best ones.
+    e_t : float
+        Their E_T, summed over all sides.
+    """
 
     n: int
     features: Codes
@@ -82,16 +103,17 @@ class TrainingStep:
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a search is.
+    """Progress of a search.
 
     Attributes
     ----------
     fits : int
-        Sides estimated so far, those of a resumed run included.
+        Sides estimated so far, including those of a resumed run.
     fraction : float
-        Share of the work that is done, from 0 to 1; an estimate, since it depends on what will be dropped.
+        Fraction of the work that is done, from 0 to 1; an estimate, since it depends on what will be dropped.
     seconds, left : float
-        Time since the start of this run, and an estimate of what is still to come; NaN before the first.
+        Time since the start of this run, and an estimate of the remaining time, s; NaN before the first
+        candidate.
     text : str
         What is being done.
     """
@@ -104,12 +126,12 @@ class Progress:
 
 
 class Ticker:
-    """Counts what is done and says how long the rest will take.
+    """Counts finished work and estimates the remaining time.
 
     Parameters
     ----------
     tell : callable or None
-        Told about each candidate; what it raises stops the search.
+        Receives a `Progress` for each candidate; if it raises, the search stops.
     """
 
     def __init__(self, tell: Callable[[Progress], None] | None = None) -> None:
@@ -126,7 +148,19 @@ class Ticker:
         return time.monotonic() - self._start
 
     def count(self, task: str, fits: int, work: float, *, fresh: bool) -> None:
-        """Add what a candidate took, once; `fresh` is False where it came from a checkpoint."""
+        """Record the work of a candidate, once.
+
+        Parameters
+        ----------
+        task : str
+            Name of the candidate.
+        fits : int
+            Number of registrations or fits.
+        work : float
+            In the unit of `work_of`.
+        fresh : bool
+            False where it came from a checkpoint.
+        """
         if task in self._counted:
             return
         self._counted.add(task)
@@ -135,7 +169,15 @@ class Ticker:
         self._fresh += work if fresh else 0.0
 
     def report(self, ahead: float, text: str) -> None:
-        """Tell how far the search is, with this much work ahead in its present part."""
+        """Report the progress of the search.
+
+        Parameters
+        ----------
+        ahead : float
+            Remaining work in the current part, in the unit of `work_of`.
+        text : str
+            What has just been found.
+        """
         if self._tell is not None:
             rest, seconds = ahead + self.later, self.seconds
             left = seconds * rest / self._fresh if self._fresh else math.nan
@@ -144,18 +186,18 @@ class Ticker:
 
 @dataclass(frozen=True)
 class Elimination:
-    """One backward elimination, over training features and within each candidate over probe features.
+    """One backward elimination over training features, and within each candidate over probe features.
 
     Parameters
     ----------
     problem : Problem
-        What scores a choice.
+        Scores a feature subset.
     executor : concurrent.futures.Executor or None
-        What candidates run on.
+        Runs the candidates.
     memory : Checkpoint
-        Where probe curves are kept.
+        Stores probe curves.
     ticker : Ticker
-        Told as candidates come in.
+        Reports progress as candidates are finished.
     name : str
         Which search of a study this is: part of the checkpoint's tasks and of the progress text.
     """
@@ -167,7 +209,20 @@ class Elimination:
     name: str = "search"
 
     def run(self, start: Codes, fewest: int) -> tuple[TrainingStep, ...]:
-        """Drop one training feature at a time, from `start` down to `fewest`."""
+        """Drop one training feature at a time.
+
+        Parameters
+        ----------
+        start : tuple of str
+            Training features to start from.
+        fewest : int
+            Number of training features to end at.
+
+        Returns
+        -------
+        tuple of TrainingStep
+            One for each number of training features.
+        """
         (curve,) = self._curves([start], work_below(start, fewest))
         steps = [_training_step(start, None, curve)]
         while len(features := steps[-1].features) > fewest:
@@ -183,7 +238,7 @@ class Elimination:
         return tuple(steps)
 
     def _curves(self, candidates: Sequence[Codes], later: float) -> list[tuple[ProbeStep, ...]]:
-        """Return the probe curve of each candidate, from memory or anew; `later` is work of later steps."""
+        """Return the probe curve of each candidate, stored or computed; `later`: work of later steps."""
         known = {c: self.memory.get(self._task(c)) for c in candidates}
         curves = {c: _from_json(content) for c, content in known.items() if content is not None}
         missing = [c for c in candidates if c not in curves]
@@ -201,11 +256,32 @@ class Elimination:
         return [curves[c] for c in candidates]
 
     def knows(self, candidate: Codes) -> bool:
-        """Return whether the probe curve of a candidate is in memory."""
+        """Return whether the probe curve of a candidate is stored.
+
+        Parameters
+        ----------
+        candidate : tuple of str
+            Training features.
+
+        Returns
+        -------
+        bool
+            Whether it need not be computed.
+        """
         return self.memory.get(self._task(candidate)) is not None
 
     def keep(self, candidate: Codes, curve: tuple[ProbeStep, ...], ahead: float) -> None:
-        """Put a new probe curve into memory and tell, with this much work ahead."""
+        """Store a new probe curve and report progress.
+
+        Parameters
+        ----------
+        candidate : tuple of str
+            Training features.
+        curve : tuple of ProbeStep
+            Its probe curve.
+        ahead : float
+            Remaining work in the current part, in the unit of `work_of`.
+        """
         self.memory.put(self._task(candidate), [[s.n, s.features, s.e_t] for s in curve])
         self._count(candidate, fresh=True)
         self.ticker.report(ahead, f"{self.name}: {len(candidate)} training features")
@@ -219,7 +295,22 @@ class Elimination:
 
 
 def run_all(searches: Sequence[Elimination], start: Codes, fewest: int) -> list[tuple[TrainingStep, ...]]:
-    """Run several searches on one ticker: the first step of all side by side, then one after the other."""
+    """Run several searches with one progress report: the first step of all together, then one by one.
+
+    Parameters
+    ----------
+    searches : sequence of Elimination
+        The searches.
+    start : tuple of str
+        Training features to start from.
+    fewest : int
+        Number of training features to end at.
+
+    Returns
+    -------
+    list of tuple of TrainingStep
+        In the order of the searches.
+    """
     ticker, executor = searches[0].ticker, searches[0].executor
     whole, first = work_of(start) + work_below(start, fewest), work_of(start)
     missing = [search for search in searches if not search.knows(start)]
@@ -243,12 +334,36 @@ def _curve_of(task: tuple[Problem, Codes]) -> tuple[ProbeStep, ...]:
 
 
 def external(training: Codes) -> Codes:
-    """Return the features among these that can be touched, in the table's order."""
+    """Return those features that can be touched.
+
+    Parameters
+    ----------
+    training : tuple of str
+        Features.
+
+    Returns
+    -------
+    tuple of str
+        External ones, in the table's order.
+    """
     return tuple(code for code in EXTERNAL if code in training)
 
 
 def probe_curve(problem: Problem, training: Codes) -> tuple[ProbeStep, ...]:
-    """Drop one probe feature at a time, from all external ones among `training` down to three."""
+    """Drop one probe feature at a time, from all external training features down to three.
+
+    Parameters
+    ----------
+    problem : Problem
+        Scores the features.
+    training : tuple of str
+        Training features.
+
+    Returns
+    -------
+    tuple of ProbeStep
+        One for each number of probe features.
+    """
     score = problem.scorer(training)
     features = external(training)
     steps = [ProbeStep(len(features), features, score(features))]
@@ -262,12 +377,36 @@ def probe_curve(problem: Problem, training: Codes) -> tuple[ProbeStep, ...]:
 
 
 def work_of(training: Codes) -> float:
-    """Return how much work a candidate is, in some unit: choices of probe features times points of a set."""
+    """Return the work for one candidate: number of probe subsets times points of a set.
+
+    Parameters
+    ----------
+    training : tuple of str
+        Training features.
+
+    Returns
+    -------
+    float
+        Work, in an arbitrary unit.
+    """
     return float(_n_probe_subsets(len(external(training))) * len(training))
 
 
 def work_below(training: Codes, fewest: int) -> float:
-    """Estimate the work of all steps below these features, as if external ones went in proportion."""
+    """Estimate the work of all further steps, assuming that external features are dropped in proportion.
+
+    Parameters
+    ----------
+    training : tuple of str
+        Training features.
+    fewest : int
+        Number of training features to end at.
+
+    Returns
+    -------
+    float
+        Work, in the unit of `work_of`.
+    """
     n, share = len(training), len(external(training)) / len(training)
     return sum(
         float((size + 1) * size * _n_probe_subsets(max(FEWEST, round(share * size))))

@@ -1,4 +1,4 @@
-"""What a long study has done so far, kept in a small file, so that it can be stopped and resumed."""
+"""Intermediate results of a long study in a small file, so that it can be stopped and resumed."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["Checkpoint", "fingerprint"]
 
 _VERSION = 1
 _DECIMALS = 6  # a nanometre: what rounding leaves of the same points read from another file stays below
-_REMEDY = "Name another file, or delete this one to start anew."
+_REMEDY = "Name another file, or delete this one to start over."
 
 
 class Checkpoint:
@@ -61,11 +61,30 @@ class Checkpoint:
         return results
 
     def get(self, task: str) -> Any:
-        """Return the result of a task, None where it is still to do."""
+        """Return the result of a task.
+
+        Parameters
+        ----------
+        task : str
+            Name of the task.
+
+        Returns
+        -------
+        object or None
+            None where it is still to do.
+        """
         return self._results.get(task)
 
     def put(self, task: str, result: Any) -> None:
-        """Keep a result, of what JSON can hold."""
+        """Store the result of a task.
+
+        Parameters
+        ----------
+        task : str
+            Name of the task.
+        result : object
+            Plain values for JSON.
+        """
         self._results[task] = result
         if self._path is not None:
             content = {"gpCheckpoint": _VERSION, "key": self._key, "results": self._results}
@@ -75,7 +94,22 @@ class Checkpoint:
 def fingerprint(
     specimens: Sequence[Specimen], settings: JrmpcSettings | None, *choices: str | Sequence[str]
 ) -> str:
-    """Return a short text that differs where animals, settings or choices of a study differ."""
+    """Return a short text that changes with animals, settings or choices of a study.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+    settings : JrmpcSettings or None
+        Of the registration.
+    *choices : str or sequence of str
+        Further choices.
+
+    Returns
+    -------
+    str
+        A digest.
+    """
     digest = hashlib.sha256()
     numbers = None if settings is None else asdict(settings)
     digest.update(repr((numbers, [tuple(choice) for choice in choices])).encode())

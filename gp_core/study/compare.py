@@ -1,4 +1,4 @@
-"""JRMPC against the robust method, touch errors rising: the project's main claim."""
+"""JRMPC compared with the robust method under increasing touch errors: the project's main claim."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
+from gp_core.constants import METHODS
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import EXTERNAL, PROBE, TRAINING
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.cochlea_pose import METHODS
 from gp_core.pose.jrmpc_estimator import training_sides
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
 from gp_core.study.leave_one_out import held_out_sides
@@ -38,7 +38,15 @@ _RANDOM = 5
 
 @dataclass(frozen=True)
 class Condition:
-    """Touch errors: Gaussian noise a coordinate, and how far one touch is off its place, in mm."""
+    """Touch errors.
+
+    Attributes
+    ----------
+    noise_mm : float
+        Standard deviation of the Gaussian noise, mm a coordinate.
+    mistouch_mm : float
+        Error of one touch, mm.
+    """
 
     noise_mm: float
     mistouch_mm: float = 0.0
@@ -76,7 +84,13 @@ class ComparisonRow:
     errors: PoseErrors
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the row as the JSON file holds it."""
+        """Return the row as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "probe": self.probe,
             "noise_mm": self.condition.noise_mm,
@@ -106,7 +120,13 @@ class ComparisonReport:
     rows: tuple[ComparisonRow, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "animals": self.animals,
             "repeats": self.repeats,
@@ -114,7 +134,18 @@ class ComparisonReport:
         }
 
     def save_csv(self, path: str | PathLike[str]) -> None:
-        """Write one line a row; numbers keep every bit."""
+        """Write one line per row, with full precision.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         statistics = [f"{e}_{s}" for e in ("e_co_mm", "e_ma_deg") for s in ("mean", "p95", "max")]
         lines = [",".join(["probe", "noise_mm", "mistouch_mm", "method", "n", *statistics])]
         for row in self.rows:
@@ -144,21 +175,21 @@ def compare(
     settings: JrmpcSettings = ESTIMATION,
     executor: Executor | None = None,
 ) -> ComparisonReport:
-    """Compare JRMPC and the robust method in leave-one-out, with noise on the touches and with a mistouch.
+    """Compare JRMPC and the robust method in leave-one-out, under touch errors.
 
-    JRMPC has the RW frame built on the touches of RWA, RWP and LLI, even where these are not among the five
-    drawn at random: it cannot start without. The robust method has the five only.
+    JRMPC gets the RW frame built on the touches of RWA, RWP and LLI, even where these are not among the five
+    random features, since it cannot start without it. The robust method gets only the five.
 
     Parameters
     ----------
     specimens : sequence of Specimen, optional
         At least three labelled animals. By default animals are drawn from the published atlas.
     repeats : int
-        How often each side is touched; where animals are drawn, how many herds.
+        Number of times that each side is touched; where animals are drawn, number of cohorts.
     n_animals : int
-        How many animals to draw for a herd.
+        Number of animals drawn for a cohort.
     rng : numpy Generator
-        The source of chance.
+        Source of random numbers.
     probes : sequence of {"six", "ten", "five at random"}
         What is touched.
     conditions : sequence of Condition
@@ -166,7 +197,12 @@ def compare(
     settings : JrmpcSettings
         Of JRMPC.
     executor : concurrent.futures.Executor, optional
-        What repeats run on; the answer does not depend on it.
+        Runs the repeats; the result does not depend on it.
+
+    Returns
+    -------
+    ComparisonReport
+        One row for each probe, condition and method.
 
     Raises
     ------
@@ -178,17 +214,17 @@ def compare(
     if repeats < 1:
         raise GpError(f"the number of repeats must be 1 or more, got {repeats}")
     if specimens is None and n_animals < 3:
-        raise GpError(f"a herd needs at least 3 animals, got {n_animals}")
+        raise GpError(f"a cohort needs at least 3 animals, got {n_animals}")
     if specimens is not None:
         check_labels(specimens, TRAINING)
-    herd = None if specimens is None else _Herd.of(specimens)
+    cohort = None if specimens is None else _Cohort.of(specimens)
     cases = [(probe, condition) for probe in probes for condition in conditions]
-    task = partial(_repeat, herd, n_animals, settings, cases)
+    task = partial(_repeat, cohort, n_animals, settings, cases)
     parts = run_map(task, rng.spawn(repeats), executor)
     keys = [(*case, method) for case in cases for method in METHODS]
     rows = [ComparisonRow(*key, PoseErrors.joined([part[i] for part in parts])) for i, key in enumerate(keys)]
     animals = (
-        f"{repeats} herds of {n_animals} animals drawn from the published atlas"
+        f"{repeats} cohorts of {n_animals} animals drawn from the published atlas"
         if specimens is None
         else f"{len(specimens)} labelled animals, each touched {repeats} times"
     )
@@ -196,8 +232,8 @@ def compare(
 
 
 @dataclass(frozen=True)
-class _Herd:
-    """Every labelled side of a herd, with what is known from the other animals.
+class _Cohort:
+    """Every labelled side of a cohort, with what is known from the other animals.
 
     Attributes
     ----------
@@ -209,7 +245,7 @@ class _Herd:
     groups: tuple[tuple[list[Atlas], FloatArray, list[LandmarkSet]], ...]
 
     @classmethod
-    def of(cls, specimens: Sequence[Specimen]) -> _Herd:
+    def of(cls, specimens: Sequence[Specimen]) -> _Cohort:
         atlases, truths = held_out_sides(specimens, TRAINING)
         groups, first = [], 0
         for side, which in sides_of(specimens):
@@ -222,20 +258,20 @@ class _Herd:
 
 
 def _repeat(
-    herd: _Herd | None,
+    cohort: _Cohort | None,
     n_animals: int,
     settings: JrmpcSettings,
     cases: Sequence[tuple[str, Condition]],
     rng: np.random.Generator,
 ) -> list[PoseErrors]:
     """Touch every side once in every case; errors by case, then by method."""
-    if herd is None:
+    if cohort is None:
         published = Atlas.published()
-        herd = _Herd.of([draw_animal(published, rng=rng, name=f"{i}") for i in range(n_animals)])
+        cohort = _Cohort.of([draw_animal(published, rng=rng, name=f"{i}") for i in range(n_animals)])
     found = []
     for probe, condition in cases:
         parts: dict[str, list[PoseErrors]] = {method: [] for method in METHODS}
-        for atlases, others, truths in herd.groups:
+        for atlases, others, truths in cohort.groups:
             trials = [_touch(truth, probe, condition, rng) for truth in truths]
             parts["robust"].append(robust_errors(atlases, [t.touches for t in trials], truths))
             parts["jrmpc"].append(jrmpc_errors(others, *window_arrays(trials), TRAINING, settings))

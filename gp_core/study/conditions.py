@@ -1,7 +1,7 @@
-"""How often the 95 % regions hold the truth, condition by condition, and how often side and names are told.
+"""Coverage of the 95 % regions under many conditions, and how often wrong sides and names are detected.
 
-Each animal is estimated with an atlas that has seen nothing of it, of either side. Without labelled animals,
-herds are drawn from atlases that differ from the published one by as much as two small herds do.
+Each animal is estimated with an atlas that excludes it, both sides. Without labelled animals, cohorts are
+drawn from atlases that differ from the published one by as much as two small cohorts do.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class TouchCondition:
     disturbances : tuple of Disturbance
         What goes wrong.
     n_random : int
-        Touch so many of `codes` only, drawn anew each time; 0: all.
+        Touch only so many of `codes`, drawn each time; 0: all.
     """
 
     group: str
@@ -90,6 +90,16 @@ class TouchCondition:
 
 def touch_conditions(groups: Sequence[str] = GROUPS) -> tuple[TouchCondition, ...]:
     """Return all conditions of some groups, in the order of the table.
+
+    Parameters
+    ----------
+    groups : sequence of str
+        Names of groups; by default all.
+
+    Returns
+    -------
+    tuple of TouchCondition
+        The conditions.
 
     Raises
     ------
@@ -164,19 +174,47 @@ class ConditionRow:
     states: NDArray[np.str_]
 
     def held(self, region: str) -> FloatArray:
-        """Return (N,) 1 where a region of `values`, such as ``plain_cone_deg``, holds the truth, else 0."""
+        """Return which estimates have the truth within a region.
+
+        Parameters
+        ----------
+        region : str
+            A region of `values`, such as ``plain_cone_deg``.
+
+        Returns
+        -------
+        (N,) array
+            1 where the region contains the truth, else 0.
+        """
         error = "e_co_mm" if region.endswith("mm") else "e_ma_deg"
         return (self.values[error] <= self.values[region]).astype(np.float64)
 
     def interval(self, values: FloatArray) -> tuple[float, float]:
-        """Return the 95 % interval of a mean (N,), over animals: their means drawn anew, with replacement."""
+        """Return the 95 % bootstrap interval of a mean, resampled over animals.
+
+        Parameters
+        ----------
+        values : (N,) array
+            One value per estimate.
+
+        Returns
+        -------
+        low, high : float
+            Bounds of the mean.
+        """
         means = np.array([values[self.animals == animal].mean() for animal in np.unique(self.animals)])
         drawn = np.random.default_rng(0).choice(means, (_RESAMPLES, len(means))).mean(axis=1)
         low, high = np.percentile(drawn, (2.5, 97.5))
         return float(low), float(high)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the row as the JSON file holds it: means, shares, and 95 % intervals over animals."""
+        """Return the row as the JSON file holds it: means, fractions, and 95 % intervals over animals.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         condition, values = self.condition, self.values
         out: dict[str, Any] = {
             "group": condition.group,
@@ -217,7 +255,13 @@ class ConditionsReport:
     rows: tuple[ConditionRow, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {"animals": self.animals, "rows": [row.as_dict() for row in self.rows]}
 
 
@@ -230,21 +274,28 @@ def conditions(
     cases: Sequence[TouchCondition] | None = None,
     executor: Executor | None = None,
 ) -> ConditionsReport:
-    """Measure what the 95 % regions hold, and what is told of side and names, under each condition.
+    """Measure the coverage of the 95 % regions, and the detection of wrong sides and names, per condition.
 
     Parameters
     ----------
     specimens : sequence of Specimen, optional
-        At least three labelled animals; each is held out, both sides. By default herds are drawn.
+        At least three labelled animals; each is held out, both sides. By default cohorts are drawn.
     repeats : int
-        How often each side is touched in each condition; where animals are drawn, how many herds.
+        Number of times that each side is touched in each condition; where animals are drawn, number of
+        cohorts.
     n_animals : int
-        How many animals to draw for a herd.
+        Number of animals drawn for a cohort.
     rng : numpy Generator
+        Source of random numbers.
     cases : sequence of TouchCondition, optional
         By default `touch_conditions`.
     executor : concurrent.futures.Executor, optional
-        What repeats run on; the answer does not depend on it.
+        Runs the repeats; the result does not depend on it.
+
+    Returns
+    -------
+    ConditionsReport
+        One row for each condition.
 
     Raises
     ------
@@ -254,7 +305,7 @@ def conditions(
     if repeats < 1:
         raise GpError(f"the number of repeats must be 1 or more, got {repeats}")
     if specimens is None and n_animals < 3:
-        raise GpError(f"a herd needs at least 3 animals, got {n_animals}")
+        raise GpError(f"a cohort needs at least 3 animals, got {n_animals}")
     if specimens is not None:
         check_labels(specimens, EXTERNAL)
     chosen = touch_conditions() if cases is None else tuple(cases)
@@ -263,14 +314,14 @@ def conditions(
     rows = []
     for k, case in enumerate(chosen):
         animals = np.concatenate([part[k].animals for part in parts])
-        if specimens is None:  # every herd has animals of its own
+        if specimens is None:  # every cohort has animals of its own
             animals += n_animals * np.repeat(np.arange(len(parts)), [len(part[k].animals) for part in parts])
         values = {
             name: np.concatenate([part[k].values[name] for part in parts]) for name in parts[0][k].values
         }
         rows.append(ConditionRow(case, animals, values, np.concatenate([part[k].states for part in parts])))
     words = (
-        f"{repeats} herds of {n_animals} animals drawn from perturbed atlases"
+        f"{repeats} cohorts of {n_animals} animals drawn from perturbed atlases"
         if specimens is None
         else f"{len(specimens)} labelled animals, each side touched {repeats} times"
     )

@@ -40,7 +40,13 @@ class DistanceTable:
     n_sides: int
 
     def pairs(self) -> list[dict[str, Any]]:
-        """Return one row a pair: features, mean and SD in mm (None where unknown), number of sides."""
+        """Return one row for each pair of features.
+
+        Returns
+        -------
+        list of dict
+            Features, mean and SD in mm (None where unknown), number of sides.
+        """
         return [
             {
                 "feature_a": CODES[i],
@@ -54,18 +60,41 @@ class DistanceTable:
         ]
 
     def typical_sd(self) -> dict[str, float]:
-        """Return for each feature the median SD of its distances to the others, mm, smallest first."""
+        """Return, for each feature, the median SD of its distances to the others.
+
+        Returns
+        -------
+        dict of str to float
+            In mm, smallest first.
+        """
         off = np.where(np.eye(len(CODES), dtype=bool), np.nan, self.sd)
         known = [i for i in range(len(CODES)) if np.isfinite(off[i]).any()]
         medians = {CODES[i]: float(np.nanmedian(off[i])) for i in known}
         return dict(sorted(medians.items(), key=lambda item: item[1]))
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the table as the JSON file holds it."""
+        """Return the table as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {"n_sides": self.n_sides, "pairs": self.pairs(), "typical_sd_mm": self.typical_sd()}
 
     def save_csv(self, path: str | PathLike[str]) -> None:
-        """Write one line a pair: features, mean and SD in mm, number of sides; numbers keep every bit."""
+        """Write one line for each pair: features, mean and SD in mm, number of sides; with full precision.
+
+        Parameters
+        ----------
+        path : path-like
+            Where to write.
+
+        Raises
+        ------
+        GpError
+            The file cannot be written.
+        """
         lines = ["feature_a,feature_b,mean_mm,sd_mm,n_sides"]
         lines += [",".join("" if v is None else str(v) for v in row.values()) for row in self.pairs()]
         write_text(path, "\n".join(lines) + "\n")
@@ -77,7 +106,12 @@ def distances(specimens: Sequence[Specimen]) -> DistanceTable:
     Parameters
     ----------
     specimens : sequence of Specimen
-        One or both sides of each; features may be missing.
+        One or both sides of each; some features may be missing.
+
+    Returns
+    -------
+    DistanceTable
+        Means and standard deviations, mm.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Figures of the study, as matplotlib figures that belong to the caller; nothing global is touched."""
+"""Figures of the study as matplotlib figures that belong to the caller; no global state is touched."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.disk import write_bytes
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, PROBE
@@ -46,7 +47,6 @@ ACCENT = "#b5403a"
 """Colour of what stands out."""
 
 _SIDES = {"L": "left", "R": "right"}
-_METHODS = {"jrmpc": "JRMPC", "robust": "robust"}
 _WAYS = {"names": ("o", "by names"), "icp": ("s", "by ICP"), "surface": ("^", "to the bone's surface")}
 
 _INK, _FAINT = "#222222", "#d9d9d9"
@@ -55,12 +55,19 @@ _DPI = 200
 
 
 def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
-    """Write a figure as PNG, PDF or SVG, by the name's ending.
+    """Write a figure as PNG, PDF or SVG, according to the suffix.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+        What to write.
+    path : path-like
+        Where to write.
 
     Raises
     ------
     GpError
-        Another ending, or the file cannot be written.
+        Another suffix, or the file cannot be written.
     """
     name = str(path)
     if not name.lower().endswith(_SUFFIXES):
@@ -71,7 +78,22 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
 
 
 def new_figure(n_rows: int, n_columns: int, size_in: tuple[float, float]) -> tuple[Figure, list[Axes]]:
-    """Return a figure of this size (inches) with a grid of plain axes, row by row."""
+    """Return a figure with a grid of plain axes.
+
+    Parameters
+    ----------
+    n_rows, n_columns : int
+        Size of the grid.
+    size_in : (float, float)
+        Width and height, inches.
+
+    Returns
+    -------
+    figure : matplotlib Figure
+        The figure.
+    axes : list of matplotlib Axes
+        Row by row.
+    """
     figure = Figure(figsize=size_in, layout="constrained")
     axes = figure.subplots(n_rows, n_columns, squeeze=False).ravel().tolist()
     for ax in axes:
@@ -82,14 +104,35 @@ def new_figure(n_rows: int, n_columns: int, size_in: tuple[float, float]) -> tup
 
 
 def label(ax: Axes, letter: str, x: str, y: str) -> None:
-    """Name the axes, and the panel by a bold letter at its upper left."""
+    """Label the axes, and mark the panel by a bold letter at its upper left.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        The panel.
+    letter : str
+        Its letter.
+    x, y : str
+        Labels of the axes.
+    """
     ax.set_xlabel(x, fontsize=9, color=_INK)
     ax.set_ylabel(y, fontsize=9, color=_INK)
     ax.set_title(letter, loc="left", fontsize=10, fontweight="bold", color=_INK)
 
 
 def distance_matrix(table: DistanceTable) -> Figure:
-    """Draw mean and SD of the distances of all pairs as a triangle of cells (Figure 2)."""
+    """Draw mean and SD of the distances of all pairs as a triangle of cells (Figure 2).
+
+    Parameters
+    ----------
+    table : DistanceTable
+        What to draw.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
+    """
     figure, (ax,) = new_figure(1, 1, (9.2, 8.2))
     shown = np.tril(np.ones_like(table.mean, dtype=bool), -1)
     shade = np.where(shown & (table.sd > 0), table.sd, np.nan)
@@ -124,7 +167,18 @@ def distance_matrix(table: DistanceTable) -> Figure:
 
 
 def error_histograms(report: LeaveOneOutReport) -> Figure:
-    """Draw histograms of both errors over the held-out sides (Figure 6 A and B)."""
+    """Draw histograms of both errors over the held-out sides (Figure 6 A and B).
+
+    Parameters
+    ----------
+    report : LeaveOneOutReport
+        What to draw.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
+    """
     figure, (first, second) = new_figure(1, 2, (7.0, 2.9))
     sides = np.array([row.side for row in report.rows])
     _histogram(first, report.errors.e_ma_deg, sides, 1.0)
@@ -151,7 +205,18 @@ def _histogram(ax: Axes, values: FloatArray, sides: Any, width: float) -> None:
 
 
 def search_curves(report: SearchReport) -> Figure:
-    """Draw E_T over the number of training features, and of touched ones at the best of these (Figure 5)."""
+    """Draw E_T over the number of training features, and of probe features at the best of these (Figure 5).
+
+    Parameters
+    ----------
+    report : SearchReport
+        What to draw.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
+    """
     figure, (first, second) = new_figure(1, 2, (7.0, 3.1))
     curve = report.best.probe_curve
     dropped = [step.dropped or "" for step in report.training]
@@ -175,7 +240,18 @@ def search_curves(report: SearchReport) -> Figure:
 
 
 def nested_errors(report: NestedReport) -> Figure:
-    """Draw the errors of each side, chosen for without its animal, over the optimistic ones."""
+    """Draw the errors of each side, with features chosen without its animal, over the optimistic ones.
+
+    Parameters
+    ----------
+    report : NestedReport
+        What to draw.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
+    """
     figure, (first, second) = new_figure(1, 2, (7.0, 3.3))
     optimistic = {(row.specimen, row.side): row for row in report.optimistic.rows}
     for ax, error, name, letter in (
@@ -225,8 +301,14 @@ def error_boxes(report: SimulationReport, physical: Sequence[tuple[float, float]
     Parameters
     ----------
     report : SimulationReport
+        What to draw.
     physical : sequence of (float, float)
         E_CO (mm) and E_MA (degrees) of touched skulls.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
     """
     figure, (first, second) = new_figure(1, 2, (7.0, 3.2))
     groups = report.groups
@@ -272,14 +354,20 @@ def draw_physical(
 ) -> Figure:
     """Draw the errors of a touched skull, over those of simulated sides where these are given.
 
-    The boxes are Figure 6 C and D of the paper, one set for each method simulated; the marks of the skull
-    stand on the box of its method and side.
+    The boxes are Figure 6 C and D of the paper, one set for each simulated method; the marks of the skull are
+    drawn on the box of its method and side.
 
     Parameters
     ----------
     report : PhysicalReport
+        Errors of the skull.
     simulation : SimulationReport or sequence of these, optional
         Of one method each.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
     """
     given = [simulation] if isinstance(simulation, SimulationReport) else list(simulation or ())
     simulations = {each.method: each for each in given}
@@ -298,7 +386,7 @@ def draw_physical(
             ticks += [(position + i, _SIDES.get(name, name)) for i, name in enumerate(names)]
             middle = position + (len(names) - 1) / 2
             ax.annotate(
-                _METHODS[method], (middle, 0), (0, -27), xycoords=ax.get_xaxis_transform(),
+                METHOD_NAMES[method], (middle, 0), (0, -27), xycoords=ax.get_xaxis_transform(),
                 textcoords="offset points", ha="center", fontsize=9, color=_INK,
             )  # fmt: skip
             position += len(names) + 1
@@ -327,7 +415,18 @@ def _marks(ax: Axes, found: Sequence[tuple[str, float]], position: float) -> Non
 
 
 def comparison(report: ComparisonReport) -> Figure:
-    """Draw mean, 95th percentile and maximum of both methods as touch errors rise."""
+    """Draw mean, 95th percentile and maximum of both methods over increasing touch errors.
+
+    Parameters
+    ----------
+    report : ComparisonReport
+        What to draw.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure.
+    """
     figure, axes = new_figure(2, len(PROBES), (9.2, 5.6))
     titles = {"six": "six (the paper's)", "ten": "all ten", "five at random": "five at random"}
     for column, probe in enumerate(PROBES):

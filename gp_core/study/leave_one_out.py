@@ -10,11 +10,11 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas
+from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import round_window_frame, with_cochlea_origin
 from gp_core.landmarks.features import PROBE, TRAINING, index_of
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.cochlea_pose import METHODS
 from gp_core.pose.jrmpc_estimator import training_sides
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings
 from gp_core.study.scoring import PoseErrors, jrmpc_errors, robust_errors, touched
@@ -35,7 +35,19 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Row:
-    """Errors of one held-out side."""
+    """Errors of one held-out side.
+
+    Attributes
+    ----------
+    specimen : str
+        Name of the animal.
+    side : str
+        ``L`` or ``R``.
+    e_co_mm : float
+        Distance between true and estimated CO, mm.
+    e_ma_deg : float
+        Angle between true and estimated modiolar axis, degrees.
+    """
 
     specimen: str
     side: str
@@ -73,7 +85,13 @@ class LeaveOneOutReport:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "rows": [asdict(row) for row in self.rows],
             "summary": summarise(self.errors),
@@ -84,13 +102,39 @@ class LeaveOneOutReport:
 def describe(
     method: str, training: Sequence[str], probe: Sequence[str], settings: JrmpcSettings | None
 ) -> dict[str, Any]:
-    """Return what a study ran on, as its JSON file holds it."""
+    """Return the settings of a study as its JSON file holds them.
+
+    Parameters
+    ----------
+    method : str
+        ``jrmpc`` or ``robust``.
+    training, probe : sequence of str
+        Features.
+    settings : JrmpcSettings or None
+        Of the registration.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON.
+    """
     numbers = {} if settings is None else asdict(settings)
     return {"method": method, "training": list(training), "probe": list(probe), **numbers}
 
 
 def summarise(errors: PoseErrors) -> dict[str, Any]:
-    """Return mean, median and maximum of both errors, and E_T."""
+    """Return mean, median and maximum of both errors, and E_T.
+
+    Parameters
+    ----------
+    errors : PoseErrors
+        Of N sides.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON; mm and degrees.
+    """
     return {
         **{name: _summary(getattr(errors, name)) for name in ("e_co_mm", "e_ma_deg")},
         "e_t": errors.e_t,
@@ -117,22 +161,27 @@ def leave_one_out(
     """Estimate the cochlea of every labelled side from the other animals, and measure the errors.
 
     With ``jrmpc`` each side is registered with the same side of the other animals, as in the paper. With
-    ``robust`` the atlas is fitted anew without the animal, neither of its sides, and with both sides of all
-    others.
+    ``robust`` the atlas is fitted to both sides of all other animals.
 
     Parameters
     ----------
     specimens : sequence of Specimen
         At least three animals that have the features on every labelled side.
     method : {"jrmpc", "robust"}
+        The estimator.
     training : iterable of str
-        Features of the training animals, CO may be among them.
+        Features of the training animals; CO may be among them.
     probe : iterable of str
         Features touched on the held-out side: external ones among `training`.
     settings : JrmpcSettings
         Of ``jrmpc``; not used by ``robust``.
     held_out : iterable of str, optional
-        Names of the animals to hold out, each by itself; by default all.
+        Names of the animals to hold out, each on its own; by default all.
+
+    Returns
+    -------
+    LeaveOneOutReport
+        One row for each held-out side.
 
     Raises
     ------
@@ -184,7 +233,22 @@ class Folds:
     window: FloatArray
 
     def errors(self, features: Sequence[str], probe: Sequence[str], settings: JrmpcSettings) -> PoseErrors:
-        """Register each animal with all others and return the errors; see `jrmpc_errors`."""
+        """Register each animal with all others and return the errors; see `jrmpc_errors`.
+
+        Parameters
+        ----------
+        features : sequence of str
+            Training features.
+        probe : sequence of str
+            Touched features.
+        settings : JrmpcSettings
+            Of the registration.
+
+        Returns
+        -------
+        PoseErrors
+            One for each animal, mm and degrees.
+        """
         animals = np.arange(len(self.cochlea))
         others = np.array([np.delete(animals, held_out) for held_out in animals])
         touches = self.window[:, [index_of(code) for code in probe]]
@@ -192,7 +256,18 @@ class Folds:
 
 
 def folds_of(specimens: Sequence[Specimen]) -> list[Folds]:
-    """Return the leave-one-out problems of each labelled side."""
+    """Return the leave-one-out problems of each labelled side.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+
+    Returns
+    -------
+    list of Folds
+        Left side first.
+    """
     folds = []
     for side, _ in sides_of(specimens):
         labelled = [training.landmarks for training in training_sides(specimens, side)]
@@ -210,10 +285,18 @@ def held_out_sides(
     Parameters
     ----------
     specimens : sequence of Specimen
+        Labelled animals.
     features : iterable of str
-        What the atlases hold, beside the features that define the cochlea.
+        What the atlases hold, in addition to the features that define the cochlea.
     names : iterable of str, optional
-        The animals to hold out, by default all.
+        The animals to hold out; by default all.
+
+    Returns
+    -------
+    atlases : list of Atlas
+        One for each held-out side.
+    sides : list of LandmarkSet
+        The held-out sides, mm.
     """
     wanted = {specimen.name for specimen in specimens} if names is None else set(names)
     features = tuple(features)

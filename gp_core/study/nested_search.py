@@ -1,4 +1,4 @@
-"""The honest search: features are chosen without the animal that they are scored on."""
+"""Unbiased search: features are selected without the animal that they are scored on."""
 
 from __future__ import annotations
 
@@ -78,7 +78,13 @@ class NestedReport:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         numbers = {} if self.settings is None else asdict(self.settings)
         return {
             "rows": [asdict(row) for row in self.rows],
@@ -102,16 +108,21 @@ def nested_search(
     checkpoint: str | PathLike[str] | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> NestedReport:
-    """Search inside each fold: hold an animal out on both sides, choose on the others, then estimate it.
+    """Search inside each fold: hold an animal out, select features on the others, then estimate it.
 
-    A search over so many choices finds some that suit its animals by chance; on an animal that had no say in
-    the choice, that luck is gone. So these are the errors to expect from a new animal.
+    A search over so many subsets finds some that suit its animals by chance; for an animal that had no part
+    in the selection, that advantage is gone. So these are the errors to expect for a new animal.
 
     Parameters
     ----------
     specimens, method, training, fewest_training, settings, executor, checkpoint, progress
-        As for `gp_core.study.subset_search.search_features`; at least four animals. It takes about as many
-        times longer as there are animals.
+        As for `gp_core.study.subset_search.search_features`; at least four animals. The search takes about as
+        many times longer as there are animals.
+
+    Returns
+    -------
+    NestedReport
+        Errors of each side, the selections of each fold, and the optimistic errors.
 
     Raises
     ------
@@ -132,10 +143,10 @@ def nested_search(
     used = settings if method == "jrmpc" else None
     memory = Checkpoint(checkpoint, fingerprint(specimens, used, ("nested", method)))
     ticker = Ticker(progress)
-    herds = {f"without {s.name}": [other for other in specimens if other is not s] for s in specimens}
+    cohorts = {f"without {s.name}": [other for other in specimens if other is not s] for s in specimens}
     searches = [
-        Elimination(problem_of(herd, method, settings), executor, memory, ticker, name)
-        for name, herd in {**herds, "all animals": list(specimens)}.items()
+        Elimination(problem_of(cohort, method, settings), executor, memory, ticker, name)
+        for name, cohort in {**cohorts, "all animals": list(specimens)}.items()
     ]
     *inner, whole = [_best(steps) for steps in run_all(searches, start, fewest)]
     folds = tuple(

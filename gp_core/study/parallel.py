@@ -1,9 +1,8 @@
-"""The one map of the study: a function over a list, here, in processes, or on a cluster."""
+"""The one parallel map of the study: in this process, in worker processes, or on a cluster."""
 
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import (
     BrokenExecutor,
@@ -18,8 +17,9 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 from gp_core.errors import GpError
+from gp_core.processors import n_cores
 
-__all__ = ["n_cores", "open_executor", "run_map"]
+__all__ = ["open_executor", "run_map"]
 
 Item = TypeVar("Item")
 Result = TypeVar("Result")
@@ -37,13 +37,19 @@ def run_map(
     Parameters
     ----------
     function : callable
-        For processes and clusters, one that pickle can carry.
+        For processes and clusters, one that can be pickled.
     items : sequence
+        Its arguments.
     executor : concurrent.futures.Executor, optional
-        Threads, processes or a cluster; by default everything runs here, one after the other.
+        Threads, processes or a cluster; by default everything runs here, one item after the other.
     done : callable, optional
-        Told the index and the result of each item as it comes in, in any order. What it raises stops the map:
-        what has not started never will.
+        Receives the index and the result of each item as soon as it is ready, in any order. If it raises, the
+        map stops: items that have not started never will.
+
+    Returns
+    -------
+    list
+        Results, in the order of the items.
 
     Raises
     ------
@@ -88,14 +94,19 @@ def _told(index: int, result: Result, done: Callable[[int, Result], None] | None
 
 @contextmanager
 def open_executor(workers: int | None = None, scheduler: str | None = None) -> Iterator[Executor | None]:
-    """Open what `run_map` runs on, and close it at the end.
+    """Open an executor for `run_map`, and close it at the end.
 
     Parameters
     ----------
     workers : int, optional
-        Number of processes, by default one a core; 1: none, all runs here.
+        Number of processes, by default one per core; 1: none, everything runs here.
     scheduler : str, optional
         Address of a Dask scheduler, such as ``tcp://host:8786``, used instead of processes.
+
+    Yields
+    ------
+    concurrent.futures.Executor or None
+        None: everything runs here.
 
     Raises
     ------
@@ -115,12 +126,6 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
 
         with ProcessPoolExecutor(count, mp_context=worker_context()) as executor:
             yield executor
-
-
-def n_cores() -> int:
-    """Return how many cores this process may use."""
-    usable = getattr(os, "sched_getaffinity", None)
-    return len(usable(0)) if usable else os.cpu_count() or 1
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""A touched skull against its own CT: the paper's physical test."""
+"""A touched skull compared with its own CT: the paper's physical test."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
+from gp_core.constants import DEFINING_FEATURES, METHODS
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import modiolar_axis, with_cochlea_origin
 from gp_core.landmarks.features import CODES, EXTERNAL, TRAINING
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.cochlea_pose import METHODS, CochleaPose
+from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.estimate import estimate_pose
 from gp_core.registration.icp_targets import Surface
+from gp_core.registration.result import RegistrationResult
 from gp_core.registration.skull import (
-    SkullRegistration,
     register_by_icp,
     register_by_names,
     register_to_surface,
@@ -35,7 +36,19 @@ _N_DRAWN = 11
 
 @dataclass(frozen=True)
 class PhysicalRow:
-    """Errors of one estimate, held against the CT by one registration."""
+    """Errors of one estimate, relative to the CT under one registration.
+
+    Attributes
+    ----------
+    registration : str
+        ``names``, ``icp`` or ``surface``.
+    method : str
+        ``robust`` or ``jrmpc``.
+    e_co_mm : float
+        Distance between true and estimated CO, mm.
+    e_ma_deg : float
+        Angle between true and estimated modiolar axis, degrees.
+    """
 
     registration: str
     method: str
@@ -50,25 +63,44 @@ class PhysicalReport:
     Attributes
     ----------
     side : str
-    registrations : tuple of SkullRegistration
+        ``L`` or ``R``.
+    registrations : tuple of RegistrationResult
+        Of the touched skull to its CT.
     rows : tuple of PhysicalRow
-        Every method by every registration.
+        Every method under every registration.
     warnings : tuple of str
+        What to know before using the errors.
     """
 
     side: str
-    registrations: tuple[SkullRegistration, ...]
+    registrations: tuple[RegistrationResult, ...]
     rows: tuple[PhysicalRow, ...]
     warnings: tuple[str, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {
             "side": self.side,
-            "registrations": [registration.as_dict() for registration in self.registrations],
+            "registrations": [_as_dict(registration) for registration in self.registrations],
             "rows": [asdict(row) for row in self.rows],
             "warnings": list(self.warnings),
         }
+
+
+def _as_dict(registration: RegistrationResult) -> dict[str, Any]:
+    return {
+        "way": registration.method,
+        "T_scan_tracker": registration.T_scan_tracker.matrix.tolist(),
+        "fre_mm": registration.fre_mm,
+        "residuals_mm": registration.residuals_mm,
+        "suspect": list(registration.suspects),
+    }
 
 
 def physical_test(
@@ -79,26 +111,31 @@ def physical_test(
     specimens: Sequence[Specimen] | None = None,
     bone: Surface | None = None,
 ) -> PhysicalReport:
-    """Estimate a cochlea from touches of a skull, and hold it against the CT of the same skull.
+    """Estimate a cochlea from touches of a skull, and compare it with the CT of the same skull.
 
     Parameters
     ----------
     touches : LandmarkSet
         Probe features, and in `extra` the skull features, tracker frame, mm.
     ct : LandmarkSet
-        CA, CB, RWA and RWP, and in `extra` the skull features by the same names, scan frame, mm.
+        CA, CB, RWA and RWP, and in `extra` the skull features with the same names, scan frame, mm.
     atlas : Atlas, optional
-        Of the robust method; by default fitted to `specimens`, or else the published one.
+        For the robust method; by default fitted to `specimens`, or else the published one.
     specimens : sequence of Specimen, optional
-        Labelled animals, other than this one; without them there is no JRMPC estimate.
+        Labelled animals other than this one; without them there is no JRMPC estimate.
     bone : Surface, optional
         The bone in the CT, scan frame, mm. Touched points in `extra` that the CT does not name are then
         registered to it, starting from the registration by names.
 
+    Returns
+    -------
+    PhysicalReport
+        Errors of every method under every registration.
+
     Raises
     ------
     GpError
-        Fewer than three skull features in common, or on one line; a side or a feature that does not fit.
+        Fewer than three skull features in common, or collinear ones; a side or a feature that does not match.
 
     References
     ----------
@@ -109,7 +146,7 @@ def physical_test(
             f"the touches are of the {touches.side.word} side, the CT of the {ct.side.word}",
             remedy="Give the landmarks of the side that was touched.",
         )
-    for code in ("CA", "CB", "RWA", "RWP"):
+    for code in DEFINING_FEATURES:
         if code not in ct:
             raise FeatureError(
                 f"the CT landmarks have no {code}, which defines the true cochlea",
@@ -139,24 +176,29 @@ def physical_simulations(
     rng: np.random.Generator,
     executor: Executor | None = None,
 ) -> tuple[SimulationReport, ...]:
-    """Simulate sides that are touched as this skull was, to hold its errors against (Figure 6 C and D).
+    """Simulate sides that are touched as this skull was, for comparison with its errors (Figure 6 C and D).
 
     Parameters
     ----------
     touches : LandmarkSet
         Which features were touched.
     specimens : sequence of Specimen, optional
-        Labelled animals: both methods are then simulated from their scatter. Without them, the robust one is,
-        from eleven animals drawn from the atlas.
+        Labelled animals: both methods are then simulated from their scatter. Without them, only the robust
+        one is, from eleven animals drawn from the atlas.
     atlas : Atlas, optional
         By default the published one.
     n, noise, rng, executor
-        As in `gp_core.study.simulation.simulate`.
+        As for `gp_core.study.simulation.simulate`.
+
+    Returns
+    -------
+    tuple of SimulationReport
+        One for each method.
 
     Raises
     ------
     GpError
-        As `gp_core.study.simulation.simulate` does.
+        As for `gp_core.study.simulation.simulate`.
     """
     probe = [code for code in touches.placed if code in EXTERNAL and code in TRAINING]
     methods = METHODS if specimens else METHODS[:1]
@@ -179,19 +221,19 @@ def _estimates(
     ]
 
 
-def _row(registration: SkullRegistration, pose: CochleaPose, true: LandmarkSet) -> PhysicalRow:
+def _row(registration: RegistrationResult, pose: CochleaPose, true: LandmarkSet) -> PhysicalRow:
     T_scan_tracker = registration.T_scan_tracker
     origin = T_scan_tracker.apply(pose.origin[None])[0]
     axis = T_scan_tracker.apply_vector(pose.axis)
     return PhysicalRow(
-        registration.way,
+        registration.method,
         pose.method,
         float(np.linalg.norm(origin - true["CO"])),
         float(angle_between_deg(axis, modiolar_axis(true["CA"], true["CB"]))),
     )
 
 
-def _warnings(registrations: Sequence[SkullRegistration], poses: Sequence[CochleaPose]) -> list[str]:
+def _warnings(registrations: Sequence[RegistrationResult], poses: Sequence[CochleaPose]) -> list[str]:
     by_names, by_icp = registrations[:2]
     found = [
         f"skull feature {name} does not fit the others: left out of the registration by names"

@@ -1,4 +1,4 @@
-"""How far an estimated cochlea is off: the errors of the paper, for both methods."""
+"""Errors of an estimated cochlea, as the paper defines them, for both methods."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.constants import MM_PER_DEGREE
 from gp_core.frames import angle_between_deg
 from gp_core.landmarks.features import index_of
 from gp_core.landmarks.sets import LandmarkSet
@@ -15,10 +16,7 @@ from gp_core.pose.robust import locate_robust
 from gp_core.registration.jrmpc import JrmpcSettings, jrmpc_batch
 from gp_core.validation import FloatArray
 
-__all__ = ["AXIS_WEIGHT", "PoseErrors", "angle_between_deg", "jrmpc_errors", "robust_errors", "touched"]
-
-AXIS_WEIGHT = 0.2
-"""What a degree of axis error counts beside a millimetre of position error in E_T."""
+__all__ = ["PoseErrors", "angle_between_deg", "jrmpc_errors", "robust_errors", "touched"]
 
 _CO, _CA = index_of("CO"), index_of("CA")
 
@@ -41,11 +39,22 @@ class PoseErrors:
     @property
     def e_t(self) -> float:
         """Total error E_T, the sum of 0.2 E_MA (degrees) + E_CO (mm)."""
-        return float(np.sum(AXIS_WEIGHT * self.e_ma_deg + self.e_co_mm))
+        return float(np.sum(MM_PER_DEGREE * self.e_ma_deg + self.e_co_mm))
 
     @classmethod
     def joined(cls, parts: Sequence[PoseErrors]) -> PoseErrors:
-        """Return the errors of several lists of estimates as one list."""
+        """Concatenate the errors of several lists of estimates.
+
+        Parameters
+        ----------
+        parts : sequence of PoseErrors
+            The lists.
+
+        Returns
+        -------
+        PoseErrors
+            In the same order.
+        """
         return cls(
             np.concatenate([part.e_co_mm for part in parts]),
             np.concatenate([part.e_ma_deg for part in parts]),
@@ -71,11 +80,16 @@ def jrmpc_errors(
     touches : (B, p, 3) array, mm
         The p points that the probe reports, in the RW frame built on them.
     truth : (B, 20, 3) array, mm
-        The points of the same sides as they are, in the same frame.
+        The true points of the same sides, in the same frame.
     features : sequence of str
         Which of the training points take part.
     settings : JrmpcSettings
-        See there.
+        Of the registration.
+
+    Returns
+    -------
+    PoseErrors
+        B errors, mm and degrees.
     """
     rows = [index_of(code) for code in features]
     n_problems, n_sets = training.shape[:2]
@@ -95,16 +109,21 @@ def jrmpc_errors(
 def robust_errors(
     atlases: Sequence[Atlas], touches: Sequence[LandmarkSet], truths: Sequence[LandmarkSet]
 ) -> PoseErrors:
-    """Estimate poses with the robust method, and hold them against the labelled cochleae.
+    """Estimate poses with the robust method, and compare them with the labelled cochleae.
 
     Parameters
     ----------
     atlases : sequence of Atlas
-        Of each estimate; nothing of the animal in question may be in it.
+        One for each estimate; it must not contain the animal in question.
     touches : sequence of LandmarkSet
         The touched features and no others; see `touched`.
     truths : sequence of LandmarkSet
         The same sides with CO and CA, in the same frame.
+
+    Returns
+    -------
+    PoseErrors
+        One for each estimate, mm and degrees.
     """
     origins, axes = [], []
     for atlas, touch, truth in zip(atlases, touches, truths, strict=True):
@@ -116,5 +135,18 @@ def robust_errors(
 
 
 def touched(landmarks: LandmarkSet, probe: Sequence[str]) -> LandmarkSet:
-    """Return a set that holds the probe features only."""
+    """Return a set with the probe features only.
+
+    Parameters
+    ----------
+    landmarks : LandmarkSet
+        One side, mm.
+    probe : sequence of str
+        The touched features.
+
+    Returns
+    -------
+    LandmarkSet
+        In the same frame.
+    """
     return LandmarkSet.from_mapping(landmarks.as_mapping(probe), landmarks.side, frame=landmarks.frame)

@@ -1,7 +1,7 @@
-"""Sessions of touching in which something goes wrong: what the probe reports of one side.
+"""Simulated touch sessions in which something goes wrong: what the probe reports of one side.
 
-Every session is held in a random tracker frame, its features are touched in random order, and positions are
-told in the frame in which the session ends: there the robot works.
+Every session has a random tracker frame, its features are touched in random order, and positions are given in
+the frame at the end of the session, in which the robot works.
 """
 
 from __future__ import annotations
@@ -85,19 +85,27 @@ def touch_session(
     disturbances: tuple[Disturbance, ...],
     rng: np.random.Generator,
 ) -> tuple[Session, dict[str, FloatArray]]:
-    """Hold a session; return it, and what was reported, by feature.
+    """Simulate a session.
 
     Parameters
     ----------
     truth : LandmarkSet
-        A labelled side, CO with it, in any frame.
+        A labelled side with CO, in any frame, mm.
     codes : tuple of str
         What is touched.
     noise : float
         Standard deviation of each touched coordinate, mm.
     disturbances : tuple of Disturbance
-        What goes wrong, one after the other.
+        What goes wrong, applied one after the other.
     rng : numpy Generator
+        Source of random numbers.
+
+    Returns
+    -------
+    session : Session
+        The true positions in the tracker frame, mm.
+    reported : dict of str to (3,) array, mm
+        What the probe reports, tracker frame.
     """
     T_tracker_any = _random_frame(rng, truth.frame)
     moved = truth.moved(T_tracker_any)
@@ -110,7 +118,18 @@ def touch_session(
 
 
 def tip_offset(length: float) -> Disturbance:
-    """Return: the tip is wrong by `length` mm in the probe's frame, which leans from touch to touch."""
+    """Return a disturbance: an error of the tip in the probe's frame, whose tilt varies from touch to touch.
+
+    Parameters
+    ----------
+    length : float
+        Length of the error, mm.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_tip_offset, length)
 
 
@@ -121,7 +140,20 @@ def _tip_offset(length: float, session: Session, rng: np.random.Generator) -> Se
 
 
 def drift(length: float, *, timed: bool = False) -> Disturbance:
-    """Return: the reference drifts by `length` mm from the first touch to the last, at an even pace."""
+    """Return a disturbance: the reference drifts uniformly from the first touch to the last.
+
+    Parameters
+    ----------
+    length : float
+        Total drift, mm.
+    timed : bool
+        Whether the touches carry times.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_drift, length, timed)
 
 
@@ -131,7 +163,18 @@ def _drift(length: float, timed: bool, session: Session, rng: np.random.Generato
 
 
 def soft_tissue(depth: float) -> Disturbance:
-    """Return: tissue of about `depth` mm keeps the tip off the bone, along the normal at each touch."""
+    """Return a disturbance: tissue keeps the tip off the bone, along the normal at each touch.
+
+    Parameters
+    ----------
+    depth : float
+        Mean thickness, mm.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_soft_tissue, depth)
 
 
@@ -143,7 +186,18 @@ def _soft_tissue(depth: float, session: Session, rng: np.random.Generator) -> Se
 
 
 def knocked_marker(length: float) -> Disturbance:
-    """Return: between two touches the reference is knocked: the ear moves by `length` mm, and turns."""
+    """Return a disturbance: the reference marker is knocked between two touches; the ear moves and rotates.
+
+    Parameters
+    ----------
+    length : float
+        Displacement, mm.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_knocked_marker, length)
 
 
@@ -158,7 +212,18 @@ def _knocked_marker(length: float, session: Session, rng: np.random.Generator) -
 
 
 def other_size(factor: float) -> Disturbance:
-    """Return: the animal is `factor` times as large."""
+    """Return a disturbance: the animal has another size.
+
+    Parameters
+    ----------
+    factor : float
+        Its size relative to the atlas.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_other_size, factor)
 
 
@@ -169,7 +234,20 @@ def _other_size(factor: float, session: Session, rng: np.random.Generator) -> Se
 
 
 def mistouch(code: str, length: float) -> Disturbance:
-    """Return: one feature is touched `length` mm off, in a random direction."""
+    """Return a disturbance: one feature is touched off its place, in a random direction.
+
+    Parameters
+    ----------
+    code : str
+        The feature.
+    length : float
+        Distance, mm.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_mistouch, code, length)
 
 
@@ -180,7 +258,18 @@ def _mistouch(code: str, length: float, session: Session, rng: np.random.Generat
 
 
 def exchanged(pair: tuple[str, str]) -> Disturbance:
-    """Return: two features are touched under each other's name."""
+    """Return a disturbance: the names of two touched features are exchanged.
+
+    Parameters
+    ----------
+    pair : (str, str)
+        The features.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_exchanged, pair)
 
 
@@ -192,12 +281,36 @@ def _exchanged(pair: tuple[str, str], session: Session, _: np.random.Generator) 
 
 
 def wrong_side(session: Session, _: np.random.Generator) -> Session:
-    """Say that the ear is the other one."""
+    """Report the ear as the other one; a disturbance.
+
+    Parameters
+    ----------
+    session : Session
+        The session.
+    _ : numpy Generator
+        Not used.
+
+    Returns
+    -------
+    Session
+        With the other side.
+    """
     return replace(session, side=session.side.other)
 
 
 def anisotropic(along: float) -> Disturbance:
-    """Return: the noise is `along` times as large along one axis of the tracker, as of a stereo camera."""
+    """Return a disturbance: larger noise along one axis of the tracker, as with a stereo camera.
+
+    Parameters
+    ----------
+    along : float
+        Factor of the noise along that axis.
+
+    Returns
+    -------
+    Disturbance
+        To be passed to `touch_session`.
+    """
     return partial(_anisotropic, along)
 
 

@@ -1,4 +1,4 @@
-"""Animals drawn from the scatter of the labelled ones, and how well they are estimated (Figure 6 C and D)."""
+"""Animals drawn from the scatter of the labelled ones, and the errors of their estimates (Figure 6 C, D)."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas
+from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import CODES, PROBE, TRAINING, Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.cochlea_pose import METHODS
 from gp_core.pose.jrmpc_estimator import training_sides
 from gp_core.registration.jrmpc import ESTIMATION, JrmpcSettings, jrmpc
 from gp_core.study.leave_one_out import describe
@@ -29,7 +29,7 @@ from gp_core.validation import FloatArray, check_option
 __all__ = ["LIMITS", "SimulationReport", "simulate", "simulate_sides"]
 
 LIMITS = (0.43, 8.1)
-"""The largest errors (mm, degrees) of the paper's 22 sides, which it holds the simulated ones against."""
+"""The largest errors (mm, degrees) of the paper's 22 sides, its limits for the simulated ones."""
 
 _CHUNK = 100
 
@@ -63,7 +63,13 @@ class SimulationReport:
         return {**self.errors, "pooled": PoseErrors.joined(list(self.errors.values()))}
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         settings = describe(self.method, self.training, self.probe, self.settings)
         return {
             "groups": {name: _statistics(errors) for name, errors in self.groups.items()},
@@ -121,10 +127,11 @@ def simulate(
     specimens : sequence of Specimen
         At least three labelled animals.
     n : int
-        How many to draw a side.
+        Number of animals drawn for each side.
     rng : numpy Generator
-        The source of chance.
+        Source of random numbers.
     method : {"jrmpc", "robust"}
+        The estimator.
     training, probe : iterable of str
         Features of the labelled animals, and those that are touched.
     settings : JrmpcSettings
@@ -132,7 +139,12 @@ def simulate(
     noise : float
         Standard deviation of the touch errors, mm a coordinate.
     executor : concurrent.futures.Executor, optional
-        What estimates run on; the answer does not depend on it.
+        Runs the estimates; the result does not depend on it.
+
+    Returns
+    -------
+    SimulationReport
+        Errors of all drawn sides.
 
     Raises
     ------
@@ -173,7 +185,7 @@ def simulate_sides(
     """Draw sides from the scatter of the labelled ones, feature by feature.
 
     The labelled sides are registered by JRMPC on some features; mean and covariance of each of the 20
-    features in the joint frame make a Gaussian. CO is computed anew from the drawn points, as in an animal.
+    features in the joint frame make a Gaussian. CO is recomputed from the drawn points, as in an animal.
 
     Parameters
     ----------

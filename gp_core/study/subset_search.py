@@ -1,4 +1,4 @@
-"""The search for the best features: backward elimination over training and probe features (Figure 5)."""
+"""Search for the best features: backward elimination over training and probe features (Figure 5)."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import asdict, dataclass
 from os import PathLike
 from typing import Any
 
+from gp_core.constants import METHODS
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.features import CODES, check_codes
 from gp_core.landmarks.sets import Specimen
-from gp_core.pose.cochlea_pose import METHODS
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
 from gp_core.study.backward_elimination import (
     FEWEST,
@@ -61,7 +61,13 @@ class SearchReport:
         return min(self.training, key=lambda step: step.e_t)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         best = self.best
         numbers = {} if self.settings is None else asdict(self.settings)
         return {
@@ -75,7 +81,15 @@ class SearchReport:
 
 @dataclass(frozen=True)
 class JrmpcProblem:
-    """Leave-one-out by JRMPC, as `Elimination` takes it."""
+    """Leave-one-out by JRMPC, as a problem for `Elimination`.
+
+    Attributes
+    ----------
+    folds : tuple of Folds
+        One for each labelled side of the head.
+    settings : JrmpcSettings
+        Of the registration.
+    """
 
     folds: tuple[Folds, ...]
     settings: JrmpcSettings
@@ -86,7 +100,18 @@ class JrmpcProblem:
         return sum(len(fold.cochlea) for fold in self.folds)
 
     def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        """Return what gives E_T of probe features."""
+        """Return the function that scores probe features, given training features.
+
+        Parameters
+        ----------
+        training : tuple of str
+            Training features.
+
+        Returns
+        -------
+        callable
+            From probe features to E_T.
+        """
         return lambda probe: (
             PoseErrors.joined([fold.errors(training, probe, self.settings) for fold in self.folds]).e_t
         )
@@ -94,7 +119,13 @@ class JrmpcProblem:
 
 @dataclass(frozen=True)
 class RobustProblem:
-    """Leave-one-out by the robust method, as `Elimination` takes it."""
+    """Leave-one-out by the robust method, as a problem for `Elimination`.
+
+    Attributes
+    ----------
+    specimens : tuple of Specimen
+        Labelled animals.
+    """
 
     specimens: tuple[Specimen, ...]
 
@@ -104,7 +135,18 @@ class RobustProblem:
         return sum(len(specimen.sides) for specimen in self.specimens)
 
     def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        """Fit the atlases, and return what gives E_T of probe features."""
+        """Fit the atlases, and return the function that scores probe features.
+
+        Parameters
+        ----------
+        training : tuple of str
+            Features of the atlases.
+
+        Returns
+        -------
+        callable
+            From probe features to E_T.
+        """
         atlases, truths = held_out_sides(self.specimens, training)
         return lambda probe: robust_errors(atlases, [touched(truth, probe) for truth in truths], truths).e_t
 
@@ -120,11 +162,11 @@ def search_features(
     checkpoint: str | PathLike[str] | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> SearchReport:
-    """Find the features whose leave-one-out error E_T is least, dropping one at a time.
+    """Find the features with the smallest leave-one-out error E_T, dropping one at a time.
 
     From the best training features of one number, each is left out in turn; each of these candidates is
-    scored by the least E_T of a backward elimination over its own external features, and the best is the next
-    step. Features are chosen on the animals that they are scored on, so the errors are optimistic: see
+    scored by the smallest E_T of a backward elimination over its own external features, and the best is the
+    next step. Features are selected on the animals that they are scored on, so the errors are optimistic: see
     `gp_core.study.nested_search`.
 
     Parameters
@@ -132,19 +174,25 @@ def search_features(
     specimens : sequence of Specimen
         At least three animals that have the features on every labelled side.
     method : {"jrmpc", "robust"}
+        The estimator.
     training : iterable of str
         Where the elimination starts, by default at all 20 features.
     fewest_training : int, optional
         Where it ends: by default at three with ``jrmpc``. With ``robust`` it ends where it starts, so that
-        probe features alone are chosen: an atlas loses nothing by features that are not touched.
+        only probe features are selected: features that are not touched do no harm in an atlas.
     settings : JrmpcSettings
         Of ``jrmpc``.
     executor : concurrent.futures.Executor, optional
-        What candidates run on; the answer does not depend on it.
-    checkpoint : path, optional
-        Where results are kept as they come in; a search that finds this file goes on from there.
+        Runs the candidates; the result does not depend on it.
+    checkpoint : path-like, optional
+        Where results are stored as they come in; a search that finds this file resumes from it.
     progress : callable, optional
-        Told about each candidate; what it raises stops the search.
+        Receives a `Progress` for each candidate; if it raises, the search stops.
+
+    Returns
+    -------
+    SearchReport
+        The steps of the elimination.
 
     Raises
     ------
@@ -167,7 +215,31 @@ def search_features(
 def check_start(
     specimens: Sequence[Specimen], method: str, training: Iterable[str], fewest: int | None
 ) -> tuple[Codes, int]:
-    """Return the training features that a search starts from, and the number that it ends at."""
+    """Return the training features that a search starts from, and the number that it ends at.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+    method : {"jrmpc", "robust"}
+        The estimator.
+    training : iterable of str
+        Requested features.
+    fewest : int or None
+        Requested end; None: the default of the method.
+
+    Returns
+    -------
+    start : tuple of str
+        Training features.
+    fewest : int
+        Number of training features to end at.
+
+    Raises
+    ------
+    GpError
+        Unknown or too few features, or an impossible end.
+    """
     check_option(method, "method", METHODS)
     start = check_codes(training, "the training features", at_least=FEWEST)
     if len(external(start)) < FEWEST:
@@ -181,7 +253,22 @@ def check_start(
 
 
 def problem_of(specimens: Sequence[Specimen], method: str, settings: JrmpcSettings) -> Problem:
-    """Return the leave-one-out problem of some animals."""
+    """Return the leave-one-out problem of some animals.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+    method : {"jrmpc", "robust"}
+        The estimator.
+    settings : JrmpcSettings
+        Of ``jrmpc``.
+
+    Returns
+    -------
+    Problem
+        Scores features.
+    """
     if method == "robust":
         return RobustProblem(tuple(specimens))
     return JrmpcProblem(tuple(folds_of(specimens)), settings)

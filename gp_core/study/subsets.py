@@ -1,9 +1,10 @@
-"""Which features and which sides take part in a study, checked once."""
+"""Validation of the features and sides of a study."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.features import EXTERNAL, Side, check_codes
 from gp_core.landmarks.sets import Specimen
@@ -13,18 +14,27 @@ __all__ = ["WINDOW_FEATURES", "check_labels", "check_subsets", "sides_of"]
 WINDOW_FEATURES = ("RWA", "RWP", "LLI")
 """The RW frame, in which touches enter JRMPC, is built on these, whether or not they are probe features."""
 
-_COCHLEA = ("CA", "CB", "RWA", "RWP")
 _FEWEST = 3
 _FEWEST_ANIMALS = 3
 
 
 def check_subsets(training: Iterable[str], probe: Iterable[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the training and the probe features as the table spells them.
+    """Return training and probe features as the table spells them.
+
+    Parameters
+    ----------
+    training, probe : iterable of str
+        The requested features.
+
+    Returns
+    -------
+    training, probe : tuple of str
+        In the requested order.
 
     Raises
     ------
     FeatureError
-        Unknown, doubled, fewer than three, or a probe feature that is internal or not a training feature.
+        Unknown, duplicated, fewer than three, or a probe feature that is internal or not a training feature.
     """
     features = check_codes(training, "the training features", at_least=_FEWEST)
     external = [code for code in EXTERNAL if code in features]
@@ -32,12 +42,19 @@ def check_subsets(training: Iterable[str], probe: Iterable[str]) -> tuple[tuple[
 
 
 def check_labels(specimens: Sequence[Specimen], codes: Iterable[str]) -> None:
-    """Raise unless there are three animals or more, and all their sides have these features and the cochlea.
+    """Check that there are at least three animals whose sides all have these features and the cochlea.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+    codes : iterable of str
+        Required features.
 
     Raises
     ------
     GpError
-        Too few animals, two of one name, or a feature is missing (says whose).
+        Too few animals, two with the same name, or a missing feature (the message names the animal).
     """
     names = [specimen.name for specimen in specimens]
     if len(names) < _FEWEST_ANIMALS:
@@ -48,7 +65,7 @@ def check_labels(specimens: Sequence[Specimen], codes: Iterable[str]) -> None:
     for name in names:
         if names.count(name) > 1:
             raise GpError("two animals have this name", specimen=name, remedy="Name them apart.")
-    needed = dict.fromkeys([*_COCHLEA, *WINDOW_FEATURES, *codes])
+    needed = dict.fromkeys([*DEFINING_FEATURES, *WINDOW_FEATURES, *codes])
     for specimen in specimens:
         for side, landmarks in specimen.sides.items():
             for code in needed:
@@ -62,12 +79,22 @@ def check_labels(specimens: Sequence[Specimen], codes: Iterable[str]) -> None:
 
 
 def sides_of(specimens: Sequence[Specimen]) -> list[tuple[Side, list[int]]]:
-    """Return for each labelled side which specimens have it, left first.
+    """Return, for each labelled side, which specimens have it; left first.
+
+    Parameters
+    ----------
+    specimens : sequence of Specimen
+        Labelled animals.
+
+    Returns
+    -------
+    list of (Side, list of int)
+        Rows of the specimens.
 
     Raises
     ------
     GpError
-        A side is labelled in fewer than three animals, but in some.
+        A side is labelled in one or two animals only.
     """
     found = [(side, [i for i, s in enumerate(specimens) if side in s.sides]) for side in Side]
     for side, which in found:

@@ -55,9 +55,14 @@ def make_trial(
     noise : float
         Standard deviation of the Gaussian error of each coordinate, mm.
     mistouch : float
-        How far one probe feature, drawn at random, is touched off its place, in a random direction, mm.
+        Error of one probe feature, drawn at random, in a random direction, mm.
     rng : numpy Generator, optional
-        The source of chance; not needed where there are no errors.
+        Source of random numbers; not needed without errors.
+
+    Returns
+    -------
+    Trial
+        Truth and touches.
     """
     if rng is None or not (noise or mistouch):
         return Trial(truth, touched(truth, probe), touched(truth, [*probe, *WINDOW_FEATURES]))
@@ -71,7 +76,20 @@ def make_trial(
 
 
 def window_arrays(trials: Sequence[Trial]) -> tuple[FloatArray, FloatArray]:
-    """Return touches (B, p, 3) and truth (B, 20, 3), each trial in the RW frame of its own touches, mm."""
+    """Return touches and truth, each trial in the RW frame of its own touches.
+
+    Parameters
+    ----------
+    trials : sequence of Trial
+        B trials with p touches each.
+
+    Returns
+    -------
+    touches : (B, p, 3) array, mm
+        What the probe reports.
+    truth : (B, 20, 3) array, mm
+        The true points.
+    """
     touches, truths = [], []
     for trial in trials:
         T_window_frame = round_window_frame(trial.window).inverse()
@@ -81,6 +99,17 @@ def window_arrays(trials: Sequence[Trial]) -> tuple[FloatArray, FloatArray]:
 
 
 def check_noise(noise: float) -> None:
-    """Raise unless a probe noise is a number of mm from 0."""
+    """Check a probe noise.
+
+    Parameters
+    ----------
+    noise : float
+        Standard deviation, mm.
+
+    Raises
+    ------
+    GpError
+        It is not a number of mm from 0.
+    """
     if not (np.isfinite(noise) and noise >= 0):
         raise GpError(f"the noise must be 0 mm or more, got {noise!r}")

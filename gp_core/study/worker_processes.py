@@ -30,9 +30,14 @@ class _WorkerContext(SpawnContext):
 
 
 def worker_context() -> SpawnContext:
-    """Return what a pool makes its processes of.
+    """Return the multiprocessing context of the worker processes.
 
-    They are started afresh, not forked: a fork copies the locks of threads that do not come along.
+    Workers are spawned, not forked: a fork would copy the locks of threads that it does not copy.
+
+    Returns
+    -------
+    multiprocessing.context.SpawnContext
+        For `concurrent.futures.ProcessPoolExecutor`.
     """
     return _WorkerContext()
 

@@ -67,7 +67,7 @@ class Animals:
     @property
     def doubts(self) -> tuple[Finding, ...]:
         """Labels that a person should look at, the worst first."""
-        found = () if self.screened is None else self.screened.doubts
+        found = () if self.screened is None else self.screened.problems
         return tuple(finding for finding in found if finding.kind != "other side")  # those are skipped
 
     def specimen_file(self, name: str, side: Side) -> Path | None:

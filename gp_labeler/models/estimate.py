@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform, angle_between_deg
 from gp_core.landmarks.anatomy import axis_frame
@@ -23,14 +24,14 @@ from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.estimate import estimate_pose
 from gp_core.pose.expected_landmarks import expected_features
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
-from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
+from gp_core.registration.fiducials import register_fiducials
+from gp_core.registration.result import RegistrationResult
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.touches import TouchHow
 
 __all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", "make_estimate", "verdict_on"]
 
-_DEFINING = ("CA", "CB", "RWA", "RWP")
 REGISTRATIONS = ("auto", "features", "skull")
 _SAME_MM, _SAME_DEG = 0.001, 0.01
 """Up to here a pose is the one that was judged: it is computed anew each time."""
@@ -73,13 +74,13 @@ class Registered:
     way : str
         ``features``, ``skull``, ``placed`` (on the scan itself) or ``known`` (given from elsewhere).
     T_scan_touches : RigidTransform
-    fiducials : FiducialRegistration, optional
+    fiducials : RegistrationResult, optional
         Where it was found from points.
     """
 
     way: str
     T_scan_touches: RigidTransform
-    fiducials: FiducialRegistration | None = None
+    fiducials: RegistrationResult | None = None
 
     @property
     def fre_mm(self) -> float | None:
@@ -385,9 +386,9 @@ def _fitted(way: str, touched: Mapping[str, FloatArray], fixed: Mapping[str, Flo
 
 def labelled_cochlea(labels: LandmarkSet) -> RigidTransform | None:
     """Return ``T_scan_cochlea`` of a labelled side, x along the modiolar axis; None before there is one."""
-    if "CO" not in labels or not all(code in labels for code in _DEFINING):
+    if "CO" not in labels or not all(code in labels for code in DEFINING_FEATURES):
         return None
-    ca, cb, rwa, rwp = labels.array(_DEFINING)
+    ca, cb, rwa, rwp = labels.array(DEFINING_FEATURES)
     origin = labels["CO"]
     try:
         return axis_frame(origin, ca - cb, (rwa + rwp) / 2 - origin, dst="scan", src="cochlea")

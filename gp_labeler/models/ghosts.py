@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from gp_core.atlas.atlas import DEFINING, Atlas
+from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
+from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
 from gp_core.landmarks.sets import LandmarkSet, Status
@@ -171,7 +172,7 @@ def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost
 def _side_variance(code: str) -> float:
     """Return how much a feature differs between the two ears of an animal, mm^2 a coordinate."""
     published = Atlas.published()
-    codes = (code,) if code in published.codes else DEFINING  # CO is computed from these
+    codes = (code,) if code in published.codes else DEFINING_FEATURES  # CO is computed from these
     return MIRROR_ASYMMETRY * float(published.variances(codes).mean())
 
 

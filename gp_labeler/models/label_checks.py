@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gp_core.atlas.label_check import Finding, SideCheck, departure, far
+from gp_core.atlas.label_check import Finding, SideCheck, deviation, far_finding
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
@@ -76,7 +76,7 @@ class LabelChecks:
         point that was moved is held against the place where the others expect it, which stays.
         """
         known = self.known(landmarks)
-        return self._carried(landmarks) if known is None else known.doubts
+        return self._carried(landmarks) if known is None else known.problems
 
     def settle(self, landmarks: LandmarkSet, found: SideCheck) -> None:
         """Take the check of a side from which the doubts after the next edit follow."""
@@ -91,7 +91,7 @@ class LabelChecks:
         moved = {f.code for f, stayed in zip(FEATURES, stays, strict=True) if not (stayed or f.computed)}
         if len(moved) > 1:
             return {}
-        carried = {code: doubt for code, doubt in found.doubts.items() if code in landmarks}
+        carried = {code: doubt for code, doubt in found.problems.items() if code in landmarks}
         for code in moved & set(carried):
             doubt = _moved(carried.pop(code), code, landmarks)
             if doubt is not None:
@@ -101,13 +101,13 @@ class LabelChecks:
 
 def _moved(doubt: Finding, code: str, landmarks: LandmarkSet) -> Finding | None:
     """Return what is doubted of a point after it was moved; None where only the next check can say."""
-    was = doubt.departure_of(code)
+    was = doubt.deviation_of(code)
     if doubt.kind == "other side":
         return doubt
     if was is None:
         return None
-    away = departure(code, landmarks[code], was.expected, was.covariance)
-    return far(landmarks.side, away) if away.is_doubtful else None
+    away = deviation(code, landmarks[code], was.expected, was.covariance)
+    return far_finding(landmarks.side, away) if away.is_outlier else None
 
 
 @dataclass(frozen=True)

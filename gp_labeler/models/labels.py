@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from psygnal import Signal
 
-from gp_core.atlas.label_check import Departure, Finding, SideCheck
+from gp_core.atlas.label_check import Deviation, Finding, SideCheck
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_core.landmarks.suggestion import Suggestion
@@ -77,7 +77,7 @@ class LabelsModel:
     ghosts_changed = Signal()
     """Another atlas is behind ghosts and doubts; they also follow the landmarks, without this signal."""
     checked = Signal()
-    """Labels were checked: ask for `departures` again."""
+    """Labels were checked: ask for `deviations` again."""
     doubts_changed = Signal()
     """Some of them are doubtful: ask `point_states(side, wait=False)` again."""
 
@@ -130,7 +130,7 @@ class LabelsModel:
 
     def doubts(self, side: Side) -> Mapping[str, Finding]:
         """Return what is doubted of the points of one side, by feature; this may take some 50 ms."""
-        return self._checks.found(self.document.landmarks(side)).doubts
+        return self._checks.found(self.document.landmarks(side)).problems
 
     def near_doubts(self, side: Side) -> Mapping[str, Finding]:
         """Return `doubts` as far as they can be told at once."""
@@ -140,10 +140,10 @@ class LabelsModel:
         """Whether one side is known to be labelled under the name of the other; at once, see `checking`."""
         return any(doubt.kind == "other side" for doubt in self.near_doubts(side).values())
 
-    def departures(self, side: Side) -> Mapping[str, Departure] | None:
+    def deviations(self, side: Side) -> Mapping[str, Deviation] | None:
         """Return how far the labels of one side are from where the atlas expects them; None while unknown."""
         known = self.checking(side).known
-        return None if known is None else known.departures
+        return None if known is None else known.deviations
 
     def checking(self, side: Side) -> CheckLabels:
         """Return the job that checks one side as it stands, for `point_states` to know its doubts."""
@@ -417,5 +417,5 @@ class LabelsModel:
 
     def _take_checked(self, showed_doubts: bool, found: SideCheck) -> None:
         self.checked.emit()
-        if showed_doubts or found.doubts:
+        if showed_doubts or found.problems:
             self.doubts_changed.emit()  # else all points look as they did

@@ -17,7 +17,7 @@ from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
 from gp_core.pose.cochlea_pose import CochleaPose
-from gp_core.pose.gate import against_writing
+from gp_core.pose.gate import reasons_against_writing
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_labeler.document import touching
@@ -338,7 +338,7 @@ class PoseModel:
             They would go to the other side, which was touched too.
         """
         pose = None if self.estimate is None else self.estimate.poses.get("robust")
-        best = None if pose is None else pose.likelier_reading
+        best = None if pose is None else pose.likelier_hypothesis
         if best is None:
             return None
         if best.exchanged is not None:
@@ -422,7 +422,7 @@ class PoseModel:
 
     def _check_doubt(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
         """Refuse to write for a robot what is in doubt, unless a person has accepted this very estimate."""
-        reasons = against_writing(pose)
+        reasons = reasons_against_writing(pose)
         estimate = self.estimate
         accepted = estimate is not None and verdict_on(estimate, self._document.state) == "accept"
         if reasons and not accepted:

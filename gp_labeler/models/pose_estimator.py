@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Specimen
-from gp_core.pose.cochlea_pose import METHODS, ROUND_WINDOWS
-from gp_core.pose.systematic_error import Systematic
+from gp_core.pose.cochlea_pose import ROUND_WINDOWS
+from gp_core.pose.systematic_error import SystematicError
 from gp_core.validation import check_option
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.touch_edits import LeaveOutTouch
@@ -65,7 +66,7 @@ class PoseEstimator:
         noise = settings.probe_noise
         if noise is not None and not 0 < noise < 20:
             raise GpError(f"probe noise must lie between 0 and 20 mm, got {noise!r}")
-        Systematic(settings.shared_error)  # refuses what is not allowed
+        SystematicError(settings.shared_error)  # refuses what is not allowed
         for method in settings.methods:
             check_option(method, "method", METHODS)
         check_option(settings.registration, "registration", REGISTRATIONS)

@@ -12,10 +12,10 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.insertion_path import (
+    angle_about,
     carry_path,
     read_path,
     rows_before_centre,
-    turn_about,
     winding_side,
     write_path,
 )
@@ -140,7 +140,7 @@ class InsertionPath:
     @property
     def turn(self) -> float:
         """How far it turns about the modiolar axis, rad, right-handed."""
-        return turn_about(self.points[: self.n_before_centre], 0)
+        return angle_about(self.points[: self.n_before_centre], 0)
 
     @property
     def fits(self) -> bool:

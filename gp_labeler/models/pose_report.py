@@ -123,7 +123,7 @@ class PoseReport:
         yield f"Origin CO, {frame} frame, mm", [_numbers(pose.origin, 2) for _, pose in poses]
         yield "Modiolar axis CB&rarr;CA", [_numbers(pose.axis, 3) for _, pose in poses]
         yield "95 % region", [_region(pose) for _, pose in poses]
-        if any(pose.has_parts for _, pose in poses):
+        if any(pose.is_multimodal for _, pose in poses):
             yield "95 % region, as named", [_plain_region(pose) for _, pose in poses]
         yield "Shared error in it", [_shared_error(pose) for _, pose in poses]
         yield "State", [pose.state for _, pose in poses]

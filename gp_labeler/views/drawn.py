@@ -94,7 +94,7 @@ def drawn_ghosts(workspace: Workspace) -> list[Ghost]:
     ghost = labels.ghosts(side).get(code)
     doubt = labels.near_doubts(side).get(code)
     if doubt is not None and labels.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
-        away = doubt.departure_of(code)
+        away = doubt.deviation_of(code)
         if away is None or away.distance > HEAD_MM:  # such a place would mean nothing
             return []
         return [Ghost(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]

@@ -71,7 +71,7 @@ def _poses(estimate: Estimate) -> tuple[DrawnPose, ...]:
         for method, pose in estimate.poses.items()
     ]
     robust = estimate.poses.get("robust")
-    if robust is not None and robust.has_parts:  # its 95 % region is where all of these are
+    if robust is not None and robust.is_multimodal:  # its 95 % region is where all of these are
         drawn += [
             DrawnPose.of_reading(reading, T_scan_touches)
             for reading in robust.hypotheses

@@ -10,7 +10,7 @@ from gp_core.atlas.sampling import draw_animal
 from gp_core.frames import RigidTransform
 
 
-def herd(n: int, seed: int = 0) -> list[Specimen]:
+def cohort(n: int, seed: int = 0) -> list[Specimen]:
     """Draw animals from the published atlas."""
     rng = np.random.default_rng(seed)
     atlas = Atlas.published()

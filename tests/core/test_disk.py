@@ -214,7 +214,7 @@ def test_no_input_in_a_folder_is_written_over(
     before = contents(labelled)
     assert main([word.replace("{in}", str(labelled)) for word in words] + [str(output)]) == 2
     error = capsys.readouterr().err
-    assert "is read, and" in error
+    assert "is an input, and" in error
     assert error.count("\n") == 1
     assert contents(labelled) == before
 
@@ -227,7 +227,7 @@ def test_results_may_go_beside_the_inputs_again_and_again(labelled: Path) -> Non
 def test_what_is_protected_stays_so_only_while_the_command_runs(tmp_path: Path) -> None:
     file = tmp_path / "touches.csv"
     file.write_bytes(OLD)
-    with disk.protected_inputs([file]), pytest.raises(GpError, match="would be written over"):
+    with disk.protected_inputs([file]), pytest.raises(GpError, match="would be overwritten"):
         disk.write_bytes(file, b"new")
     disk.write_bytes(file, b"new")
     assert file.read_bytes() == b"new"

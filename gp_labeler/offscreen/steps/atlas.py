@@ -106,7 +106,7 @@ class Check(Step):
         scan = None if measure is None else {side: measure(landmarks) for side, landmarks in sides.items()}
         atlas = rig.workspace.atlas.current or Atlas.published()
         findings = check_specimen(Specimen(state.specimen, sides), atlas, scan=scan)
-        doubtful = [finding for finding in findings if finding.is_doubt]
+        doubtful = [finding for finding in findings if finding.is_problem]
         if self.path is not None:
             file, rows = rig.to_write(self.path), [finding.as_dict() for finding in findings]
             write_text(file, json.dumps(rows, indent=1) + "\n")

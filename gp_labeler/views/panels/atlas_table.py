@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_core.atlas.label_check import Departure
+from gp_core.atlas.label_check import Deviation
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
 from gp_labeler.models.workflow import PointState
@@ -59,7 +59,7 @@ class AtlasModel(QAbstractTableModel):
         self._workspace = workspace
         self.codes: tuple[str, ...] = ()
         self._sd: dict[str, float] = {}
-        self._away: dict[Side, Mapping[str, Departure]] = {}
+        self._away: dict[Side, Mapping[str, Deviation]] = {}
         self.refresh_atlas()
 
     def refresh_atlas(self) -> None:
@@ -74,7 +74,7 @@ class AtlasModel(QAbstractTableModel):
 
     def refresh_labels(self) -> None:
         """Ask how well the labels fit."""
-        self._away = {side: self._workspace.labels.departures(side) or {} for side in _SIDES}
+        self._away = {side: self._workspace.labels.deviations(side) or {} for side in _SIDES}
         if self.codes:
             self.dataChanged.emit(self.index(0, 2), self.index(len(self.codes) - 1, 3))
 
@@ -86,7 +86,7 @@ class AtlasModel(QAbstractTableModel):
     @property
     def n_doubtful(self) -> int:
         """Those of them that should be looked at again."""
-        return sum(found.is_doubtful for away in self._away.values() for found in away.values())
+        return sum(found.is_outlier for away in self._away.values() for found in away.values())
 
     @property
     def others_doubted(self) -> tuple[str, ...]:
@@ -97,7 +97,7 @@ class AtlasModel(QAbstractTableModel):
             for side in _SIDES
             for code, state in labels.point_states(side, wait=False).items()
             if state is PointState.DOUBTFUL
-            and not (code in self._away[side] and self._away[side][code].is_doubtful)
+            and not (code in self._away[side] and self._away[side][code].is_outlier)
         }
         return tuple(found)
 
@@ -126,17 +126,17 @@ class AtlasModel(QAbstractTableModel):
         if role == Qt.ItemDataRole.DisplayRole:
             return (code, f"{self._sd[code]:.2f}", "", "")[index.column()] or _words(found)
         if role == DOUBTFUL_ROLE:
-            return found is not None and found.is_doubtful
+            return found is not None and found.is_outlier
         if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
             return self._sentence(code, index, found)
         return None
 
-    def _found(self, index: Index) -> Departure | None:
+    def _found(self, index: Index) -> Deviation | None:
         if index.column() < 2:
             return None
         return self._away[_SIDES[index.column() - 2]].get(self.codes[index.row()])
 
-    def _sentence(self, code: str, index: Index, found: Departure | None) -> str:
+    def _sentence(self, code: str, index: Index, found: Deviation | None) -> str:
         name = f"{code}, {feature(code).name}"
         if index.column() == 0:
             return name
@@ -148,7 +148,7 @@ class AtlasModel(QAbstractTableModel):
         return f"{name}, {side}: {found.text} ({found.n_sd:.1f} SD)"
 
 
-def _words(found: Departure | None) -> str:
+def _words(found: Deviation | None) -> str:
     if found is None:
         return NONE
     return f"{found.word.removesuffix(' mm')} · {found.n_sd:.1f}"

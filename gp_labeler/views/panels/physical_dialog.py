@@ -81,7 +81,7 @@ class PhysicalDialog(QDialog):
         self.busy.hide()
         for column, words in enumerate(("Registered by", "FRE", "Method", "CO off by", "Axis off by")):
             self.rows.addWidget(text_label(words, "hint"), 0, column)
-        fre = {registration.way: registration.fre_mm for registration in result.report.registrations}
+        fre = {registration.method: registration.fre_mm for registration in result.report.registrations}
         for n, row in enumerate(result.report.rows, start=1):
             cells = (
                 _WAYS.get(row.registration, row.registration),

@@ -98,7 +98,7 @@ def allowance_text(pose: CochleaPose) -> str:
     if pose.shared_error is None:
         return ""
     text = f"With a shared error of {pose.shared_error:g} mm"
-    if not pose.has_parts:
+    if not pose.is_multimodal:
         return text
     plain = f"{fine_mm(pose.plain_radius_95)}  ·  cone {degrees_text(pose.plain_cone_95)}"
     return f"As named: {plain}\nThe region above is of several parts. {text}"

@@ -83,7 +83,7 @@ def test_real_labels_pass(real_specimens: list[Specimen], published: Atlas) -> N
 def test_a_label_in_the_wrong_place_is_found(published: Atlas, side: LandmarkSet) -> None:
     kinds = _kinds(side.with_point("LLI", side["LLI"] + (1.5, 0, 0)), published)
     assert "LLI" in kinds["far"]
-    away = check_side(side.with_point("LLI", side["LLI"] + (1.5, 0, 0)), published).departures["LLI"]
+    away = check_side(side.with_point("LLI", side["LLI"] + (1.5, 0, 0)), published).deviations["LLI"]
     assert away.distance == pytest.approx(1.5, abs=0.4)
     assert away.n_sd > 5
 

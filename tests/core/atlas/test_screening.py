@@ -56,7 +56,7 @@ def _same(one: Atlas, other: Atlas) -> bool:
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
 
 
-def test_where_nothing_is_in_doubt_the_fit_is_the_plain_one_to_the_bit(
+def test_where_no_label_is_rejected_the_fit_is_the_plain_one_to_the_bit(
     animals: list[Specimen], real_specimens: list[Specimen]
 ) -> None:
     for those in (animals, real_specimens):
@@ -147,7 +147,7 @@ def test_animals_unlike_the_published_ones_are_held_against_each_other(animals: 
 def test_both_sides_get_the_mean_of_their_shared_point(animals: list[Specimen]) -> None:
     animal = animals[0]
     noisy = _changed(animal, lambda m: m.with_point("IN", m["IN"] + [0.3, 0, 0]), R)
-    assert not [f for f in screen_labels([noisy]).findings if f.is_doubt]
+    assert not [f for f in screen_labels([noisy]).findings if f.is_problem]
     middle = mean_shared_points(noisy)
     np.testing.assert_allclose(middle.side(L)["IN"], animal.side(L)["IN"] + [0.15, 0, 0])
     np.testing.assert_array_equal(middle.side(L)["IN"], middle.side(R)["IN"])

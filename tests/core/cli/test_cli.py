@@ -125,7 +125,7 @@ def test_check_finds_what_is_wrong(tmp_path: Path, capsys: pytest.CaptureFixture
     assert "FPA and LLI look exchanged" in capsys.readouterr().out
 
 
-def test_fit_leaves_out_what_check_doubts(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_fit_leaves_out_what_check_rejects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     rng = np.random.default_rng(3)
     for name in ("GP1", "GP2", "GP3", "GP4"):
         for side in draw_animal(gp_core.Atlas.published(), rng=rng, name=name).sides.values():

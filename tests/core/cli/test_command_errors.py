@@ -108,7 +108,7 @@ def test_nothing_read_is_written_over(
     same = tmp_path / "." / "sub" / ".." / touches.name
     (tmp_path / "sub").mkdir()
     error = _error(["estimate", str(touches), "--side", "L", option, str(same)], capsys)
-    assert error == f"gp-core: {same}: is read, and {option} would write over it. Name another file.\n"
+    assert error == f"gp-core: {same}: is an input, and {option} would overwrite it. Name another file.\n"
     assert touches.read_bytes() == before
 
 
@@ -129,7 +129,7 @@ def test_an_atlas_is_not_written_over_the_animals_it_is_fitted_to(
         animal = draw_animal(gp_core.Atlas.published(), rng=np.random.default_rng(ord(file.name[0])))
         write_markups(file, animal.side("L"), specimen=file.name[0])
     error = _error(["fit", *map(str, files), "-o", str(files[1])], capsys)
-    assert error.startswith(f"gp-core: {files[1]}: is read, and --output would write over it")
+    assert error.startswith(f"gp-core: {files[1]}: is an input, and --output would overwrite it")
 
 
 def test_writing_onto_a_folder_is_said_plainly(

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core.cli import main
 from gp_core.io import landmark_file_name, write_markups
@@ -17,8 +17,8 @@ from gp_core.landmarks.sets import LandmarkSet
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Landmark files of four drawn animals."""
-    where = tmp_path_factory.mktemp("herd")
-    for animal in herd(4):
+    where = tmp_path_factory.mktemp("cohort")
+    for animal in cohort(4):
         for side, landmarks in animal.sides.items():
             write_markups(where / landmark_file_name(animal.name, side), landmarks, specimen=animal.name)
     return str(where)
@@ -106,7 +106,7 @@ def test_simulate_with_physical_results(
     assert figure.read_bytes().startswith(b"%PDF")
     skull.write_text("[]")
     assert main(["simulate", folder, *options]) == 2
-    assert "is no result of a physical test" in capsys.readouterr().err
+    assert "is not the result of a physical test" in capsys.readouterr().err
 
 
 def test_compare(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -121,7 +121,7 @@ def test_compare(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_physical(folder: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    animal = herd(1, seed=9)[0].side("R")
+    animal = cohort(1, seed=9)[0].side("R")
     skull = {f"S{i}": 12.0 * np.array([np.cos(i), np.sin(2 * i), np.cos(5 * i)]) for i in range(1, 9)}
     ct = LandmarkSet(animal.points, animal.side, "scan", extra=skull)
     write_markups(tmp_path / "ct_R.mrk.json", ct, specimen="ct")

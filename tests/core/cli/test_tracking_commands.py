@@ -126,7 +126,7 @@ def test_register_finds_the_scan(tmp_path: Path, capsys: pytest.CaptureFixture[s
     np.testing.assert_allclose(way_back[9:], np.linalg.inv(content["transform"])[:3, 3], atol=1e-9)
     text = capsys.readouterr().out
     assert "Tracker to scan by 10 points" in text
-    assert "to expect at the cochlea (TRE)" in text
+    assert "expected error at the cochlea (TRE)" in text
 
 
 def test_register_without_a_labelled_cochlea(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,7 +30,7 @@ def landmarks() -> LandmarkSet:
     return LandmarkSet(marks.points, "L", unseen=marks.unseen, provenance=KNOWN, observer="AB", round=2)
 
 
-def test_it_stays_with_a_label_until_that_is_placed_anew(landmarks: LandmarkSet) -> None:
+def test_it_stays_with_a_label_until_that_is_placed_again(landmarks: LandmarkSet) -> None:
     assert landmarks.provenance["CB"].certainty is Certainty.GUESS
     assert dict(landmarks.checked) == {"CA": "CD"}
     again = landmarks.with_point("CB", [1, 2, 3])

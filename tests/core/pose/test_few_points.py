@@ -23,7 +23,7 @@ def _said(pose: CochleaPose) -> list[str]:
 
 @pytest.mark.parametrize("n", [3, 4])
 def test_up_to_four_points_a_mistouch_cannot_be_told(n: int) -> None:
-    assert _said(_pose(n)) == [f"only {n} points: a mistouch cannot be told from an unusual animal"]
+    assert _said(_pose(n)) == [f"only {n} points: a mistouch cannot be distinguished from an unusual animal"]
 
 
 @pytest.mark.parametrize("n", [5, 6])

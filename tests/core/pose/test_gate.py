@@ -89,7 +89,7 @@ def _file(folder: Path, touches: dict[str, np.ndarray]) -> str:
         ({code: ANIMAL[code] for code in ("OS", "MN", "RWA")}, "L", ("undecided", "clear")),
     ],
 )
-def test_the_shell_writes_nothing_for_a_robot_in_doubt(
+def test_the_shell_writes_no_ambiguous_pose_for_a_robot(
     touches: dict, side: str, state: tuple[str, str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = {name: tmp_path / name for name in ("p.json", "p.tfm", "p.csv", "p.mrk.json")}
@@ -132,7 +132,7 @@ def test_the_shell_reads_touches_as_they_are_likeliest_meant(
         np.testing.assert_allclose(pose.transform, straight.transform, atol=1e-6)
         assert pose.side.value == "L"
     said = capsys.readouterr().out
-    assert said.count("! taken as the left ear, which is likelier than what was given") == 1
+    assert said.count("! used as the left ear, which is likelier than the given names and side") == 1
     assert said.count("exchanged, which is likelier") == 1
 
 

@@ -1,4 +1,4 @@
-"""Other readings of the touches are weighed, kept, and widen the region where they are not ruled out."""
+"""Alternative hypotheses are weighted, kept, and widen the region where they are not ruled out."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from atlas_cases import draw_side, errors, noisy, random_pose
 
 from gp_core import PROBE, Atlas, LandmarkSet, Side, estimate_pose, read_pose
 from gp_core.frames import mirror_x
-from gp_core.pose.hypotheses import log_evidence, readings
+from gp_core.pose.hypotheses import fit_hypotheses, log_evidence
 from gp_core.pose.robust import touch_model
 from gp_core.registration.named_points import fit_named_points
 
@@ -64,7 +64,7 @@ def test_the_heaviest_other_reading_is_the_true_one() -> None:
     assert (pose.names_state, set(best.exchanged or ())) == ("wrong", {"CL", "OS"})
     assert best.label in ("CL and OS exchanged", "OS and CL exchanged")
     assert np.linalg.norm(best.origin - animal["CO"]) < 0.8
-    assert pose.has_parts
+    assert pose.is_multimodal
     assert pose.radius_95 > np.linalg.norm(best.origin - pose.origin)
     right = estimate_pose(touches, "R", ATLAS)
     assert (right.side_state, right.hypotheses[0].side) == ("wrong", Side.LEFT)
@@ -132,6 +132,6 @@ def test_what_is_read_first_is_what_was_named() -> None:
     touches = LandmarkSet.from_mapping(_touches(6, 0.4)[1], "L", frame="tracker")
     model = touch_model(touches, ATLAS, None)
     fit = fit_named_points(model, touches.array(model.codes))
-    named, *others = readings(model, touches.array(model.codes), fit)
+    named, *others = fit_hypotheses(model, touches.array(model.codes), fit)
     assert (named.mirrored, named.exchanged, named.fit) == (False, None, fit)
     assert [r.probability for r in others] == sorted((r.probability for r in others), reverse=True)

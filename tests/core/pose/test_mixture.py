@@ -1,4 +1,4 @@
-"""The region around one pose that holds several readings of the touches."""
+"""The region around one pose that covers several hypotheses on the touches."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gp_core.pose.covariance import radius_95
-from gp_core.pose.mixture import Part, axis_part, holding_radius, origin_part
+from gp_core.pose.mixture import MixturePart, axis_part, mixture_radius_95, origin_part
 
 RNG = np.random.default_rng(0)
 
@@ -20,16 +20,16 @@ def test_of_one_reading_it_is_the_plain_radius() -> None:
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = _covariance(0.2)
     part = origin_part(1.0, np.ones(3), np.ones(3), covariance)
-    assert holding_radius([part]) == pytest.approx(radius_95(covariance))
+    assert mixture_radius_95([part]) == pytest.approx(radius_95(covariance))
 
 
 @pytest.mark.parametrize("share", [0.004, 0.02, 0.3, 0.7, 0.999])
 def test_it_holds_95_percent_of_the_mixture_and_of_every_reading_not_ruled_out(share: float) -> None:
     parts = [
-        Part(1 - share, np.zeros(3), _covariance(0.2)),
-        Part(share, np.array([2.0, 1, 0]), _covariance(0.3)),
+        MixturePart(1 - share, np.zeros(3), _covariance(0.2)),
+        MixturePart(share, np.array([2.0, 1, 0]), _covariance(0.3)),
     ]
-    radius = holding_radius(parts)
+    radius = mixture_radius_95(parts)
     held = []
     for part in parts:
         drawn = RNG.multivariate_normal(part.offset, part.covariance, 40_000)
@@ -44,8 +44,11 @@ def test_it_holds_95_percent_of_the_mixture_and_of_every_reading_not_ruled_out(s
 
 
 def test_a_reading_of_no_weight_changes_nothing() -> None:
-    parts = [Part(1.0, np.zeros(3), _covariance(0.2)), Part(0.0, np.full(3, 9.0), _covariance(0.2))]
-    assert holding_radius(parts) == pytest.approx(holding_radius(parts[:1]))
+    parts = [
+        MixturePart(1.0, np.zeros(3), _covariance(0.2)),
+        MixturePart(0.0, np.full(3, 9.0), _covariance(0.2)),
+    ]
+    assert mixture_radius_95(parts) == pytest.approx(mixture_radius_95(parts[:1]))
 
 
 def test_an_axis_is_as_far_as_its_angle_even_the_opposite_one() -> None:
@@ -54,8 +57,8 @@ def test_an_axis_is_as_far_as_its_angle_even_the_opposite_one() -> None:
         angle = np.radians(degrees)
         part = axis_part(1.0, np.array([np.cos(angle), np.sin(angle), 0]), x, covariance)
         assert np.linalg.norm(part.offset) == pytest.approx(angle, abs=1e-6)
-        assert holding_radius([part]) == pytest.approx(angle, abs=1e-3)
+        assert mixture_radius_95([part]) == pytest.approx(angle, abs=1e-3)
 
 
 def test_no_spread_at_all_is_no_distance() -> None:
-    assert holding_radius([Part(1.0, np.zeros(3), np.zeros((3, 3)))]) == 0.0
+    assert mixture_radius_95([MixturePart(1.0, np.zeros(3), np.zeros((3, 3)))]) == 0.0

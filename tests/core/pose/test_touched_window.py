@@ -104,21 +104,21 @@ def _moved(pose: CochleaPose, by: np.ndarray) -> CochleaPose:
 def test_the_covariance_is_that_of_small_errors() -> None:
     touches = LandmarkSet.from_mapping(_touched(_animal(10), 11), "L", frame="tracker")
     pose = estimate_pose(touches, "L", ATLAS, probe_noise=0.15, round_window="expected")
-    turned = towards_touched_window(pose, touches)
+    rotated = towards_touched_window(pose, touches)
 
     def error(by: np.ndarray) -> np.ndarray:
-        """What (pose, middle of the window) off by that does to the turned frame."""
+        """What (pose, middle of the window) off by that does to the rotated frame."""
         off = {c: p + by[6:] * (c in ("RWA", "RWP")) for c, p in touches.as_mapping(PROBE).items()}
         window = LandmarkSet.from_mapping(off, "L", frame="tracker")
         found = towards_touched_window(_moved(pose, by[:6]), window)
-        turn = found.transform[:3, :3] @ turned.transform[:3, :3].T
-        return np.append(found.origin - turned.origin, Rotation.from_matrix(turn).as_rotvec())
+        turn = found.transform[:3, :3] @ rotated.transform[:3, :3].T
+        return np.append(found.origin - rotated.origin, Rotation.from_matrix(turn).as_rotvec())
 
     step = 1e-6
     jacobian = np.array([(error(step * row) - error(-step * row)) / (2 * step) for row in np.eye(9)]).T
     errors = np.zeros((9, 9))
     errors[:6, :6], errors[6:, 6:] = pose.covariance, 0.15**2 / 2 * np.eye(3)
-    np.testing.assert_allclose(turned.covariance, jacobian @ errors @ jacobian.T, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(rotated.covariance, jacobian @ errors @ jacobian.T, rtol=1e-4, atol=1e-9)
 
 
 def test_the_choice_is_kept_in_the_file_and_older_files_are_read(tmp_path: Path) -> None:

@@ -8,8 +8,9 @@ from scipy.stats import chi2
 
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import RigidTransform
-from gp_core.registration.fiducials import FiducialRegistration, register_fiducials
+from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.procrustes import fit_rigid, rms_without_each
+from gp_core.registration.result import RegistrationResult
 from gp_core.validation import FloatArray
 
 TARGETS = np.array([[3.0, -25.0, 8.0], [0.0, 0.0, 0.0], [40.0, 5.0, -3.0]])
@@ -38,7 +39,7 @@ def _lists(n: int, noise: float, seed: int, wrong: float) -> tuple[FloatArray, F
 
 def touched(
     n: int, noise: float, seed: int, *, wrong: float = 0.0
-) -> tuple[FiducialRegistration, RigidTransform]:
+) -> tuple[RegistrationResult, RigidTransform]:
     scan, points, T = _lists(n, noise, seed, wrong)
     return register_fiducials(named(points), {**named(scan), "other": np.zeros(3)}), T.inverse()
 
@@ -117,7 +118,7 @@ def test_what_the_others_fit_twice_as_well_without_is_named() -> None:
 def test_few_points_say_what_they_cannot_tell() -> None:
     found = touched(3, 0.2, 0)[0]
     (warning,) = found.warnings
-    assert warning.startswith("only 3 points: a wrong one cannot be told")
+    assert warning.startswith("only 3 points: a wrong one cannot be detected")
     assert found.fle_95_mm > 2.5 * found.fle_mm
     assert touched(8, 0.2, 0)[0].warnings == ()
     assert touched(3, 0.0, 0)[0].warnings

@@ -58,7 +58,7 @@ def test_agrees_with_plain_numpy_in_pieces_on_threads(monkeypatch: pytest.Monkey
     whole = jrmpc(sets, centres, gamma=0.1, max_iterations=25)
     monkeypatch.setattr(module, "_TABLE", 45 * 40)
     monkeypatch.setattr(module, "_WORTH_THREADS", 0)
-    monkeypatch.setattr(module, "_n_cores", lambda: 3)
+    monkeypatch.setattr(module, "n_cores", lambda: 3)
     pieces = jrmpc(sets, centres, gamma=0.1, max_iterations=25)
     assert_same(whole, expected)
     assert_same(pieces, expected)
@@ -117,7 +117,7 @@ def test_stopping_at_rest_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     early = jrmpc(sets, max_iterations=400)
     assert early.n_iterations < 400
     assert early.converged
-    monkeypatch.setattr(module, "_AT_REST", -1.0)
+    monkeypatch.setattr(module, "_STATIONARY", -1.0)
     full = jrmpc(sets, max_iterations=400)
     assert full.n_iterations == 400
     assert_same(early, full)

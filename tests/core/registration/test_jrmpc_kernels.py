@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gp_core.registration.jrmpc_kernels import exp_negative
-from gp_core.registration.rotation_compiled import as_matrix, least_turn
+from gp_core.registration.rotation_compiled import as_matrix, minimal_rotation
 from gp_core.validation import FloatArray
 
 
@@ -22,7 +22,7 @@ def test_exponential_falls_to_zero_cleanly() -> None:
 
 
 def rotation_of(h: FloatArray) -> FloatArray:
-    return np.reshape(as_matrix(least_turn(tuple(h.ravel().tolist()))), (3, 3))
+    return np.reshape(as_matrix(minimal_rotation(tuple(h.ravel().tolist()))), (3, 3))
 
 
 def random_orthogonal(rng: np.random.Generator) -> FloatArray:

@@ -7,7 +7,7 @@ from atlas_cases import random_pose
 from gp_core import PROBE, Atlas
 from gp_core.errors import GeometryError
 from gp_core.frames import mirror_x
-from gp_core.registration.named_points import TouchModel, careful_misfit, fit_named_points, motion_jacobian
+from gp_core.registration.named_points import TouchModel, fit_named_points, gaussian_deviance, motion_jacobian
 from gp_core.registration.procrustes import weighted_procrustes
 
 
@@ -75,12 +75,12 @@ def test_a_mirrored_ear_fits_worse_at_careful_and_at_rough_touches() -> None:
     rng = np.random.default_rng(5)
     codes = tuple(code for code in Atlas.published().codes if code not in ("IN", "ZL"))
     model = _model(codes)
-    assert careful_misfit(model, model.mean, 0.05) < 1e-9
-    assert careful_misfit(model, mirror_x(model.mean), 0.05) > 20
+    assert gaussian_deviance(model, model.mean, 0.05) < 1e-9
+    assert gaussian_deviance(model, mirror_x(model.mean), 0.05) > 20
     for noise in (0.0, 0.4):
         touches = model.mean + noise * rng.normal(size=model.mean.shape)
         own, mirrored = fit_named_points(model, touches), fit_named_points(model, mirror_x(touches))
-        assert mirrored.misfit > own.misfit + 10
+        assert mirrored.neg_log_posterior > own.neg_log_posterior + 10
 
 
 def test_a_touch_is_held_against_the_others_as_if_it_had_been_left_out() -> None:
@@ -99,7 +99,7 @@ def test_a_touch_is_held_against_the_others_as_if_it_had_been_left_out() -> None
         lever = motion_jacobian(model.mean[[j]])
         of_pose = lever @ np.linalg.solve(information, lever.T)
         spread = of_pose + (model.variances[j] + 0.1**2) * np.eye(3)
-        found = fit.against_others
+        found = fit.leave_one_out_residuals
         assert found.squared[j] == pytest.approx(away @ np.linalg.solve(spread, away), rel=0.05)
 
 
@@ -107,7 +107,7 @@ def test_an_odd_touch_is_as_wrong_as_makes_its_deviation_an_average_one() -> Non
     model = _model()
     touches = model.mean.copy()
     touches[2] += (0.0, 2.5, -2.5)
-    others = fit_named_points(model, touches).against_others
+    others = fit_named_points(model, touches).leave_one_out_residuals
     j = int(others.squared.argmax())
     spread = others.variances[j] + others.error_variance[j]
     assert others.squared[j] > 8
@@ -119,7 +119,7 @@ def test_an_odd_touch_is_as_wrong_as_makes_its_deviation_an_average_one() -> Non
 def test_three_touches_say_nothing_against_each_other() -> None:
     model = _model(("CL", "OS", "RWA"))
     fit = fit_named_points(model, model.mean * 1.02)
-    assert (fit.against_others.squared < 2).all()
+    assert (fit.leave_one_out_residuals.squared < 2).all()
 
 
 @pytest.mark.parametrize("scale", [1 / 25.4, 1 / 3, 1 / 2.54, 3, 25.4])

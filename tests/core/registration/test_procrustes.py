@@ -11,7 +11,12 @@ from hypothesis import strategies as st
 
 from gp_core.errors import GeometryError, GpError
 from gp_core.frames import mirror_x
-from gp_core.registration.procrustes import fit_rigid, rms_without_each, surely_no_line, weighted_procrustes
+from gp_core.registration.procrustes import (
+    certainly_not_collinear,
+    fit_rigid,
+    rms_without_each,
+    weighted_procrustes,
+)
 from gp_core.validation import FloatArray
 
 seeds = st.integers(0, 2**32 - 1)
@@ -156,9 +161,9 @@ def test_input_is_left_alone() -> None:
 def test_a_line_is_never_surely_none(width: float, sure: bool) -> None:
     line = 7 * np.arange(5.0)[:, None] * np.array([1.0, 2, 2]) / 3 + 100
     bent = line + 10 * width * np.array([0, 1, 0, -1, 0])[:, None] * np.array([2.0, 1, -2]) / 3
-    assert surely_no_line(bent) is sure
-    assert not surely_no_line(np.full((4, 3), 123.456))
-    assert not surely_no_line(bent[:2])
+    assert certainly_not_collinear(bent) is sure
+    assert not certainly_not_collinear(np.full((4, 3), 123.456))
+    assert not certainly_not_collinear(bent[:2])
 
 
 def test_leaving_each_out_at_once_is_leaving_them_out_one_by_one() -> None:

@@ -49,10 +49,12 @@ def _run(
 
 
 def _assert_same(model: TouchModel, touches: np.ndarray) -> None:
-    settled = _run(student_t_fit, "settle", model, touches)
-    for plain, fast in zip(settled, _run(student_t_fit_compiled, "settle", model, touches), strict=True):
+    solution = _run(student_t_fit, "fit_student_t", model, touches)
+    for plain, fast in zip(
+        solution, _run(student_t_fit_compiled, "fit_student_t", model, touches), strict=True
+    ):
         np.testing.assert_allclose(plain, fast, rtol=1e-10, atol=1e-10)
-    below = settled[0][2] - 6
+    below = solution[0][2] - 6
     for plain, fast in zip(
         _run(student_t_fit, "best_exchange", model, touches, below),
         _run(student_t_fit_compiled, "best_exchange", model, touches, below),
@@ -78,7 +80,7 @@ def test_the_turn_is_the_best_of_all_rotations() -> None:
     for trial in range(300):
         h = rng.normal(size=(3, 3)) @ np.diag([1, 10.0 ** -rng.integers(0, 4), 10.0 ** -rng.integers(0, 8)])
         start = Rotation.random(random_state=trial).as_quat(scalar_first=True)
-        turn = rotation.best_turn(tuple(h.ravel().tolist()), tuple(start.tolist()))
+        turn = rotation.optimal_rotation(tuple(h.ravel().tolist()), tuple(start.tolist()))
         u, s, v = np.linalg.svd(h)
         best = s.sum() - (2 * s[2] if np.linalg.det(u @ v) < 0 else 0)
         matrix = np.reshape(rotation.as_matrix(turn), (3, 3))
@@ -89,11 +91,11 @@ def test_the_turn_is_the_best_of_all_rotations() -> None:
 
 def test_an_open_turn_is_not_a_number() -> None:
     half = (1.0, 0, 0, 0, 0, 0, 0, 0, 0)
-    assert np.isnan(rotation.best_turn(half, (1.0, 0, 0, 0))).all()
+    assert np.isnan(rotation.optimal_rotation(half, (1.0, 0, 0, 0))).all()
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_a_settled_fit_solves_its_own_equations(seed: int) -> None:
+def test_a_converged_fit_solves_its_own_equations(seed: int) -> None:
     """Pose: weighted Procrustes; weights and scale: the expected errors, by plain linear algebra."""
     model, touches = _drawn(seed)
     fit = fit_named_points(model, touches)

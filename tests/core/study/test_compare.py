@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core import GpError, Specimen
 from gp_core.study.compare import CONDITIONS, PROBES, ComparisonReport, Condition, compare
@@ -55,7 +55,7 @@ def test_robust_wins_on_real_animals(real_specimens: list[Specimen]) -> None:
 
 
 def test_without_errors_it_is_leave_one_out() -> None:
-    animals = herd(5)
+    animals = cohort(5)
     exact = (Condition(0.0),)
     found = means(compare(animals, repeats=1, rng=rng(), probes=["six"], conditions=exact))
     for method in ("jrmpc", "robust"):
@@ -74,7 +74,7 @@ def test_every_condition_is_there_for_both(drawn: ComparisonReport) -> None:
 
 
 def test_workers_do_not_change_the_answer() -> None:
-    animals = herd(3)
+    animals = cohort(3)
     cases = (Condition(0.1), Condition(0.1, 1.5))
     alone = compare(animals, repeats=3, rng=rng(), conditions=cases)
     with ThreadPoolExecutor(2) as threads:
@@ -108,8 +108,8 @@ def test_what_cannot_be_compared_is_refused() -> None:
     with pytest.raises(GpError, match="at least 3 animals, got 2"):
         compare(n_animals=2, rng=rng())
     with pytest.raises(GpError, match="at least 3 labelled animals"):
-        compare(herd(2), rng=rng())
+        compare(cohort(2), rng=rng())
     with pytest.raises(
         GpError, match="touched features must be one of six, ten, five at random, got 'eight'"
     ):
-        compare(herd(3), rng=rng(), probes=["eight"])
+        compare(cohort(3), rng=rng(), probes=["eight"])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_cases import herd, moved
+from study_cases import cohort, moved
 
 from gp_core import CODES, GpError, Side, Specimen
 from gp_core.landmarks.sets import LandmarkSet
@@ -27,7 +27,7 @@ def test_real_sets_give_the_published_table(shared_data: Path, real_specimens: l
 
 
 def test_spread_is_that_of_a_sample() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     table = distances(animals)
     lengths = [np.linalg.norm(s["CA"] - s["MN"]) for a in animals for s in a.sides.values()]
     i, j = CODES.index("CA"), CODES.index("MN")
@@ -37,7 +37,7 @@ def test_spread_is_that_of_a_sample() -> None:
 
 
 def test_where_an_animal_lies_does_not_count() -> None:
-    animals = herd(3)
+    animals = cohort(3)
     rng = np.random.default_rng(1)
     elsewhere = [moved(animal, rng) for animal in animals]
     table, other = distances(animals), distances(elsewhere)
@@ -46,7 +46,7 @@ def test_where_an_animal_lies_does_not_count() -> None:
 
 
 def test_missing_features_count_where_they_are() -> None:
-    animals = herd(3)
+    animals = cohort(3)
     first = animals[0].side("L").with_point("ZL", None)
     table = distances([Specimen("D01", {Side.LEFT: first}), *animals[1:]])
     zl, ca, cb = (CODES.index(code) for code in ("ZL", "CA", "CB"))
@@ -59,7 +59,7 @@ def test_missing_features_count_where_they_are() -> None:
 
 
 def test_table_is_written_to_the_last_bit(tmp_path: Path) -> None:
-    table = distances(herd(2))
+    table = distances(cohort(2))
     table.save_csv(tmp_path / "table.csv")
     with (tmp_path / "table.csv").open() as file:
         rows = list(csv.DictReader(file))

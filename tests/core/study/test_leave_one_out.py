@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from study_cases import herd, moved
+from study_cases import cohort, moved
 
 from gp_core import PROBE, TRAINING, GpError, Side, Specimen, estimate_pose
 from gp_core.atlas.fitting import fit_atlas
@@ -40,7 +40,7 @@ def test_robust_is_as_good_without_noise(real_specimens: list[Specimen]) -> None
 
 @pytest.mark.parametrize("method", ["jrmpc", "robust"])
 def test_where_and_in_which_order_animals_lie_does_not_count(method: str) -> None:
-    animals = herd(5)
+    animals = cohort(5)
     rng = np.random.default_rng(1)
     rows = leave_one_out(animals, method=method).rows
     others = leave_one_out([moved(animal, rng) for animal in reversed(animals)], method=method).rows
@@ -52,7 +52,7 @@ def test_where_and_in_which_order_animals_lie_does_not_count(method: str) -> Non
 
 
 def test_robust_uses_neither_side_of_the_held_out_animal() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     spoilt = animals[0].side("R")
     rng = np.random.default_rng(2)
     for code in spoilt.placed:
@@ -66,7 +66,7 @@ def test_robust_uses_neither_side_of_the_held_out_animal() -> None:
 
 
 def test_robust_rows_are_estimates_on_an_atlas_of_the_others() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     row = leave_one_out(animals, method="robust").rows[1]
     truth = animals[1].side("L")
     pose = estimate_pose(
@@ -80,7 +80,7 @@ def test_robust_rows_are_estimates_on_an_atlas_of_the_others() -> None:
 
 
 def test_report_says_what_it_ran_on() -> None:
-    report = leave_one_out(herd(3), method="jrmpc", probe=["cl", "mn", "os", "rwa"]).as_dict()
+    report = leave_one_out(cohort(3), method="jrmpc", probe=["cl", "mn", "os", "rwa"]).as_dict()
     assert report.keys() == {"rows", "summary", "settings"}
     assert report["rows"][0].keys() == {"specimen", "side", "e_co_mm", "e_ma_deg"}
     assert report["summary"].keys() == {"e_co_mm", "e_ma_deg", "e_t"}
@@ -93,7 +93,7 @@ def test_report_says_what_it_ran_on() -> None:
 
 
 def test_animals_with_one_side_take_part() -> None:
-    animals = herd(5)
+    animals = cohort(5)
     animals[2] = Specimen("D03", {Side.LEFT: animals[2].side("L")})
     for method in ("jrmpc", "robust"):
         rows = leave_one_out(animals, method=method).rows
@@ -102,13 +102,13 @@ def test_animals_with_one_side_take_part() -> None:
 
 
 def test_one_side_alone_is_enough() -> None:
-    animals = [Specimen(a.name, {Side.RIGHT: a.side("R")}) for a in herd(4)]
+    animals = [Specimen(a.name, {Side.RIGHT: a.side("R")}) for a in cohort(4)]
     for method in ("jrmpc", "robust"):
         assert len(leave_one_out(animals, method=method).rows) == 4
 
 
 def test_what_cannot_be_done_is_refused() -> None:
-    animals = herd(3)
+    animals = cohort(3)
     with pytest.raises(GpError, match="at least 3 labelled animals, got 2"):
         leave_one_out(animals[:2])
     with pytest.raises(GpError, match="D01: two animals have this name"):

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core import CODES, EXTERNAL, Atlas, GpError, Side, Specimen
 from gp_core.atlas.plain_fit import as_left
@@ -73,7 +73,7 @@ def mean_pose(animals: list[Specimen], *, both_sides: bool) -> PoseErrors:
 def test_touches_that_say_nothing_do_not_beat_the_mean_pose(method: str, features: list[str]) -> None:
     options = {**OPTIONS, "training": features, "fewest_training": 7}
     totals = []
-    for seed in range(3):  # the mean of some herds: one alone can be lucky
+    for seed in range(3):  # the mean of some cohorts: one alone can be lucky
         animals = uninformed(seed)
         report = nested_search(animals, method=method, **options)
         chance = mean_pose(animals, both_sides=method == "robust")
@@ -84,7 +84,7 @@ def test_touches_that_say_nothing_do_not_beat_the_mean_pose(method: str, feature
 
 
 def test_held_out_animal_has_no_say() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     rng = np.random.default_rng(1)
     spoilt = {}
     for side, landmarks in animals[0].sides.items():
@@ -99,7 +99,7 @@ def test_held_out_animal_has_no_say() -> None:
 
 
 def test_each_fold_is_a_search_without_the_animal() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     report = nested_search(animals, **OPTIONS)
     best = search_features([animals[i] for i in (0, 1, 3)], **OPTIONS).best
     fold = report.folds[2]
@@ -115,7 +115,7 @@ def test_each_fold_is_a_search_without_the_animal() -> None:
 
 
 def test_stopped_search_goes_on_with_any_workers(tmp_path: Path) -> None:
-    animals = herd(4)
+    animals = cohort(4)
     expected = nested_search(animals, **OPTIONS)
     seen: list[Progress] = []
 
@@ -144,7 +144,7 @@ def test_stopped_search_goes_on_with_any_workers(tmp_path: Path) -> None:
 
 
 def test_report_as_json() -> None:
-    content = json.loads(json.dumps(nested_search(herd(4), **OPTIONS).as_dict(), allow_nan=False))
+    content = json.loads(json.dumps(nested_search(cohort(4), **OPTIONS).as_dict(), allow_nan=False))
     assert content.keys() == {
         "rows", "summary", "folds", "optimistic", "fits", "seconds", "settings",
     }  # fmt: skip
@@ -154,4 +154,4 @@ def test_report_as_json() -> None:
 
 def test_too_few_animals_are_refused() -> None:
     with pytest.raises(GpError, match="at least 4 animals, got 3"):
-        nested_search(herd(3), **OPTIONS)
+        nested_search(cohort(3), **OPTIONS)

@@ -9,7 +9,7 @@ import pytest
 from matplotlib.axes import Axes
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core import PROBE, GpError, RigidTransform
 from gp_core.landmarks.sets import LandmarkSet
@@ -18,16 +18,16 @@ from gp_core.registration.skull import register_by_icp, register_by_names
 from gp_core.study import figures
 from gp_core.study.physical import PhysicalReport, PhysicalRow, physical_simulations, physical_test
 
-HERD = herd(6, seed=3)
+COHORT = cohort(6, seed=3)
 SKULL_MM = np.array([18.0, 25.0, 14.0])
 
 
 def skull(
     *, noise: float = 0.0, wrong: float = 0.0, seed: int = 0
 ) -> tuple[LandmarkSet, LandmarkSet, RigidTransform]:
-    """Touches (tracker), CT landmarks (scan) and T_scan_tracker of an animal that is not in the herd."""
+    """Touches (tracker), CT landmarks (scan) and T_scan_tracker of an animal that is not in the cohort."""
     rng = np.random.default_rng(seed)
-    animal = herd(1, seed=100 + seed)[0].side("R")
+    animal = cohort(1, seed=100 + seed)[0].side("R")
     features = {f"S{i}": SKULL_MM * rng.uniform(-1, 1, 3) for i in range(1, 9)}
     ct_points = animal.as_mapping(("CA", "CB", "RWA", "RWP"))
     ct = LandmarkSet.from_mapping(ct_points, "R", frame="scan")
@@ -58,7 +58,7 @@ def test_known_pose_is_found_both_ways() -> None:
 
 def test_errors_are_those_of_the_estimate() -> None:
     touches, ct, _ = skull()
-    report = physical_test(touches, ct, specimens=HERD)
+    report = physical_test(touches, ct, specimens=COHORT)
     found = rows(report)
     assert found.keys() == {(w, m) for w in ("names", "icp") for m in ("robust", "jrmpc")}
     for row in found.values():
@@ -107,7 +107,7 @@ def test_points_anywhere_on_the_bone_register_too() -> None:
     touches = LandmarkSet(touches.points, touches.side, "tracker", extra=MappingProxyType(extra))
     report = physical_test(touches, ct, bone=bone)
     surface = report.registrations[2]
-    assert surface.way == "surface"
+    assert surface.method == "surface"
     assert surface.fre_mm < 0.01
     np.testing.assert_allclose(surface.T_scan_tracker.matrix, T_scan_tracker.matrix, atol=0.02)
     assert {row.registration for row in report.rows} == {"names", "icp", "surface"}
@@ -148,8 +148,8 @@ def marks(ax: Axes) -> list[tuple[float, float]]:
 
 def test_the_skull_is_drawn_on_the_simulated_sides() -> None:
     touches, ct, _ = skull(noise=0.2)
-    report = physical_test(touches, ct, specimens=HERD)
-    simulated = physical_simulations(touches, specimens=HERD, n=20, rng=np.random.default_rng(0))
+    report = physical_test(touches, ct, specimens=COHORT)
+    simulated = physical_simulations(touches, specimens=COHORT, n=20, rng=np.random.default_rng(0))
     assert [each.method for each in simulated] == ["robust", "jrmpc"]
     assert set(simulated[0].probe) == set(PROBE)
     figure = figures.draw_physical(report, simulated)

@@ -8,7 +8,7 @@ from dataclasses import asdict
 
 import numpy as np
 import pytest
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core import TRAINING, GpError, Side, Specimen, jrmpc
 from gp_core.landmarks.anatomy import cochlea_origin
@@ -33,7 +33,7 @@ def test_real_sets_give_the_papers_figures(real_specimens: list[Specimen]) -> No
 
 
 def test_drawn_features_scatter_as_the_registered_ones() -> None:
-    animals = herd(8)
+    animals = cohort(8)
     drawn = simulate_sides(animals, Side.LEFT, 4000, rng=rng())
     labelled = [training.landmarks for training in training_sides(animals, Side.LEFT)]
     registered = jrmpc([landmarks.array(TRAINING) for landmarks in labelled], **asdict(ESTIMATION))
@@ -48,14 +48,14 @@ def test_drawn_features_scatter_as_the_registered_ones() -> None:
 
 
 def test_origin_is_computed_from_the_drawn_points() -> None:
-    for landmarks in simulate_sides(herd(4), Side.RIGHT, 5, rng=rng()):
+    for landmarks in simulate_sides(cohort(4), Side.RIGHT, 5, rng=rng()):
         expected = cochlea_origin(*(landmarks[code] for code in ("CA", "CB", "RWA", "RWP")))
         np.testing.assert_allclose(landmarks["CO"], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("method", ["jrmpc", "robust"])
 def test_noise_hurts_and_seeds_repeat(method: str) -> None:
-    animals = herd(5)
+    animals = cohort(5)
     first, again = (simulate(animals, n=40, rng=rng(), method=method) for _ in range(2))
     noisy = simulate(animals, n=40, rng=rng(), method=method, noise=0.4)
     assert np.array_equal(first.groups["pooled"].e_co_mm, again.groups["pooled"].e_co_mm)
@@ -63,7 +63,7 @@ def test_noise_hurts_and_seeds_repeat(method: str) -> None:
 
 
 def test_workers_do_not_change_the_answer() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     alone = simulate(animals, n=250, rng=rng())
     with ThreadPoolExecutor(3) as threads:
         other = simulate(animals, n=250, rng=rng(), executor=threads)
@@ -71,7 +71,7 @@ def test_workers_do_not_change_the_answer() -> None:
 
 
 def test_report_as_json() -> None:
-    content = json.loads(json.dumps(simulate(herd(3), n=20, rng=rng()).as_dict(), allow_nan=False))
+    content = json.loads(json.dumps(simulate(cohort(3), n=20, rng=rng()).as_dict(), allow_nan=False))
     assert content["groups"].keys() == {"L", "R", "pooled"}
     group = content["groups"]["pooled"]
     assert group["e_co_mm"].keys() == {"mean", "median", "whisker", "beyond", "max"}
@@ -85,7 +85,7 @@ def test_report_as_json() -> None:
 
 def test_what_cannot_be_simulated_is_refused() -> None:
     with pytest.raises(GpError, match="must be 1 or more, got 0"):
-        simulate(herd(3), n=0, rng=rng())
+        simulate(cohort(3), n=0, rng=rng())
     for noise in (-0.1, np.nan):
         with pytest.raises(GpError, match="noise must be 0 mm or more"):
-            simulate(herd(3), n=1, rng=rng(), noise=noise)
+            simulate(cohort(3), n=1, rng=rng(), noise=noise)

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core import CODES, EXTERNAL, PROBE, TRAINING, GpError, Specimen
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
@@ -99,7 +99,7 @@ def test_each_step_drops_one_of_the_step_before() -> None:
 
 
 def test_score_is_that_of_leave_one_out() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     report = search_features(animals, training=SMALL, fewest_training=7, settings=QUICK)
     for step in report.training:
         again = leave_one_out(animals, training=step.features, probe=step.probe, settings=QUICK)
@@ -107,7 +107,7 @@ def test_score_is_that_of_leave_one_out() -> None:
 
 
 def test_any_number_of_workers_gives_the_same() -> None:
-    animals = herd(4)
+    animals = cohort(4)
     run: dict[str, Any] = {"training": SMALL, "fewest_training": 7, "settings": QUICK}
     alone = search_features(animals, **run)
     with ThreadPoolExecutor(3) as threads, open_executor(2) as processes:
@@ -119,7 +119,7 @@ def test_any_number_of_workers_gives_the_same() -> None:
 
 def test_a_dask_cluster_gives_the_same() -> None:
     distributed = pytest.importorskip("distributed")
-    animals = herd(3)
+    animals = cohort(3)
     run: dict[str, Any] = {"training": SMALL, "fewest_training": 7, "settings": QUICK}
     alone = search_features(animals, **run)
     with (
@@ -135,7 +135,7 @@ class StopError(Exception):
 
 
 def test_stopped_search_goes_on_where_it_was(tmp_path: Path) -> None:
-    animals, file = herd(4), tmp_path / "search.json"
+    animals, file = cohort(4), tmp_path / "search.json"
     seen: list[Progress] = []
 
     def search(progress: Callable[[Progress], None]) -> SearchReport:
@@ -168,7 +168,7 @@ def test_stopped_search_goes_on_where_it_was(tmp_path: Path) -> None:
 
 def test_progress_rises_to_the_whole() -> None:
     seen: list[Progress] = []
-    search_features(herd(3), training=SMALL, fewest_training=6, settings=QUICK, progress=seen.append)
+    search_features(cohort(3), training=SMALL, fewest_training=6, settings=QUICK, progress=seen.append)
     fractions = [progress.fraction for progress in seen]
     assert fractions == sorted(fractions)
     assert all(progress.left >= 0 for progress in seen)
@@ -176,14 +176,14 @@ def test_progress_rises_to_the_whole() -> None:
 
 
 def test_robust_chooses_probe_features_only() -> None:
-    report = search_features(herd(3), method="robust", training=SMALL)
+    report = search_features(cohort(3), method="robust", training=SMALL)
     assert [step.n for step in report.training] == [8]
     assert [step.n for step in report.best.probe_curve] == [6, 5, 4, 3]
     assert "gamma" not in report.as_dict()["settings"]
 
 
 def test_report_as_json() -> None:
-    report = search_features(herd(3), training=SMALL, fewest_training=7, settings=QUICK)
+    report = search_features(cohort(3), training=SMALL, fewest_training=7, settings=QUICK)
     content = json.loads(json.dumps(report.as_dict(), allow_nan=False))
     assert content.keys() == {"training", "best", "fits", "seconds", "settings"}
     first, second = content["training"]
@@ -201,19 +201,19 @@ def test_report_as_json() -> None:
 def test_checkpoint_of_another_study_is_refused(tmp_path: Path) -> None:
     file = tmp_path / "search.json"
     run: dict[str, Any] = {"training": SMALL, "fewest_training": 8, "checkpoint": file}
-    search_features(herd(3), settings=QUICK, **run)
+    search_features(cohort(3), settings=QUICK, **run)
     with pytest.raises(GpError, match=r"search.json: is the checkpoint of a study of other animals"):
-        search_features(herd(3, seed=1), settings=QUICK, **run)
+        search_features(cohort(3, seed=1), settings=QUICK, **run)
     with pytest.raises(GpError, match="of other animals, features or settings"):
-        search_features(herd(3), **run)
+        search_features(cohort(3), **run)
     for text in ("", "[]", "{}", '{"gpCheckpoint": 1, "key": "x"}'):
         file.write_text(text)
         with pytest.raises(GpError, match=r"is not a checkpoint|is not JSON"):
-            search_features(herd(3), **run)
+            search_features(cohort(3), **run)
 
 
 def test_what_cannot_be_searched_is_refused() -> None:
-    animals = herd(3)
+    animals = cohort(3)
     with pytest.raises(GpError, match="must end at 3 to 8 training features, got 9"):
         search_features(animals, training=SMALL, fewest_training=9)
     with pytest.raises(GpError, match="fewer than 3 that can be touched"):

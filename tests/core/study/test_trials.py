@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from study_cases import herd
+from study_cases import cohort
 
 from gp_core import PROBE, LandmarkSet
 from gp_core.landmarks.anatomy import with_cochlea_origin
@@ -14,7 +14,7 @@ from gp_core.study.trials import Trial, make_trial, window_arrays
 
 @pytest.fixture(scope="module")
 def side() -> LandmarkSet:
-    return with_cochlea_origin(herd(1)[0].side("L"))
+    return with_cochlea_origin(cohort(1)[0].side("L"))
 
 
 def _off(trial: Trial) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 from animal_cases import drawn_animals, write_animals, write_side
 from test_workspace import QueuedWorkspace
 
-from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.atlas import Atlas, is_atlas_file
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.errors import GpError
 from gp_core.io import load_specimens
@@ -19,7 +19,6 @@ from gp_core.study.leave_one_out import leave_one_out
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.specimen_edits import RenameSpecimen
 from gp_labeler.document.state import How, Provenance
-from gp_labeler.models.atlas import is_atlas_file
 
 L = Side.LEFT
 
@@ -148,12 +147,12 @@ def test_an_animal_is_held_against_an_atlas_that_does_not_know_it(workspace, fol
     workspace.atlas.fit([folder])
     workspace.wait()
     assert not workspace.atlas.is_held_out
-    known = {code: found.n_sd for code, found in workspace.labels.departures(L).items()}
+    known = {code: found.n_sd for code, found in workspace.labels.deviations(L).items()}
     workspace.document.do(RenameSpecimen("GP01"))
     workspace.atlas.use(workspace.atlas.current, workspace.atlas.specimens)
     workspace.wait()
     assert workspace.atlas.is_held_out
-    alone = {code: found.n_sd for code, found in workspace.labels.departures(L).items()}
+    alone = {code: found.n_sd for code, found in workspace.labels.deviations(L).items()}
     assert alone.keys() == known.keys()
     assert np.mean(list(alone.values())) > np.mean(list(known.values()))
 

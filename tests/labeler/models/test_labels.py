@@ -164,7 +164,7 @@ def test_states_of_points():
     assert states["ZL"] is PointState.GHOST
     assert states["MN"] is PointState.UNSEEN
     assert [c for c, s in states.items() if s is PointState.DOUBTFUL] == ["FPP"]
-    assert editing.labels.doubts(L)["FPP"].departure_of("FPP").distance == pytest.approx(3, abs=0.5)
+    assert editing.labels.doubts(L)["FPP"].deviation_of("FPP").distance == pytest.approx(3, abs=0.5)
     editing.document.do(CheckPoint(L, "FPP"))
     assert editing.labels.point_states(L)["FPP"] is PointState.CHECKED
 
@@ -251,7 +251,7 @@ def test_nonsense_is_doubted_in_words_not_in_kilometres():
     published = partial(check_side, atlas=Atlas.published())
     rng = np.random.default_rng(0)
     heap = {code: 1e-3 * rng.normal(size=3) for code in CODES if code != "CO"}
-    assert not published(LandmarkSet.from_mapping(heap, L)).departures
+    assert not published(LandmarkSet.from_mapping(heap, L)).deviations
     off = {code: Atlas.published()[code] for code in heap} | {"ZL": (300.0, 0, 0)}
     doubt = published(LandmarkSet.from_mapping(off, L)).doubts["ZL"]
     assert doubt.word == "far off"
@@ -277,7 +277,7 @@ def test_doubts_do_not_blink_while_an_edit_is_judged():
             c for c, s in states.items() if s is PointState.DOUBTFUL
         }
         doubts = editing.labels.near_doubts(L)
-        return {code: round(doubt.departure_of(code).distance, 1) for code, doubt in doubts.items()}
+        return {code: round(doubt.deviation_of(code).distance, 1) for code, doubt in doubts.items()}
 
     assert doubted() == {}, "nobody has looked yet"
     editing.labels.checking(L).run(lambda fraction: None)
@@ -329,7 +329,7 @@ def test_a_point_far_off_is_doubted_and_its_ghost_comes_where_it_belongs():
     editing = Editing(predict=partial(shape_predict, atlas), check=partial(check_side, atlas=atlas))
     editing.document.do(ImportLandmarks((LandmarkSet.from_mapping(points, L),), MARK))
     assert set(editing.labels.doubts(L)) == {"MH"}
-    assert np.linalg.norm(editing.labels.doubts(L)["MH"].departure_of("MH").expected - atlas["MH"]) < 0.5
+    assert np.linalg.norm(editing.labels.doubts(L)["MH"].deviation_of("MH").expected - atlas["MH"]) < 0.5
     editing.labels.clear(side=L, code="MH")
     ghost = editing.labels.ghosts(L)["MH"]
     assert np.linalg.norm(ghost.position - atlas["MH"]) < ghost.radius_95 < 1.0

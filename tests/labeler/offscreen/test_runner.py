@@ -103,7 +103,7 @@ def test_a_script_does_not_write_over_what_it_reads(tmp_path) -> None:
     assert run(tmp_path, LOOK, CA, {"do": "export"}).ok
     before = (tmp_path / "out" / "ball_L.mrk.json").read_bytes()
     report = run(tmp_path, {"do": "import", "files": "out/ball_L.mrk.json"}, {"do": "export"})
-    assert "ball_L.mrk.json: is read, and would be written over" in report.error
+    assert "ball_L.mrk.json: is an input, and would be overwritten" in report.error
     assert (tmp_path / "out" / "ball_L.mrk.json").read_bytes() == before
 
 

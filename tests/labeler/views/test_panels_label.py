@@ -124,7 +124,7 @@ def test_every_state_has_its_word(workspace, panel):
     assert word(table, "FPA", LEFT) == "ghost"
     assert word(table, "FPA", RIGHT) == "to do"
     assert word(table, "CO", RIGHT) == "by itself", "nobody places it"
-    distance = workspace.labels.doubts(LEFT)["OI"].departure_of("OI").distance
+    distance = workspace.labels.doubts(LEFT)["OI"].deviation_of("OI").distance
     assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
 
 
