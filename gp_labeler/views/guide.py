@@ -24,8 +24,8 @@ from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels, styled, text_scale
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import scrolled, text_label
-from gp_labeler.views.panels.pose_words import sentence
-from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
+from gp_labeler.views.panels.pose.wording import sentence
+from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
 
 __all__ = ["GuideWindow"]
 

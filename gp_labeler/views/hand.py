@@ -13,7 +13,7 @@ from gp_labeler.document.touches import TouchHow
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.views.drawn import point_of
-from gp_labeler.views.panels.landmark_menu import landmark_menu
+from gp_labeler.views.panels.label.landmark_menu import landmark_menu
 
 __all__ = ["Hand", "nudge"]
 

@@ -27,14 +27,14 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
-from gp_labeler.views.panels.atlas_panel import AtlasPanel
-from gp_labeler.views.panels.label_panel import LabelPanel
+from gp_labeler.views.panels.atlas.panel import AtlasPanel
+from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.panel_stack import PanelStack
-from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
+from gp_labeler.views.panels.pose.panel import PosePanel, holds_touches
 from gp_labeler.views.panels.rail import Rail
-from gp_labeler.views.panels.scan_panel import ScanPanel
-from gp_labeler.views.panels.tracker_card import TrackerCard
-from gp_labeler.views.panels.welcome import Welcome
+from gp_labeler.views.panels.scan.panel import ScanPanel
+from gp_labeler.views.panels.scan.welcome import Welcome
+from gp_labeler.views.panels.tracker.card import TrackerCard
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.reference_layer import ReferenceLayer

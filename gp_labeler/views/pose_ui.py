@@ -16,8 +16,8 @@ from gp_labeler.models.pose_exports import FORMATS, InsertionPath
 from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
 from gp_labeler.views.guide import GuideWindow
-from gp_labeler.views.panels.physical_dialog import PhysicalDialog
-from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
+from gp_labeler.views.panels.tracker.dialog import TrackerDialog
 from gp_labeler.views.report_file import report_of, reported_estimate, save_report
 from gp_labeler.views.ui_part import UiPart
 

@@ -19,10 +19,10 @@ from gp_labeler.models.atlas import is_atlas_file
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.fonts import nearest_text_size
-from gp_labeler.views.panels.export_dialog import ExportDialog
-from gp_labeler.views.panels.import_dialog import ImportDialog
-from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
-from gp_labeler.views.panels.recover_dialog import RecoverDialog
+from gp_labeler.views.panels.label.export_dialog import ExportDialog
+from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.scan.import_dialog import ImportDialog
+from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
 from gp_labeler.views.pictures import grab, write_picture
 from gp_labeler.views.pose_ui import PoseUi
 from gp_labeler.views.prompts import Prompts

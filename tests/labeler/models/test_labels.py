@@ -22,7 +22,7 @@ from gp_labeler.document.state import How, SpecimenState
 from gp_labeler.models.ghosts import Expectations, mirror_ghosts
 from gp_labeler.models.view import ViewModel, ViewState
 from gp_labeler.models.workflow import Active, PointState, placing_order
-from gp_labeler.views.panels.card_content import content_of
+from gp_labeler.views.panels.label.card_content import content_of
 
 L, R = Side.LEFT, Side.RIGHT
 BOTH = ImportLandmarks((shape(L), shape(R)), MARK)

@@ -20,7 +20,7 @@ from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.panels.card_content import content_of
+from gp_labeler.views.panels.label.card_content import content_of
 
 
 class QueuedWorkspace(Workspace):

@@ -15,8 +15,8 @@ from gp_labeler.models.pose import ORDER
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.views.guide import GuideWindow
-from gp_labeler.views.panels.tracker_card import TrackerCard
-from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.panels.tracker.card import TrackerCard
+from gp_labeler.views.panels.tracker.dialog import TrackerDialog
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.window_state import WindowState
 

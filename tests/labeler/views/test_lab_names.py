@@ -13,7 +13,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
 from gp_labeler.document.lab_names import LabNamesMemory
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
 
 _CLICK = Qt.MouseButton.LeftButton

@@ -20,9 +20,9 @@ from gp_labeler.document.specimen_document import utc_now
 from gp_labeler.document.specimen_file import write_specimen
 from gp_labeler.document.state import How, Provenance, SpecimenState
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.panels.atlas_panel import AtlasCard, AtlasPanel
-from gp_labeler.views.panels.atlas_table import DOUBTFUL_ROLE
-from gp_labeler.views.panels.card_content import content_of
+from gp_labeler.views.panels.atlas.feature_table import DOUBTFUL_ROLE
+from gp_labeler.views.panels.atlas.panel import AtlasCard, AtlasPanel
+from gp_labeler.views.panels.label.card_content import content_of
 from gp_labeler.views.panels.parts import Notice
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 

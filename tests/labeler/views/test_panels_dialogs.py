@@ -21,11 +21,11 @@ from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.panels.export_dialog import ExportDialog
-from gp_labeler.views.panels.import_dialog import ImportDialog
-from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.label.export_dialog import ExportDialog
+from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
-from gp_labeler.views.panels.recover_dialog import RecoverDialog
+from gp_labeler.views.panels.scan.import_dialog import ImportDialog
+from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 
 CLICK = Qt.MouseButton.LeftButton

@@ -18,10 +18,10 @@ from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
-from gp_labeler.views.panels.feature_card import FeatureCard
-from gp_labeler.views.panels.label_panel import LabelPanel
-from gp_labeler.views.panels.landmark_menu import landmark_menu
-from gp_labeler.views.panels.landmark_table import LandmarkTable
+from gp_labeler.views.panels.label.feature_card import FeatureCard
+from gp_labeler.views.panels.label.landmark_menu import landmark_menu
+from gp_labeler.views.panels.label.landmark_table import LandmarkTable
+from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme, contrast
 

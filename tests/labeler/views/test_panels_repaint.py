@@ -23,9 +23,9 @@ from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views import feature_picture as pictures
 from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
-from gp_labeler.views.panels.label_panel import LabelPanel
-from gp_labeler.views.panels.landmark_model import LandmarkModel
-from gp_labeler.views.panels.pose_model import MISFIT, TouchModel
+from gp_labeler.views.panels.label.landmark_table_model import LandmarkTableModel
+from gp_labeler.views.panels.label.panel import LabelPanel
+from gp_labeler.views.panels.pose.touch_table_model import MISFIT, TouchTableModel
 from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of
 
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
@@ -172,10 +172,10 @@ def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(workspace, pan
 
 
 def test_the_table_is_never_stale(workspace, qtbot):
-    model = LandmarkModel(workspace)
+    model = LandmarkTableModel(workspace)
     for what in edits(workspace):
         deliver(workspace)  # until then, one made now may know of doubts that nobody told of
-        fresh = LandmarkModel(workspace)
+        fresh = LandmarkTableModel(workspace)
         for row in range(len(CODES)):
             cells = [[m.itemData(m.index(row, column)) for column in range(3)] for m in (model, fresh)]
             assert cells[0] == cells[1], (what, CODES[row])
@@ -249,7 +249,7 @@ def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
     workspace = Workspace(None, QueueDispatcher(), atlas=ATLAS)
     for code in (*PROBE, "ZL"):
         workspace.pose.record(animal[code], TouchHow.TYPED, name=code)
-    model, painted = TouchModel(workspace, lambda _: None), set()
+    model, painted = TouchTableModel(workspace, lambda _: None), set()
 
     def note(first: QModelIndex, last: QModelIndex) -> None:
         columns = range(first.column(), last.column() + 1)

@@ -17,11 +17,11 @@ from gp_labeler.document.specimen_edits import SetThreshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import mm_text, position_text, spacing_text, value_text, voxel_text
-from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.rail import Rail
-from gp_labeler.views.panels.scan_panel import ScanPanel, facts_of
-from gp_labeler.views.panels.welcome import Welcome
+from gp_labeler.views.panels.scan.notes_card import NotesCard
+from gp_labeler.views.panels.scan.panel import ScanPanel, facts_of
+from gp_labeler.views.panels.scan.welcome import Welcome
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 
 CLICK = Qt.MouseButton.LeftButton
@@ -175,7 +175,7 @@ def test_an_empty_panel_says_what_to_do(qtbot):
 
 
 def test_notes_are_one_undo_for_all_that_was_typed(workspace, qtbot):
-    notes = NotesPanel(workspace)
+    notes = NotesCard(workspace)
     qtbot.addWidget(notes)
     notes.show()
     notes.text.setFocus()

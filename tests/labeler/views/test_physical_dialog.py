@@ -19,7 +19,7 @@ from gp_labeler.jobs.physical import PhysicalTest
 from gp_labeler.jobs.runner import Progress
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.dispatch import QtDispatcher
-from gp_labeler.views.panels.physical_dialog import PhysicalDialog
+from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
 
 SKULL = {f"S{n}": position for n, position in enumerate(np.random.default_rng(8).uniform(-15, 15, (8, 3)), 1)}
 

@@ -23,9 +23,9 @@ from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.pose import ORDER
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.parts import Notice
-from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ
-from gp_labeler.views.panels.pose_panel import PosePanel, holds_touches
-from gp_labeler.views.panels.pose_words import parse_position
+from gp_labeler.views.panels.pose.panel import PosePanel, holds_touches
+from gp_labeler.views.panels.pose.touch_table_model import CLEAR, NAME, USE, XYZ
+from gp_labeler.views.panels.pose.wording import parse_position
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 
 DATA = Path(__file__).resolve().parents[4] / "shared" / "data"

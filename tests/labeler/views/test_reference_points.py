@@ -14,7 +14,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
-from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 
 _LEFT = Qt.MouseButton.LeftButton
 INSIDE = MIDDLE + np.array([2.125, -1.625, 0.125])

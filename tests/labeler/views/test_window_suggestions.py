@@ -17,7 +17,7 @@ from gp_labeler.document.state import How
 from gp_labeler.models.workflow import PointState
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.drawn import drawn_marks
-from gp_labeler.views.panels.export_dialog import ExportDialog
+from gp_labeler.views.panels.label.export_dialog import ExportDialog
 
 L = Side.LEFT
 INSIDE = MIDDLE + np.array([2.1, -1.7, 0.125])

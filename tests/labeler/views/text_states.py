@@ -23,12 +23,12 @@ from gp_labeler.imaging.readers import inspect_volume
 from gp_labeler.models.workflow import Active
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.main_window import MainWindow
-from gp_labeler.views.panels.export_dialog import ExportDialog
-from gp_labeler.views.panels.import_dialog import ImportDialog
-from gp_labeler.views.panels.landmark_import_dialog import LandmarkImportDialog
-from gp_labeler.views.panels.physical_dialog import PhysicalDialog
-from gp_labeler.views.panels.recover_dialog import RecoverDialog
-from gp_labeler.views.panels.tracker_dialog import TrackerDialog
+from gp_labeler.views.panels.label.export_dialog import ExportDialog
+from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
+from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
+from gp_labeler.views.panels.scan.import_dialog import ImportDialog
+from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
+from gp_labeler.views.panels.tracker.dialog import TrackerDialog
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 

@@ -8,11 +8,11 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
-from gp_labeler.views.panels.bone_card import BoneCard
-from gp_labeler.views.panels.grey_card import GreyCard
-from gp_labeler.views.panels.mesh_card import MeshCard
-from gp_labeler.views.panels.notes_panel import NotesPanel
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
+from gp_labeler.views.panels.scan.bone_card import BoneCard
+from gp_labeler.views.panels.scan.mesh_card import MeshCard
+from gp_labeler.views.panels.scan.notes_card import NotesCard
+from gp_labeler.views.panels.scan.window_level_card import WindowLevelCard
 
 __all__ = ["ScanPanel", "facts_of"]
 
@@ -44,13 +44,13 @@ class ScanPanel(QWidget):
         about.add(self._empty)
         about.add(self.facts)
         about.add(self._notes)
-        self.grey, self.bone, self.mesh = GreyCard(workspace), BoneCard(workspace), MeshCard(workspace)
+        self.grey, self.bone, self.mesh = WindowLevelCard(workspace), BoneCard(workspace), MeshCard(workspace)
         content = QWidget()
         content.setProperty("role", "panel")
         column = QVBoxLayout(content)
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
-        self.notes = NotesPanel(workspace)
+        self.notes = NotesCard(workspace)
         for card in (about, self.bone, self.grey, self.mesh, self.notes):
             column.addWidget(card)
         column.addStretch(1)

@@ -13,11 +13,11 @@ from gp_labeler.models.estimate import Estimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import NONE, attempt, follow, position_text
 from gp_labeler.views.fonts import HEADING, styled
+from gp_labeler.views.panels.card_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.views.panels.pose_parts import Notices, Segments, link, numbers
-from gp_labeler.views.panels.pose_words import METHOD_WORDS, fine_mm, sentence
+from gp_labeler.views.panels.pose.wording import METHOD_WORDS, fine_mm, sentence
 
-__all__ = ["InScanCard"]
+__all__ = ["RegistrationCard"]
 
 _WAYS = {"auto": "Automatic", "features": "Features", "skull": "Skull"}
 _NO_SCAN = "No scan is open: the pose stays in the frame of the touches."
@@ -35,7 +35,7 @@ _FOUND = {
 }
 
 
-class InScanCard(Card):
+class RegistrationCard(Card):
     """Registration, and the error against the labels.
 
     Parameters

@@ -13,11 +13,11 @@ from gp_labeler.document import touching
 from gp_labeler.document.touches import Touch
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow, set_role
+from gp_labeler.views.panels.card_parts import Notices, link
 from gp_labeler.views.panels.parts import Card, ElidedLabel
-from gp_labeler.views.panels.pose_model import TouchModel
-from gp_labeler.views.panels.pose_parts import Notices, link
-from gp_labeler.views.panels.pose_table import TouchTable
-from gp_labeler.views.panels.pose_words import change_text
+from gp_labeler.views.panels.pose.touch_table import TouchTable
+from gp_labeler.views.panels.pose.touch_table_model import TouchTableModel
+from gp_labeler.views.panels.pose.wording import change_text
 
 __all__ = ["TouchesCard"]
 
@@ -51,7 +51,7 @@ class TouchesCard(Card):
         super().__init__("Touches", parent)
         self._workspace = workspace
         self._looked_at = ""
-        self.model = TouchModel(workspace, self.tell, self)
+        self.model = TouchTableModel(workspace, self.tell, self)
         self.table = TouchTable(self.model)
         self.notices, self.change = Notices(), ElidedLabel("", "hint")
         self.change.setAccessibleName("What leaving a point out changes")

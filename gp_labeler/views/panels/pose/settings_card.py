@@ -10,11 +10,11 @@ from gp_labeler.document.specimen_edits import RenameSpecimen
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.panels.card_parts import Segments, link
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
-from gp_labeler.views.panels.pose_parts import Segments, link
 
-__all__ = ["HeadCard"]
+__all__ = ["EstimateSettingsCard"]
 
 _METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmpc")}
 _SHARED = "Error common to all touches, mm"
@@ -25,7 +25,7 @@ _HINTS = {
 }
 
 
-class HeadCard(Card):
+class EstimateSettingsCard(Card):
     """Settings of the estimate.
 
     Parameters

@@ -34,8 +34,8 @@ from qtpy.QtWidgets import (
 )
 
 from gp_labeler.views.fonts import field_width, fit, font_of, line_height, pixels
-from gp_labeler.views.panels.pose_cells import column_widths, names_width, paint_cell, paint_ground
-from gp_labeler.views.panels.pose_model import CLEAR, NAME, USE, XYZ, TouchModel
+from gp_labeler.views.panels.pose.touch_cells import column_widths, names_width, paint_cell, paint_ground
+from gp_labeler.views.panels.pose.touch_table_model import CLEAR, NAME, USE, XYZ, TouchTableModel
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["TouchTable"]
@@ -48,11 +48,11 @@ Index = QModelIndex | QPersistentModelIndex
 
 
 class TouchTable(QTableView):
-    """Rows of `TouchModel`.
+    """Rows of `TouchTableModel`.
 
     Parameters
     ----------
-    model : TouchModel
+    model : TouchTableModel
         What it shows.
     """
 
@@ -69,7 +69,7 @@ class TouchTable(QTableView):
     pasted = Signal(str, str)
     """Text that was pasted on a row."""
 
-    def __init__(self, model: TouchModel, parent: QWidget | None = None) -> None:
+    def __init__(self, model: TouchTableModel, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._model = model
         self.setModel(model)

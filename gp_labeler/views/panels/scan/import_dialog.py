@@ -23,7 +23,6 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
-from gp_labeler.views.panels.import_words import MB, PreviewScan, bare, facts_of, remedy, sentence, why_not
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
     Facts,
@@ -35,8 +34,17 @@ from gp_labeler.views.panels.parts import (
     scrolled,
     text_label,
 )
-from gp_labeler.views.panels.preview_picture import PreviewPicture
-from gp_labeler.views.panels.spacing_fields import SpacingFields
+from gp_labeler.views.panels.scan.import_wording import (
+    MB,
+    PreviewScan,
+    bare,
+    facts_of,
+    remedy,
+    sentence,
+    why_not,
+)
+from gp_labeler.views.panels.scan.preview_picture import PreviewPicture
+from gp_labeler.views.panels.scan.spacing_fields import SpacingFields
 
 __all__ = ["ImportDialog"]
 

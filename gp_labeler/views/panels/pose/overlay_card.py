@@ -11,9 +11,9 @@ from qtpy.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.panels.card_parts import link
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.views.panels.pose_parts import link
 
 __all__ = ["OverlayCard"]
 

@@ -10,12 +10,12 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.panels.parts import Card
 
-__all__ = ["NotesPanel"]
+__all__ = ["NotesCard"]
 
 _PAUSE_MS = 600
 
 
-class NotesPanel(Card):
+class NotesCard(Card):
     """A text field; all that is typed before the field is left is one undo.
 
     Parameters

@@ -28,7 +28,7 @@ from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
 from gp_labeler.views.theme import theme_of
 
-__all__ = ["AtlasModel", "AtlasTable"]
+__all__ = ["FeatureTable", "FeatureTableModel"]
 
 _SIDES = (Side.LEFT, Side.RIGHT)
 _HEADINGS = ("Feature", "SD mm", "Left mm · SD", "Right mm · SD")
@@ -45,7 +45,7 @@ DOUBTFUL_ROLE = int(Qt.ItemDataRole.UserRole) + 1
 Index = QModelIndex | QPersistentModelIndex
 
 
-class AtlasModel(QAbstractTableModel):
+class FeatureTableModel(QAbstractTableModel):
     """A row for each feature of the atlas in use.
 
     Parameters
@@ -154,7 +154,7 @@ def _words(found: Deviation | None) -> str:
     return f"{found.word.removesuffix(' mm')} · {found.n_sd:.1f}"
 
 
-class AtlasTable(QTableView):
+class FeatureTable(QTableView):
     """The table; a click on a label goes to it.
 
     Parameters
@@ -166,7 +166,7 @@ class AtlasTable(QTableView):
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
-        self.rows = AtlasModel(workspace, self)
+        self.rows = FeatureTableModel(workspace, self)
         self.setModel(self.rows)
         self.setItemDelegate(_Cells(self))
         self.setAccessibleName("Features of the atlas")

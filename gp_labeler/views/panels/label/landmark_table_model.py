@@ -11,7 +11,7 @@ from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow, mm_text, suggestion_text
 
-__all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkModel"]
+__all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkTableModel"]
 
 SIDES = (Side.LEFT, Side.RIGHT)
 """Of the columns after the first."""
@@ -34,7 +34,7 @@ class _Cell(NamedTuple):
     word: str
 
 
-class LandmarkModel(QAbstractTableModel):
+class LandmarkTableModel(QAbstractTableModel):
     """States of the 20 features on both sides, as words and as roles for the chips.
 
     It tells of each cell that changed, and of no other: the table then draws these alone.

@@ -11,9 +11,9 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow, mm_text
 from gp_labeler.views.fonts import fit, pixels, text_width
-from gp_labeler.views.panels.cut_row import CutRow
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.panels.scan.cut_row import CutRow
 
 __all__ = ["MeshCard"]
 

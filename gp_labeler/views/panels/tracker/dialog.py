@@ -30,7 +30,7 @@ from gp_labeler.views.bind import follow, set_role
 from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
-from gp_labeler.views.panels.tracker_card import tracker_role, tracker_words
+from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
 from gp_labeler.views.window_state import WindowState
 
 __all__ = ["TrackerDialog"]

@@ -16,10 +16,10 @@ from gp_labeler.models.estimate import Estimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt
 from gp_labeler.views.fonts import HEADING, TITLE, styled
+from gp_labeler.views.panels.card_parts import Notices, Verdict, link, numbers
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.views.panels.pose_parts import Notices, Verdict, link, numbers
-from gp_labeler.views.panels.pose_words import (
+from gp_labeler.views.panels.pose.wording import (
     METHOD_WORDS,
     allowance_text,
     fine_mm,

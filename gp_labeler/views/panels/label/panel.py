@@ -7,8 +7,8 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
-from gp_labeler.views.panels.feature_card import FeatureCard
-from gp_labeler.views.panels.landmark_table import LandmarkTable
+from gp_labeler.views.panels.label.feature_card import FeatureCard
+from gp_labeler.views.panels.label.landmark_table import LandmarkTable
 from gp_labeler.views.panels.parts import Scrolled
 
 __all__ = ["LabelPanel"]

@@ -10,7 +10,7 @@ from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
 
-__all__ = ["GreyCard"]
+__all__ = ["WindowLevelCard"]
 
 _HINTS = {
     "Auto": "The window that suits the whole scan",
@@ -21,7 +21,7 @@ _HINTS = {
 }
 
 
-class GreyCard(Card):
+class WindowLevelCard(Card):
     """Grey window of the slices.
 
     Parameters

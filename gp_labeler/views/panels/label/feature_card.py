@@ -26,8 +26,8 @@ from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
-from gp_labeler.views.panels.card_content import CardContent, content_of
 from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.label.card_content import CardContent, content_of
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.theme import theme_of
 

@@ -12,9 +12,9 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
 from gp_labeler.document.touches import Touch, TouchHow, frame_of
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.panels.pose_words import fine_mm, parse_position, touch_text, triple
+from gp_labeler.views.panels.pose.wording import fine_mm, parse_position, touch_text, triple
 
-__all__ = ["CLEAR", "MISFIT", "NAME", "ROW_ROLE", "USE", "XYZ", "TouchModel", "TouchRow"]
+__all__ = ["CLEAR", "MISFIT", "NAME", "ROW_ROLE", "USE", "XYZ", "TouchRow", "TouchTableModel"]
 
 NAME, XYZ, MISFIT, USE, CLEAR = range(5)
 _HEADINGS = ("Point", "x, y, z in mm", "Misfit", "Use", "")
@@ -51,7 +51,7 @@ class TouchRow:
         return self.name not in CODES
 
 
-class TouchModel(QAbstractTableModel):
+class TouchTableModel(QAbstractTableModel):
     """Names, positions and misfits of the touches of the side in work.
 
     Parameters

@@ -21,13 +21,13 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.parts import Card, scrolled
-from gp_labeler.views.panels.pose_head import HeadCard
-from gp_labeler.views.panels.pose_overlay import OverlayCard
-from gp_labeler.views.panels.pose_result import ResultCard
-from gp_labeler.views.panels.pose_scan import InScanCard
-from gp_labeler.views.panels.pose_touches import TouchesCard
-from gp_labeler.views.panels.pose_verdict import VerdictCard
-from gp_labeler.views.panels.welcome import dropped_path
+from gp_labeler.views.panels.pose.overlay_card import OverlayCard
+from gp_labeler.views.panels.pose.registration_card import RegistrationCard
+from gp_labeler.views.panels.pose.result_card import ResultCard
+from gp_labeler.views.panels.pose.settings_card import EstimateSettingsCard
+from gp_labeler.views.panels.pose.touches_card import TouchesCard
+from gp_labeler.views.panels.pose.verdict_card import VerdictCard
+from gp_labeler.views.panels.scan.welcome import dropped_path
 
 __all__ = ["PosePanel", "holds_touches"]
 
@@ -73,8 +73,8 @@ class PosePanel(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.setAcceptDrops(True)
-        self.head, self.touches = HeadCard(workspace), TouchesCard(workspace)
-        self.result, self.in_scan = ResultCard(workspace), InScanCard(workspace)
+        self.head, self.touches = EstimateSettingsCard(workspace), TouchesCard(workspace)
+        self.result, self.in_scan = ResultCard(workspace), RegistrationCard(workspace)
         self.overlay, self.verdict = OverlayCard(workspace, actions or {}), VerdictCard(workspace)
         self.report, self.export = QPushButton("Report…"), QPushButton("Export…")
         self.report.setToolTip("One page with touches, estimate, errors and pictures")

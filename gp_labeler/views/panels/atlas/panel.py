@@ -23,11 +23,11 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, pixels
-from gp_labeler.views.panels.atlas_table import AtlasTable
+from gp_labeler.views.panels.atlas.feature_table import FeatureTable
+from gp_labeler.views.panels.card_parts import Notices
 from gp_labeler.views.panels.finding_list import FindingList, FindingRow
-from gp_labeler.views.panels.import_words import sentence
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, emptied, scrolled, text_label
-from gp_labeler.views.panels.pose_parts import Notices
+from gp_labeler.views.panels.scan.import_wording import sentence
 
 __all__ = ["AtlasPanel"]
 
@@ -55,8 +55,8 @@ class AtlasPanel(QWidget):
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
-        self.which, self.own = AtlasCard(workspace), OwnCard(workspace)
-        self.trial, self.labels = TrialCard(workspace), LabelsCard(workspace)
+        self.which, self.own = AtlasCard(workspace), AtlasFittingCard(workspace)
+        self.trial, self.labels = LeaveOneOutCard(workspace), LabelsCard(workspace)
         for asking in (self.which, self.own, self.trial):
             asking.asked.connect(self.asked)
         self.own.animal_asked.connect(self.animal_asked)
@@ -192,7 +192,7 @@ def _made_from(workspace: Workspace) -> str:
     return f"{n} animal{'' if n == 1 else 's'}, {sides}" if n else sides
 
 
-class OwnCard(_AskingCard):
+class AtlasFittingCard(_AskingCard):
     """Fitting an atlas to labelled animals, and what was read for it."""
 
     animal_asked = Signal(object)
@@ -300,7 +300,7 @@ class LabelsCard(Card):
         super().__init__("Features")
         self._workspace = workspace
         self.verdict = text_label("", "hint", wrap=True)
-        self.table = AtlasTable(workspace)
+        self.table = FeatureTable(workspace)
         self.add(self.verdict)
         self.add(self.table)
         for signal in (
@@ -329,7 +329,7 @@ class LabelsCard(Card):
         self.verdict.setText(words)
 
 
-class TrialCard(_AskingCard):
+class LeaveOneOutCard(_AskingCard):
     """Leave-one-out: how well each animal's cochlea is found from the others."""
 
     def __init__(self, workspace: Workspace) -> None:

@@ -22,14 +22,14 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
-from gp_labeler.views.panels.landmark_menu import landmark_menu
-from gp_labeler.views.panels.landmark_model import (
+from gp_labeler.views.panels.label.landmark_menu import landmark_menu
+from gp_labeler.views.panels.label.landmark_table_model import (
     ACTIVE_ROLE,
     CODE_ROLE,
     LOCKED_ROLE,
     SIDES,
     STATE_ROLE,
-    LandmarkModel,
+    LandmarkTableModel,
 )
 from gp_labeler.views.theme import Theme, theme_of
 
@@ -59,7 +59,7 @@ class LandmarkTable(QWidget):
     def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
-        self.model = LandmarkModel(workspace, self)
+        self.model = LandmarkTableModel(workspace, self)
         self.view = _TableView(self.model, self)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 0, 0, 0)
@@ -122,7 +122,7 @@ class LandmarkTable(QWidget):
 class _TableView(QTableView):
     """Twenty rows that share the height there is."""
 
-    def __init__(self, model: LandmarkModel, parent: LandmarkTable) -> None:
+    def __init__(self, model: LandmarkTableModel, parent: LandmarkTable) -> None:
         super().__init__(parent)
         self._table = parent
         self.setModel(model)

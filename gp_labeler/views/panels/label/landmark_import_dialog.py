@@ -25,7 +25,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.lab_names import LabNamesMemory
 from gp_labeler.document.landmark_import import MisfitError, Predicate, import_landmarks
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.panels.lab_names_table import LabNamesTable
+from gp_labeler.views.panels.label.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
 

@@ -1,0 +1,1 @@
+"""The panel of the step Atlas: its cards and its dialogs."""

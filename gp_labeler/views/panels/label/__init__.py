@@ -1,0 +1,1 @@
+"""The panel of the step Label: its cards and its dialogs."""

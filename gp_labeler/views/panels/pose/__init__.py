@@ -1,0 +1,1 @@
+"""The panel of the step Pose: its cards and its dialogs."""

@@ -1,0 +1,1 @@
+"""The panel of the step Scan: its cards and its dialogs."""
