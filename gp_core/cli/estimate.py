@@ -27,7 +27,7 @@ from gp_core.io.file_names import named_side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.estimate import estimate_pose
-from gp_core.pose.gate import PoseGate, reasons_against_writing
+from gp_core.pose.gate import PoseGate, named_for_other_side, reasons_against_writing
 from gp_core.pose.hypothesis_check import read_as, with_names_exchanged
 from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_before_centre, write_path
 from gp_core.pose.mixture import Hypothesis
@@ -187,10 +187,8 @@ def run(args: argparse.Namespace) -> int:
             if atlas is None
             else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
         )
-    doubtful = bool(reasons_against_writing(pose)) or (
-        taken is not None and taken.probability < _CERTAIN_ENOUGH
-    )
-    held_back = doubtful and not args.accept_warnings
+    doubts = _doubts(args, pose, taken)
+    held_back = bool(doubts) and not args.accept_warnings
     _write(args, pose, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
@@ -200,8 +198,8 @@ def run(args: argparse.Namespace) -> int:
     for line in _remarks(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
     if held_back:
-        say(f"  ! {_what_was_held_back(args, pose)}")
-    elif doubtful:
+        say(f"  ! {_what_was_held_back(args, doubts)}")
+    elif doubts:
         say("  ! written although side or names are ambiguous: --accept-warnings was given")
     return HELD_BACK if held_back else 0
 
@@ -241,11 +239,18 @@ def _estimated(
     return touches, estimate(touches), best
 
 
-def _what_was_held_back(args: argparse.Namespace, pose: CochleaPose) -> str:
-    why = (
-        " and ".join(reason.text for reason in reasons_against_writing(pose))
-        or "the hypothesis used is not certain enough"
-    )
+def _doubts(args: argparse.Namespace, pose: CochleaPose, taken: Hypothesis | None) -> list[str]:
+    """Return why side or names are not beyond doubt."""
+    doubts = [reason.text for reason in reasons_against_writing(pose)]
+    if taken is not None and taken.probability < _CERTAIN_ENOUGH:
+        doubts.append("the hypothesis used is not certain enough")
+    if named_side(args.touches) is pose.side.other:
+        doubts.append(named_for_other_side(Path(args.touches).name, pose.side).text)
+    return doubts
+
+
+def _what_was_held_back(args: argparse.Namespace, doubts: Sequence[str]) -> str:
+    why = " and ".join(doubts)
     files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
     what = f"not written: {' '.join(files)}, as {why}" if files else why
     if old := [file for file in files if Path(file).exists()]:
@@ -283,14 +288,11 @@ def _remarks(
     """Yield what the files say beside the pose, and what the written frame is."""
     if touches.unseen:
         yield f"not seen by the tracker: {' '.join(sorted(touches.unseen))}"
-    named = named_side(args.touches)
-    if named not in (None, pose.side):
-        yield f"! by its name the file is of the {named.word} side: check the side"
     centre = None if path is None else rows_before_centre(path)
     if centre is not None:
         yield f"! row {centre + 1} of the path is CO itself, where no path can be: --path-rows {centre}?"
     for reason in PoseGate().reasons(pose, accepted=True):
-        if reason.code in ("radius", "cone", "side unchecked", "names unchecked"):
+        if reason.code in ("radius", "cone"):
             yield f"! a robot link would not send this pose: {reason.text}"
     if args.json or (not held_back and any((args.tfm, args.csv, args.path_out))):
         yield f"y of what was written points to the {pose.round_window} round window"

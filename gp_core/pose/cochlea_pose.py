@@ -145,6 +145,11 @@ class CochleaPose:
         return any(h.probability >= UNDECIDED for h in self.hypotheses)
 
     @property
+    def other_side_probability(self) -> float:
+        """How likely the touches are those of the other ear, 0 to 1."""
+        return sum(h.probability for h in self.hypotheses if h.exchanged is None)
+
+    @property
     def likelier_hypothesis(self) -> Hypothesis | None:
         """A hypothesis that is likelier than the touches as they are named; None if there is none."""
         best = next(iter(self.hypotheses), None)

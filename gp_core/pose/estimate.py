@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
@@ -14,6 +15,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
+from gp_core.pose.hypothesis_check import hypothesis_warnings
 from gp_core.pose.jrmpc_estimator import estimate_jrmpc
 from gp_core.pose.robust import estimate_robust
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
@@ -44,7 +46,8 @@ def estimate_pose(
     side : {"L", "R"}
         Side of the head.
     atlas : Atlas, optional
-        By default fitted to `specimens`, or else the published one. Not used by ``jrmpc``.
+        By default fitted to `specimens`, or else the published one. With ``jrmpc`` it judges side and names
+        only, which JRMPC cannot.
     method : {"robust", "jrmpc"}
         ``robust`` uses the names of the points; ``jrmpc`` is the paper's method and needs `specimens`.
     specimens : sequence of Specimen, optional
@@ -88,7 +91,7 @@ def estimate_pose(
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
     check_plausible_size(landmarks, strict=True)
     if method == "jrmpc":
-        pose = estimate_jrmpc(landmarks, specimens)
+        pose = _with_hypotheses(estimate_jrmpc(landmarks, specimens), landmarks, atlas, specimens)
     else:
         pose = estimate_robust(
             landmarks,
@@ -109,6 +112,32 @@ def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> Landmar
             remedy="Read a file of touches with read_touches.",
         )
     return LandmarkSet.from_mapping(touches, side, frame="tracker")
+
+
+def _with_hypotheses(
+    pose: CochleaPose, touches: LandmarkSet, atlas: Atlas | None, specimens: Sequence[Specimen] | None
+) -> CochleaPose:
+    """Return JRMPC's pose with what the robust method finds of side and names, which JRMPC cannot judge."""
+    try:
+        named = estimate_robust(touches, atlas or _atlas_of_names(specimens))
+    except GpError:  # they stay unchecked, so nothing of this pose is for a robot
+        return pose
+    return replace(
+        pose,
+        side_state=named.side_state,
+        names_state=named.names_state,
+        swapped=named.swapped,
+        probability=named.probability,
+        hypotheses=named.hypotheses,
+        warnings=(*hypothesis_warnings(named), *pose.warnings),
+    )
+
+
+def _atlas_of_names(specimens: Sequence[Specimen] | None) -> Atlas:
+    try:
+        return _default_atlas(specimens)
+    except GpError:  # too few animals for an atlas, though enough for JRMPC
+        return Atlas.published()
 
 
 def _default_atlas(specimens: Sequence[Specimen] | None) -> Atlas:

@@ -13,9 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
 from gp_core.pose.cochlea_pose import CochleaPose
 
-__all__ = ["GateReason", "PoseGate", "reasons_against_writing", "reasons_of_ambiguity"]
+__all__ = [
+    "GateReason",
+    "PoseGate",
+    "named_for_other_side",
+    "reasons_against_writing",
+    "reasons_of_ambiguity",
+]
 
 
 @dataclass(frozen=True)
@@ -130,24 +137,38 @@ def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
     other = pose.side.other.word
     words = {
         "wrong": ("wrong side", f"the touches look like those of the {other} ear"),
-        "undecided": ("side undecided", f"the touches fit the {other} ear about as well"),
-        "unchecked": ("side unchecked", f"the method {pose.method} does not check the side"),
+        "undecided": (
+            "side undecided",
+            f"the touches may be those of the {other} ear ({100 * pose.other_side_probability:.1f} %)",
+        ),
+        "unchecked": ("side unchecked", "nothing has checked the side"),
     }
     if pose.side_state in words:
         yield GateReason(*words[pose.side_state])
     words = {
         "wrong": ("wrong names", f"{_pair(pose)} look exchanged"),
         "undecided": ("names undecided", f"{_pair(pose)} may be exchanged"),
-        "unchecked": ("names unchecked", f"the method {pose.method} does not check the names"),
+        "unchecked": ("names unchecked", "nothing has checked the names"),
     }
     if pose.names_state in words:
         yield GateReason(*words[pose.names_state])
 
 
-def reasons_against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
-    """Return why a pose must not be written for a robot: its side or names look wrong, or are undecided.
+def named_for_other_side(file: str, side: Side) -> GateReason:
+    """Return the reason that a file of touches gives which is named for the other side than `side`.
 
-    A method that checks neither gives no reason.
+    Parameters
+    ----------
+    file : str
+        Its name.
+    side : Side
+        Side that the touches are said to be of.
+    """
+    return GateReason("side undecided", f"by its name {file} is of the {side.other.word} side")
+
+
+def reasons_against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
+    """Return why a pose must not be written for a robot: side or names wrong, undecided or unchecked.
 
     Parameters
     ----------
@@ -159,7 +180,7 @@ def reasons_against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
     tuple of GateReason
         Empty where it may be written.
     """
-    return tuple(reason for reason in reasons_of_ambiguity(pose) if not reason.code.endswith("unchecked"))
+    return tuple(reasons_of_ambiguity(pose))
 
 
 def _pair(pose: CochleaPose) -> str:

@@ -95,7 +95,7 @@ def hypothesis_warnings(pose: CochleaPose) -> Iterator[str]:
         yield f"the {other} side fits these points better than the {this}: check the side"
     elif pose.side_state == "undecided":
         yield (
-            f"these points fit the {other} side about as well, so a wrong side would pass: "
+            f"these points may be of the {other} side ({100 * pose.other_side_probability:.1f} %): "
             "touch one more feature away from their plane"
         )
 

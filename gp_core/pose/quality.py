@@ -85,6 +85,6 @@ def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
         return PoseQuality(
             "warning",
             "Side undecided",
-            "The touches fit the other ear about as well; touch one more feature.",
+            "The touches may be those of the other ear; touch one more feature.",
         )
     return None

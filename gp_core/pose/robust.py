@@ -106,7 +106,7 @@ def estimate_robust(
         hypotheses=tuple(_hypothesis(atlas, model, hypothesis, touches, systematic) for hypothesis in others),
     )
     decided = replace(pose, **hypothesis_states(pose, better))
-    return replace(decided, warnings=tuple(_warnings(fit, decided)))
+    return replace(decided, warnings=tuple(_warnings(fit, decided, systematic.drift(fit))))
 
 
 def _elapsed(times: Mapping[str, float] | None, model: TouchModel) -> list[float] | None:
@@ -352,12 +352,17 @@ def _better_exchanged(
     return model.codes[i], model.codes[j]
 
 
-def _warnings(fit: NamedFit, pose: CochleaPose) -> Iterator[str]:
+def _warnings(fit: NamedFit, pose: CochleaPose, drift: float | None) -> Iterator[str]:
     yield from hypothesis_warnings(pose)
     if pose.suspects and pose.names_state != "wrong":
         names = " and ".join(pose.suspects)
         verb, it = ("does", "it") if len(pose.suspects) == 1 else ("do", "them")
         yield f"{names} {verb} not fit the other points: touch {it} again, or leave {it} out"
+    if drift is not None:
+        yield (
+            f"the touches drift by {drift:.1f} mm from the first to the last: check that the reference is "
+            "fixed, and touch the first feature again"
+        )
     n = len(fit.weights)
     if n < _ENOUGH_TOUCHES and not pose.suspects:
         yield f"only {n} points: a mistouch cannot be distinguished from an unusual animal"

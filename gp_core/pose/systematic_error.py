@@ -3,9 +3,8 @@
 Independent touch errors average out and show in the residuals; an error that all touches share does neither.
 A tip that was calibrated wrongly, soft tissue under the tip, a reference marker that drifted or was knocked:
 each moves all touches of a session by nearly the same offset. Its size cannot be estimated from the touches;
-the user gives it as the *shared error*, the RMS length of that offset. It moves the whole pose; and because
-no such error is exactly the same at every touch, part of its variance is taken as different from touch to
-touch.
+the user gives it as the *shared error*, the RMS length of that offset. It moves the whole pose. What of
+such an error differs from touch to touch shows as noise, which the fit estimates.
 
 Likewise for an animal of unusual size: an atlas of a few adult animals hardly knows how much the size of
 guinea pigs varies. A scale factor with a wide prior is therefore estimated, and what the touches show of it
@@ -29,15 +28,12 @@ from gp_core.errors import GpError
 from gp_core.registration.named_points import NamedFit
 from gp_core.validation import FloatArray
 
-__all__ = ["DEFAULT_SHARED_ERROR_MM", "SystematicError"]
+__all__ = ["DEFAULT_SHARED_ERROR_MM", "OUTLIER_SQUARED_SHARED", "SystematicError"]
 
 DEFAULT_SHARED_ERROR_MM = 0.2
 """RMS length of the offset of a well calibrated probe on a well fixed reference, mm."""
 
 _LARGEST_MM = 20.0
-
-_WITHIN = 0.04
-"""Fraction of the variance of the shared error that varies from touch to touch."""
 
 _SIZE_SCATTER = 0.06
 """Standard deviation of the size of animals beyond the variation in an atlas, as a factor."""
@@ -45,7 +41,13 @@ _SIZE_SCATTER = 0.06
 _CHANCE = 3.0
 """Squared Mahalanobis distance of the size that animals of an atlas ordinarily reach."""
 
-_ODD_SQUARED_SHARED = 5.0
+OUTLIER_SQUARED_SHARED = 5.0
+
+_DRIFT_SQUARED = 11.344866730144373
+"""Chi-square of 3 degrees that 1 of 100 ordinary sessions is above."""
+
+_ENOUGH_FOR_DRIFT = 5
+"""Touches from which a drift can be told from an unusual animal."""
 
 _FLOOR_MM = {3: 0.2, 4: 0.15}
 """Smallest noise assumed, mm a coordinate: so few touches leave too few residuals to estimate it."""
@@ -100,7 +102,7 @@ class SystematicError:
         For ordinary touches it is chi-squared with 3 degrees of freedom: 1 of 20 exceeds the larger value, 1
         of 6 the smaller one, which catches more of the outliers that pull the pose towards themselves.
         """
-        return CHI2_3_95 if self.shared_error == 0 else _ODD_SQUARED_SHARED
+        return CHI2_3_95 if self.shared_error == 0 else OUTLIER_SQUARED_SHARED
 
     def covariance(
         self, atlas: Atlas, fit: NamedFit, of_touches: FloatArray, of_shape: FloatArray
@@ -126,9 +128,25 @@ class SystematicError:
         if self.shared_error == 0:
             return np.zeros((6, 6))
         each = self.shared_error**2 / 3
-        added = _WITHIN * each * of_touches @ of_touches.T
-        added[:3, :3] += each * np.eye(3)
+        added = np.zeros((6, 6))
+        added[:3, :3] = each * np.eye(3)
         return added + self._nuisances(atlas, fit, of_touches, of_shape)
+
+    def drift(self, fit: NamedFit) -> float | None:
+        """Return how far the touches drift from the first to the last, mm; None where that may be chance.
+
+        Weighed against independent errors and the shape of the animal, the pose left free; of an ordinary
+        session, 1 of 100 shows so much.
+        """
+        ramp = self._ramp()
+        if ramp is None or len(fit.weights) < _ENOUGH_FOR_DRIFT:
+            return None
+        moved = (ramp[:, None, None] * np.eye(3)).reshape(-1, 3)
+        columns = _pose_taken_out(fit, moved)
+        weighted = fit.precision[:, None] * columns
+        information, score = weighted.T @ columns, weighted.T @ fit.residual
+        step = np.linalg.lstsq(information, score, rcond=1e-6)[0]
+        return float(np.linalg.norm(step)) if float(score @ step) > _DRIFT_SQUARED else None
 
     def _nuisances(
         self, atlas: Atlas, fit: NamedFit, of_touches: FloatArray, of_shape: FloatArray
@@ -144,8 +162,7 @@ class SystematicError:
                 moved.append(-of_touches @ touched[-1])
                 prior.append(self.shared_error**2 / 3)
         columns, effect = np.array(touched).T, np.array(moved).T
-        weighted = fit.precision[:, None] * fit.jacobian
-        columns = columns - fit.jacobian @ np.linalg.solve(weighted.T @ fit.jacobian, weighted.T @ columns)
+        columns = _pose_taken_out(fit, columns)
         spread = np.linalg.inv((fit.precision[:, None] * columns).T @ columns + np.diag(1 / np.array(prior)))
         mean = spread @ (columns.T @ (fit.precision * fit.residual))
         shown = np.zeros((6, 6))
@@ -164,3 +181,11 @@ class SystematicError:
         times = np.array(self.elapsed, dtype=np.float64)
         length = np.ptp(times)
         return None if length == 0 else (times - times.mean()) / length
+
+
+def _pose_taken_out(fit: NamedFit, columns: FloatArray) -> FloatArray:
+    """Return how touches (3 n, m) move beyond what a change of the pose makes good."""
+    weighted = fit.precision[:, None] * fit.jacobian
+    solved = np.linalg.solve(weighted.T @ fit.jacobian, weighted.T @ columns)
+    left: FloatArray = columns - fit.jacobian @ solved
+    return left

@@ -32,8 +32,8 @@ __all__ = [
     "load_skull",
     "load_touches",
     "mark_skull",
+    "misnamed_files",
     "move_touches",
-    "named_side",
     "record_touch",
     "swap_touches",
 ]
@@ -104,6 +104,13 @@ def load_touches(document: SpecimenDocument, path: str | PathLike[str], side: Si
     if named not in (None, Side.parse(side)):
         doubts.append(f"By its name it is of the {named.word} side: check the side")
     return tuple(doubts)
+
+
+def misnamed_files(document: SpecimenDocument, side: Side) -> tuple[str, ...]:
+    """Return the files that touches of a side are from, and whose names tell the other one."""
+    touches = (touch for (of, _), touch in document.state.touches.items() if of is side)
+    files = {touch.source for touch in touches if touch.how is TouchHow.FILE}
+    return tuple(sorted(file for file in files if named_side(file) is side.other))
 
 
 def leave_out(document: SpecimenDocument, side: Side | str, name: str, left_out: bool = True) -> bool:

@@ -17,7 +17,7 @@ from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import EXTERNAL, RECOMMENDED, Side
 from gp_core.pose.cochlea_pose import CochleaPose
-from gp_core.pose.gate import reasons_against_writing
+from gp_core.pose.gate import GateReason, named_for_other_side, reasons_against_writing
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_labeler.document import touching
@@ -131,6 +131,7 @@ class PoseModel:
         self._gains: tuple[Estimate, tuple[TouchGain, ...]] | None = None
         self._path: InsertionPath | None = None
         self._prepared = False
+        self._confirmed: set[tuple[Side, str]] = set()
         self._seen = self._touched_now()
         self._on_atlas_changed()
         document.reset.connect(self._on_reset)
@@ -323,6 +324,22 @@ class PoseModel:
         poses = () if self.estimate is None else self.estimate.poses.values()
         return next((pose.swapped for pose in poses if pose.swapped is not None), None)
 
+    @property
+    def misnamed(self) -> tuple[str, ...]:
+        """Files of this side's touches that are named for the other one, unless `confirm_side` was told."""
+        files = touching.misnamed_files(self._document, self.side)
+        return tuple(file for file in files if (self.side, file) not in self._confirmed)
+
+    def confirm_side(self) -> None:
+        """Say that the touches are of this side, whatever their files are named."""
+        self._confirmed |= {(self.side, file) for file in self.misnamed}
+        self.changed.emit()
+
+    @property
+    def file_doubts(self) -> tuple[GateReason, ...]:
+        """What the names of its files say against the side of the touches."""
+        return tuple(named_for_other_side(file, self.side) for file in self.misnamed)
+
     def swap_names(self) -> None:
         """Give each of these two the other's name; raises `GpError` where none look so."""
         if self.swapped is None:
@@ -422,7 +439,7 @@ class PoseModel:
 
     def _check_doubt(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
         """Refuse to write for a robot what is in doubt, unless a person has accepted this very estimate."""
-        reasons = reasons_against_writing(pose)
+        reasons = (*reasons_against_writing(pose), *self.file_doubts)
         estimate = self.estimate
         accepted = estimate is not None and verdict_on(estimate, self._document.state) == "accept"
         if reasons and not accepted:
@@ -457,6 +474,7 @@ class PoseModel:
     def _on_reset(self) -> None:
         self._estimator.forget_registrations()
         self._skipped, self._seen = frozenset(), self._touched_now()
+        self._confirmed.clear()
         self._aim(self._first_untouched())
         self.changed.emit()
 

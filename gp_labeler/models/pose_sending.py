@@ -64,6 +64,7 @@ class PoseSending:
         state: SpecimenState,
         doubtful: tuple[str, ...],
         reference_age_s: float | None,
+        file_doubts: tuple[GateReason, ...] = (),
     ) -> None:
         """Send how the pose stands now.
 
@@ -76,6 +77,8 @@ class PoseSending:
             Touches that may lie in another frame than what the tracker reads now.
         reference_age_s : float or None
             How long ago the reference was read, seconds; None where no touch hangs on one.
+        file_doubts : tuple of GateReason
+            What the names of the touches' files say against the side.
         """
         if self._sender is None:
             return
@@ -89,6 +92,7 @@ class PoseSending:
                 pose, accepted=verdict_on(estimate, state) == "accept", reference_age_s=reference_age_s
             ),
             *_reasons_of_touches(pose, doubtful),
+            *file_doubts,
         )
         if verdict_on(estimate, state) == "reject":
             reasons = (

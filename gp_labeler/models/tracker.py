@@ -267,8 +267,6 @@ class TrackerModel:
     @property
     def doubtful(self) -> tuple[str, ...]:
         """Tracked touches of the side in work that may lie in another frame than what is read now."""
-        if not self.on:
-            return ()
         touches = self._tracked().items()
         return tuple(name for name, touch in touches if self._frame.is_doubtful(touch.position))
 
@@ -276,6 +274,12 @@ class TrackerModel:
     def frame_words(self) -> str:
         """Since when the reference is verified, or which touches may lie in another frame."""
         if doubtful := self.doubtful:
+            if self._frame.is_unknown(self._tracked()[doubtful[0]].position):
+                was, it = ("was", "it") if len(doubtful) == 1 else ("were", "them")
+                return (
+                    f"{', '.join(doubtful)} {was} touched in an earlier sitting, and the reference may have "
+                    f"moved since. Touch {it} again."
+                )
             return (
                 f"The marker jumped, or the connection was lost, since {', '.join(doubtful)} "
                 f"{'was' if len(doubtful) == 1 else 'were'} touched. Touch {doubtful[0]} again to check."
@@ -453,7 +457,7 @@ class TrackerModel:
     def _update_sending(self, *_: object) -> None:
         if self._sending.on:
             pose, state = self._pose, self._document.state
-            self._sending.update(pose.estimate, state, self.doubtful, self._reference_age())
+            self._sending.update(pose.estimate, state, self.doubtful, self._reference_age(), pose.file_doubts)
 
     def _reference_age(self) -> float | None:
         """Return how long ago the reference was read, s; None where no touch was taken in its frame."""

@@ -45,7 +45,8 @@ class FrameCheck:
     """Knows which touches are in one frame beyond doubt.
 
     Touches of one segment are. Those of two are once a feature of the one is touched again in the other, at
-    the same place.
+    the same place. All this is known for one sitting: until the next the reference may have been moved, so
+    the touches of a specimen that is opened again are in doubt until they are touched again.
 
     Parameters
     ----------
@@ -95,10 +96,14 @@ class FrameCheck:
 
     def is_doubtful(self, position: ArrayLike) -> bool:
         """Whether a touch may lie in another frame than the newest sample."""
-        if self._now is None:
-            return False
         segment = self._segments.get(_place(position))
-        return segment is None or self._root(segment) != self._root(self._now)
+        if segment is None:
+            return True
+        return self._now is not None and self._root(segment) != self._root(self._now)
+
+    def is_unknown(self, position: ArrayLike) -> bool:
+        """Whether a touch was not made in this sitting: read from a specimen's file."""
+        return _place(position) not in self._segments
 
     def forget(self) -> None:
         """Begin anew: there are no touches any more."""

@@ -23,6 +23,9 @@ __all__ = ["HIDDEN_BY", "Simulator"]
 HIDDEN_BY = ("status", "identity", "stop")
 """How a covered marker is told: by metadata and identity, by an identity alone, or by no message."""
 
+_LONGEST_S, _FARTHEST_MM = 3600.0, 1000.0
+"""What a command can ask for."""
+
 _BAD = ("nan", "scale", "mirror", "repeat", "back")
 
 
@@ -182,22 +185,22 @@ class Simulator:
         self._later(seconds, lambda: self._say(f"done {line.strip()}"))
 
     def _do_go(self, name: str, seconds: str = "1") -> float:
-        self.probe.go(name, float(seconds), self.now)
-        return float(seconds)
+        self.probe.go(name, _seconds(seconds), self.now)
+        return _seconds(seconds)
 
     def _do_lift(self, mm: str = "30", seconds: str = "0.5") -> float:
-        self.probe.lift(float(mm), float(seconds), self.now)
-        return float(seconds)
+        self.probe.lift(_millimetres(mm), _seconds(seconds), self.now)
+        return _seconds(seconds)
 
     def _do_wait(self, seconds: str) -> float:
-        return float(seconds)
+        return _seconds(seconds)
 
     def _do_turn(self, seconds: str = "") -> float:
+        lasts = _seconds(seconds) if seconds else 0.0
         self.probe.turn(True)
-        if not seconds:
-            return 0.0
-        self._later(float(seconds), self._do_still)
-        return float(seconds)
+        if seconds:
+            self._later(lasts, self._do_still)
+        return lasts
 
     def _do_still(self) -> None:
         self.probe.turn(False)
@@ -209,15 +212,16 @@ class Simulator:
         self.probe.hidden.clear()
 
     def _do_jump(self, mm: str, seconds: str = "0") -> None:
+        length, lasts = _millimetres(mm), _seconds(seconds)
         aside = self.probe.rng.standard_normal(3)
-        self.probe.displaced = float(mm) * aside / np.linalg.norm(aside)
-        self._later(max(float(seconds), 0.5 * self._period), self._stay)
+        self.probe.displaced = length * aside / np.linalg.norm(aside)
+        self._later(max(lasts, 0.5 * self._period), self._stay)
 
     def _stay(self) -> None:
         self.probe.displaced = np.zeros(3)
 
     def _do_late(self, seconds: str) -> None:
-        self._late = float(seconds)
+        self._late = _seconds(seconds)
 
     def _do_bad(self, kind: str) -> None:
         if kind not in _BAD:
@@ -225,18 +229,19 @@ class Simulator:
         self._bad = kind
 
     def _do_stale(self, seconds: str = "1") -> None:
-        self._stale_until = self.now + float(seconds)
+        self._stale_until = self.now + _seconds(seconds)
 
     def _do_press(self) -> None:
         self._send(pyigtl.StringMessage("1", device_name=self._names["button"]))
         self._later(0.1, lambda: self._send(pyigtl.StringMessage("0", device_name=self._names["button"])))
 
     def _do_cut(self, seconds: str = "1") -> None:
+        lasts = _seconds(seconds)
         server, self._server = self._server, None
         if server is not None:
             server.stop()
         self._held.clear()
-        self._later(float(seconds), self._come_back)
+        self._later(lasts, self._come_back)
 
     def _come_back(self) -> None:
         if self._server is None and self.running:
@@ -280,6 +285,22 @@ class Simulator:
     def _send(self, message: Any) -> None:
         if self._server is not None and self._server.is_connected():
             self._server.send_message(message, wait=False)
+
+
+def _seconds(text: str) -> float:
+    """Return a time of a command."""
+    seconds = float(text)
+    if not 0 <= seconds <= _LONGEST_S:
+        raise GpError(f"seconds must be from 0 to {_LONGEST_S:g}, got {text}")
+    return seconds
+
+
+def _millimetres(text: str) -> float:
+    """Return a length of a command."""
+    mm = float(text)
+    if not 0 <= mm <= _FARTHEST_MM:
+        raise GpError(f"millimetres must be from 0 to {_FARTHEST_MM:g}, got {text}")
+    return mm
 
 
 def _spoilt(matrix: FloatArray, bad: str) -> FloatArray:

@@ -75,9 +75,11 @@ def test_estimate_says_what_names_and_paths_tell(tmp_path: Path, capsys: pytest.
     path.write_text("".join(f"{x},{y},{z}\n" for x, y, z in rows))
     about = ["--path", str(path), "--path-units", "mm", "--path-side", "L", "--path-out"]
     words = ["estimate", str(touches), "--side", "L", *about, str(tmp_path / "out.csv")]
+    assert main(words) == 3
+    assert "as by its name Skull_Right_new.csv is of the right side" in capsys.readouterr().out
+    words.append("--accept-warnings")
     assert main(words) == 0
     text = capsys.readouterr().out
-    assert "! by its name the file is of the right side: check the side" in text
     assert "! row 21 of the path is CO itself, where no path can be: --path-rows 20?" in text
     assert "y of what was written points to the touched round window" in text
     assert main([*words, "--path-rows", "20", "--round-window", "expected"]) == 0

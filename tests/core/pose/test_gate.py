@@ -13,6 +13,7 @@ from gp_core import PROBE, Atlas, CochleaPose, GpError, PoseGate, estimate_pose
 from gp_core.atlas.sampling import draw_animal
 from gp_core.cli import main
 from gp_core.io.pose_json import read_pose
+from gp_core.pose.gate import reasons_against_writing
 
 SEVEN = (*PROBE, "IN")
 ATLAS = Atlas.published()
@@ -160,3 +161,33 @@ def test_the_shell_says_what_the_regions_allow_for(
     assert "shared error  0.6 mm" in said
     assert radii[1] > 1.5 * radii[0]
     assert main(["estimate", _file(tmp_path, ANIMAL), "--side", "L", "--shared-error", "-1"]) == 2
+
+
+def test_a_file_named_for_the_other_side_is_held_back_until_the_user_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The touches themselves fit the side that is given beyond doubt."""
+    file, tfm = Path(_file(tmp_path, ANIMAL)), tmp_path / "p.tfm"
+    other = file.rename(tmp_path / "GP7_Right.csv")
+    words = ["estimate", str(other), "--side", "L", "--tfm", str(tfm)]
+    assert main(words) == 3
+    assert "by its name GP7_Right.csv is of the right side" in capsys.readouterr().out
+    assert not tfm.exists()
+    assert main([*words, "--accept-warnings"]) == 0
+    assert main(["estimate", str(other.rename(tmp_path / "GP7_Left.csv")), "--side", "L"]) == 0
+
+
+def test_the_papers_method_passes_the_same_gate() -> None:
+    """JRMPC cannot judge side and names: the robust method's readings of the same touches do."""
+    rng = np.random.default_rng(5)
+    herd = [draw_animal(ATLAS, rng=rng, name=f"{i}") for i in range(4)]
+    for touches, side, state in (
+        (ANIMAL, "L", "side clear, names clear"),
+        (ANIMAL, "R", "side wrong, names clear"),
+        (EXCHANGED, "L", "side clear, names wrong"),
+    ):
+        pose = estimate_pose(touches, side, method="jrmpc", specimens=herd)
+        assert pose.state == state
+        assert bool(reasons_against_writing(pose)) == (state != "side clear, names clear")
+    two = estimate_pose(ANIMAL, "L", method="jrmpc", specimens=herd[:2])
+    assert two.state == "side clear, names clear"

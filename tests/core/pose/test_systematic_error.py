@@ -118,3 +118,16 @@ def test_the_next_touch_is_weighed_with_the_same_shared_error() -> None:
     for mm in (0.0, 0.5):
         pose = estimate_pose(touches, "L", ATLAS, shared_error=mm)
         assert gains(touches, ATLAS, shared_error=mm)[0].radius_95_now == pytest.approx(pose.plain_radius_95)
+
+
+def test_a_drift_is_told_where_touches_carry_times() -> None:
+    rng = np.random.default_rng(3)
+    animal = draw_side(ATLAS, rng)
+    codes = tuple(rng.permutation(EXTERNAL))
+    times = {code: 10.0 * i for i, code in enumerate(codes)}
+    wandering = {code: animal[code] + [0, 0, 0.2 * i] for i, code in enumerate(codes)}
+    (told,) = (w for w in estimate_pose(wandering, "L", ATLAS, times=times).warnings if "drift" in w)
+    assert 1.0 < float(told.split("drift by ")[1].split()[0]) < 3.0
+    assert not any("drift" in w for w in estimate_pose(wandering, "L", ATLAS).warnings)
+    still = estimate_pose(animal.as_mapping(codes), "L", ATLAS, times=times)
+    assert not any("drift" in w for w in still.warnings)

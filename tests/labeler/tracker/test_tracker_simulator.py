@@ -12,6 +12,7 @@ from gp_core import Atlas, estimate_pose
 from gp_core.errors import GpError
 from gp_labeler.tracker import Probe, Sample
 from gp_labeler.tracker.simulated_probe import SimulatedProbe
+from gp_labeler.tracker.simulated_tracker import Simulator
 from gp_labeler.tracker.simulator import main
 
 
@@ -85,3 +86,21 @@ class _Silent:
     def __init__(self, *_: object, **__: object) -> None: ...
 
     def close(self) -> None: ...
+
+
+@pytest.mark.parametrize(
+    "command",
+    ["wait -1", "wait nan", "go CL inf", "jump nan", "late -0.5", "stale nan", "cut -1", "lift 1e9"],
+)
+def test_a_time_or_length_that_cannot_be_is_refused(command: str) -> None:
+    said: list[str] = []
+    names = {"probe": "Probe", "button": "Button"}
+    simulator = Simulator(_probe(), port=0, names=names, say=said.append)
+    try:
+        simulator.tell(command)
+        simulator.step()
+        assert simulator.now < 60
+        assert len(said) == 1
+        assert said[0].startswith(f"error {command}: ")
+    finally:
+        simulator.close()

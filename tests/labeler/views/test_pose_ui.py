@@ -78,9 +78,30 @@ def test_a_file_named_for_the_other_side_is_told_and_moved_by_a_click(qtbot, mak
     panel = window.steps["pose"]
     assert panel.take_file(shared_data / "probe" / "SkullD_Right.dat")
     assert "By its name SkullD_Right.dat is of the right side." in told(panel)
+    assert [reason.code for reason in window.workspace.pose.file_doubts] == ["side undecided"]
     qtbot.mouseClick(panel.result.other_side, Qt.MouseButton.LeftButton)
     assert window.workspace.pose.side is Side.RIGHT
     assert not any("By its name" in text for text in told(panel))
+
+
+def test_a_file_named_for_the_other_side_is_believed_once_the_user_says_which_side_it_is(
+    qtbot, make_window, tmp_path
+):
+    window = make_window()
+    window.workspace.atlas.use(ATLAS)
+    window.set_step("pose")
+    panel, file = window.steps["pose"], tmp_path / "GP7_Right.csv"
+    rows = (f"{code},{','.join(map(str, ANIMAL[code]))}" for code in PROBE)
+    file.write_text("\n".join(rows) + "\n")
+    assert panel.take_file(file)
+    assert "By its name GP7_Right.csv is of the right side." in told(panel)
+    assert panel.result.this_side.text() == "They are of the left side"
+    with pytest.raises(GpError, match=r"by its name GP7_Right.csv is of the right side"):
+        window.workspace.pose.export(tmp_path / "pose.tfm")
+    qtbot.mouseClick(panel.result.this_side, Qt.MouseButton.LeftButton)
+    assert not any("By its name" in text for text in told(panel))
+    assert not panel.result.this_side.isVisible()
+    window.workspace.pose.export(tmp_path / "pose.tfm")
 
 
 def test_y_of_the_robot_is_chosen_in_the_menu_and_told_with_the_file(make_window, tmp_path):

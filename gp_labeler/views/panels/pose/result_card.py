@@ -10,8 +10,6 @@ from qtpy.QtWidgets import QGridLayout, QWidget
 
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.quality import pose_quality
-from gp_labeler.document import touching
-from gp_labeler.document.touches import TouchHow
 from gp_labeler.models.estimate import Estimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt
@@ -53,16 +51,18 @@ class ResultCard(Card):
         self.one, self.two = _OnePose(), _TwoPoses()
         self.next = link("", "Make it the next to touch")
         self.swap = link("", "Give each the other's name; undo brings them back")
+        self.this_side = link("", "The names of files tell the other side; say that this one is right")
         self.other_side = link("", "Move all touches to the other side; undo brings them back")
         self.add_to_heading(self.verdict)
         for what in (self.waiting, self.one, self.two, self.notices):
             self.add(what)
         row = FlowLayout(spacing=4)
-        for button in (self.other_side, self.swap, self.next):
+        for button in (self.other_side, self.this_side, self.swap, self.next):
             row.addWidget(button)
         self.add(row)
         self.next.clicked.connect(self._aim)
         self.swap.clicked.connect(lambda: attempt(workspace, workspace.pose.swap_names))
+        self.this_side.clicked.connect(workspace.pose.confirm_side)
         self.other_side.clicked.connect(lambda: attempt(workspace, workspace.pose.change_side))
 
     def refresh(self, *_: object) -> None:
@@ -83,7 +83,7 @@ class ResultCard(Card):
         if pose is not None:
             trust = pose_quality(pose)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
-        wrong = pose is not None and (pose.side_state == "wrong" or bool(_misnamed(self._workspace)))
+        wrong = pose is not None and (pose.side_state == "wrong" or bool(self._workspace.pose.misnamed))
         self._offer_readings(pose, wrong=wrong)
         self.notices.show_notices([] if estimate is None else [*_notices(self._workspace, estimate)])
         self._show_gain(wanted=not wrong and model.swapped is None)
@@ -97,6 +97,8 @@ class ResultCard(Card):
         model = self._workspace.pose
         undecided = pose is not None and pose.side_state == "undecided"
         self.other_side.setVisible(wrong or undecided)
+        self.this_side.setVisible(bool(model.misnamed))
+        self.this_side.setText(f"They are of the {model.side.word} side")
         side = f"the {model.side.other.word} side"
         likely = _likely(pose, model.swapped)
         self.other_side.setText(f"They are of {side}" if wrong else f"Take as {side}  ({likely[0]})")
@@ -210,22 +212,14 @@ def _waiting(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _misnamed(workspace: Workspace) -> list[str]:
-    """Return the files that touches of this side are from, and whose names tell the other one."""
-    side = workspace.pose.side
-    touches = [touch for (of, _), touch in workspace.document.state.touches.items() if of is side]
-    files = {touch.source for touch in touches if touch.how is TouchHow.FILE}
-    return sorted(file for file in files if touching.named_side(file) is side.other)
-
-
 def _notices(workspace: Workspace, estimate: Estimate) -> Iterator[tuple[str, ...]]:
     for method in estimate.settings.methods:
         if method in estimate.problems:
             yield ("error", f"{METHOD_WORDS[method]}: {estimate.problems[method]}")
     if "jrmpc" in workspace.pose.settings.methods and not workspace.pose.joint_ready:
         yield ("info", "JRMPC is being made ready; that takes some seconds once.")
-    for file in _misnamed(workspace):
-        yield ("warning", f"By its name {file} is of the {estimate.side.other.word} side.", "Check the side.")
+    for reason in workspace.pose.file_doubts:
+        yield ("warning", sentence(reason.text), "Nothing is sent to a robot until you say which side it is.")
     said: set[str] = set()
     for pose in estimate.poses.values():
         for warning in pose.warnings:

@@ -78,7 +78,7 @@ class TrackerCard(Card):
             self.dwell.setChecked(tracker.dwell)
         self.record.setText(f"Record {target}" if target else "All touched")
         self.record.setEnabled(target is not None and tracker.pivot is None)
-        words = tracker.frame_words
+        words = tracker.frame_words if tracker.on or tracker.sending else ""
         self.frame_words.setText(words)
         self.frame_words.setVisible(bool(words))
         set_role(self.frame_words, "warning" if tracker.doubtful else "hint")
