@@ -155,14 +155,19 @@ def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
 
 
 def named_for_other_side(file: str, side: Side) -> GateReason:
-    """Return the reason that a file of touches gives which is named for the other side than `side`.
+    """Return the reason against a pose whose file of touches is named for the other side.
 
     Parameters
     ----------
     file : str
         Its name.
     side : Side
-        Side that the touches are said to be of.
+        The given side of the touches.
+
+    Returns
+    -------
+    GateReason
+        The side is ambiguous.
     """
     return GateReason("side undecided", f"by its name {file} is of the {side.other.word} side")
 

@@ -1,10 +1,10 @@
-"""Systematic errors: errors that all touches share, and animals unlike the atlas; how they widen the region.
+"""Systematic errors: errors that all touches share, and animals unlike the atlas; they widen the region.
 
 Independent touch errors average out and show in the residuals; an error that all touches share does neither.
 A tip that was calibrated wrongly, soft tissue under the tip, a reference marker that drifted or was knocked:
 each moves all touches of a session by nearly the same offset. Its size cannot be estimated from the touches;
-the user gives it as the *shared error*, the RMS length of that offset. It moves the whole pose. What of
-such an error differs from touch to touch shows as noise, which the fit estimates.
+the user gives it as the *shared error*, the RMS length of that offset. It moves the whole pose. The part of
+such an error that differs from touch to touch shows as noise, which the fit estimates.
 
 Likewise for an animal of unusual size: an atlas of a few adult animals hardly knows how much the size of
 guinea pigs varies. A scale factor with a wide prior is therefore estimated, and what the touches show of it
@@ -133,10 +133,20 @@ class SystematicError:
         return added + self._nuisances(atlas, fit, of_touches, of_shape)
 
     def drift(self, fit: NamedFit) -> float | None:
-        """Return how far the touches drift from the first to the last, mm; None where that may be chance.
+        """Return the drift of the touches from the first to the last, if it exceeds chance.
 
-        Weighed against independent errors and the shape of the animal, the pose left free; of an ordinary
-        session, 1 of 100 shows so much.
+        It is tested against independent errors and the shape of the animal, with a free pose; 1 of 100
+        ordinary sessions exceeds the limit.
+
+        Parameters
+        ----------
+        fit : NamedFit
+            Of the touches.
+
+        Returns
+        -------
+        float or None
+            Length of the drift, mm; None where it may be chance.
         """
         ramp = self._ramp()
         if ramp is None or len(fit.weights) < _ENOUGH_FOR_DRIFT:
