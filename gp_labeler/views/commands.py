@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from qtpy.QtCore import QObject, Qt, Signal
+from qtpy.QtCore import QObject, Qt, QTimer, Signal
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
@@ -57,6 +57,8 @@ class Commands(QObject):
     def __init__(self, workspace: Workspace, ui: Ui, window: QWidget, views: QWidget) -> None:
         super().__init__(window)
         self._workspace, self._ui = workspace, ui
+        self._soon = QTimer(self, singleShot=True, interval=0)
+        self._soon.timeout.connect(self.refresh)
         self.actions = {row.id: self._made(row, window, views) for row in ACTIONS.values()}
         for signal in (
             workspace.document.reset,
@@ -76,7 +78,7 @@ class Commands(QObject):
             workspace.references.changed,
             workspace.meshes.changed,
         ):
-            follow(self, signal, self.refresh)
+            follow(self, signal, self._refresh_soon)
         self.refresh()
 
     def fill(self, bar: QMenuBar) -> None:
@@ -84,6 +86,7 @@ class Commands(QObject):
         for name in MENUS:
             shown = menu = bar.addMenu(f"&{name}")
             menu.setToolTipsVisible(True)
+            menu.aboutToShow.connect(self.flush)
             group = None
             for row in ACTIONS.values():
                 if row.menu != name:
@@ -98,8 +101,19 @@ class Commands(QObject):
                 if row.id == "file.demo" and self._workspace.recent is not None:
                     self._add_recent(menu)
 
-    def refresh(self, *_: object) -> None:
+    def _refresh_soon(self, *_: object) -> None:
+        """Refresh once for all that is announced in one turn of the event loop."""
+        if not self._soon.isActive():
+            self._soon.start()
+
+    def flush(self) -> None:
+        """Refresh now if anything was announced since: a key or a menu asks what can be done."""
+        if self._soon.isActive():
+            self.refresh()
+
+    def refresh(self) -> None:
         """Bring what can be done, and what is on, up to date."""
+        self._soon.stop()
         for row in ACTIONS.values():
             made = self.actions[row.id]
             made.setEnabled(row.enabled(self._workspace))

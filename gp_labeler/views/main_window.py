@@ -8,7 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
 
-from qtpy.QtCore import QByteArray, QSize
+from qtpy.QtCore import QByteArray, QEvent, QSize
 from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
 from qtpy.QtWidgets import (
     QApplication,
@@ -296,6 +296,11 @@ class MainWindow(QMainWindow):
         self.memory.save()
 
     # Qt's events
+
+    def event(self, event: QEvent) -> bool:  # noqa: D102
+        if event.type() == QEvent.Type.ShortcutOverride:  # comes before a key is looked up
+            self.commands.flush()
+        return super().event(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if not self.ui.settle():

@@ -40,7 +40,7 @@ def test_mesh_writes_the_surface_in_lps(ball_file, tmp_path, capsys) -> None:
     [
         (["nowhere.nrrd"], "nowhere.nrrd: does not exist"),
         (["mesh", "nowhere.nrrd", "-o", "x.ply"], "nowhere.nrrd"),
-        (["mesh", "{ball}", "-o", "x.obj", "--threshold", "1000"], ".ply"),
+        (["mesh", "{ball}", "-o", "x.abc", "--threshold", "1000"], ".ply"),
         (["mesh", "{ball}", "-o", "x.ply", "--threshold", "1e9"], "no surface"),
         (["mesh", "{ball}", "-o", "x.ply", "--spacing", "1", "2"], "one number or three"),
         (["mesh", "{ball}", "-o", "x.ply", "--spacing", "-1"], "spacing must be positive"),

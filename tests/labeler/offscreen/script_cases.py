@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -51,4 +52,4 @@ def untimed(path: Path) -> str:
     marks = found["gpLabeler"]["provenance"]
     for mark in marks.values():
         mark.pop("time")
-    return json.dumps(found, indent=1)
+    return re.sub(r"; time: [^]]*", "", json.dumps(found, indent=1))

@@ -44,6 +44,8 @@ ACTION_STEPS = {
     **dict.fromkeys(("file.save", "file.save_as"), "save"),
     "file.import": "import",
     **dict.fromkeys(("file.show_references", "file.clear_references"), "reference"),
+    "file.add_mesh": "add_mesh",
+    "file.remove_meshes": "remove_mesh",
     "file.export": "export",
     "file.save_mesh": "mesh",
     "file.screenshot": "screenshot",
@@ -157,7 +159,7 @@ class Recording:
 
 
 def untimed(path) -> str:
-    return re.sub(r'"time": "[^"]*"', "", path.read_text())
+    return re.sub(r'"time": "[^"]*"|; time: [^]]*', "", path.read_text())
 
 
 def write_path(folder) -> Path:

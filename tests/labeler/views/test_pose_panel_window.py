@@ -81,19 +81,20 @@ def test_keys_are_commands_and_no_letters_of_the_specimens_name(qtbot, bare):
     assert bare.workspace.document.state.specimen == "GP-9"
 
 
-def test_the_key_that_records_works_from_the_moment_a_tracker_is_connected(bare):
+def test_the_key_that_records_works_from_the_moment_a_tracker_is_connected(qtbot, bare):
     tracker, record = bare.workspace.tracker, bare.commands.actions["pose.record"]
     assert not record.isEnabled()
     tracker.connect(TrackerAddress(port=1))
-    assert record.isEnabled()
+    qtbot.waitUntil(record.isEnabled)
     tracker.disconnect()
-    assert not record.isEnabled()
+    qtbot.waitUntil(lambda: not record.isEnabled())
 
 
 def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_window, tmp_path):
     to_step(qtbot, bare, "pose")
     drop_file(bare, touch_file(tmp_path))
     bare.ui.prompts.files = [tmp_path / "touched"]
+    bare.commands.flush()
     assert bare.commands.actions["file.save"].isEnabled()
     bare.commands.run("file.save")
     saved = tmp_path / "touched.gpspecimen.json"
@@ -214,6 +215,7 @@ def test_keys_and_menu_do_what_the_panel_does(qtbot, window):
     assert not window.commands.actions["pose.accept"].isEnabled()
     for code in PROBE:
         workspace.pose.record(ANIMAL[code] + MIDDLE, TouchHow.SCAN, name=code)
+    window.commands.flush()
     for id in ("pose.accept", "pose.along_axis", "pose.through_window", "pose.clear"):
         assert window.commands.actions[id].isEnabled(), id
     scene = window.grid.scene_view.scene
