@@ -17,9 +17,9 @@ from qtpy.QtWidgets import QApplication
 from gp_core.errors import GpError
 from gp_labeler.document.paths import default_directory
 from gp_labeler.document.recovery import find_recoveries, unreadable_journals
-from gp_labeler.installation import check_display
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.plain_numbers import use_plain_numbers
+from gp_labeler.system.installation import check_display
+from gp_labeler.system.plain_numbers import use_plain_numbers
 from gp_labeler.views.canvas_choice import choose_canvas, share_contexts
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow

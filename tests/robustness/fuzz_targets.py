@@ -23,7 +23,7 @@ from gp_core.io.tracker_recordings import read_marker_poses, read_recording
 from gp_core.pose.insertion_path import read_path
 from gp_core.registration.pivot import calibrate_pivot
 from gp_core.study.checkpoint import Checkpoint
-from gp_labeler.__main__ import main as gp_labeler_main
+from gp_labeler.cli.entry import main as gp_labeler_main
 from gp_labeler.document.animals import read_animals
 from gp_labeler.document.atlas_memory import AtlasMemory
 from gp_labeler.document.journal import read_journal
@@ -35,7 +35,7 @@ from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.touching import load_skull, load_touches
 from gp_labeler.imaging.readers import inspect_volume, read_volume
-from gp_labeler.offscreen.script import read_script
+from gp_labeler.scripting.script import read_script
 from gp_labeler.views.window_state import WindowState
 
 __all__ = ["TARGETS", "Outcome", "Target"]

@@ -18,8 +18,8 @@ from gp_labeler.document.paths import journal_folder
 from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_json import document_of
-from gp_labeler.offscreen.runner import run_script
-from gp_labeler.offscreen.script import read_script
+from gp_labeler.scripting.runner import run_script
+from gp_labeler.scripting.script import read_script
 
 EARLIER = Path(__file__).parent / "earlier"
 EXPECTED = json.loads((EARLIER / "expected.json").read_text())

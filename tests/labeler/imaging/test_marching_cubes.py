@@ -13,10 +13,10 @@ from scipy.spatial.transform import Rotation
 from skimage.measure import marching_cubes
 
 from gp_core.errors import GpError
+from gp_labeler.cli.mesh import run_mesh
 from gp_labeler.imaging.mesh_files import read_mesh
 from gp_labeler.imaging.surface import METHODS, extract_isosurface
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.mesh_command import run_mesh
 
 TOLERANCE_VOXELS = 0.01
 OBLIQUE = Rotation.from_euler("xyz", [20, -35, 50], degrees=True).as_matrix()

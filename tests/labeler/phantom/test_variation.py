@@ -12,7 +12,7 @@ from skimage.measure import marching_cubes
 from gp_core.errors import GpError
 from gp_core.io.markups import read_markups
 from gp_core.landmarks.features import CODES, Side
-from gp_labeler.__main__ import main
+from gp_labeler.cli.entry import main
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.phantom import SWITCHES, USUAL, HeadVariation, make_phantom, save_phantom
 from gp_labeler.phantom.grey import AIR, BONE, LENS, SOFT

@@ -12,8 +12,8 @@ from window_cases import BALL_MM, MIDDLE, settle
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.surface_files import write_mesh
-from gp_labeler.offscreen.step import make_step
-from gp_labeler.offscreen.steps import STEPS
+from gp_labeler.scripting.step import make_step
+from gp_labeler.scripting.steps import STEPS
 from gp_labeler.views.recorder import Recorder
 
 

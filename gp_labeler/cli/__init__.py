@@ -1,0 +1,1 @@
+"""The commands of ``gp-labeler``, one module each, and where both commands begin."""

@@ -1,0 +1,148 @@
+"""The command ``gp-labeler``: the window, and meshing without one."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from gp_core import __version__
+from gp_core.command_line import CommandParser
+from gp_core.errors import GpError
+from gp_core.terminal import leave_output, plain_terminal
+from gp_labeler.cli.export import run_export
+from gp_labeler.cli.mesh import run_mesh
+from gp_labeler.cli.phantom import run_phantom
+from gp_labeler.system.installation import explain_import
+from gp_labeler.system.plain_numbers import use_plain_numbers
+
+__all__ = ["main", "make_parser"]
+
+_EXAMPLE = """examples:
+  gp-labeler                          the window
+  gp-labeler head.nrrd                the window with a scan, or a specimen saved before
+  gp-labeler --demo                   the window with a synthetic head
+  gp-labeler --offscreen demo --output out    the demo without a display
+  gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
+  gp-labeler phantom -o head.nrrd            a synthetic head with its truth; see gp-labeler phantom --help
+  gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
+  gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
+  gp-labeler doctor                   what this machine has, and what it lacks
+"""
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Return the parser of the window's command line."""
+    parser = CommandParser(
+        prog="gp-labeler",
+        description="Label guinea-pig heads in micro-CT.",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
+    parser.add_argument("path", nargs="?", type=Path, metavar="VOLUME|SPECIMEN", help="what to open")
+    parser.add_argument("--demo", action="store_true", help="open a synthetic head")
+    parser.add_argument(
+        "--state",
+        type=Path,
+        metavar="DIR",
+        help="where unsaved edits are kept; by default a folder of the user",
+    )
+    offscreen = parser.add_argument_group("without a display")
+    offscreen.add_argument(
+        "--offscreen", metavar="SCRIPT|demo", help="do what a script says, in the same window, unseen"
+    )
+    offscreen.add_argument("--output", type=Path, metavar="DIR", help="where what it makes goes")
+    offscreen.add_argument(
+        "--specimens", nargs="+", default=(), metavar="S", help="what {specimen} in the script stands for"
+    )
+    return parser
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command.
+
+    Returns
+    -------
+    int
+        0; 2 where the input is wrong or the installation incomplete, said in one line.
+    """
+    use_plain_numbers()
+    with plain_terminal():
+        return _run(arguments)
+
+
+def _run(arguments: Sequence[str] | None) -> int:
+    logging.basicConfig(format="gp-labeler: %(message)s", level=logging.WARNING)
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        if given[:1] == ["mesh"]:
+            return run_mesh(given[1:])
+        if given[:1] == ["phantom"]:
+            return run_phantom(given[1:])
+        if given[:1] == ["export"]:
+            return run_export(given[1:])
+        if given[:1] == ["simulate-tracker"]:
+            from gp_labeler.tracker.simulator import main as simulate  # here: nothing else needs a server
+
+            return simulate(given[1:], prog="gp-labeler simulate-tracker")
+        if given[:1] == ["doctor"]:
+            from gp_labeler.cli.doctor import run_doctor
+
+            return run_doctor(given[1:])
+        return _window(make_parser().parse_args(given))
+    except GpError as error:
+        return _refuse(error)
+    except ImportError as error:
+        return _refuse(explain_import(error))
+    except BrokenPipeError:  # who reads has read enough, such as `head`
+        leave_output()
+        return 141
+    except MemoryError:
+        return _refuse(GpError("there is not enough memory for this", remedy="Close other programs."))
+    except OSError as error:
+        sys.stderr.write(f"gp-labeler: {error.filename or 'file'}: {error.strerror or error}\n")
+        return 2
+    except KeyboardInterrupt:
+        sys.stderr.write("gp-labeler: stopped\n")
+        return 130
+
+
+def _refuse(error: GpError) -> int:
+    sys.stderr.write(f"gp-labeler: {error}\n")
+    return 2
+
+
+def _window(args: argparse.Namespace) -> int:
+    _check_together(args)
+    if args.offscreen is not None:
+        from gp_labeler.scripting.command import run_offscreen
+
+        return run_offscreen(args.offscreen, args.output, args.specimens)
+    if args.path is not None and not args.path.exists():
+        raise GpError(
+            "does not exist", file=args.path, remedy="Give a scan, a folder of slices or a specimen."
+        )
+    from gp_labeler.views.application import run_window  # here: `--help` need not wait for Qt and VTK
+
+    return run_window(args.path, demo=args.demo, directory=args.state)
+
+
+def _check_together(args: argparse.Namespace) -> None:
+    """Refuse words that would be ignored."""
+    if args.offscreen is None:
+        for option, value in (("--output", args.output), ("--specimens", args.specimens)):
+            if value:
+                raise GpError(f"{option} is for a script", remedy="Give --offscreen SCRIPT, or leave it out.")
+        if args.demo and args.path is not None:
+            raise GpError("--demo opens the synthetic head, and a path was given too", remedy="Give one.")
+        return
+    for option, value in (("--demo", args.demo), ("--state", args.state), (f"{args.path}", args.path)):
+        if value:
+            raise GpError(f"{option} is for the window, not for --offscreen", remedy="Leave it out.")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,40 @@
+"""All steps that a script can take, by what they do."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from gp_labeler.scripting.step import Step
+from gp_labeler.scripting.steps.atlas import Check, Fit, UseAtlas
+from gp_labeler.scripting.steps.expecting import Expect
+from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
+from gp_labeler.scripting.steps.looking import Act, Key, Look, Screenshot, Undo
+from gp_labeler.scripting.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
+from gp_labeler.scripting.steps.pose import CarryPath, Estimate, Overlay, Report, Verdict
+from gp_labeler.scripting.steps.scan import Mesh, Open, Spacing, Threshold
+from gp_labeler.scripting.steps.touching import Register, Skull, Touches
+
+__all__ = ["STEPS"]
+
+_ALL: tuple[type[Step], ...] = (
+    *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, Key, Act, Undo),
+    *(
+        Details,
+        Import,
+        Reference,
+        AddMesh,
+        RemoveMesh,
+        Export,
+        Fit,
+        UseAtlas,
+        Touches,
+        Skull,
+        Register,
+        Estimate,
+        Overlay,
+    ),
+    *(Verdict, Report, CarryPath, Check, Screenshot, Save, Expect),
+)
+
+STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

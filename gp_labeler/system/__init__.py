@@ -1,0 +1,1 @@
+"""What the machine brings: Python packages, the Qt binding, system libraries, number formats."""
