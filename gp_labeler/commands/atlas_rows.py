@@ -23,7 +23,7 @@ def _is_own(workspace: Workspace) -> bool:
 
 
 def _can_try(workspace: Workspace) -> bool:
-    return workspace.atlas.can_try
+    return workspace.atlas.can_try and not workspace.atlas.is_trying
 
 
 # fmt: off

@@ -40,6 +40,8 @@ __all__ = ["AtlasModel", "is_atlas_file"]
 
 _HEAD = 4096
 
+_TRIAL = "atlas trial"
+
 
 class AtlasModel:
     """Keeps the atlas in use; a specimen that is one of its animals is compared with the others alone.
@@ -129,6 +131,11 @@ class AtlasModel:
     def can_try(self) -> bool:
         """Whether there are animals enough for leave-one-out."""
         return len(self._specimens) >= FEWEST_ANIMALS
+
+    @property
+    def is_trying(self) -> bool:
+        """Whether leave-one-out is at work."""
+        return any(task.key == _TRIAL for task in self._jobs.running)
 
     @property
     def is_held_out(self) -> bool:
@@ -225,7 +232,7 @@ class AtlasModel:
                 f"leave-one-out needs at least {FEWEST_ANIMALS} animals, got {len(self._specimens)}",
                 remedy="Fit an atlas from labelled animals first.",
             )
-        self._jobs.submit(TryAtlas(self._specimens), self._take_trial, key="atlas trial")
+        self._jobs.submit(TryAtlas(self._specimens), self._take_trial, key=_TRIAL)
 
     def use(self, atlas: Atlas, specimens: Iterable[Specimen] = (), *, file: Path | None = None) -> None:
         """Take another atlas for ghosts, doubts and poses.
@@ -245,7 +252,7 @@ class AtlasModel:
     # Inside
 
     def _take(self, atlas: Atlas, animals: Animals, source: AtlasSource | None) -> None:
-        self._cancel("atlas trial")
+        self._cancel(_TRIAL)
         self._atlas, self._specimens = atlas, animals.specimens
         self.animals = animals if animals.specimens else None
         self.source, self.trial = source, None

@@ -77,6 +77,10 @@ class Commands(QObject):
             workspace.tracker.changed,
             workspace.references.changed,
             workspace.meshes.changed,
+            workspace.jobs.started,
+            workspace.jobs.done,
+            workspace.jobs.failed,
+            workspace.jobs.cancelled,
         ):
             follow(self, signal, self._refresh_soon)
         self.refresh()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import fields
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
@@ -104,8 +103,8 @@ class MainWindow(QMainWindow):
         self.tracker_display.audible = self.memory.get("audible", bool, False)
         self.commands = Commands(workspace, self.ui, self, self.grid)
         self.commands.fill(self.menuBar())
-        self.rail, self.panels = Rail(workspace), PanelStack()
-        self.pages, self.welcome = QStackedWidget(), Welcome(workspace)
+        self.rail, self.panels = Rail(workspace, self.commands.actions), PanelStack()
+        self.pages, self.welcome = QStackedWidget(), Welcome(workspace, self.commands.actions)
         self.status = StatusLine(workspace)
         self._dock()
         self._listen()
@@ -154,12 +153,10 @@ class MainWindow(QMainWindow):
         return self._pose.verdict.judge(verdict)
 
     def _dock(self) -> None:
-        self._scan, self._label = ScanPanel(self.workspace), LabelPanel(self.workspace)
-        self._atlas = AtlasPanel(self.workspace)
-        self._pose = PosePanel(self.workspace, self.commands.actions)
-        probe = TrackerCard(self.workspace)
-        probe.settings_asked.connect(self.ui.show_tracker)
-        self._pose.add_card(probe)
+        workspace, actions = self.workspace, self.commands.actions
+        self._scan, self._label = ScanPanel(workspace, actions), LabelPanel(workspace, actions)
+        self._atlas, self._pose = AtlasPanel(workspace, actions), PosePanel(workspace, actions)
+        self._pose.add_card(TrackerCard(workspace, actions))
         self.steps: dict[str, QWidget] = {
             "scan": self._scan,
             "label": self._label,
@@ -189,33 +186,10 @@ class MainWindow(QMainWindow):
         workspace = self.workspace
         self.grid.hovered.connect(self.status.show_position)
         self.rail.step_chosen.connect(self.set_step)
-        self.rail.keys_asked.connect(self.ui.show_shortcuts)
-        self.welcome.open_scan_asked.connect(self.ui.ask_open_file)
-        self.welcome.open_specimen_asked.connect(self.ui.ask_open_file)
-        self.welcome.demo_asked.connect(self.ui.open_demo)
         self.welcome.path_chosen.connect(self._on_path_chosen)
         for id in ("point.accept_ghost", "point.confirm"):
             self._label.addAction(self.commands.actions[id])  # Enter means it there too
-        card = self._label.card
-        card.open_asked.connect(self.ui.ask_open_file)
-        card.find_asked.connect(self.ui.ask_find_scan)
-        card.export_asked.connect(partial(self.commands.run, "file.export"))
-        card.confirm_asked.connect(partial(self.commands.run, "point.confirm"))
-        self._scan.mesh.save_asked.connect(partial(self.commands.run, "file.save_mesh"))
-        self._scan.mesh.action_asked.connect(self.commands.run)
-        self._atlas.asked.connect(self.commands.run)
         self._atlas.animal_asked.connect(self.ui.show_finding)
-        self._pose.touch_file_asked.connect(partial(self.commands.run, "pose.open_touches"))
-        self._pose.skull_file_asked.connect(partial(self.commands.run, "pose.open_skull"))
-        for asked, action in (
-            (self._pose.tracker_asked, "pose.tracker"),
-            (self._pose.guide_asked, "pose.guide"),
-            (self._pose.export_asked, "pose.export"),
-            (self._pose.report_asked, "pose.report"),
-        ):
-            asked.connect(partial(self.commands.run, action))
-        self._pose.new_asked.connect(partial(self.commands.run, "file.new"))
-        self._pose.atlas_asked.connect(partial(self.rail.buttons["atlas"].click))
         follow(self, workspace.scan.opened, self._show_page)
         follow(self, workspace.document.reset, self._show_page)
         follow(self, workspace.scan.import_asked, self._on_import_asked)

@@ -14,6 +14,7 @@ from gp_labeler.views.bind import follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
 from gp_labeler.views.icons import draw_icon
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["STEPS", "Rail", "Step"]
@@ -51,17 +52,16 @@ class Rail(QWidget):
     ----------
     workspace : Workspace
         Whose progress it shows.
-    actions : object, optional
-        Not needed here; all panels are made alike.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
     step_chosen = Signal(str)
-    keys_asked = Signal()
 
     def __init__(
         self,
         workspace: Workspace,
-        actions: object = None,
+        actions: Actions,
         parent: QWidget | None = None,
     ) -> None:
         super().__init__(parent)
@@ -72,7 +72,7 @@ class Rail(QWidget):
         self.buttons = {step.id: self._button(n, step) for n, step in enumerate(STEPS, 1)}
         self.keys_button = _RailButton("keys", "Keys", "?", "info", self)
         self.keys_button.setToolTip("All keyboard shortcuts (?)")
-        self.keys_button.clicked.connect(self.keys_asked)
+        do_action(self.keys_button, actions["help.shortcuts"])
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 8, 0, 8)
         layout.setSpacing(4)

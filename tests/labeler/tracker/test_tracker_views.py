@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from panel_cases import actions_of
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtWidgets import QWidget
 from tracker_cases import POINTS, TIP, SimulatorProcess
@@ -161,7 +162,7 @@ def test_the_pose_is_sent_and_stopped_from_the_dialog(qtbot, workspace, top):
 
 
 def test_the_card_shows_only_a_tracker_that_is_asked_for(qtbot, workspace, top, simulator):
-    card = TrackerCard(workspace, top)
+    card = TrackerCard(workspace, actions_of(workspace, qtbot), top)
     top.show()
     assert not card.isVisible()
     connected(qtbot, workspace, simulator)

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from animal_cases import drawn_animals, write_animals, write_side
-from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
+from panel_cases import RecordingUi, actions_of, cut_words, deliver, desk_with_scan, in_scan, place
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from qtpy.QtGui import QDropEvent, QFontMetrics
 from qtpy.QtWidgets import QApplication, QPushButton
@@ -39,8 +39,13 @@ def workspace() -> Iterator[Workspace]:
 
 
 @pytest.fixture
-def panel(workspace, qtbot) -> AtlasPanel:
-    panel = AtlasPanel(workspace)
+def ui() -> RecordingUi:
+    return RecordingUi()
+
+
+@pytest.fixture
+def panel(workspace, qtbot, ui) -> AtlasPanel:
+    panel = AtlasPanel(workspace, actions_of(workspace, qtbot, ui))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(panel.width(), 900)
@@ -106,12 +111,10 @@ def test_points_that_are_doubted_for_another_reason_are_named_beside_the_table(w
     assert panel.labels.verdict.text() == "All 6 labels that can be checked fit the atlas."
 
 
-def test_an_atlas_is_fitted_and_tried_out(workspace, panel, folder, qtbot) -> None:
-    asked = []
-    panel.asked.connect(asked.append)
+def test_an_atlas_is_fitted_and_tried_out(workspace, panel, ui, folder, qtbot) -> None:
     for button in (panel.own.files, panel.own.folder, panel.which.open, panel.which.save):
         qtbot.mouseClick(button, CLICK)
-    assert asked == ["atlas.fit_files", "atlas.fit_folder", "atlas.open", "atlas.save"]
+    assert ui.calls == ["ask_fit_atlas", "ask_fit_atlas", "ask_open_atlas", "ask_save_atlas"]
     animal = drawn_animals(1)[0]
     write_side(folder, "torn", animal.side(L))
     (folder / "torn_L.mrk.json").write_text("{")

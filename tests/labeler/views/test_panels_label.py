@@ -6,7 +6,16 @@ from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan, in_scan, place
+from panel_cases import (
+    PANEL_WIDTH,
+    RecordingUi,
+    actions_of,
+    cut_words,
+    deliver,
+    desk_with_scan,
+    in_scan,
+    place,
+)
 from qtpy.compat import isalive
 from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
 from qtpy.QtGui import QFontMetrics, QGuiApplication
@@ -41,8 +50,13 @@ def workspace() -> Iterator[Workspace]:
 
 
 @pytest.fixture
-def panel(workspace: Workspace, qtbot) -> LabelPanel:
-    panel = LabelPanel(workspace)
+def ui() -> RecordingUi:
+    return RecordingUi()
+
+
+@pytest.fixture
+def panel(workspace: Workspace, qtbot, ui) -> LabelPanel:
+    panel = LabelPanel(workspace, actions_of(workspace, qtbot, ui))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(LOWEST_PANEL)
@@ -261,23 +275,24 @@ def test_an_error_is_told_and_nothing_else_happens(workspace, panel, qtbot):
     assert "CA" in workspace.document.landmarks(LEFT)
 
 
-def test_everything_done_offers_the_export(workspace, panel, qtbot):
+def test_everything_done_offers_the_export(workspace, panel, ui, qtbot):
     for side in Side:
         for row in FEATURES:
             if not row.computed:
                 workspace.labels.mark_unseen(side=side, code=row.code)
     assert panel.card.content.name == "Everything is labelled"
-    with qtbot.waitSignal(panel.card.export_asked):
-        qtbot.mouseClick(panel.card.primary, CLICK)
+    qtbot.mouseClick(panel.card.primary, CLICK)
+    assert ui.calls == ["ask_export"]
 
 
 def test_without_a_scan_the_card_offers_to_open_one(qtbot):
     workspace = Workspace(None)
-    card = FeatureCard(workspace)
+    ui = RecordingUi()
+    card = FeatureCard(workspace, actions_of(workspace, qtbot, ui))
     qtbot.addWidget(card)
     card.show()
-    with qtbot.waitSignal(card.open_asked):
-        qtbot.mouseClick(card.primary, CLICK)
+    qtbot.mouseClick(card.primary, CLICK)
+    assert ui.calls == ["ask_open_file"]
     workspace.close(discard=True)
 
 
@@ -314,7 +329,7 @@ def test_all_of_the_card_can_be_reached_by_keyboard(workspace, panel, qtbot):
 
 
 def test_the_rail_tells_of_steps_that_are_built_and_only_those(workspace, qtbot):
-    rail = Rail(workspace)
+    rail = Rail(workspace, actions_of(workspace, qtbot))
     qtbot.addWidget(rail)
     rail.show()
     told = []
@@ -333,7 +348,7 @@ def test_the_rail_tells_of_steps_that_are_built_and_only_those(workspace, qtbot)
 
 
 def test_a_panel_that_is_gone_hears_nothing_more(workspace, qtbot):
-    panel = LabelPanel(workspace)
+    panel = LabelPanel(workspace, actions_of(workspace, qtbot))
     panel.show()
     panel.close()
     panel.deleteLater()

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from panel_cases import ATLAS, PANEL_WIDTH, deliver, desk_with_scan, in_scan, place
+from panel_cases import ATLAS, PANEL_WIDTH, actions_of, deliver, desk_with_scan, in_scan, place
 from qtpy.QtCore import QEvent, QModelIndex, QObject, QSize
 from qtpy.QtGui import QColor, QImage, QPixmap, QRegion
 from qtpy.QtWidgets import QApplication, QDialog, QWidget
@@ -42,7 +42,7 @@ def workspace() -> Iterator[Workspace]:
 
 @pytest.fixture
 def panel(workspace: Workspace, qtbot) -> LabelPanel:
-    panel = LabelPanel(workspace)
+    panel = LabelPanel(workspace, actions_of(workspace, qtbot))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(PANEL_WIDTH, 698)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import cut_words, deliver, desk_with_scan, grey_volume, place
+from panel_cases import RecordingUi, actions_of, cut_words, deliver, desk_with_scan, grey_volume, place
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from qtpy.QtGui import QDropEvent
 from qtpy.QtWidgets import QApplication, QPushButton
@@ -37,8 +37,13 @@ def workspace() -> Iterator[Workspace]:
 
 
 @pytest.fixture
-def panel(workspace: Workspace, qtbot) -> ScanPanel:
-    panel = ScanPanel(workspace)
+def ui() -> RecordingUi:
+    return RecordingUi()
+
+
+@pytest.fixture
+def panel(workspace: Workspace, qtbot, ui) -> ScanPanel:
+    panel = ScanPanel(workspace, actions_of(workspace, qtbot, ui))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(panel.width(), 760)
@@ -139,10 +144,10 @@ def test_opacity_and_what_is_shown(workspace, panel, qtbot):
     assert panel.mesh.opacity.value() == 40
 
 
-def test_the_mesh_card_counts_triangles_and_offers_to_save(workspace, panel, qtbot):
+def test_the_mesh_card_counts_triangles_and_offers_to_save(workspace, panel, ui, qtbot):
     assert "triangles" in panel.mesh.state.text()
-    with qtbot.waitSignal(panel.mesh.save_asked):
-        qtbot.mouseClick(panel.mesh.save, CLICK)
+    qtbot.mouseClick(panel.mesh.save, CLICK)
+    assert ui.calls == ["ask_save_mesh"]
 
 
 # Facts and notes
@@ -161,7 +166,7 @@ def test_facts_tell_size_type_and_axes():
 
 def test_an_empty_panel_says_what_to_do(qtbot):
     workspace = Workspace(None)
-    panel = ScanPanel(workspace)
+    panel = ScanPanel(workspace, actions_of(workspace, qtbot))
     qtbot.addWidget(panel)
     panel.show()
     assert panel.bone.slider.value is None
@@ -211,18 +216,15 @@ def test_the_first_page_offers_scan_specimen_demo_and_recent_files(tmp_path, qtb
     (tmp_path / "GP-014.nrrd").write_text("")
     workspace.recent.add(tmp_path / "GP-014.nrrd")
     workspace.recent.add(tmp_path / "gone.nrrd")
-    page = Welcome(workspace)
+    ui = RecordingUi()
+    page = Welcome(workspace, actions_of(workspace, qtbot, ui))
     apply_theme(page, DARK)
     qtbot.addWidget(page)
     page.resize(900, 640)
     page.show()
-    for button, signal in (
-        (page.open_scan, page.open_scan_asked),
-        (page.open_specimen, page.open_specimen_asked),
-        (page.demo, page.demo_asked),
-    ):
-        with qtbot.waitSignal(signal):
-            qtbot.mouseClick(button, CLICK)
+    for button in (page.open_scan, page.open_specimen, page.demo):
+        qtbot.mouseClick(button, CLICK)
+    assert ui.calls == ["ask_open_file", "ask_open_file", "open_demo"]
     QApplication.processEvents()
     recent = [b for b in page.findChildren(QPushButton, "recent") if b.isVisible()]
     assert [b.accessibleName() for b in recent] == ["Open GP-014.nrrd"]
@@ -262,7 +264,7 @@ def test_a_number_field_steps_and_tells_once(qtbot):
 
 
 def test_the_rail_marks_what_is_done(workspace, qtbot):
-    rail = Rail(workspace)
+    rail = Rail(workspace, actions_of(workspace, qtbot))
     qtbot.addWidget(rail)
     assert rail.buttons["scan"].accessibleDescription().endswith("done")
     place(workspace, "CA", side=Side.RIGHT)

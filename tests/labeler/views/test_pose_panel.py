@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import PANEL_WIDTH, cut_words, deliver, desk_with_scan
+from panel_cases import PANEL_WIDTH, RecordingUi, actions_of, cut_words, deliver, desk_with_scan
 from qtpy.QtCore import QEvent, QPoint, QSize, Qt
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QApplication, QLabel, QLineEdit
@@ -63,8 +63,8 @@ def panel(workspace: Workspace, qtbot) -> PosePanel:
     return shown(workspace, qtbot)
 
 
-def shown(workspace: Workspace, qtbot, size: QSize = NARROW, theme=DARK) -> PosePanel:
-    panel = PosePanel(workspace)
+def shown(workspace: Workspace, qtbot, size: QSize = NARROW, theme=DARK, ui=None) -> PosePanel:
+    panel = PosePanel(workspace, actions_of(workspace, qtbot, ui))
     apply_theme(panel, theme)
     qtbot.addWidget(panel)
     panel.set_wide(size.width() > PANEL_WIDTH)
@@ -584,16 +584,23 @@ def test_what_is_drawn_is_chosen(workspace, panel, qtbot):
     assert not panel.overlay.parts["region"].isEnabled()
 
 
-def test_other_parts_of_the_program_are_asked_for(workspace, panel, qtbot):
-    asked = []
-    for name in ("tracker", "guide", "atlas", "report", "export", "touch_file", "skull_file"):
-        getattr(panel, f"{name}_asked").connect(lambda *_, name=name: asked.append(name))
+def test_other_parts_of_the_program_are_asked_for(workspace, qtbot):
+    ui = RecordingUi()
+    panel = shown(workspace, qtbot, ui=ui)
     touch(workspace, *PROBE)
     for button in (panel.touches.ways["file"], panel.touches.ways["tracker"], panel.touches.guide):
         qtbot.mouseClick(button, CLICK)
     for button in (panel.head.to_atlas, panel.report, panel.export, panel.in_scan.file):
         button.click()
-    assert asked == ["touch_file", "tracker", "guide", "atlas", "report", "export", "skull_file"]
+    assert ui.calls == [
+        "ask_open_touches",
+        "show_tracker",
+        "show_guide",
+        "show_step",
+        "ask_report",
+        "ask_export_pose",
+        "ask_open_skull",
+    ]
 
 
 # Looks, and speed

@@ -23,6 +23,7 @@ from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.atlas.feature_table import FeatureTable
 from gp_labeler.views.panels.card_parts import Notices
 from gp_labeler.views.panels.finding_list import FindingList, FindingRow
@@ -42,23 +43,19 @@ class AtlasPanel(QWidget):
     ----------
     workspace : Workspace
         Whose atlas it shows and changes.
-    actions : object, optional
-        Not needed here; all panels are made alike.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    asked = Signal(str)
-    """Id of an action of the menu Atlas."""
     animal_asked = Signal(object)
     """A `Finding` whose animal the user wants to see."""
 
-    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
-        self.which, self.own = AtlasCard(workspace), AtlasFittingCard(workspace)
-        self.trial, self.labels = LeaveOneOutCard(workspace), LabelsCard(workspace)
-        for asking in (self.which, self.own, self.trial):
-            asking.asked.connect(self.asked)
+        self.which, self.own = AtlasCard(workspace, actions), AtlasFittingCard(workspace, actions)
+        self.trial, self.labels = LeaveOneOutCard(workspace, actions), LabelsCard(workspace)
         self.own.animal_asked.connect(self.animal_asked)
         content = QWidget()
         content.setProperty("role", "panel")
@@ -102,23 +99,10 @@ def _column(*cards: QWidget) -> QVBoxLayout:
     return column
 
 
-class _AskingCard(Card):
-    """A card whose buttons are actions of the menu Atlas."""
-
-    asked = Signal(str)
-
-    def _button(self, row: QHBoxLayout, id: str, words: str, hint: str) -> QPushButton:
-        button = QPushButton(words)
-        button.setToolTip(hint)
-        button.clicked.connect(lambda: self.asked.emit(id))
-        row.addWidget(button, 1)
-        return button
-
-
-class AtlasCard(_AskingCard):
+class AtlasCard(Card):
     """Which atlas is in use."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions) -> None:
         super().__init__("Atlas in use")
         self._workspace = workspace
         self.name, self.facts = ElidedLabel("", "title"), Facts()
@@ -127,8 +111,10 @@ class AtlasCard(_AskingCard):
         row = QHBoxLayout()
         row.setSpacing(6)
         self.published, self.open, self.save = (
-            self._button(row, f"atlas.{name}", *texts) for name, texts in _BUTTONS.items()
+            action_button(actions[f"atlas.{name}"], *texts) for name, texts in _BUTTONS.items()
         )
+        for button in (self.published, self.open, self.save):
+            row.addWidget(button, 1)
         self.notices = Notices()
         self.add(self.notices)
         self.add(row)
@@ -140,12 +126,10 @@ class AtlasCard(_AskingCard):
         """Show which it is."""
         workspace, atlas = self._workspace, self._workspace.atlas.current
         self.name.set_words(_title(workspace))
-        self.published.setEnabled(not workspace.atlas.is_published or bool(workspace.atlas.problem))
         remedy = "Choose another, or press Published and it is forgotten."
         self.notices.show_notices(
             [("warning", workspace.atlas.problem, remedy)] if workspace.atlas.problem else []
         )
-        self.save.setEnabled(atlas is not None)
         if atlas is None:
             self.facts.show_facts({})
             return
@@ -192,23 +176,25 @@ def _made_from(workspace: Workspace) -> str:
     return f"{n} animal{'' if n == 1 else 's'}, {sides}" if n else sides
 
 
-class AtlasFittingCard(_AskingCard):
+class AtlasFittingCard(Card):
     """Fitting an atlas to labelled animals, and what was read for it."""
 
     animal_asked = Signal(object)
     """A `Finding` whose animal the user wants to see."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions) -> None:
         super().__init__("Fit to labelled animals")
         self._workspace = workspace
         hint = "Specimens saved here, or landmarks exported from here or from 3D Slicer."
         self.add(text_label(hint, "hint", wrap=True))
         row = QHBoxLayout()
         row.setSpacing(6)
-        self.files = self._button(row, "atlas.fit_files", "From files…", "Choose all of them at once")
-        self.folder = self._button(
-            row, "atlas.fit_folder", "From a folder…", "It is searched, and the folders in it"
+        self.files = action_button(actions["atlas.fit_files"], "From files…", "Choose all of them at once")
+        self.folder = action_button(
+            actions["atlas.fit_folder"], "From a folder…", "It is searched, and the folders in it"
         )
+        for button in (self.files, self.folder):
+            row.addWidget(button, 1)
         self.add(row)
         self.keep_doubtful = QCheckBox("Believe doubtful labels too")
         self.keep_doubtful.setToolTip(
@@ -329,10 +315,10 @@ class LabelsCard(Card):
         self.verdict.setText(words)
 
 
-class LeaveOneOutCard(_AskingCard):
+class LeaveOneOutCard(Card):
     """Leave-one-out: how well each animal's cochlea is found from the others."""
 
-    def __init__(self, workspace: Workspace) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions) -> None:
         super().__init__("Leave-one-out")
         self._workspace = workspace
         self.words = text_label("", "hint", wrap=True)
@@ -346,9 +332,10 @@ class LeaveOneOutCard(_AskingCard):
         self.findings = FindingList()
         self.add(self.findings)
         row = QHBoxLayout()
-        self.run = self._button(
-            row, "atlas.try", "Run leave-one-out", "On the animals the atlas is fitted to"
+        self.run = action_button(
+            actions["atlas.try"], "Run leave-one-out", "On the animals the atlas is fitted to"
         )
+        row.addWidget(self.run, 1)
         self.add(row)
         for signal in (workspace.atlas.changed, workspace.atlas.details_changed):
             follow(self, signal, self.refresh)
@@ -405,9 +392,7 @@ class LeaveOneOutCard(_AskingCard):
         )
 
     def _on_jobs(self, *_: object) -> None:
-        running = any(task.key == "atlas trial" for task in self._workspace.jobs.running)
-        self.run.setEnabled(self._workspace.atlas.can_try and not running)
-        self.run.setText("Running…" if running else "Run leave-one-out")
+        self.run.setText("Running…" if self._workspace.atlas.is_trying else "Run leave-one-out")
 
 
 def _figure(words: str, role: str) -> QWidget:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from qtpy.QtCore import QEvent, Qt, Signal
+from qtpy.QtCore import QEvent, Qt
 from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import (
     QBoxLayout,
@@ -26,6 +26,7 @@ from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.label.card_content import CardContent, content_of
 from gp_labeler.views.shortcuts_sheet import keys_text
@@ -37,6 +38,14 @@ _CHIP = 14
 _TALL = 350
 """From this height on the picture stands above the words, not beside; at the normal text size."""
 
+_IN_MENUS = {
+    "open": "file.open",
+    "find": "file.find_scan",
+    "export": "file.export",
+    "confirm": "point.confirm",
+}
+"""Next actions that the menus have too."""
+
 
 class FeatureCard(QWidget):
     """Shows the active feature.
@@ -45,18 +54,13 @@ class FeatureCard(QWidget):
     ----------
     workspace : Workspace
         Whose session it shows and edits.
-    actions : object, optional
-        Not needed here; all panels are made alike.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    open_asked = Signal()
-    find_asked = Signal()
-    export_asked = Signal()
-    confirm_asked = Signal()
-
-    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workspace = workspace
+        self._workspace, self._actions = workspace, actions
         self._content = CardContent("")
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "card")
@@ -200,14 +204,8 @@ class FeatureCard(QWidget):
     def _on_primary(self) -> None:
         """Do the one next thing."""
         action = self._content.action
-        if action == "open":
-            self.open_asked.emit()
-        elif action == "find":
-            self.find_asked.emit()
-        elif action == "export":
-            self.export_asked.emit()
-        elif action == "confirm":
-            self.confirm_asked.emit()
+        if action in _IN_MENUS:
+            self._actions[_IN_MENUS[action]].trigger()
         else:
             self._do(lambda: _EDITS[action](self._workspace))
 

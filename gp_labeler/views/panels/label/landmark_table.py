@@ -52,11 +52,9 @@ class LandmarkTable(QWidget):
     ----------
     workspace : Workspace
         Whose session it shows and edits.
-    actions : object, optional
-        Not needed here; all panels are made alike.
     """
 
-    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
         self.model = LandmarkTableModel(workspace, self)

@@ -7,6 +7,7 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.label.feature_card import FeatureCard
 from gp_labeler.views.panels.label.landmark_table import LandmarkTable
 from gp_labeler.views.panels.parts import Scrolled
@@ -24,16 +25,16 @@ class LabelPanel(QWidget):
     ----------
     workspace : Workspace
         Whose session they show and edit.
-    actions : object, optional
-        Handed on.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.card = FeatureCard(workspace, actions)
-        self.table = LandmarkTable(workspace, actions)
+        self.table = LandmarkTable(workspace)
         content = QWidget()
         content.setProperty("role", "panel")
         column = QVBoxLayout(content)

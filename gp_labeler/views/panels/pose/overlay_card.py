@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 from qtpy.QtCore import Qt
-from qtpy.QtGui import QAction
 from qtpy.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import link
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
@@ -42,9 +40,7 @@ class OverlayCard(Card):
         Of the cameras: ``pose.along_axis`` and ``pose.through_window``, where they are.
     """
 
-    def __init__(
-        self, workspace: Workspace, actions: Mapping[str, QAction], parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Overlay", parent)
         self._workspace = workspace
         self.visible = self._box("visible", "Show", "Draw the estimate over bone and slices")
@@ -76,7 +72,7 @@ class OverlayCard(Card):
         box.toggled.connect(lambda on: self._workspace.pose.draw(**{name: on}))
         return box
 
-    def _lay_out(self, actions: Mapping[str, QAction]) -> None:
+    def _lay_out(self, actions: Actions) -> None:
         self.add_to_heading(self.visible)
         grid = QGridLayout()
         grid.setHorizontalSpacing(8)
@@ -93,11 +89,7 @@ class OverlayCard(Card):
         self.add(row)
         looks = FlowLayout(spacing=2)
         for name, button in self.cameras.items():
-            action = actions.get(name)
-            button.setVisible(action is not None)
-            if action is not None:
-                button.clicked.connect(action.trigger)
-                button.setToolTip(action.toolTip())
+            do_action(button, actions[name])
             looks.addWidget(button)
         self.add(looks)
 

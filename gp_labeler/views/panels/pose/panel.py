@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 
-from qtpy.QtCore import QEvent, QObject, Qt, QTimer, Signal
+from qtpy.QtCore import QEvent, QObject, Qt, QTimer
 from qtpy.QtGui import (
-    QAction,
     QDragEnterEvent,
     QDragLeaveEvent,
     QDropEvent,
@@ -15,11 +13,12 @@ from qtpy.QtGui import (
     QResizeEvent,
     QShowEvent,
 )
-from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QPushButton, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, pixels
+from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.parts import Card, scrolled
 from gp_labeler.views.panels.pose.overlay_card import OverlayCard
 from gp_labeler.views.panels.pose.registration_card import RegistrationCard
@@ -48,37 +47,26 @@ class PosePanel(QWidget):
     ----------
     workspace : Workspace
         Whose touches and estimate it shows and edits.
-    actions : mapping of str to QAction, optional
-        What some of its buttons do.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    touch_file_asked = Signal()
-    skull_file_asked = Signal()
-    tracker_asked = Signal()
-    guide_asked = Signal()
-    atlas_asked = Signal()
-    new_asked = Signal()
-    report_asked = Signal()
-    export_asked = Signal()
-
-    def __init__(
-        self,
-        workspace: Workspace,
-        actions: Mapping[str, QAction] | None = None,
-        parent: QWidget | None = None,
-    ) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
         self._stale, self._is_alone = True, False
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.setAcceptDrops(True)
-        self.head, self.touches = EstimateSettingsCard(workspace), TouchesCard(workspace)
-        self.result, self.in_scan = ResultCard(workspace), RegistrationCard(workspace)
-        self.overlay, self.verdict = OverlayCard(workspace, actions or {}), VerdictCard(workspace)
-        self.report, self.export = QPushButton("Report…"), QPushButton("Export…")
-        self.report.setToolTip("One page with touches, estimate, errors and pictures")
-        self.export.setToolTip("The pose as JSON, Slicer transform, 4x4 table or markups")
+        self.head, self.touches = EstimateSettingsCard(workspace, actions), TouchesCard(workspace, actions)
+        self.result, self.in_scan = ResultCard(workspace), RegistrationCard(workspace, actions)
+        self.overlay, self.verdict = OverlayCard(workspace, actions), VerdictCard(workspace)
+        self.report = action_button(
+            actions["pose.report"], "Report…", "One page with touches, estimate, errors and pictures"
+        )
+        self.export = action_button(
+            actions["pose.export"], "Export…", "The pose as JSON, Slicer transform, 4x4 table or markups"
+        )
         self._lay_out()
         self._connect()
         self.set_wide(False)
@@ -90,11 +78,6 @@ class PosePanel(QWidget):
             return
         for card in (self.head, self.touches, self.result, self.in_scan, self.verdict):
             card.refresh()
-        is_there = (
-            self._workspace.pose.estimate is not None and self._workspace.pose.estimate.pose is not None
-        )
-        for button in (self.report, self.export):
-            button.setEnabled(is_there)
 
     def set_wide(self, wide: bool) -> None:
         """Take all the width there is, where there is no scan beside; else that of the other panels."""
@@ -149,15 +132,7 @@ class PosePanel(QWidget):
         layout.addWidget(self._area)
 
     def _connect(self) -> None:
-        self.head.atlas_asked.connect(self.atlas_asked)
-        self.head.new_asked.connect(self.new_asked)
         self.head.specimen.returnPressed.connect(self._leave_name)
-        self.touches.file_asked.connect(self.touch_file_asked)
-        self.touches.tracker_asked.connect(self.tracker_asked)
-        self.touches.guide_asked.connect(self.guide_asked)
-        self.in_scan.skull_file_asked.connect(self.skull_file_asked)
-        self.report.clicked.connect(self.report_asked)
-        self.export.clicked.connect(self.export_asked)
         pose = self._workspace.pose
         for signal in (pose.changed, pose.target_changed):
             follow(self, signal, self.refresh)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from qtpy.QtCore import Qt, Signal
+from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gp_labeler.document import touching
@@ -13,6 +13,7 @@ from gp_labeler.models.estimate import Estimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import NONE, attempt, follow, position_text
 from gp_labeler.views.fonts import HEADING, styled
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose.wording import METHOD_WORDS, fine_mm, sentence
@@ -42,11 +43,11 @@ class RegistrationCard(Card):
     ----------
     workspace : Workspace
         Whose estimate it shows.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    skull_file_asked = Signal()
-
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("In the scan", parent)
         self._workspace = workspace
         self.way = Segments(_WAYS, _HINTS)
@@ -58,7 +59,7 @@ class RegistrationCard(Card):
         self.mark = link("Mark skull point S1 at the crosshair", "Say that this skull feature is there")
         self._lay_out()
         self.way.chosen.connect(self._choose)
-        self.file.clicked.connect(self.skull_file_asked)
+        do_action(self.file, actions["pose.open_skull"])
         self.mark.clicked.connect(self._mark)
         follow(self, workspace.scan.opened, self.refresh)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from gp_core.landmarks.features import Side
@@ -10,6 +9,7 @@ from gp_labeler.document.specimen_edits import RenameSpecimen
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import fit, text_width
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Segments, link
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
@@ -32,12 +32,11 @@ class EstimateSettingsCard(Card):
     ----------
     workspace : Workspace
         Whose estimate it sets.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    atlas_asked = Signal()
-    new_asked = Signal()
-
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Estimate", parent)
         self._workspace = workspace
         hints = {side.value: f"The {side.word} ear was touched" for side in Side}
@@ -69,9 +68,9 @@ class EstimateSettingsCard(Card):
         self.noise.value_chosen.connect(lambda mm: self._choose(probe_noise=mm))
         self.noise.textEdited.connect(self._on_edited)
         self.shared.value_chosen.connect(lambda mm: self._choose(shared_error=mm))
-        self.to_atlas.clicked.connect(self.atlas_asked)
+        do_action(self.to_atlas, actions["atlas.show"])
         self.specimen.editingFinished.connect(self._rename)
-        self.new.clicked.connect(self.new_asked)
+        do_action(self.new, actions["file.new"])
         for signal in (workspace.document.details_changed, workspace.document.reset, workspace.scan.opened):
             follow(self, signal, self.refresh)
         for signal in (workspace.atlas.changed, workspace.atlas.details_changed):

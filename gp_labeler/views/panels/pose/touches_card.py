@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from qtpy.QtCore import QPoint, Qt, QTimer, Signal
+from qtpy.QtCore import QPoint, Qt, QTimer
 from qtpy.QtWidgets import QHBoxLayout, QMenu, QSizePolicy, QToolButton, QWidget
 
 from gp_core.errors import GpError
@@ -13,6 +13,7 @@ from gp_labeler.document import touching
 from gp_labeler.document.touches import Touch
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow, set_role
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, link
 from gp_labeler.views.panels.parts import Card, ElidedLabel
 from gp_labeler.views.panels.pose.touch_table import TouchTable
@@ -41,13 +42,11 @@ class TouchesCard(Card):
     ----------
     workspace : Workspace
         Whose touches it shows and edits.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    file_asked = Signal()
-    tracker_asked = Signal()
-    guide_asked = Signal()
-
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Touches", parent)
         self._workspace = workspace
         self._looked_at = ""
@@ -65,7 +64,7 @@ class TouchesCard(Card):
         self._timer = QTimer(self, interval=_LOOK_MS, singleShot=True)
         self._timer.timeout.connect(self._show_change)
         self._lay_out()
-        self._connect()
+        self._connect(actions)
 
     def refresh(self, *_: object) -> None:
         """Show the touches as they stand."""
@@ -138,15 +137,15 @@ class TouchesCard(Card):
         self.add(change)
         self.add(foot)
 
-    def _connect(self) -> None:
+    def _connect(self, actions: Actions) -> None:
         table, pose = self.table, self._workspace.pose
-        self.ways["file"].clicked.connect(self.file_asked)
+        do_action(self.ways["file"], actions["pose.open_touches"])
+        do_action(self.ways["tracker"], actions["pose.tracker"])
+        do_action(self.guide, actions["pose.guide"])
         self.ways["type"].clicked.connect(self._type_next)
         self.ways["scan"].clicked.connect(
             lambda on: self._workspace.interaction.set_tool("touch" if on else "look")
         )
-        self.ways["tracker"].clicked.connect(self.tracker_asked)
-        self.guide.clicked.connect(self.guide_asked)
         self.clear.clicked.connect(lambda: self._do(lambda: self._clear(None)))
         self.more.clicked.connect(self._toggle_skull)
         self.skull.clicked.connect(lambda: pose.aim(pose.next_skull))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
+from qtpy.QtGui import QAction
+from qtpy.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, QWidget
 
-from qtpy.QtCore import Signal
-from qtpy.QtWidgets import QHBoxLayout, QPushButton, QSizePolicy, QToolButton, QVBoxLayout, QWidget
-
-from gp_labeler.commands.actions import action
 from gp_labeler.models.view import CUTS
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
+from gp_labeler.views.panels.action_button import Actions, action_button, do_action
 from gp_labeler.views.panels.parts import text_label
 from gp_labeler.views.scene_overlay import cut_text
 
@@ -24,23 +22,22 @@ class CutRow(QWidget):
     ----------
     workspace : Workspace
         Whose bone is cut.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    action_asked = Signal(str)
-    """Id of the action to be done."""
-
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
         planes = QHBoxLayout()
         planes.setSpacing(4)
         planes.addWidget(text_label("Cut open", "hint"))
-        self.planes = {plane: self._plane_button(plane) for plane in CUTS}
+        self.planes = {plane: _plane_button(plane, actions[f"view.cut_{plane}"]) for plane in CUTS}
         for button in self.planes.values():
             planes.addWidget(button)
         self.where = text_label()
         self.flip, self.here = (
-            self._button(title, id)
+            action_button(actions[id], title)
             for title, id in (("Other side", "view.cut_flip"), ("To the crosshair", "view.cut_here"))
         )
         changes = QHBoxLayout()
@@ -58,37 +55,22 @@ class CutRow(QWidget):
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addLayout(planes)
         whole.addWidget(self._more)
-        for signal in (workspace.view.changed, workspace.bone.surfaces_changed, workspace.document.reset):
+        for signal in (workspace.view.changed, workspace.document.reset):
             follow(self, signal, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
         """Show the cut as it is."""
         cut = self._workspace.view.state.cut
-        for plane, button in self.planes.items():
-            button.setChecked(cut is not None and cut.plane == plane)
-            button.setEnabled(bool(self._workspace.bone.surfaces))
         self._more.setVisible(cut is not None)
         if cut is not None:
             self.where.setText(cut_text(cut))
 
-    def _plane_button(self, plane: str) -> QToolButton:
-        button = QToolButton()
-        button.setText("View" if plane == "view" else plane.capitalize())
-        button.setCheckable(True)
-        button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
-        row = action(f"view.cut_{plane}")
-        button.setToolTip(f"{row.hint}  ({row.shortcuts[0]})")
-        button.setAccessibleName(row.title)
-        button.clicked.connect(partial(self._ask, row.id))
-        return button
 
-    def _button(self, title: str, id: str) -> QPushButton:
-        row, button = action(id), QPushButton(title)
-        button.setToolTip(f"{row.hint or row.title}  ({row.shortcuts[0]})")
-        button.clicked.connect(partial(self._ask, id))
-        return button
-
-    def _ask(self, id: str, *_: object) -> None:
-        self.action_asked.emit(id)
-        self.refresh()
+def _plane_button(plane: str, action: QAction) -> QToolButton:
+    button = QToolButton()
+    button.setText("View" if plane == "view" else plane.capitalize())
+    button.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
+    button.setAccessibleName(action.text())
+    do_action(button, action)
+    return button

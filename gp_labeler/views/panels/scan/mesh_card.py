@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
-from qtpy.QtCore import Qt, Signal
+from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QSlider, QWidget
 
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import blocked, follow, mm_text
 from gp_labeler.views.fonts import fit, pixels, text_width
+from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.scan.cut_row import CutRow
 
 __all__ = ["MeshCard"]
+
+_SAVED_AS = "As PLY, STL, VTP, OBJ or glTF, in LPS mm"
 
 _SHOWN = {
     "outline_visible": ("Outline on slices", "The edge of bone, drawn on the slices"),
@@ -31,13 +34,11 @@ class MeshCard(Card):
     ----------
     workspace : Workspace
         Whose mesh it is about.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    save_asked = Signal()
-    action_asked = Signal(str)
-    """Id of an action to be done."""
-
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Bone surface", parent)
         self._workspace = workspace
         self.state = text_label("", "hint", wrap=True)
@@ -57,10 +58,9 @@ class MeshCard(Card):
         checks = FlowLayout(spacing=8)
         self.checks = {name: self._check(name, checks) for name in _SHOWN}
         self.add(checks)
-        self.cut = CutRow(workspace)
-        self.cut.action_asked.connect(self.action_asked)
+        self.cut = CutRow(workspace, actions)
         self.add(self.cut)
-        self._add_buttons()
+        self._add_buttons(actions)
         self._listen()
         self.refresh()
 
@@ -74,7 +74,6 @@ class MeshCard(Card):
         self._percent.setText(f"{round(100 * view.mesh_opacity)} %")
         self.state.setText(self._words())
         self.ears.setEnabled(any(s.stride > 1 for s in surfaces))
-        self.save.setEnabled(bool(surfaces))
 
     def _words(self) -> str:
         surfaces = self._workspace.bone.surfaces
@@ -94,13 +93,11 @@ class MeshCard(Card):
         row.addWidget(check)
         return check
 
-    def _add_buttons(self) -> None:
+    def _add_buttons(self, actions: Actions) -> None:
         self.ears = QPushButton("Ears at full resolution")
         self.ears.setToolTip("Mesh around each ear with every voxel; needs a placed feature or a ghost there")
         self.ears.clicked.connect(self._mesh_ears)
-        self.save = QPushButton("Save mesh…")
-        self.save.setToolTip("As PLY, STL or VTP, in LPS mm")
-        self.save.clicked.connect(self.save_asked)
+        self.save = action_button(actions["file.save_mesh"], "Save mesh…", _SAVED_AS)
         buttons = QHBoxLayout()
         buttons.setSpacing(6)
         buttons.addWidget(self.ears, 2)

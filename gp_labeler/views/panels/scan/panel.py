@@ -8,6 +8,7 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
+from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.views.panels.scan.bone_card import BoneCard
 from gp_labeler.views.panels.scan.mesh_card import MeshCard
@@ -27,11 +28,11 @@ class ScanPanel(QWidget):
     ----------
     workspace : Workspace
         Whose scan it shows.
-    actions : object, optional
-        Not needed here; all panels are made alike.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
@@ -44,7 +45,11 @@ class ScanPanel(QWidget):
         about.add(self._empty)
         about.add(self.facts)
         about.add(self._notes)
-        self.grey, self.bone, self.mesh = WindowLevelCard(workspace), BoneCard(workspace), MeshCard(workspace)
+        self.grey, self.bone, self.mesh = (
+            WindowLevelCard(workspace),
+            BoneCard(workspace),
+            MeshCard(workspace, actions),
+        )
         content = QWidget()
         content.setProperty("role", "panel")
         column = QVBoxLayout(content)

@@ -22,6 +22,7 @@ from gp_labeler.views.bind import set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import elided, fit, font_of, pixels, text_width
 from gp_labeler.views.icons import icon, icon_pixmap
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import emptied, scrolled
 from gp_labeler.views.theme import theme_of
@@ -48,18 +49,15 @@ class Welcome(QWidget):
     ----------
     workspace : Workspace
         Whose recent files it lists.
-    actions : object, optional
-        Not needed here; all panels are made alike.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    open_scan_asked = Signal()
-    open_specimen_asked = Signal()
-    demo_asked = Signal()
     path_chosen = Signal(str)
 
-    def __init__(self, workspace: Workspace, actions: object = None, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workspace = workspace
+        self._workspace, self._actions = workspace, actions
         self._icons: list[tuple[QLabel, str]] = []
         self._button_icons: list[tuple[QPushButton, str, bool]] = []
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
@@ -147,10 +145,12 @@ class Welcome(QWidget):
         self.open_scan = self._big("Open scan…", "scan", "primary", "A file or folder with a micro-CT")
         self.open_specimen = self._big("Open specimen…", "file", "", "Go on with a labelled specimen")
         self.demo = self._big("Try a demo head", "play", "", "A synthetic head to practise on; takes seconds")
-        self.open_scan.clicked.connect(self.open_scan_asked)
-        self.open_specimen.clicked.connect(self.open_specimen_asked)
-        self.demo.clicked.connect(self.demo_asked)
-        for button in (self.open_scan, self.open_specimen, self.demo):
+        for button, id in (
+            (self.open_scan, "file.open"),
+            (self.open_specimen, "file.open"),
+            (self.demo, "file.demo"),
+        ):
+            do_action(button, self._actions[id])
             row.addWidget(button)
         return row
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from qtpy.QtCore import Signal
 from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import LinkPhase
 from gp_labeler.views.bind import attempt, blocked, follow, set_role
+from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.parts import Card, text_label
 
 __all__ = ["TrackerCard", "tracker_role", "tracker_words"]
@@ -35,11 +35,11 @@ class TrackerCard(Card):
     ----------
     workspace : Workspace
         Whose tracker.
+    actions : mapping of str to QAction
+        What its buttons do.
     """
 
-    settings_asked = Signal()
-
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__("Tracked probe", parent)
         self._workspace = workspace
         self.words = text_label(wrap=True)
@@ -56,7 +56,7 @@ class TrackerCard(Card):
         self.dwell.toggled.connect(workspace.tracker.set_dwell)
         settings = QPushButton("Settings…")
         settings.setProperty("role", "link")
-        settings.clicked.connect(self.settings_asked)
+        do_action(settings, actions["pose.tracker"])
         self.add_to_heading(settings)
         for widget in (self.words, self.tip, self.progress, self.frame_words):
             self.add(widget)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from qtpy.QtGui import QFontMetrics
@@ -13,6 +13,8 @@ from gp_core.landmarks.features import Side
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.commands import Commands
+from gp_labeler.views.panels.action_button import Actions
 
 ATLAS = Atlas.published()
 PANEL_WIDTH = 472
@@ -53,6 +55,24 @@ def place(workspace: Workspace, *codes: str, side: Side = Side.LEFT) -> None:
     """Place features where the atlas has them."""
     for code in codes:
         workspace.labels.place(in_scan(code, side), side=side, code=code)
+
+
+class RecordingUi:
+    """Stands for the window: keeps which of its dialogs were asked for."""
+
+    def __init__(self) -> None:
+        self.calls: list[str] = []
+
+    def __getattr__(self, name: str) -> Callable[..., None]:
+        return lambda *args, **options: self.calls.append(name)
+
+
+def actions_of(workspace: Workspace, qtbot, ui: RecordingUi | None = None) -> Actions:
+    """Make the window's actions, for panels that are tried alone."""
+    window = QWidget()
+    qtbot.addWidget(window)
+    vars(qtbot).setdefault("windows", []).append(window)  # which keeps no widget alive by itself
+    return Commands(workspace, ui or RecordingUi(), window, window).actions
 
 
 def cut_words(root: QWidget) -> Iterator[str]:
