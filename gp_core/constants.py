@@ -18,7 +18,7 @@ METHODS = ("robust", "jrmpc")
 """The estimators of a cochlea's pose."""
 
 METHOD_NAMES = {"robust": "Robust", "jrmpc": "JRMPC"}
-"""How each estimator is called in texts and figures."""
+"""Display names of the estimators."""
 
 MM_PER_DEGREE = 0.2
 """Weight of a degree of axis error against a millimetre of origin error, in the paper's total error E_T."""

@@ -25,7 +25,7 @@ from gp_core.errors import FileFormatError, GpError
 
 try:
     import fcntl
-except ImportError:  # Windows, which does not let go of a file that is open
+except ImportError:  # Windows locks open files
     fcntl = None  # type: ignore[assignment]
 
 __all__ = [
@@ -51,15 +51,15 @@ MAX_BYTES = 50_000_000
 
 _DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+)?", re.DOTALL)
 _CHUNK_BYTES = 1 << 20
-_LONGEST_NAME = 200  # bytes of a name in its draft's name; systems allow 255
-_FORGOTTEN_SECONDS = 3600.0  # after which the draft of any file counts as left behind
-_PATIENCE_SECONDS = 10.0  # for somebody who reads a pipe
+_LONGEST_NAME = 200  # bytes of the name in that of its temporary file; systems allow 255
+_FORGOTTEN_SECONDS = 3600.0  # after which any temporary file counts as abandoned
+_PATIENCE_SECONDS = 10.0  # for a reader of a pipe
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(?P<number>\d+)")
 _STREAMS = {"/dev/stdout": 1, "/dev/stderr": 2}
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 _protected: dict[tuple[int, int], str] = {}
-"""Device and number of the files that must not be written over."""
+"""Device and inode of the files that must not be overwritten."""
 
 
 # Reading
@@ -110,15 +110,15 @@ def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
     FileFormatError
         Missing, a folder, a device or a pipe, not readable, or too large.
     """
-    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # no pipe makes it wait
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)  # do not block on a pipe
     try:
-        if Path(path).is_dir():  # Windows cannot open one
+        if Path(path).is_dir():  # Windows cannot open a folder
             _check_kind(Path(path).stat(), path, what, max_bytes)
         with os.fdopen(os.open(path, flags), "rb") as file:
             status = os.fstat(file.fileno())
             _check_kind(status, path, what, max_bytes)
             content = file.read(status.st_size + 1)
-            while len(content) <= max_bytes and (more := file.read(_CHUNK_BYTES)):  # it grows, or is in /proc
+            while len(content) <= max_bytes and (more := file.read(_CHUNK_BYTES)):  # growing, or in /proc
                 content += more
     except (OSError, ValueError) as error:
         raise _unreadable(path, error) from None
@@ -224,7 +224,9 @@ def write_text(path: AnyPath, text: str) -> None:
     GpError
         As for `atomic_file`.
     """
-    write_bytes(path, text.encode("utf-8", errors="backslashreplace"))  # names may hold what is not UTF-8
+    write_bytes(
+        path, text.encode("utf-8", errors="backslashreplace")
+    )  # names may contain bytes that are not UTF-8
 
 
 def write_bytes(path: AnyPath, content: bytes) -> None:
@@ -274,7 +276,7 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
                 yield draft
                 _send(path, draft.read_bytes())
             return
-        target = Path(os.path.realpath(path))  # a link stays a link
+        target = Path(os.path.realpath(path))  # keep a symbolic link
         _check_target(target, path)
         remove_drafts(target.parent, target.name)
         with _locked_draft(target) as draft:
@@ -283,7 +285,7 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
             if target.exists():
                 draft.chmod(stat.S_IMODE(target.stat().st_mode))
             draft.replace(target)
-        with contextlib.suppress(OSError):  # make the name last too, where the system can
+        with contextlib.suppress(OSError):  # flush the directory entry too, where the system can
             _to_disk(target.parent)
     except (OSError, ValueError) as error:
         raise GpError(f"cannot be written ({_reason(error)})", file=path, remedy=_remedy(error)) from None
@@ -314,19 +316,19 @@ def _check_target(target: Path, path: AnyPath) -> None:
     if target.exists() and not target.is_file():
         raise GpError("is neither a file nor a pipe", file=path, remedy="Name another file.")
     as_we_are = os.access in os.supports_effective_ids
-    if target.exists() and not os.access(target, os.W_OK, effective_ids=as_we_are):  # the folder's would do
+    if target.exists() and not os.access(target, os.W_OK, effective_ids=as_we_are):  # the folder is enough
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
 
 
 @contextmanager
 def _locked_draft(target: Path) -> Iterator[Path]:
-    """Make a draft that `remove_drafts` leaves alone as long as this program lives."""
+    """Create a temporary file that `remove_drafts` ignores while this program runs."""
     name = os.fsdecode(os.fsencode(target.name)[:_LONGEST_NAME])
     draft = target.with_name(f".{name}.{os.urandom(4).hex()}.tmp{target.suffix[:20]}")
     descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
         if fcntl is None:
-            os.close(descriptor)  # Windows renames no file that is open
+            os.close(descriptor)  # Windows cannot rename an open file
             descriptor = -1
         else:
             with contextlib.suppress(OSError):  # a file system without locks
@@ -413,7 +415,7 @@ def _send(path: AnyPath, content: bytes) -> None:
 
 
 def _opened_stream(path: AnyPath) -> int:
-    """Open a device, or a pipe that somebody reads, or will soon."""
+    """Open a device, or a pipe that has a reader, or will soon have one."""
     end = time.monotonic() + _PATIENCE_SECONDS
     while True:
         try:

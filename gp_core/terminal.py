@@ -16,7 +16,7 @@ from typing import Any, TextIO
 
 __all__ = ["leave_output", "plain_terminal", "printable"]
 
-# C0 and C1 control characters, line separators, what turns the direction of writing, lone surrogates
+# C0 and C1 control characters, line separators, bidirectional controls, lone surrogates
 _UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
 _KEPT = "\n\t"
 
@@ -59,7 +59,7 @@ def plain_terminal() -> Iterator[None]:
     before = sys.stdout, sys.stderr
     for stream in before:
         if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="replace")  # a terminal that lacks a letter shows a question mark
+            stream.reconfigure(errors="replace")  # a terminal that lacks a character shows a question mark
     sys.stdout, sys.stderr = (_PlainStream(stream) for stream in before)
     try:
         yield

@@ -91,7 +91,7 @@ class Atlas:
             raise GpError(f"the atlas {self.name!r} must be of at least one side, got {self.n_samples}")
         landmarks = LandmarkSet.from_mapping(dict(zip(codes, self.mean, strict=True)), "L")
         check_plausible_size(landmarks, strict=True)
-        cochlea_frame(landmarks)  # raises where the four features give none
+        cochlea_frame(landmarks)  # raises if the four features determine no frame
 
     def _freeze(self, name: str, value: ArrayLike, shape: tuple[int, ...]) -> None:
         array = np.array(value, dtype=np.float64)

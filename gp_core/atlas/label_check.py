@@ -56,10 +56,10 @@ SAME_PLACE_MM = 0.05
 """Half a voxel: no two features are that close."""
 
 SHARED_MM = 0.5
-"""Up to here two labels of one point differ as labels do."""
+"""Largest ordinary difference between two labels of the same point."""
 
 SHARED_WRONG_MM = 1.0
-"""From here on one of two labels of one point is wrong: 7 SD of the difference of two labels."""
+"""From this difference on, one of two labels of the same point is wrong: 7 SD of the difference."""
 
 HEAD_MM = 40.0
 """No two features of a head are farther apart than this."""

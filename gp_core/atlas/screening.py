@@ -130,7 +130,7 @@ def mean_shared_points(specimen: Specimen) -> Specimen:
     """
     sides = dict(specimen.sides)
     frames = {side.frame for side in sides.values()}
-    if len(sides) < 2 or len(frames) > 1 or "cochlea" in frames:  # which is another for each side
+    if len(sides) < 2 or len(frames) > 1 or "cochlea" in frames:  # one frame for each side
         return specimen
     for code in (row.code for row in FEATURES if row.shared):
         if all(code in side for side in sides.values()):
@@ -201,7 +201,7 @@ def _without(specimen: Specimen, findings: Sequence[Finding]) -> Specimen:
 def _without_shared(
     sides: Mapping[Side, LandmarkSet], findings: Sequence[Finding]
 ) -> Mapping[Side, LandmarkSet]:
-    """Leave out a point of both sides whose two labels cannot both be right, unless one has gone already."""
+    """Leave out a midline point whose two labels cannot both be right, unless one is already left out."""
     for finding in filter(_is_left_out, findings):
         if finding.kind == "shared point wrong" and all(finding.landmarks[0] in s for s in sides.values()):
             sides = {key: side.with_point(finding.landmarks[0], None) for key, side in sides.items()}
@@ -215,7 +215,7 @@ def _side_without(landmarks: LandmarkSet, findings: Sequence[Finding]) -> Landma
         if finding.kind == "other side":
             return LandmarkSet.empty(landmarks.side, frame=landmarks.frame)
         if finding.kind == "duplicate" and far.intersection(finding.landmarks):
-            continue  # it is known which of the two it is
+            continue  # another finding already tells which of the two is wrong
         if finding.kind != "shared point wrong":
             for code in finding.landmarks:
                 landmarks = landmarks.with_point(code, None)

@@ -87,7 +87,7 @@ def _run(arguments: Sequence[str] | None) -> int:
     except GpError as error:
         sys.stderr.write(f"gp-core: {error}\n")
         return 2
-    except BrokenPipeError:  # who reads has read enough, such as `head`
+    except BrokenPipeError:  # the reader has exited, such as `head`
         leave_output()
         return 141
     except MemoryError:

@@ -38,7 +38,7 @@ from gp_core.validation import FloatArray
 __all__ = ["HELD_BACK", "add", "pose_table"]
 
 HELD_BACK = 3
-"""Status of a command that wrote no pose, since names or side look wrong."""
+"""Exit status of a command that wrote no pose because names or side look wrong."""
 
 _FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
 """Options whose files hold a pose without its states and warnings."""
@@ -187,8 +187,8 @@ def run(args: argparse.Namespace) -> int:
             if atlas is None
             else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
         )
-    doubts = _doubts(args, pose, taken)
-    held_back = bool(doubts) and not args.accept_warnings
+    ambiguities = _ambiguities(args, pose, taken)
+    held_back = bool(ambiguities) and not args.accept_warnings
     _write(args, pose, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
@@ -198,8 +198,8 @@ def run(args: argparse.Namespace) -> int:
     for line in _remarks(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
     if held_back:
-        say(f"  ! {_what_was_held_back(args, doubts)}")
-    elif doubts:
+        say(f"  ! {_what_was_held_back(args, ambiguities)}")
+    elif ambiguities:
         say("  ! written although side or names are ambiguous: --accept-warnings was given")
     return HELD_BACK if held_back else 0
 
@@ -217,7 +217,7 @@ def _estimated(
     atlas: Atlas | None,
     specimens: list[Specimen] | None,
 ) -> tuple[LandmarkSet, CochleaPose, Hypothesis | None]:
-    """Estimate the touches as they are named; with ``--take-best``, as they are likeliest to be meant."""
+    """Estimate the touches as they are named; with ``--take-best``, under the likeliest hypothesis."""
 
     def estimate(read: LandmarkSet) -> CochleaPose:
         return estimate_pose(
@@ -239,18 +239,18 @@ def _estimated(
     return touches, estimate(touches), best
 
 
-def _doubts(args: argparse.Namespace, pose: CochleaPose, taken: Hypothesis | None) -> list[str]:
-    """Return why side or names are not beyond doubt."""
-    doubts = [reason.text for reason in reasons_against_writing(pose)]
+def _ambiguities(args: argparse.Namespace, pose: CochleaPose, taken: Hypothesis | None) -> list[str]:
+    """Return why side or names are ambiguous."""
+    ambiguities = [reason.text for reason in reasons_against_writing(pose)]
     if taken is not None and taken.probability < _CERTAIN_ENOUGH:
-        doubts.append("the hypothesis used is not certain enough")
+        ambiguities.append("the hypothesis used is not certain enough")
     if named_side(args.touches) is pose.side.other:
-        doubts.append(named_for_other_side(Path(args.touches).name, pose.side).text)
-    return doubts
+        ambiguities.append(named_for_other_side(Path(args.touches).name, pose.side).text)
+    return ambiguities
 
 
-def _what_was_held_back(args: argparse.Namespace, doubts: Sequence[str]) -> str:
-    why = " and ".join(doubts)
+def _what_was_held_back(args: argparse.Namespace, ambiguities: Sequence[str]) -> str:
+    why = " and ".join(ambiguities)
     files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
     what = f"not written: {' '.join(files)}, as {why}" if files else why
     if old := [file for file in files if Path(file).exists()]:
@@ -259,7 +259,7 @@ def _what_was_held_back(args: argparse.Namespace, doubts: Sequence[str]) -> str:
 
 
 def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None, *, held_back: bool) -> None:
-    """Write what was asked for; of a pose that is held back only the JSON, which carries its state."""
+    """Write the requested files; for a pose that is held back, only the JSON, which holds its state."""
     if path is not None:
         with blaming(args.path):
             carried = carry_path(path, pose, path_side=args.path_side)
@@ -285,7 +285,7 @@ def _remarks(
     *,
     held_back: bool,
 ) -> Iterator[str]:
-    """Yield what the files say beside the pose, and what the written frame is."""
+    """Yield further remarks on the touches, the pose and the written frame."""
     if touches.unseen:
         yield f"not seen by the tracker: {' '.join(sorted(touches.unseen))}"
     centre = None if path is None else rows_before_centre(path)
@@ -299,7 +299,7 @@ def _remarks(
 
 
 def _path_of(args: argparse.Namespace) -> FloatArray | None:
-    """Return the insertion path that was given, once all is said that must be."""
+    """Return the given insertion path; all options that it needs must be given."""
     if args.path is None:
         given = [name for name in _OF_A_PATH if getattr(args, name) is not None]
         if given:
@@ -352,7 +352,7 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
 
 
 def _position_lines(pose: CochleaPose) -> Iterator[str]:
-    """Yield origin and axis with their regions, the state of side and names, and the other readings."""
+    """Yield origin and axis with their regions, the states of side and names, and the other hypotheses."""
     x, y, z = pose.origin
     within = "95 % within" if pose.method == "robust" else "animals scatter by"
     yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
@@ -371,7 +371,7 @@ def _position_lines(pose: CochleaPose) -> Iterator[str]:
 
 
 def _advice(best: TouchGain) -> str:
-    """Say what the best next touch gains, if anything to speak of."""
+    """Return what the best next touch gains, or that it gains little."""
     if best.worth < _NEGLIGIBLE_GAIN * (best.radius_95_now + MM_PER_DEGREE * np.degrees(best.cone_95_now)):
         return "no other touch would gain much"
     return (

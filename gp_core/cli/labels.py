@@ -121,7 +121,7 @@ def run_fit(args: argparse.Namespace) -> int:
 
 
 def _say_screened(screened: Screened, *, kept: bool) -> None:
-    """Say what the check found, the worst animal first, and what became of it."""
+    """Print what the check found, the worst animal first, and what was left out."""
     for name in dict.fromkeys(finding.specimen for finding in screened.findings):
         _say_findings(name, [finding for finding in screened.findings if finding.specimen == name])
     for note in screened.notes:
@@ -195,7 +195,7 @@ def run_check(args: argparse.Namespace) -> int:
 
 
 def _one_side(args: argparse.Namespace) -> Specimen:
-    """Read the one file whose side was said."""
+    """Read a single file of the given side."""
     files: list[str] = args.specimens
     if len(files) > 1:
         raise GpError(f"--side is for one file, got {len(files)}", remedy="Check them one by one.")

@@ -48,7 +48,7 @@ _ENDINGS = {
     "landmarks": (".mrk.json", ".json"),
     "path_out": (".csv", ".txt"),
 }
-"""How the names of these files may end, so that whatever reads them knows what they are."""
+"""Permitted suffixes of these files, by which other programs recognise them."""
 
 _ANOTHER = "Name another file."
 
@@ -264,11 +264,11 @@ def check_ending(word: str, endings: tuple[str, ...], option: str) -> None:
 
 
 def _files_read(args: argparse.Namespace) -> Iterator[str | Path]:
-    """Yield every word that is no output, and the landmark files of those that are folders."""
+    """Yield every input on the command line, and the landmark files in folders."""
     for word in _words_read(args):
         yield word
         if Path(word).is_dir():
-            with suppress(GpError):  # a folder without any, which the command itself may complain about
+            with suppress(GpError):  # an empty folder: the command itself reports it
                 yield from landmark_files(word)
 
 

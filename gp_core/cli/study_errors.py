@@ -138,7 +138,7 @@ def run_simulate(args: argparse.Namespace) -> int:
 
 
 def _physical_errors(file: str, method: str) -> list[tuple[float, float]]:
-    """Return E_CO and E_MA by ICP, the paper's way, of a result of ``physical``."""
+    """Return E_CO and E_MA under ICP, as in the paper, from a result of ``physical``."""
     remedy = "Make it with: gp-core physical ... --json"
     content = read_json(file, what="result of a physical test", remedy=remedy)
     try:

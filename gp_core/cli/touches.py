@@ -108,7 +108,7 @@ def _touched_name(word: str) -> str:
 
 
 def _tip(word: str) -> FloatArray:
-    """Return the tip offset that a word gives: three numbers, or a file that pivot wrote."""
+    """Return the tip offset from three numbers, or from a file that pivot wrote."""
     remedy = "Give x,y,z in mm, or the JSON file of gp-core pivot."
     if not word.lower().endswith(".json"):
         try:

@@ -96,7 +96,7 @@ def run_register(args: argparse.Namespace) -> int:
 
 
 def _at_cochlea(found: RegistrationResult, ct: LandmarkSet) -> dict[str, Any]:
-    """Return the errors to expect at the labelled cochlea, None where it is not labelled."""
+    """Return the expected errors at the labelled cochlea; None where it is not labelled."""
     target = ct["CO"][None]
     expected, bound = (
         (float(tre(target)[0]) if "CO" in ct else None) for tre in (found.tre_mm, found.tre_95_mm)

@@ -61,7 +61,7 @@ def read_fcsv(path: str | PathLike[str]) -> PointList:
     system = next((m[1].strip(' ",;') for line in heads if (m := _SYSTEM.match(line))), None)
     body = [numbered for numbered, head in zip(lines, heads, strict=True) if not head.startswith("#")]
     first = body[0][1] if body else ""
-    n_marks = first.count(";")  # as a spreadsheet saves it; a description may hold some, too
+    n_marks = first.count(";")  # as saved by a spreadsheet; a description may contain some too
     mark = ";" if n_marks >= 4 and n_marks > first.count(",") else ","
     rows = [(number, _unpadded(split_fields(line, mark, number, path))) for number, line in body]
     old = bool(rows) and all(4 <= len(fields) <= 7 for _, fields in rows)

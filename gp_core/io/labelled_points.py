@@ -42,7 +42,7 @@ STATUS_WORDS: Mapping[str, Status] = {
     "missing": Status.UNSEEN,
 }
 
-# What marks a suggestion in the one text that 3D Slicer shows of a point, and keeps when it saves.
+# Marks a suggestion in the description, which 3D Slicer shows and preserves.
 _SUGGESTED = re.compile(
     r"suggested, not confirmed"
     r"(?: \((?P<source>.*?)(?:; 95 % within (?P<radius>[0-9]{1,6}\.?[0-9]*) mm)?\)(?=\.|$))?",

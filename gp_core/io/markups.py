@@ -38,7 +38,7 @@ _SCHEMA = (
     "Modules/Loadable/Markups/Resources/Schema/markups-schema-v1.0.3.json#"
 )
 ACCEPTED = "accepted ghost"
-"""The provenance of a point that was put, and not looked at, where the atlas expected it."""
+"""The provenance of a point accepted at its predicted position without review."""
 
 _LINES = ("Line",)
 """What this program writes beside point lists: through points of the lists, so that nothing is lost."""
@@ -79,7 +79,7 @@ def read_markups(path: str | PathLike[str]) -> PointList:
 def _without_accepted_ghosts(
     points: list[LabelledPoint], header: FileHeader, file: str | PathLike[str]
 ) -> list[LabelledPoint]:
-    """Take what earlier versions placed unseen, where the atlas expected it, as the suggestions they are."""
+    """Convert ghosts accepted without review, which earlier versions stored as placed, to suggestions."""
     accepted = {
         label
         for label, how in header.provenance.items()
@@ -120,7 +120,7 @@ def _load(path: str | PathLike[str]) -> dict[str, Any]:
 def _point_lists(
     content: dict[str, Any], file: str | PathLike[str], told: Sequence[str]
 ) -> list[dict[str, Any]]:
-    """Return the point lists; what else there is is told of, unless its kind is `told` already."""
+    """Return the point lists; other kinds of markups are reported, unless their kind is in `told`."""
     found = []
     kinds = []
     for markup in content["markups"]:

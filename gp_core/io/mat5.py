@@ -73,7 +73,7 @@ def _variables(content: bytes) -> Iterator[tuple[str, FloatArray | None]]:
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
-    """Go through tagged elements: type and length in 8 bytes, then the data, padded to 8."""
+    """Yield tagged elements: type and length in 8 bytes, then the data, padded to 8."""
     at = 0
     while at < len(data):
         kind, size = struct.unpack_from(order + "II", data, at)
@@ -97,6 +97,6 @@ def _matrix(body: bytes, order: str) -> tuple[str, FloatArray | None]:
         raise ValueError("no real numbers")
     kind, numbers = parts[0]
     shape = np.frombuffer(dimensions, order + _NUMBER_TYPES[_INT32]).tolist()
-    with np.errstate(invalid="ignore"):  # a damaged float may be a NaN that signals
+    with np.errstate(invalid="ignore"):  # a damaged float may be a signalling NaN
         values = np.frombuffer(numbers, order + _NUMBER_TYPES[kind]).astype(np.float64)
     return label, values.reshape(shape, order="F")

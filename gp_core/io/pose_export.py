@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 __all__ = ["AXIS_POINT_MM", "write_csv", "write_landmarks"]
 
 AXIS_POINT_MM = 5.0
-"""How far from CO, towards the apex, the point ``axis`` lies in a landmark file: about a cochlea's height."""
+"""Distance of the point ``axis`` in a landmark file from CO, towards the apex: about a cochlea's height."""
 
 
 def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:

@@ -49,7 +49,7 @@ _READERS = {
     ".tsv": read_table,
     ".dat": read_dat,
 }
-_SAME_PLACE_MM = 1e-3  # far below a voxel, and still right for a file in metres, which is told elsewhere
+_SAME_PLACE_MM = 1e-3  # far below a voxel, even for a file in metres, which is detected elsewhere
 _MIN_TO_TELL_A_POINT_FROM_A_SHAPE = 3
 
 
@@ -105,7 +105,7 @@ def read_points(path: str | PathLike[str], *, names: LabelNames | None = None) -
 
 
 def _with_name(point: LabelledPoint, names: LabelNames, file: str | PathLike[str]) -> LabelledPoint:
-    """Return a point under the name that its label stands for, with the side that the label tells."""
+    """Return a point with the name and the side that its label gives."""
     name, side = parse_label(names.translate(point.label))
     if side is not None and point.side not in (None, side):
         raise FeatureError(
@@ -310,7 +310,7 @@ def _side_of(points: PointList, side: Side | str | None) -> Side:
 
 
 def _one_side(points: PointList, side: Side) -> PointList:
-    """Return the points of one side; in a file that tells sides, only what both share may tell none."""
+    """Return the points of one side; in a file with sides, only shared points may lack one."""
     told = points.sides
     if told == {side.other}:
         raise FeatureError(
@@ -413,7 +413,7 @@ def _provenance(points: PointList, names: list[str]) -> dict[str, LabelProvenanc
 
 
 def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:
-    """Refuse an axis without a direction, whatever else is placed."""
+    """Reject an axis without a direction."""
     ca, cb = (positions.get(code, np.full(3, np.nan)) for code in ("CA", "CB"))
     if np.linalg.norm(ca - cb) < _SAME_PLACE_MM:
         raise GeometryError(

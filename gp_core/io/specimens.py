@@ -26,7 +26,7 @@ _log = logging.getLogger(__name__)
 
 _SAME_MM = 1e-6
 _ROUNDED_MM = 1e-3
-"""Two files of a side that differ by no more hold the same labels, in another format."""
+"""Two files of a side that differ by no more hold the same labels in different formats."""
 
 _IN_FOLDERS = (".mrk.json", ".fcsv")
 _RICHEST_FIRST = (".mrk.json", ".json", ".fcsv")
@@ -181,18 +181,18 @@ class _Key(NamedTuple):
 
 
 def _kind(file: Path) -> int:
-    """Tell formats apart; those that say more of their labels come first."""
+    """Rank formats; those with more information on their labels come first."""
     name = file.name.lower()
     return next((i for i, suffix in enumerate(_RICHEST_FIRST) if name.endswith(suffix)), len(_RICHEST_FIRST))
 
 
 def _richest(file: Path) -> int:
-    """Sort files that say more of their labels before those that say less, suggestions last."""
+    """Sort files by the information on their labels, most first, suggestions last."""
     return _kind(file) + 10 * ("suggested" in file.name.lower())
 
 
 def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
-    """Whether two files hold the same labels, but for rounding, such as one exported in two formats."""
+    """Whether two files hold the same labels up to rounding, such as one set exported in two formats."""
     return (
         one.frame == other.frame
         and one.placed == other.placed
@@ -202,7 +202,7 @@ def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
 
 
 def _sharing(sides: Mapping[Side, LandmarkSet]) -> dict[Side, LandmarkSet]:
-    """Let a point of both sides that one side alone has count for the other as well."""
+    """Use a midline point that only one side has for the other side too."""
     found = dict(sides)
     if len({landmarks.frame for landmarks in sides.values()}) > 1:
         return found
@@ -268,7 +268,7 @@ def _together(known: LandmarkSet | None, read: LandmarkSet, file: Path) -> Landm
 
 
 def _with_true_origin(landmarks: LandmarkSet) -> LandmarkSet:
-    """Compute CO, but keep the file's own number, to the last bit, where it says the same."""
+    """Compute CO, but keep the file's own value, to the last bit, where it agrees."""
     computed = with_cochlea_origin(landmarks)
     same = "CO" in landmarks and np.abs(computed["CO"] - landmarks["CO"]).max() < _SAME_MM
     return landmarks if same else computed
@@ -308,7 +308,7 @@ def landmark_files(place: str | PathLike[str]) -> list[Path]:
         found = sorted(file for file in path.iterdir() if file.name.lower().endswith(_IN_FOLDERS))
     except (OSError, ValueError) as error:
         raise FileFormatError(f"cannot be searched ({error})", file=path, remedy="Check the name.") from None
-    found = [file for file in found if not file.name.startswith(".")]  # drafts, and what macOS leaves
+    found = [file for file in found if not file.name.startswith(".")]  # temporary files, and those of macOS
     if not found:
         raise FileFormatError(
             f"holds no landmark files ({', '.join('*' + suffix for suffix in _IN_FOLDERS)})",

@@ -47,7 +47,7 @@ def read_stl(path: str | PathLike[str]) -> Surface:
 
 
 def _binary(raw: bytes) -> FloatArray | None:
-    """Return the corners (T, 3, 3) where the length is what the count says; headers tell nothing."""
+    """Return the corners (T, 3, 3) if the length matches the count; headers are unreliable."""
     count = int.from_bytes(raw[_HEADER : _HEADER + 4], "little")
     if len(raw) < _HEADER + 4 or len(raw) != _HEADER + 4 + count * _RECORD.itemsize:
         return None

@@ -97,7 +97,7 @@ def read_table(path: str | PathLike[str]) -> PointList:
 
 
 def _header_names(rows: list[tuple[int, list[str]]]) -> list[str]:
-    """Return the names of the columns by the first row; that of R's row names is empty, or not there."""
+    """Return the names of the columns from the first row; that of R's row names is empty or absent."""
     if not rows:
         return []
     names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]]
@@ -148,9 +148,9 @@ def read_rows(
 
 
 def _delimiter_of(line: str) -> str:
-    """Return what separates the columns of a table, told from its first line."""
+    """Return the column separator of a table, guessed from its first line."""
     if all(has_decimal_comma(field) for field in line.split()[1:]) and len(line.split()) > 2:
-        return " "  # the commas are decimal ones: for the message, since such numbers are refused
+        return " "  # decimal commas: needed for the message, since such numbers are rejected
     return next((mark for mark in "\t;," if mark in line), " ")
 
 
@@ -199,7 +199,7 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
 
 
 def _side(other: Callable[[str], str], label: str, file: str | PathLike[str]) -> Side | None:
-    """Return the side that a row tells in a column of its own; None where it is empty."""
+    """Return the side in a row's own column; None where it is empty."""
     word = next((found for name in _SIDE_COLUMNS if (found := other(name))), "")
     try:
         return Side.parse(word) if word else None

@@ -29,9 +29,9 @@ __all__ = [
 ]
 
 MAX_POINTS = 10_000
-"""What one landmark file may hold; more is refused before any of it is looked at."""
+"""Maximum number of points in a file; a larger file is rejected before parsing."""
 
-_MAX_COORDINATE_MM = 1e9  # beyond nanometres of a large head: keeps squares and sums finite
+_MAX_COORDINATE_MM = 1e9  # larger than a head in nanometres: keeps squares and sums finite
 
 # What stands for "no number": R writes NA, or null through its JSON writer.
 _MISSING_WORDS = frozenset({"", "na", "null"})

@@ -35,7 +35,7 @@ _POSE, _STATUS, _TIME = "Transform", "TransformStatus", "Timestamp"
 
 _NOT_SEEN = ("", "na", "nan", "null", "missing")
 _COLUMNS = {16: 0, 17: 1, 12: 0, 13: 1}
-"""Numbers in a row that holds a whole pose, and how many before it are a time stamp."""
+"""Numbers in a row with a whole pose, and how many of them precede it as a time stamp."""
 
 _QUATERNION = (("qw", "qx", "qy", "qz"), ("q0", "qx", "qy", "qz"), ("w", "i", "j", "k"))
 _TRANSLATION = (("tx", "ty", "tz"), ("x", "y", "z"), ("px", "py", "pz"))
@@ -164,7 +164,7 @@ def _read_frames(path: str | PathLike[str]) -> list[_Frame]:
 def _fields(path: str | PathLike[str]) -> Iterator[tuple[int, str, str]]:
     head = read_head(Path(path), _MAX_HEADER_BYTES)
     ends = [end for mark in (b"ElementDataFile", b"\n\n", b"\r\n\r\n") if (end := head.find(mark)) >= 0]
-    head = head[: min(ends, default=len(head))]  # the images that follow are not of interest
+    head = head[: min(ends, default=len(head))]  # the images that follow are not needed
     for match in _FIELD.finditer(head):
         yield int(match["frame"]), match["field"].decode(), match["value"].decode("utf-8", "replace")
 
@@ -248,7 +248,7 @@ def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
 
 @dataclass(frozen=True)
 class _PoseColumns:
-    """Where a table with a header holds its poses."""
+    """The columns of the poses in a table with a header."""
 
     rotation: tuple[int, ...]
     translation: tuple[int, ...]
@@ -334,7 +334,7 @@ def _matrices(rows: list[tuple[int, list[str]]], file: str | PathLike[str]) -> F
 
 
 def _by_columns(poses: FloatArray) -> bool:
-    """Whether matrices were written column by column: the place of the marker is in the last row then."""
+    """Whether matrices were written column by column: the translation is then in the last row."""
     seen = poses[np.isfinite(poses).all(axis=(1, 2))]
     return len(seen) > 0 and not seen[:, :3, 3].any() and bool(seen[:, 3, :3].any())
 

@@ -143,7 +143,7 @@ EXTERNAL: tuple[str, ...] = tuple(f.code for f in FEATURES if f.external)
 TRAINING: tuple[str, ...] = named_set("training")
 PROBE: tuple[str, ...] = named_set("probe")
 RECOMMENDED: tuple[str, ...] = (*PROBE, "IN")
-"""What to touch: the paper's six, and IN, far from their plane. Where IN cannot be reached, ZL."""
+"""Recommended touches: the paper's six, and IN, far from their plane; ZL where IN cannot be reached."""
 
 _INDEX = {code: i for i, code in enumerate(CODES)}
 

@@ -28,7 +28,7 @@ _TEXTS = {"how": "how", "observer": "by", "time": "time", "note": "note", "check
 _BLOCK = re.compile(r"\s*\[((?:certainty|observer|round|time|checked by|note): .*)\]\s*$", re.DOTALL)
 _ENTRY = re.compile(r"(certainty|observer|round|time|checked by|note): (.*)", re.DOTALL)
 _UNNAMED = "unnamed"
-"""Stands in a description for a person who gave no name."""
+"""Used in a description for a person who gave no name."""
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ def described(text: str, provenance: LabelProvenance | None, observer: str = "",
         "round": str(round_) if round_ > 1 else "",
         "time": known.time,
         "checked by": (known.checked_by or _UNNAMED) if known.checked else "",
-        "note": known.note,  # the last one, for it may hold anything
+        "note": known.note,  # the last one, since it may contain anything
     }
     told = "; ".join(f"{key}: {_plain(key, value)}" for key, value in words.items() if value)
     return f"{text} [{told}]" if told else text

@@ -78,14 +78,14 @@ def cochlea_jacobian(ca: FloatArray, cb: FloatArray, rwa: FloatArray, rwp: Float
     squared = float(spiral @ spiral)
     length = math.sqrt(squared)
     x = spiral / length
-    share = float(spiral @ middle) / squared  # of the way from CB to CA at which CO lies
+    share = float(spiral @ middle) / squared  # fraction of the way from CB to CA at which CO lies
     to_window = middle - share * spiral
     along, cross_x = x[:, None] * x, cross_matrix(x)
     across = np.eye(3) - along
     origin_of_ca = x[:, None] * (to_window / length) + share * across
     rotation_of_ca = cross_x / length
     tilt = x[:, None] * (cross_x @ (to_window / float(to_window @ to_window)))
-    jacobian = np.empty((2, 3, 4, 3))  # of what, its coordinate, by which point, its coordinate
+    jacobian = np.empty((2, 3, 4, 3))  # quantity, its coordinate, point, its coordinate
     jacobian[0, :, 0] = origin_of_ca
     jacobian[0, :, 1] = across - origin_of_ca
     jacobian[0, :, 2] = jacobian[0, :, 3] = along / 2

@@ -120,7 +120,7 @@ def _with_hypotheses(
     """Return JRMPC's pose with what the robust method finds of side and names, which JRMPC cannot judge."""
     try:
         named = estimate_robust(touches, atlas or _atlas_of_names(specimens))
-    except GpError:  # they stay unchecked, so nothing of this pose is for a robot
+    except GpError:  # they stay unchecked, so this pose is not for a robot
         return pose
     return replace(
         pose,

@@ -113,7 +113,7 @@ def _regions(
 
 
 def _with_touch(atlas: Atlas, model: TouchModel, fit: NamedFit, code: str) -> tuple[TouchModel, NamedFit]:
-    """Return model and fit as if an ordinary touch of the feature had met its mean."""
+    """Return model and fit with an additional ordinary touch of the feature, at its mean position."""
     point, variance = atlas.rows((code,)), atlas.variances((code,))
     noise = fit.noise**2
     return (

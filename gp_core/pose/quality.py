@@ -11,7 +11,7 @@ from gp_core.pose.cochlea_pose import CochleaPose
 __all__ = ["PoseQuality", "pose_quality"]
 
 _GOOD_MM, _GOOD_DEG = 0.75, 14.0
-"""What six careful touches of an ordinary animal give, with some room."""
+"""What six careful touches of an ordinary animal achieve, with some margin."""
 
 _POOR_MM, _POOR_DEG = 1.5, 25.0
 """Beyond this, an opening drilled for the round window may well miss it."""

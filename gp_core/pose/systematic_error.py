@@ -44,10 +44,10 @@ _CHANCE = 3.0
 OUTLIER_SQUARED_SHARED = 5.0
 
 _DRIFT_SQUARED = 11.344866730144373
-"""Chi-square of 3 degrees that 1 of 100 ordinary sessions is above."""
+"""Chi-squared with 3 degrees of freedom that 1 of 100 ordinary sessions exceeds."""
 
 _ENOUGH_FOR_DRIFT = 5
-"""Touches from which a drift can be told from an unusual animal."""
+"""Number of touches from which on a drift can be distinguished from an unusual animal."""
 
 _FLOOR_MM = {3: 0.2, 4: 0.15}
 """Smallest noise assumed, mm a coordinate: so few touches leave too few residuals to estimate it."""
@@ -152,7 +152,7 @@ class SystematicError:
         if ramp is None or len(fit.weights) < _ENOUGH_FOR_DRIFT:
             return None
         moved = (ramp[:, None, None] * np.eye(3)).reshape(-1, 3)
-        columns = _pose_taken_out(fit, moved)
+        columns = _without_pose(fit, moved)
         weighted = fit.precision[:, None] * columns
         information, score = weighted.T @ columns, weighted.T @ fit.residual
         step = np.linalg.lstsq(information, score, rcond=1e-6)[0]
@@ -172,7 +172,7 @@ class SystematicError:
                 moved.append(-of_touches @ touched[-1])
                 prior.append(self.shared_error**2 / 3)
         columns, effect = np.array(touched).T, np.array(moved).T
-        columns = _pose_taken_out(fit, columns)
+        columns = _without_pose(fit, columns)
         spread = np.linalg.inv((fit.precision[:, None] * columns).T @ columns + np.diag(1 / np.array(prior)))
         mean = spread @ (columns.T @ (fit.precision * fit.residual))
         shown = np.zeros((6, 6))
@@ -193,8 +193,8 @@ class SystematicError:
         return None if length == 0 else (times - times.mean()) / length
 
 
-def _pose_taken_out(fit: NamedFit, columns: FloatArray) -> FloatArray:
-    """Return how touches (3 n, m) move beyond what a change of the pose makes good."""
+def _without_pose(fit: NamedFit, columns: FloatArray) -> FloatArray:
+    """Return displacements (3 n, m) of the touches with the effect of a pose change projected out."""
     weighted = fit.precision[:, None] * fit.jacobian
     solved = np.linalg.solve(weighted.T @ fit.jacobian, weighted.T @ columns)
     left: FloatArray = columns - fit.jacobian @ solved

@@ -39,7 +39,7 @@ def towards_touched_window(pose: CochleaPose, touches: LandmarkSet) -> CochleaPo
     """
     doubtful = {*pose.suspects, *(pose.swapped or ())}
     if pose.swapped is not None and set(pose.swapped) == set(_EDGES):
-        doubtful = set(pose.suspects)  # with each other: their middle is the same
+        doubtful = set(pose.suspects)  # exchanged with each other: their middle is the same
     if not all(code in touches and code not in doubtful for code in _EDGES):
         return pose
     to_window = touches.array(_EDGES).mean(axis=0) - pose.origin

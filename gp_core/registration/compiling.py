@@ -83,7 +83,7 @@ def compiled_together(
 
 
 def _njit(signature: str | None, **options: Any) -> Any:
-    make: Any = njit  # its stubs tell signatures from functions, but not here
+    make: Any = njit  # its stubs cannot infer the type here
     return make(signature, nogil=True, error_model="numpy", **options)
 
 

@@ -149,10 +149,10 @@ class Surface:
         best: FloatArray,
         found: FloatArray,
     ) -> None:
-        """Take the candidates that are nearer than the best squared distance so far."""
+        """Keep the candidates that are nearer than the best squared distance so far."""
         candidates = _nearest_in_triangles(points[rows], self._corners[triangles])
         squared = np.sum((candidates - points[rows]) ** 2, axis=1)
-        order = np.argsort(-squared, kind="stable")  # of several writes to a row the last, the nearest, stays
+        order = np.argsort(-squared, kind="stable")  # the nearest is written last, and stays
         rows, candidates, squared = rows[order], candidates[order], squared[order]
         better = squared < best[rows]
         best[rows[better]] = squared[better]

@@ -27,10 +27,10 @@ _FEWEST_POINTS = 3
 _SIZES = (1e-30, 1e30)
 _LEAST_GAMMA = 1e-12
 _STATIONARY = 1e-13
-"""Largest relative change of an iteration after which the rest would move nothing beyond 1e-9."""
+"""Relative change of an iteration below which the remaining ones would change nothing beyond 1e-9."""
 _CONVERGED = 1e-6
 _TABLE = 32768
-"""Responsibilities kept at a time and thread: a quarter of a megabyte, so that they stay in the cache."""
+"""Responsibilities per thread held at a time: a quarter of a megabyte, so that they stay in the cache."""
 _WORTH_THREADS = 200_000
 
 
@@ -275,7 +275,7 @@ def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettin
 
 @dataclass(frozen=True)
 class _Problem:
-    """B problems as the kernels want them: coordinates in rows, each set about its own centroid.
+    """B problems as the kernels need them: coordinates in rows, each set about its own centroid.
 
     `poses` (B, M, 7) and `centres` (B, 5, K) change as the kernels run. All arrays are C-contiguous: any
     other layout would make numba compile the kernels once more.

@@ -31,9 +31,9 @@ IndexArray = NDArray[np.uint64]
 _SUMS = {"contract", "reassoc", "nsz"}
 _EXACT = {"contract"}
 
-_NOTHING = 1e-290  # a weight that no point gives
+_NOTHING = 1e-290  # smaller than any weight of a point
 _LEAST_SPREAD = (
-    1e-10  # of a centre, as a part of the size: keeps one that fell onto a point finite at epsilon 0
+    1e-10  # of a centre, relative to the size: keeps one that collapsed onto a point finite at epsilon 0
 )
 
 _LOG2_E = 1.4426950408889634
@@ -327,8 +327,8 @@ def _write_rotation(turn: Quaternion, out: FloatArray) -> None:
 def _add_set(moments: FloatArray, j: int, motion: FloatArray, centres: FloatArray, sums: FloatArray) -> None:
     """Add what one set gives to each centre: weight, displacement from the old centre (three), its square.
 
-    All is reckoned from the old centre, so that nothing cancels: c is how far the motion carries the centre,
-    and R D + a c is the sum of what the points lie off it afterwards.
+    Everything is relative to the old centre, against cancellation: c is the displacement of the centre by the
+    motion, and R D + a c the sum of the displacements of the moved points from it.
     """
     m00, m01, m02, m03 = motion[0, 0], motion[0, 1], motion[0, 2], motion[0, 3]
     m10, m11, m12, m13 = motion[1, 0], motion[1, 1], motion[1, 2], motion[1, 3]
@@ -359,7 +359,7 @@ def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: f
     for k in range(centres.shape[1]):
         weight = sums[0, k]
         if weight <= _NOTHING:
-            continue  # no point reaches this centre: it stays as it is
+            continue  # no point has weight here: the centre stays
         x, y, z = sums[1, k] / weight, sums[2, k] / weight, sums[3, k] / weight
         moved = x * x + y * y + z * z
         variance = max((sums[4, k] / weight - moved) / 3.0, 0.0) + epsilon

@@ -266,7 +266,7 @@ def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
         Fewer than three touches, collinear touches, or touches that no pose brings near the atlas.
     """
     if not (certainly_not_collinear(model.mean) and certainly_not_collinear(touches)):
-        weighted_procrustes(model.mean, touches, names=model.codes)  # for its guards
+        weighted_procrustes(model.mean, touches, names=model.codes)  # for its error messages
     solution = _fit_student_t(model, touches, model.noise)
     if not math.isfinite(solution.neg_log_posterior):
         weighted_procrustes(model.mean, touches, names=model.codes)

@@ -31,7 +31,7 @@ __all__ = [
 Codes = tuple[str, ...]
 
 FEWEST = 3
-"""The smallest number of training and of probe features: fewer points have no pose."""
+"""The smallest number of training and of probe features: fewer points determine no pose."""
 
 
 class Problem(Protocol):
@@ -136,7 +136,7 @@ class Ticker:
 
     def __init__(self, tell: Callable[[Progress], None] | None = None) -> None:
         self.fits = 0
-        self.later = 0.0  # work of searches still to follow the present one
+        self.later = 0.0  # work of the searches after the present one
         self._tell = tell
         self._start = time.monotonic()
         self._done = self._fresh = 0.0

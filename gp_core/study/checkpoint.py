@@ -20,7 +20,7 @@ from gp_core.registration.jrmpc import JrmpcSettings
 __all__ = ["Checkpoint", "fingerprint"]
 
 _VERSION = 1
-_DECIMALS = 6  # a nanometre: what rounding leaves of the same points read from another file stays below
+_DECIMALS = 6  # a nanometre: larger than rounding between files with the same points
 _REMEDY = "Name another file, or delete this one to start over."
 
 

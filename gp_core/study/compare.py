@@ -61,7 +61,7 @@ CONDITIONS = (
     *(Condition(noise) for noise in (0.0, 0.1, 0.2, 0.4)),
     *(Condition(0.1, mistouch) for mistouch in (1.5, 3.0)),
 )
-"""A mistouch comes with the noise of a careful hand."""
+"""Noise of a careful hand, in trials with a mistouch."""
 
 
 @dataclass(frozen=True)

@@ -359,7 +359,7 @@ def _repeat(
 def _estimate(
     case: TouchCondition, atlas: Atlas, truth: LandmarkSet, rng: np.random.Generator
 ) -> tuple[dict[str, float], tuple[str, str]]:
-    """Hold a session until it gives a pose: few touches at random may lie too close together for one."""
+    """Simulate sessions until one gives a pose: a few random touches may be too close together."""
     for _ in range(_TRIES):
         codes = case.codes
         if case.n_random:

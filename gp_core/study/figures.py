@@ -39,12 +39,12 @@ __all__ = [
 ]
 
 LEFT, RIGHT = "#2f6f9f", "#e0a458"
-"""Colours of the two sides; told apart in grey print and by colour-blind readers."""
+"""Colours of the two sides; distinguishable in grey print and for colour-blind readers."""
 
 AXIS_ERROR, ORIGIN_ERROR = "Modiolar-axis error (degrees)", "Cochlea-origin error (mm)"
 
 ACCENT = "#b5403a"
-"""Colour of what stands out."""
+"""Accent colour."""
 
 _SIDES = {"L": "left", "R": "right"}
 _WAYS = {"names": ("o", "by names"), "icp": ("s", "by ICP"), "surface": ("^", "to the bone's surface")}

@@ -68,7 +68,7 @@ def run_map(
         raise GpError(
             "a worker process died", remedy="Free some memory, or try again with fewer workers."
         ) from None
-    except CancelledError:  # Dask cancels what it cannot reach any more
+    except CancelledError:  # Dask cancels tasks of workers that it cannot reach
         raise _scheduler_gone() from None
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # of Dask, which is not imported here
@@ -143,7 +143,12 @@ def _cluster(address: str) -> Iterator[Executor]:
             f"no Dask scheduler answers at {address} ({error})",
             remedy="Start one with: dask scheduler, and workers with: dask worker ADDRESS.",
         ) from None
-    for name in ("distributed", "distributed.client", "tornado", "asyncio"):  # what matters is said by us
+    for name in (
+        "distributed",
+        "distributed.client",
+        "tornado",
+        "asyncio",
+    ):  # our error replaces its log
         logging.getLogger(name).setLevel(logging.CRITICAL + 1)
     try:
         with client:

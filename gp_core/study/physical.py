@@ -31,7 +31,7 @@ from gp_core.study.simulation import SimulationReport, simulate
 __all__ = ["PhysicalReport", "PhysicalRow", "physical_simulations", "physical_test"]
 
 _N_DRAWN = 11
-"""As many as the paper labelled."""
+"""Number of animals in the paper."""
 
 
 @dataclass(frozen=True)

@@ -34,7 +34,7 @@ __all__ = [
 
 _FAR_MM = 80.0
 _LEAN_DEG = 25.0
-"""How much a probe is leant from touch to touch, SD about each axis."""
+"""Tilt of the probe from touch to touch, SD about each axis."""
 
 _MARKER_MM = 40.0
 """From the ear to the reference marker on the head."""
@@ -158,7 +158,7 @@ def drift(length: float, *, timed: bool = False) -> Disturbance:
 
 
 def _drift(length: float, timed: bool, session: Session, rng: np.random.Generator) -> Session:
-    share = np.linspace(-1.0, 0.0, len(session.codes))  # told in the frame of the end
+    share = np.linspace(-1.0, 0.0, len(session.codes))  # in the frame at the end of the session
     return replace(session, points=session.points + length * np.outer(share, _direction(rng)), timed=timed)
 
 

@@ -14,10 +14,10 @@ __all__ = ["worker_context"]
 
 
 class _Worker(SpawnProcess):
-    """A process that no Ctrl-C reaches from its start on, and that does not outlive its parent."""
+    """A process that ignores Ctrl-C from its start on, and does not outlive its parent."""
 
     def start(self) -> None:
-        with _interrupts_held():  # what is held here stays held in the process that begins
+        with _interrupts_held():  # signals blocked here stay blocked in the new process
             super().start()
 
     def run(self) -> None:
@@ -43,7 +43,7 @@ def worker_context() -> SpawnContext:
 
 
 def _end_with_parent() -> None:
-    """Wait until the parent is gone, killed or not, then end at once: nobody reads the results any more."""
+    """Wait until the parent has ended, killed or not, then exit at once: nobody needs the results."""
     parent = parent_process()
     if parent is not None:
         parent.join()

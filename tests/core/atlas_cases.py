@@ -21,15 +21,16 @@ def draw_side(atlas: Atlas, rng: np.random.Generator, side: Side = Side.LEFT) ->
 
 
 def draw_specimens(atlas: Atlas, n: int, rng: np.random.Generator) -> list[Specimen]:
-    """Draw animals whose two sides are independent, each in a head pose of its own."""
-    return [
-        Specimen(f"S{i:02}", {side: draw_side(atlas, rng, side).moved(random_pose(rng)) for side in Side})
-        for i in range(n)
-    ]
+    """Draw animals whose two sides are independent, each in a head pose, and so in a frame, of its own."""
+
+    def drawn(side: Side) -> LandmarkSet:
+        return draw_side(atlas, rng, side).moved(random_pose(rng, dst=f"{side.word} head"))
+
+    return [Specimen(f"S{i:02}", {side: drawn(side) for side in Side}) for i in range(n)]
 
 
 def random_pose(rng: np.random.Generator, dst: str = "tracker", src: str = "scan") -> RigidTransform:
-    """A random rigid motion some centimetres away."""
+    """A random rigid transform, some centimetres away."""
     rotation = Rotation.random(random_state=rng).as_matrix()
     return RigidTransform.from_parts(rotation, 50 * rng.normal(size=3), dst=dst, src=src)
 

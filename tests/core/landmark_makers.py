@@ -12,7 +12,7 @@ import pytest
 from gp_core.landmarks.features import CODES
 from gp_core.landmarks.sets import LandmarkSet
 
-SHARED = Path(__file__).resolve().parents[5] / "shared" / "data"
+SHARED = Path(__file__).resolve().parents[3] / "shared" / "data"
 
 needs_shared_data = pytest.mark.skipif(not SHARED.is_dir(), reason=f"the shared data are not at {SHARED}")
 

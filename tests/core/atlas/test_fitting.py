@@ -9,12 +9,16 @@ from atlas_cases import draw_specimens, random_pose
 
 from gp_core import Atlas, LandmarkSet, Side, Specimen, fit_atlas
 from gp_core.errors import FeatureError, FileFormatError, GpError
-from gp_core.frames import mirror_x
+from gp_core.frames import RigidTransform, mirror_x
 
 
 def _moved(specimen: Specimen, rng: np.random.Generator) -> Specimen:
-    T = random_pose(rng, dst="scan", src="tracker")
-    return Specimen(specimen.name, {side: landmarks.moved(T) for side, landmarks in specimen.sides.items()})
+    matrix = random_pose(rng).matrix
+    moved = {
+        side: landmarks.moved(RigidTransform(matrix, landmarks.frame, landmarks.frame))
+        for side, landmarks in specimen.sides.items()
+    }
+    return Specimen(specimen.name, moved)
 
 
 def _mirrored(specimen: Specimen) -> Specimen:

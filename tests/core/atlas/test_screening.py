@@ -121,7 +121,7 @@ def test_a_label_whose_file_says_that_it_was_checked_is_believed_and_still_repor
     )
     screened = screen_labels([far_off, *animals[1:]])
     assert not screened.left_out
-    assert [(f.landmarks, f.checked_by) for f in screened.doubts] == [(("LLI",), "AB")]
+    assert [(f.landmarks, f.checked_by) for f in screened.problems] == [(("LLI",), "AB")]
     assert (screened.weights == 1).all()
     exchanged = _changed(animals[0], lambda m: _swapped("CA", "LLI")(m).with_provenance(checked), L)
     assert screen_labels([exchanged, *animals[1:]]).left_out, "CA was not looked at again"

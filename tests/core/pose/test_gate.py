@@ -166,7 +166,7 @@ def test_the_shell_says_what_the_regions_allow_for(
 def test_a_file_named_for_the_other_side_is_held_back_until_the_user_says_so(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """The touches themselves fit the side that is given beyond doubt."""
+    """The touches themselves fit the side that is given clearly."""
     file, tfm = Path(_file(tmp_path, ANIMAL)), tmp_path / "p.tfm"
     other = file.rename(tmp_path / "GP7_Right.csv")
     words = ["estimate", str(other), "--side", "L", "--tfm", str(tfm)]
@@ -180,14 +180,14 @@ def test_a_file_named_for_the_other_side_is_held_back_until_the_user_says_so(
 def test_the_papers_method_passes_the_same_gate() -> None:
     """JRMPC cannot judge side and names: the robust method's readings of the same touches do."""
     rng = np.random.default_rng(5)
-    herd = [draw_animal(ATLAS, rng=rng, name=f"{i}") for i in range(4)]
+    cohort = [draw_animal(ATLAS, rng=rng, name=f"{i}") for i in range(4)]
     for touches, side, state in (
         (ANIMAL, "L", "side clear, names clear"),
         (ANIMAL, "R", "side wrong, names clear"),
         (EXCHANGED, "L", "side clear, names wrong"),
     ):
-        pose = estimate_pose(touches, side, method="jrmpc", specimens=herd)
+        pose = estimate_pose(touches, side, method="jrmpc", specimens=cohort)
         assert pose.state == state
         assert bool(reasons_against_writing(pose)) == (state != "side clear, names clear")
-    two = estimate_pose(ANIMAL, "L", method="jrmpc", specimens=herd[:2])
+    two = estimate_pose(ANIMAL, "L", method="jrmpc", specimens=cohort[:2])
     assert two.state == "side clear, names clear"
