@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +46,10 @@ __all__ = [
 
 
 class Edit(Protocol):
-    """One thing that a user does, and can undo."""
+    """One thing that a user does, and can undo: also a line of the journal, and a step of a script."""
+
+    do: ClassVar[str]
+    """Its name there; see `edit_tables`."""
 
     @property
     def text(self) -> str:
@@ -113,6 +116,7 @@ class _OnPoint:
 class PlacePoint(_OnPoint):
     """Put a point at `position` (scan frame, mm), or move it there; on IN, for both sides."""
 
+    do: ClassVar[str] = "place_point"
     position: Position
     provenance: Provenance
     verb: str = "place"
@@ -145,6 +149,7 @@ class SuggestPoints:
         Who took them over, and when.
     """
 
+    do: ClassVar[str] = "suggest_points"
     side: Side
     suggestions: Mapping[str, Suggestion]
     provenance: Provenance
@@ -174,6 +179,7 @@ class SuggestPoints:
 class ConfirmPoint(_OnPoint):
     """Make an observation of a suggestion: a person has looked at the point and finds it right."""
 
+    do: ClassVar[str] = "confirm_point"
     provenance: Provenance
 
     @property
@@ -198,6 +204,8 @@ class ConfirmPoint(_OnPoint):
 class ClearPoint(_OnPoint):
     """Make a point one that is still to do."""
 
+    do: ClassVar[str] = "clear_point"
+
     @property
     def text(self) -> str:
         """Such as ``clear FPP left``."""
@@ -212,6 +220,7 @@ class ClearPoint(_OnPoint):
 class MarkUnseen(_OnPoint):
     """Say that a feature was looked for and cannot be seen."""
 
+    do: ClassVar[str] = "mark_unseen"
     provenance: Provenance | None = None
 
     @property
@@ -228,6 +237,7 @@ class MarkUnseen(_OnPoint):
 class CheckPoint(_OnPoint):
     """Say that a placed point was looked at again and is right, and who says so (or take that back)."""
 
+    do: ClassVar[str] = "check_point"
     checked: bool = True
     by: str = ""
 
@@ -260,6 +270,7 @@ class LockPoints:
         Lock or unlock.
     """
 
+    do: ClassVar[str] = "lock_points"
     points: tuple[tuple[Side, str], ...]
     locked: bool = True
 
@@ -289,6 +300,7 @@ class SwapPoints:
     A suggestion was made for its own feature, so it is dropped, not exchanged.
     """
 
+    do: ClassVar[str] = "swap_points"
     side: Side
     code: str
     other: str
@@ -318,6 +330,8 @@ class SwapPoints:
 @dataclass(frozen=True)
 class SwapSides:
     """Exchange everything of the left and the right side; IN stays."""
+
+    do: ClassVar[str] = "swap_sides"
 
     @property
     def text(self) -> str:

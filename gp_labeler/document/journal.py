@@ -1,9 +1,10 @@
 """The journal: what makes every confirmed edit outlive the program.
 
 A journal is a file of JSON lines, each ``{"record": ..., "crc32": ...}``. The first record holds the whole
-document as it was last saved; each further one what an edit changed in it (not the command: so replay depends
-on nothing but the format). A record is on the disk before the edit shows. An edit whose line was not finished
-was never confirmed. Damaged lines are left out, with what no longer fits without them, and counted.
+document as it was last saved; each further one what an edit changed in it (recovery needs nothing else, so
+it depends on nothing but the format), and the edit itself, as a script has it (`edit_tables`). A record is on
+the disk before the edit shows. An edit whose line was not finished was never confirmed. Damaged lines are
+left out, with what no longer fits without them, and counted.
 """
 
 from __future__ import annotations
@@ -45,6 +46,7 @@ class Entry:
     text: str
     time: str
     document: Document
+    edit: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -145,8 +147,25 @@ class Journal:
             document=content.document,
         )
 
-    def append(self, kind: str, text: str, document: Document, *, time: str = "") -> None:
+    def append(
+        self,
+        kind: str,
+        text: str,
+        document: Document,
+        *,
+        time: str = "",
+        edit: Mapping[str, Any] | None = None,
+    ) -> None:
         """Write what leads from the last document to this one, and wait until the disk has it.
+
+        Parameters
+        ----------
+        kind, text, time : str
+            See `Entry`.
+        document : Document
+            The document after the edit.
+        edit : mapping, optional
+            The edit as a table; none for undo, redo and another scan.
 
         Raises
         ------
@@ -154,7 +173,8 @@ class Journal:
             The disk is full or gone; the journal is as it was.
         """
         changes = difference(self._document, document)
-        line = _line({"kind": kind, "n": self._n_records, "text": text, "time": time, "changes": changes})
+        record = {"kind": kind, "n": self._n_records, "text": text, "time": time, "changes": changes}
+        line = _line(record if edit is None else record | {"edit": edit})
         try:
             self._write(line)
         except OSError as error:
@@ -278,7 +298,7 @@ def _entries(document: Document, records: list[dict[str, Any]]) -> tuple[list[En
             if n != expected or n_lost:
                 state_of(changed)  # what it builds on is lost: it may not fit
                 kind = "edit" if n != expected and kind != "change" else kind  # nor what it undoes be there
-            entries.append(Entry(kind, record["text"], record["time"], changed))
+            entries.append(Entry(kind, record["text"], record["time"], changed, record.get("edit")))
         except (GpError, KeyError, TypeError, ValueError, IndexError, AttributeError):
             n_lost += 1
             continue

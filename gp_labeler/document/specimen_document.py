@@ -248,7 +248,7 @@ class SpecimenDocument:
         if new == old:
             return False
         text = edit.text
-        self._store.record("merge" if merge else "edit", text, new, time=self.now())
+        self._store.record("merge" if merge else "edit", text, new, time=self.now(), edit=edit)
         self._history.push(text, new, focus=self.focus, merge=merge)
         self._announce(old)
         self.edited.emit(edit, merge)

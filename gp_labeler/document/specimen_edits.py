@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from gp_labeler.document.state import PoseCheck, SpecimenState
 
@@ -13,6 +14,7 @@ __all__ = ["RecordPoseCheck", "RenameSpecimen", "SetNotes", "SetThreshold"]
 class SetThreshold:
     """Set the bone threshold, in grey values of the scan."""
 
+    do: ClassVar[str] = "set_threshold"
     threshold: float
 
     @property
@@ -29,6 +31,7 @@ class SetThreshold:
 class SetNotes:
     """Replace the notes on the specimen."""
 
+    do: ClassVar[str] = "set_notes"
     notes: str
 
     @property
@@ -45,6 +48,7 @@ class SetNotes:
 class RenameSpecimen:
     """Give the specimen another name."""
 
+    do: ClassVar[str] = "rename_specimen"
     name: str
 
     @property
@@ -61,6 +65,7 @@ class RenameSpecimen:
 class RecordPoseCheck:
     """Keep a person's verdict on an estimated pose."""
 
+    do: ClassVar[str] = "record_pose_check"
     check: PoseCheck
 
     @property

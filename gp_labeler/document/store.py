@@ -9,6 +9,8 @@ from uuid import uuid4
 
 from gp_core.disk import read_bytes, write_bytes
 from gp_core.errors import GpError
+from gp_labeler.document.edit_tables import edit_table
+from gp_labeler.document.edits import Edit
 from gp_labeler.document.journal import Journal, read_journal
 from gp_labeler.document.lock import FileLock, InUseError
 from gp_labeler.document.paths import (
@@ -86,8 +88,10 @@ class SpecimenStore:
             raise
         return store
 
-    def record(self, kind: str, text: str, state: SpecimenState, *, time: str) -> None:
-        """Write an edit down; only then may it show.
+    def record(
+        self, kind: str, text: str, state: SpecimenState, *, time: str, edit: Edit | None = None
+    ) -> None:
+        """Write an edit down; only then may it show. The arguments are those of `Journal.append`.
 
         Raises
         ------
@@ -95,7 +99,8 @@ class SpecimenStore:
             The disk does not take it.
         """
         if self._journal is not None:
-            self._journal.append(kind, text, document_of(state), time=time)
+            table = None if edit is None else edit_table(edit)
+            self._journal.append(kind, text, document_of(state), time=time, edit=table)
 
     def save(
         self, state: SpecimenState, path: str | PathLike[str] | None = None, *, overwrite: bool = False

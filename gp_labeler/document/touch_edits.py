@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -27,6 +28,7 @@ __all__ = [
 class RecordTouch:
     """Record one touch, in place of an earlier one of the same name."""
 
+    do: ClassVar[str] = "record_touch"
     side: Side
     name: str
     touch: Touch
@@ -55,6 +57,7 @@ class RecordTouch:
 class TakeTouches:
     """Take these touches of one side in place of all it had."""
 
+    do: ClassVar[str] = "take_touches"
     side: Side
     touches: Mapping[str, Touch]
 
@@ -74,6 +77,7 @@ class TakeTouches:
 class RemoveTouches:
     """Forget one touch of a side, or all of them."""
 
+    do: ClassVar[str] = "remove_touches"
     side: Side
     name: str | None = None
 
@@ -98,6 +102,7 @@ class RemoveTouches:
 class LeaveOutTouch:
     """Let the estimate do without a touch, or take it in again."""
 
+    do: ClassVar[str] = "leave_out_touch"
     side: Side
     name: str
     left_out: bool = True
@@ -124,6 +129,7 @@ class LeaveOutTouch:
 class SwapTouches:
     """Give each of two touches of a side the other's name."""
 
+    do: ClassVar[str] = "swap_touches"
     side: Side
     name: str
     other: str
@@ -151,6 +157,7 @@ class SwapTouches:
 class MoveTouches:
     """Say that all touches of a side are those of the other one."""
 
+    do: ClassVar[str] = "move_touches"
     side: Side
 
     @property
@@ -170,6 +177,7 @@ class MoveTouches:
 class SetSkull:
     """Say where the skull's registration features are on the scan, in place of all that was said."""
 
+    do: ClassVar[str] = "set_skull"
     skull: Mapping[str, Position]
 
     @property

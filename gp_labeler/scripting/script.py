@@ -16,6 +16,7 @@ from gp_core.disk import read_bytes
 from gp_core.errors import GpError
 from gp_labeler.scripting.step import Step, make_step
 from gp_labeler.scripting.steps import STEPS
+from gp_labeler.scripting.steps.edits import EDIT_STEPS
 
 __all__ = ["Script", "StepError", "make_script", "read_script"]
 
@@ -127,7 +128,7 @@ def make_script(
     steps = []
     for number, table in enumerate(tables, start=1):
         try:
-            steps.append(make_step(STEPS, table))
+            steps.append(make_step({**STEPS, **EDIT_STEPS}, table))
         except GpError as error:
             raise StepError(number, error.problem, file=file, remedy=error.remedy) from None
     return Script(name, tuple(steps), folder or Path.cwd(), tuple(tables), tuple(specimens), file)

@@ -35,6 +35,11 @@ class Step:
     says: ClassVar[tuple[str, ...]] = ()
     """Fields that its title names."""
 
+    @classmethod
+    def of(cls, given: Mapping[str, Any]) -> Step:
+        """Return the step of these keys; raises `GpError` for a key or a value that it does not take."""
+        return _filled(cls, given)
+
     def run(self, driver: WindowDriver) -> str | None:
         """Do it, and return what is worth telling.
 
@@ -80,7 +85,7 @@ def make_step(kinds: Mapping[str, type[Step]], table: Any) -> Step:
         raise GpError(
             f"unknown step {does!r:.40}{_nearest(does, kinds)}", remedy=f"There are {', '.join(kinds)}."
         )
-    return _filled(kinds[does], {key: value for key, value in table.items() if key != "do"})
+    return kinds[does].of({key: value for key, value in table.items() if key != "do"})
 
 
 def _filled(kind: type[S], given: Mapping[str, Any]) -> S:

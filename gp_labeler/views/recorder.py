@@ -12,8 +12,10 @@ from qtpy.QtCore import QObject
 
 from gp_core.disk import write_text
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
+from gp_labeler.document.edit_tables import Table, script_table
 from gp_labeler.document.edits import Edit
 from gp_labeler.document.history import History
+from gp_labeler.document.import_edit import ImportLandmarks
 from gp_labeler.document.landmark_export import FORMATS, ExportReport
 from gp_labeler.document.opening import tidy_name
 from gp_labeler.document.specimen_edits import RecordPoseCheck
@@ -29,7 +31,6 @@ from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.models.view import ViewState
 from gp_labeler.scene.pose_data import PARTS
 from gp_labeler.views.bind import follow
-from gp_labeler.views.recorded_edits import Table, step, steps_of
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -161,17 +162,33 @@ class Recorder(QObject):
         now, before = self._window.workspace.document.state, self._replayed.state
         if _untimed(now) == _untimed(before):
             return
-        tables = steps_of(edit, before, merge=merge)
-        if tables is None:
+        tables = self._steps_of(edit)
+        if not tables:
             self._begin()
             return
+        continues = merge and self._is_last(edit)
         self._replayed.push(edit.text, now, merge=merge)
-        if isinstance(edit, RecordPoseCheck):
-            self.tables += self._estimated([])
-        if merge and self.tables and _is_continued(self.tables[-1], tables[0]):
-            self.tables[-1] |= {key: value for key, value in tables[0].items() if key in ("at", "notes")}
+        if continues:  # one gesture, which ends here
+            self.tables[-1] |= tables[-1]
         else:
-            self.tables += tables
+            self.tables += [table | {"merge": True} for table in tables] if merge else tables
+
+    def _steps_of(self, edit: Edit) -> list[Table]:
+        """Return an edit as steps: as itself, or as what reads its files or judges the estimate again."""
+        if isinstance(edit, ImportLandmarks) and edit.asked is not None:
+            asked = {key: value for key, value in edit.asked.items() if key != "names" or value}
+            return [step("import", **asked, keep=not edit.replace_placed)]
+        if isinstance(edit, RecordPoseCheck):
+            check = edit.check
+            said = {"verdict": check.verdict, "by": check.by, "note": check.note or None}
+            return [*self._estimated([]), step("verdict", side=check.side.value, **said)]
+        table = script_table(edit)
+        return [] if table is None else [table]
+
+    def _is_last(self, edit: Edit) -> bool:
+        """Whether the last step is an edit of the same text, which this one may continue."""
+        last = self._replayed.to_undo
+        return last is not None and last.text == edit.text and self.tables[-1]["do"] == edit.do
 
     def _estimated(self, files: list[str]) -> list[Table]:
         """Return the steps that lead to the estimate as it is set up here, and write it into files."""
@@ -312,6 +329,12 @@ class Recorder(QObject):
             self.tables.append(step("mesh", save=Path(task.job.path).name))
 
 
+def step(do: str, **keys: Any) -> Table:
+    """Return a step without the keys that say nothing."""
+    said = {key: value for key, value in keys.items() if value is not None and value is not False}
+    return {"do": do, **said}
+
+
 def script_text(tables: list[Table]) -> str:
     """Return steps as TOML."""
     steps = ["\n".join(["[[step]]", *(f"{key} = {_toml(each)}" for key, each in t.items())]) for t in tables]
@@ -331,14 +354,6 @@ def _scan(volume: Volume) -> Table:
     if volume.path is None and volume.name.startswith(_PHANTOM):
         return {"phantom": int(volume.name.removeprefix(_PHANTOM)), "spacing": volume.spacing[0]}
     return {"path": volume.name if volume.path is None else str(volume.path), **volume.choices}
-
-
-def _is_continued(last: Table, new: Table) -> bool:
-    """Return whether a step continues the gesture of the last one."""
-    names = ("do", "feature", "side", "how")
-    if [last.get(name) for name in names] != [new.get(name) for name in names]:
-        return False
-    return bool(last.get("nudge")) if new["do"] == "put" else "notes" in last
 
 
 def _untimed(state: SpecimenState) -> Any:

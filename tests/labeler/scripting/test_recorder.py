@@ -17,7 +17,7 @@ from window_cases import BALL_MM, MIDDLE, settle
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import ACTIONS
-from gp_labeler.document import edits, landmark_import, specimen_edits, touch_edits, touching
+from gp_labeler.document import touching
 from gp_labeler.document.edits import SwapPoints
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.landmark_import import import_landmarks
@@ -29,7 +29,7 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.runner import run_script
 from gp_labeler.scripting.script import make_script, read_script
 from gp_labeler.scripting.steps import STEPS
-from gp_labeler.views.recorded_edits import RECORDED
+from gp_labeler.scripting.steps.edits import EDIT_STEPS
 from gp_labeler.views.recorder import Recorder, script_text
 
 SAVED = "ball.gpspecimen.json"
@@ -50,19 +50,25 @@ ACTION_STEPS = {
     "file.save_mesh": "mesh",
     "file.screenshot": "screenshot",
     "edit.undo": "undo",
-    **dict.fromkeys(("edit.redo", "edit.swap", "edit.swap_sides"), "action"),
+    "edit.redo": "action",
+    "edit.swap": "swap_points",
+    "edit.swap_sides": "swap_sides",
     **{id: "view" for id in ACTIONS if id.startswith("view.")},
     **{id: "action" for id in ACTIONS if id.startswith(("view.from_", "view.cut_", "tool."))},
     **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection", "view.slices_visible"), "action"),
-    "point.place": "put",
-    **dict.fromkeys(("point.accept_ghost", "point.accept_all"), "suggest"),
-    "point.confirm": "confirm",
-    **{f"point.{verb}": "action" for verb in ("unseen", "clear", "check", "lock", "lock_all")},
-    **dict.fromkeys(("pose.open_touches", "pose.clear"), "touches"),
-    "pose.open_skull": "skull",
+    "point.place": "place_point",
+    **dict.fromkeys(("point.accept_ghost", "point.accept_all"), "suggest_points"),
+    "point.confirm": "confirm_point",
+    "point.unseen": "mark_unseen",
+    "point.clear": "clear_point",
+    "point.check": "check_point",
+    **dict.fromkeys(("point.lock", "point.lock_all"), "lock_points"),
+    "pose.open_touches": "take_touches",
+    "pose.clear": "remove_touches",
+    "pose.open_skull": "set_skull",
     **dict.fromkeys(("pose.touch", "pose.along_axis", "pose.through_window"), "action"),
     "pose.overlay": "overlay",
-    "pose.record": "touches",
+    "pose.record": "record_touch",
     "pose.export": "estimate",
     "pose.report": "report",
     **dict.fromkeys(("pose.path", "pose.save_path"), "path"),
@@ -93,18 +99,7 @@ NOT_WRITTEN = {
 def test_every_command_is_written_or_need_not_be() -> None:
     for id in ACTIONS:  # those of panels that come later may be said here already
         assert (id in ACTION_STEPS) != (id in NOT_WRITTEN), f"say how {id} is recorded, or why it is not"
-    assert set(ACTION_STEPS.values()) <= STEPS.keys()
-
-
-def test_every_edit_of_a_session_is_written() -> None:
-    kinds = {
-        kind
-        for module in (edits, specimen_edits, touch_edits, landmark_import)
-        for kind in vars(module).values()
-        if isinstance(kind, type) and kind.__module__ == module.__name__ and hasattr(kind, "apply")
-    }
-    kinds = {kind for kind in kinds if not kind.__name__.startswith("_") and kind is not edits.Edit}
-    assert kinds == RECORDED.keys()
+    assert set(ACTION_STEPS.values()) <= STEPS.keys() | EDIT_STEPS.keys()
 
 
 class Recording:
@@ -206,31 +201,32 @@ def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
     place_three(recording)
     workspace, run = recording.workspace, recording.run
     workspace.labels.go_to(Side.LEFT, "CB")
-    assert run("point.unseen") == ["choose", "action"]
+    assert run("point.unseen") == ["mark_unseen"]
     workspace.labels.go_to(Side.LEFT, "CA")
-    assert run("point.check") == ["choose", "action"]
-    assert run("point.lock") == ["choose", "action"]
+    assert run("point.check") == ["check_point"]
+    assert run("point.lock") == ["lock_points"]
     workspace.labels.go_to(Side.RIGHT, "OS")
     assert run("point.place") == []  # it is placed already
     assert run("point.replace") == []
-    assert run("point.place") == ["put"]  # where the crosshair is
+    assert run("point.place") == ["place_point"]  # where the crosshair is
     assert run("edit.undo") == ["undo"]
     assert run("edit.redo") == ["action"]
-    assert run("edit.swap", "CB") == ["choose", "action"]
+    assert run("edit.swap", "CB") == ["swap_points"]
     workspace.labels.go_to(Side.LEFT, "CA")
-    assert run("point.lock") == ["choose", "action"]
-    assert run("edit.swap_sides") == ["action"]
-    assert run("point.lock_all") == ["action"]
+    assert run("point.lock") == ["lock_points"]
+    assert run("edit.swap_sides") == ["swap_sides"]
+    assert run("point.lock_all") == ["lock_points"]
     assert run("edit.undo") == ["undo"]
     workspace.labels.go_to(Side.RIGHT, "RWP")
-    assert run("point.clear") == ["choose", "action"]
+    assert run("point.clear") == ["clear_point"]
     workspace.scan.set_threshold(1003.25)
     settle(recording.qtbot, recording.window)
     recording.document.do(SetNotes("one"), merge=False)
     recording.document.do(SetNotes('one "two"\nthrée'), merge=True)
     steps = recording.check()
-    assert [do for do in steps if do in ("put", "threshold", "specimen", "save")] == [
-        *("put", "put", "put", "put", "put", "threshold", "specimen", "save")
+    assert [do for do in steps if do in ("place_point", "set_threshold", "set_notes", "save")] == [
+        *("place_point",) * 5,
+        *("set_threshold", "set_notes", "save"),
     ]  # the three nudges are one step
 
 
@@ -255,16 +251,16 @@ def test_suggestions_and_confirmations_are_done_again(recording) -> None:
     for code, at in (("CA", (2, 0, 0)), ("RWP", (-2, 1, 0)), ("OS", (0, -2, 1))):
         recording.labels.place(MIDDLE + at, How.SLICE, side="L", code=code)
     recording.workspace.labels.go_to(Side.LEFT, "CB")
-    assert recording.run("point.accept_ghost") == ["suggest"]
-    assert recording.recorder.tables[-1]["source"] == "atlas"
-    assert recording.run("point.accept_all") == ["suggest"]
+    assert recording.run("point.accept_ghost") == ["suggest_points"]
+    assert recording.recorder.tables[-1]["suggestions"]["CB"]["source"] == "atlas"
+    assert recording.run("point.accept_all") == ["suggest_points"]
     assert recording.run("edit.undo") == ["undo"]
     assert recording.run("edit.redo") == ["action"]
     for code in ("CB", "RWA"):
         recording.workspace.labels.go_to(Side.LEFT, code)
         assert recording.run("point.confirm") == []  # not drawn yet: it is shown first
-        assert recording.run("point.confirm") == ["confirm"]
-    assert [table["feature"] for table in recording.recorder.tables if table["do"] == "confirm"] == [
+        assert recording.run("point.confirm") == ["confirm_point"]
+    assert [table["code"] for table in recording.recorder.tables if table["do"] == "confirm_point"] == [
         "CB",
         "RWA",
     ]
@@ -323,7 +319,7 @@ def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
     assert run("pose.export")[-1] == "estimate"
     recording.window.ui.prompts.files = [recording.folder / "first" / "page.html"]
     assert run("pose.report")[-1] == "report"
-    assert run("pose.clear") == ["touches"]
+    assert run("pose.clear") == ["remove_touches"]
     assert run("edit.undo") == ["undo"]
     recording.check(*FILES, "pose.json")
     assert (recording.folder / "again" / "page.html").exists()

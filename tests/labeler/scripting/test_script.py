@@ -9,9 +9,11 @@ from pathlib import Path
 import pytest
 
 from gp_core.errors import GpError
+from gp_labeler.document.edit_tables import EDITS
 from gp_labeler.scripting.demo import demo_script
 from gp_labeler.scripting.script import StepError, make_script, read_script
 from gp_labeler.scripting.steps import STEPS
+from gp_labeler.scripting.steps.edits import EDIT_STEPS
 from gp_labeler.scripting.steps.placing import Place
 from gp_labeler.scripting.steps.scan import Open
 
@@ -57,7 +59,7 @@ def test_the_name_of_a_specimen_goes_into_its_places() -> None:
 @pytest.mark.parametrize(
     ("table", "text"),
     [
-        ({"do": "plaice", "feature": "CA"}, r"step 2: unknown step 'plaice' \(did you mean place\?\)"),
+        ({"do": "plaice", "feature": "CA"}, r"step 2: unknown step 'plaice' \(did you mean place\b"),
         ({"feature": "CA"}, "step 2: does not say what to do"),
         ("save", "step 2: must be a table"),
         ({"do": "place", "side": "L"}, "step 2: place: feature is missing"),
@@ -126,8 +128,8 @@ def test_the_demo_labels_everything_and_uses_every_kind_of_file() -> None:
 def test_the_manual_has_every_step_and_key() -> None:
     lines = (Path(__file__).resolve().parents[3] / "docs" / "offscreen.md").read_text().splitlines()
     rows = {line.split("`")[1]: line.split(" | ")[1] for line in lines if line.startswith("| `")}
-    assert rows.keys() == STEPS.keys()
-    for do, kind in STEPS.items():
+    assert rows.keys() == STEPS.keys() | EDIT_STEPS.keys()
+    for do, kind in {**STEPS, **EDITS}.items():
         assert [field.name for field in fields(kind) if f"`{field.name}`" not in rows[do]] == [], do
 
 

@@ -1,0 +1,101 @@
+"""The edit that takes over the landmarks of files; see `edits` for what an edit is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.document.edits import as_position, require_free
+from gp_labeler.document.state import TO_DO, Landmark, PointKey, Provenance, SpecimenState, point_key
+
+__all__ = ["ImportLandmarks"]
+
+
+@dataclass(frozen=True)
+class ImportLandmarks:
+    """Take over the landmarks of a file.
+
+    Parameters
+    ----------
+    landmarks : tuple of LandmarkSet
+        One or both sides, scan frame. A computed CO in them is not taken: it is computed anew.
+    provenance : Provenance
+        Of those points that bring none of their own.
+    known : mapping of (Side, str) to Provenance
+        Provenance that the file carries.
+    replace_placed : bool
+        Whether placed points give way; otherwise only what is still to do is filled. A suggestion never
+        replaces a placed or unseen point.
+    asked : mapping, optional
+        How `import_landmarks` was asked for it, for a script that does it again.
+    """
+
+    do: ClassVar[str] = "import_landmarks"
+    landmarks: tuple[LandmarkSet, ...]
+    provenance: Provenance
+    known: Mapping[tuple[Side, str], Provenance] | None = None
+    replace_placed: bool = True
+    asked: Mapping[str, Any] | None = None
+
+    @property
+    def text(self) -> str:
+        """Such as ``import 38 points``."""
+        marks = self._marks().values()
+        n, n_suggested = (sum(bool(getattr(m, name)) for m in marks) for name in ("position", "suggestion"))
+        text = f"import {n} point{'' if n == 1 else 's'}"
+        return f"{text}, {n_suggested} suggestion{'' if n_suggested == 1 else 's'}" if n_suggested else text
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the points taken over.
+
+        Raises
+        ------
+        GpError
+            They are not in the scan frame, the sides disagree on IN, or a locked point would change.
+        """
+        for landmarks in self.landmarks:
+            if landmarks.frame != "scan":
+                raise GpError(f"landmarks to import must be in the scan frame, got {landmarks.frame!r}")
+        changes = {
+            key: mark
+            for key, mark in self._marks().items()
+            if not state.landmarks.get(key, TO_DO).settled
+            or (self.replace_placed and mark.suggestion is None)
+        }
+        moved = [key for key, mark in changes.items() if _moves(state.landmarks.get(key, TO_DO), mark)]
+        require_free(state, moved)
+        return state.with_landmarks({key: changes[key] for key in moved})
+
+    def _marks(self) -> dict[PointKey, Landmark]:
+        marks: dict[PointKey, Landmark] = {}
+        for landmarks in self.landmarks:
+            for code in (*landmarks.placed, *sorted(landmarks.unseen)):
+                if feature(code).computed:
+                    continue
+                key, mark = point_key(landmarks.side, code), self._mark(landmarks, code)
+                if _moves(marks.setdefault(key, mark), mark):
+                    raise GpError(
+                        f"the sides share {code}, but have it at {marks[key].position} and {mark.position}",
+                        landmark=code,
+                        remedy="Correct one of the files, or import one side.",
+                    )
+        for landmarks in self.landmarks:
+            for code in landmarks.suggested:
+                marks.setdefault(point_key(landmarks.side, code), self._mark(landmarks, code))
+        return marks
+
+    def _mark(self, landmarks: LandmarkSet, code: str) -> Landmark:
+        provenance = (self.known or {}).get((landmarks.side, code), self.provenance)
+        if code in landmarks.unseen:
+            return Landmark(unseen=True, provenance=provenance)
+        if code in landmarks.suggested:
+            return Landmark(suggestion=landmarks.suggested[code], provenance=provenance)
+        return Landmark(as_position(landmarks[code], code), provenance=provenance)
+
+
+def _moves(old: Landmark, new: Landmark) -> bool:
+    return (old.position, old.unseen, old.suggestion) != (new.position, new.unseen, new.suggestion)
