@@ -53,6 +53,7 @@ class Ui(Protocol):
     def look_from(self, letter: str) -> None: ...  # noqa: D102
     def cut(self, plane: str) -> None: ...  # noqa: D102
     def toggle_theme(self) -> None: ...  # noqa: D102
+    def ask_canvas(self) -> None: ...  # noqa: D102
     def change_text_size(self, step: int) -> None: ...  # noqa: D102
     def toggle_projection(self) -> None: ...  # noqa: D102
     def show_shortcuts(self) -> None: ...  # noqa: D102

@@ -301,6 +301,8 @@ def view_rows() -> Iterator[Action]:
     yield row("view.solider", "Bone more solid", ("]",), _change_opacity(0.1), group="bone")
     yield row("view.projection", "Perspective on or off", ("5", "Num+5"),
               lambda w, ui: ui.toggle_projection(), group="bone")
+    yield row("view.canvas", "3D canvas…", (), lambda d, ui: ui.ask_canvas(), group="theme",
+              hint="Painted or native: how the 3D view is drawn from the next start on")
     yield row("view.theme", "Dark or light", ("Ctrl+T",), lambda w, ui: ui.toggle_theme(), group="theme",
               icon="moon")
     for title, id, step, keys in _TEXT_SIZES:

@@ -89,4 +89,4 @@ def cut_rows() -> Iterator[Action]:
     yield row("cut_shallower", "Cut: less deep", ("Shift+[",), _move(-_STEP_MM),
               hint="By half a millimetre")
     yield row("slices_visible", "Slices in the 3D view", ("Shift+D",), _toggle_slices, _has_scan,
-              checked=lambda workspace: workspace.view.state.slices_visible, group="slices")
+              checked=lambda workspace: workspace.view.state.slices_visible)

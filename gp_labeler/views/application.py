@@ -21,6 +21,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.system.installation import check_display
 from gp_labeler.system.plain_numbers import use_plain_numbers
 from gp_labeler.views.canvas_choice import choose_canvas, share_contexts
+from gp_labeler.views.canvas_ui import offer_measurement
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.prompts import Prompts
@@ -131,6 +132,7 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
             window.ui.open_demo()
         elif path is not None:
             window.ui.open_path(path)
+        offer_measurement(window, window.ui.prompts)
 
     QTimer.singleShot(0, begin)
     return int(app.exec())

@@ -31,7 +31,6 @@ _FOLDED = {
     "text": "Text size",
     "references": "Compare with",
     "cut": "Cut bone",
-    "canvas": "3D canvas",
     "estimate": "Method",
     "out": "Export and report",
 }

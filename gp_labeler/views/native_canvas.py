@@ -5,11 +5,13 @@ Imported only where this canvas is chosen: pyvistaqt takes two seconds.
 
 from __future__ import annotations
 
-from contextlib import AbstractContextManager
+import sys
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
 from pyvistaqt import QtInteractor
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QMessageLogContext, Qt, QtMsgType, qInstallMessageHandler
 from qtpy.QtGui import QPainter, QPaintEvent
 from qtpy.QtWidgets import QWidget
 
@@ -108,7 +110,8 @@ class _DrawnWidget(QtInteractor):
     """Shows what a function draws in its render window; takes no event and draws nothing by itself."""
 
     def __init__(self, parent: QWidget, draw: Any) -> None:
-        super().__init__(parent, auto_update=False, multi_samples=0)
+        with _without_warning():
+            super().__init__(parent, auto_update=False, multi_samples=0)
         window: Any = self.render_window
         self.window_of_vtk = window
         for renderer in list(self.renderers):
@@ -125,6 +128,25 @@ class _DrawnWidget(QtInteractor):
     def stop(self) -> None:
         """Draw no more."""
         self._interactor.RemoveObserver(self._tag)
+
+
+@contextmanager
+def _without_warning() -> Iterator[None]:
+    """Drop what Qt says when pyvistaqt sets the default format: `share_contexts` has set the same."""
+
+    def tell(kind: QtMsgType, context: QMessageLogContext, text: str) -> None:
+        if "Setting a new default format" in text:
+            return
+        if before is None:
+            sys.stderr.write(f"{text}\n")
+        else:
+            before(kind, context, text)
+
+    before = qInstallMessageHandler(tell)
+    try:
+        yield
+    finally:
+        qInstallMessageHandler(before)
 
 
 class _Over(QWidget):

@@ -7,6 +7,7 @@ time, a coarse stand-in is shown. A picture of the widget (`grab`) always shows 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.slices import SliceSource
 from gp_labeler.views.bind import follow
+from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.fonts import text_scale
@@ -72,6 +74,8 @@ class SceneView(QWidget):
         What is shown.
     parent : QWidget, optional
         Qt's parent.
+    canvas : callable
+        Makes what shows it; by default the kind that was chosen at the start.
     """
 
     hovered = Signal(object)
@@ -80,14 +84,19 @@ class SceneView(QWidget):
     frame_drawn = Signal()
     """A frame has been drawn; what only lies over it may be painted without."""
 
-    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+    def __init__(
+        self,
+        workspace: Workspace,
+        parent: QWidget | None = None,
+        canvas: Callable[[QWidget], Canvas] = make_canvas,
+    ) -> None:
         super().__init__(parent)
         self.setMinimumSize(120, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self._workspace = workspace
-        self.canvas = make_canvas(self)
+        self.canvas = canvas(self)
         self.scene = Scene3D(self.canvas.target)
         workspace.meshes.scene = self.scene
         self._hand = Hand(workspace)
@@ -326,9 +335,9 @@ class SceneView(QWidget):
 
     @property
     def pixels(self) -> tuple[int, int]:
-        """Width and height, device pixels."""
+        """Width and height, device pixels, rounded as Qt does."""
         ratio = self.devicePixelRatioF()
-        return round(self.width() * ratio), round(self.height() * ratio)
+        return int(self.width() * ratio + 0.5), int(self.height() * ratio + 0.5)
 
     def finish(self) -> None:
         """Draw all that is still to be drawn, at once."""
@@ -511,5 +520,7 @@ class SceneView(QWidget):
         self._fine_timer.stop()
         if self._source is not None:
             self._source.close()
+        if self._workspace.meshes.scene is self.scene:
+            self._workspace.meshes.scene = None
         self.scene.close()
         self.canvas.release()

@@ -18,6 +18,7 @@ from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.atlas import is_atlas_file
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.atlas_ui import AtlasUi
+from gp_labeler.views.canvas_ui import ask_canvas
 from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.panels.label.export_dialog import ExportDialog
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
@@ -280,6 +281,10 @@ class WindowUi(AtlasUi, PoseUi):
     def toggle_theme(self) -> None:
         """Change between dark and light."""
         self._window.set_theme("light" if self._window.theme_name == "dark" else "dark")
+
+    def ask_canvas(self) -> None:
+        """Ask which canvas the 3D view shall have from the next start on."""
+        ask_canvas(self._window, self.prompts)
 
     def change_text_size(self, step: int) -> None:
         """Draw text larger (1) or smaller (-1), or as large as the desktop's (0)."""
