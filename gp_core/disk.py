@@ -53,7 +53,7 @@ _DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+)?", re.DOTALL)
 _CHUNK_BYTES = 1 << 20
 _LONGEST_NAME = 200  # bytes of the name in that of its temporary file; systems allow 255
 _FORGOTTEN_SECONDS = 3600.0  # after which any temporary file counts as abandoned
-_PATIENCE_SECONDS = 10.0  # for a reader of a pipe
+PIPE_PATIENCE_S = 10.0  # for a reader of a pipe
 _DESCRIPTOR = re.compile(r"/(?:dev|proc/self)/fd/(?P<number>\d+)")
 _STREAMS = {"/dev/stdout": 1, "/dev/stderr": 2}
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -416,7 +416,7 @@ def _send(path: AnyPath, content: bytes) -> None:
 
 def _opened_stream(path: AnyPath) -> int:
     """Open a device, or a pipe that has a reader, or will soon have one."""
-    end = time.monotonic() + _PATIENCE_SECONDS
+    end = time.monotonic() + PIPE_PATIENCE_S
     while True:
         try:
             descriptor = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0))

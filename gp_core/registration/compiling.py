@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from numba import njit
 
-__all__ = ["compiled", "compiled_together"]
+__all__ = ["compiled", "compiled_together", "source_files"]
 
 _Kernel = TypeVar("_Kernel", bound=Callable[..., Any])
 
@@ -90,14 +90,25 @@ def _njit(signature: str | None, **options: Any) -> Any:
 def _digest(kernel: Callable[..., Any]) -> str:
     """Return a short digest of the files that a kernel is made of."""
     digest = hashlib.sha256()
-    for file in sorted(_files(kernel)):
+    for file in sorted(source_files(kernel)):
         with suppress(OSError):  # a frozen application has no source files: Numba checks the executable
             digest.update(Path(file).read_bytes())
     return digest.hexdigest()[:12]
 
 
-def _files(kernel: Callable[..., Any]) -> set[str]:
-    """Return this file, and the files of this package whose functions the kernel can call."""
+def source_files(kernel: Callable[..., Any]) -> set[str]:
+    """Return the source files that a kernel is compiled from.
+
+    Parameters
+    ----------
+    kernel : callable
+        A plain function.
+
+    Returns
+    -------
+    set of str
+        This file, and the files of this package whose functions the kernel can call.
+    """
     files = {__file__}
     pending: list[Any] = [kernel]
     while pending:

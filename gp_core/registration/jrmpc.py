@@ -26,12 +26,12 @@ __all__ = ["DEFAULTS", "ESTIMATION", "JrmpcBatch", "JrmpcResult", "JrmpcSettings
 _FEWEST_POINTS = 3
 _SIZES = (1e-30, 1e30)
 _LEAST_GAMMA = 1e-12
-_STATIONARY = 1e-13
+STATIONARY = 1e-13
 """Relative change of an iteration below which the remaining ones would change nothing beyond 1e-9."""
 _CONVERGED = 1e-6
-_TABLE = 32768
+TABLE_SIZE = 32768
 """Responsibilities per thread held at a time: a quarter of a megabyte, so that they stay in the cache."""
-_WORTH_THREADS = 200_000
+THREADS_FROM_WORK = 200_000
 
 
 def _is_number(value: Any, allowed: Callable[[float], bool]) -> bool:
@@ -266,7 +266,7 @@ def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettin
         settings.epsilon,
         problem.size,
         settings.max_iterations,
-        _STATIONARY,
+        STATIONARY,
         iterations,
         change,
     )
@@ -338,7 +338,7 @@ def _run_one(problem: _Problem, settings: JrmpcSettings) -> tuple[FloatArray, fl
     kernels = _kernels()
     points, poses, centres = problem.points[0], problem.poses[0], problem.centres[0]
     n_points, n_centres = points.shape[1], centres.shape[1]
-    pieces, piece_sets, blocks = _cut(problem.starts, max(32, _TABLE // n_centres))
+    pieces, piece_sets, blocks = cut_into_blocks(problem.starts, max(32, TABLE_SIZE // n_centres))
     moved, inverse = np.empty_like(points), np.empty(n_points)
     moments = np.empty((len(piece_sets), 5, n_centres))
     widest = int(np.diff(pieces[blocks]).max())
@@ -350,7 +350,7 @@ def _run_one(problem: _Problem, settings: JrmpcSettings) -> tuple[FloatArray, fl
         def expect(i: int) -> None:
             kernels.expect(moved, pieces, shares[i], centres, problem.beta[0], tables[i], inverse, moments)
 
-        while len(objective) < settings.max_iterations and change > _STATIONARY:
+        while len(objective) < settings.max_iterations and change > STATIONARY:
             kernels.move(points, problem.starts, poses, moved)
             do_all(expect, range(len(shares)))
             objective.append(float(np.log(inverse).sum()))
@@ -365,7 +365,7 @@ def _shares(
     blocks: NDArray[np.uint64], work: int
 ) -> Iterator[tuple[list[NDArray[np.uint64]], Callable[[Callable[[int], None], range], object]]]:
     """Split blocks among threads where it is worth while; also yield a function that maps over the parts."""
-    workers = min(n_cores(), len(blocks) - 1) if work >= _WORTH_THREADS else 1
+    workers = min(n_cores(), len(blocks) - 1) if work >= THREADS_FROM_WORK else 1
     if workers == 1:
         yield [blocks], lambda function, which: list(map(function, which))
         return
@@ -377,13 +377,26 @@ def _shares(
         )
 
 
-def _cut(
+def cut_into_blocks(
     starts: NDArray[np.uint64], longest: int
 ) -> tuple[NDArray[np.uint64], NDArray[np.uint64], NDArray[np.uint64]]:
-    """Cut sets into pieces and gather pieces into blocks, both of at most `longest` points.
+    """Cut sets into pieces and gather pieces into blocks, both of limited length.
 
-    Returns where pieces start, the set of each, and the first piece of each block; the first and last with
-    their end.
+    Parameters
+    ----------
+    starts : (M + 1,) array of uint64
+        Set j holds the points from ``starts[j]`` to ``starts[j + 1]``.
+    longest : int
+        Maximum number of points of a piece, and of a block.
+
+    Returns
+    -------
+    pieces : (P + 1,) array of uint64
+        Where pieces start; the last value is the end.
+    piece_sets : (P,) array of uint64
+        The set of each piece.
+    blocks : (B + 1,) array of uint64
+        The first piece of each block; the last value is the number of pieces.
     """
     pieces, blocks = [0], [0]
     piece_sets: list[int] = []

@@ -173,7 +173,7 @@ def test_a_pipe_is_written_to_and_stays(tmp_path: Path) -> None:
 
 
 def test_a_pipe_that_nobody_reads_is_said(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(disk, "_PATIENCE_SECONDS", 0.1)
+    monkeypatch.setattr(disk, "PIPE_PATIENCE_S", 0.1)
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(GpError, match="nobody reads this pipe"):
         disk.write_bytes(tmp_path / "pipe", b"x")

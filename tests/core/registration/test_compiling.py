@@ -58,7 +58,7 @@ def test_a_kernel_is_compiled_again_when_the_file_of_one_it_calls_changes(packag
     ],
 )
 def test_both_fits_are_made_of_the_one_solver(kernel: object, own: str) -> None:
-    files = {Path(file).name for file in compiling._files(kernel.py_func)}
+    files = {Path(file).name for file in compiling.source_files(kernel.py_func)}
     assert {own, "rotation.py", "compiling.py"} <= files
 
 

@@ -56,8 +56,8 @@ def test_agrees_with_plain_numpy_in_pieces_on_threads(monkeypatch: pytest.Monkey
     centres = 4 * np.random.default_rng(0).normal(size=(45, 3))
     expected = reference_jrmpc(sets, centres, gamma=0.1, max_iterations=25)
     whole = jrmpc(sets, centres, gamma=0.1, max_iterations=25)
-    monkeypatch.setattr(module, "_TABLE", 45 * 40)
-    monkeypatch.setattr(module, "_WORTH_THREADS", 0)
+    monkeypatch.setattr(module, "TABLE_SIZE", 45 * 40)
+    monkeypatch.setattr(module, "THREADS_FROM_WORK", 0)
     monkeypatch.setattr(module, "n_cores", lambda: 3)
     pieces = jrmpc(sets, centres, gamma=0.1, max_iterations=25)
     assert_same(whole, expected)
@@ -67,7 +67,7 @@ def test_agrees_with_plain_numpy_in_pieces_on_threads(monkeypatch: pytest.Monkey
 @pytest.mark.parametrize("longest", [1, 7, 16, 40, 1000])
 def test_pieces_and_blocks_cover_every_point_once(longest: int) -> None:
     starts = np.array([0, 16, 32, 35, 100], dtype=np.uint64)
-    pieces, piece_sets, blocks = (rows.astype(int) for rows in module._cut(starts, longest))
+    pieces, piece_sets, blocks = (rows.astype(int) for rows in module.cut_into_blocks(starts, longest))
     assert pieces[0] == blocks[0] == 0
     assert (pieces[-1], blocks[-1]) == (100, len(piece_sets))
     assert (np.diff(pieces) > 0).all()
@@ -117,7 +117,7 @@ def test_stopping_at_rest_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     early = jrmpc(sets, max_iterations=400)
     assert early.n_iterations < 400
     assert early.converged
-    monkeypatch.setattr(module, "_STATIONARY", -1.0)
+    monkeypatch.setattr(module, "STATIONARY", -1.0)
     full = jrmpc(sets, max_iterations=400)
     assert full.n_iterations == 400
     assert_same(early, full)
