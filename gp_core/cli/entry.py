@@ -9,15 +9,20 @@ from collections.abc import Sequence
 
 from gp_core import __version__
 from gp_core.cli import (
+    check,
+    compare,
     conditions,
+    distances,
     estimate,
-    labels,
-    study,
-    study_errors,
-    study_physical,
-    study_search,
+    fit,
+    import_mat,
+    leave_one_out,
+    physical,
+    pivot,
+    register,
+    search,
+    simulate,
     touches,
-    tracking,
 )
 from gp_core.cli.options import keeping_inputs
 from gp_core.command_line import CommandParser
@@ -28,13 +33,18 @@ __all__ = ["main", "make_parser"]
 
 _COMMANDS = (
     estimate,
-    tracking,
+    register,
+    pivot,
     touches,
-    labels,
-    study,
-    study_search,
-    study_errors,
-    study_physical,
+    fit,
+    import_mat,
+    check,
+    distances,
+    leave_one_out,
+    search,
+    simulate,
+    compare,
+    physical,
     conditions,
 )
 

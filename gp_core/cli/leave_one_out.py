@@ -1,4 +1,4 @@
-"""Commands of the study on labelled animals: ``distances`` and ``leave-one-out``."""
+"""``gp-core leave-one-out``: every cochlea estimated from the other animals (Figure 6 A, B)."""
 
 from __future__ import annotations
 
@@ -24,77 +24,35 @@ from gp_core.cli.study_options import (
     settings_of,
 )
 from gp_core.registration.jrmpc import ESTIMATION
-from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out, summarise
 
 __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the commands to the parser.
+    """Add the command to the parser.
 
     Parameters
     ----------
     commands : Subparsers
-        The subparsers of ``gp-core``, to which the commands are added.
+        The subparsers of ``gp-core``, to which the command is added.
     """
-    table = add_command(
-        commands,
-        "distances",
-        run_distances,
-        summary="measure mean and SD of the distances of all pairs of features (Figure 2)",
-        example="gp-core distances labelled/ --csv distances.csv --figure figure2.png",
-    )
-    add_specimens(table)
-    table.add_argument("--csv", metavar="FILE", help="write the table here")
-    add_figure(table)
-    add_json(table)
-    held_out = add_command(
+    parser = add_command(
         commands,
         "leave-one-out",
-        run_leave_one_out,
+        run,
         summary="estimate every labelled cochlea from the other animals (Figure 6 A, B)",
         example="gp-core leave-one-out labelled/ --method jrmpc --figure figure6ab.png",
     )
-    add_specimens(held_out)
-    add_method(held_out)
-    add_features(held_out)
-    add_settings(held_out, "estimation")
-    add_figure(held_out)
-    add_json(held_out)
+    add_specimens(parser)
+    add_method(parser)
+    add_features(parser)
+    add_settings(parser, "estimation")
+    add_figure(parser)
+    add_json(parser)
 
 
-def run_distances(args: argparse.Namespace) -> int:
-    """Run ``gp-core distances``.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        The parsed options.
-
-    Returns
-    -------
-    int
-        Exit status; see `gp_core.cli.entry.main`.
-    """
-    table = distances(labelled_specimens(args))
-    save_json(args.json, table.as_dict())
-    if args.csv:
-        table.save_csv(args.csv)
-    save_figure_of(args.figure, "distance_matrix", table)
-    for line in _distance_lines(table):
-        say(line)
-    return 0
-
-
-def _distance_lines(table: DistanceTable) -> Iterator[str]:
-    yield f"Distances between features on {table.n_sides} sides"
-    yield "  feature   median SD of its distances to the others, mm"
-    for code, spread in table.typical_sd().items():
-        yield f"  {code:<9} {spread:5.2f}"
-
-
-def run_leave_one_out(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Run ``gp-core leave-one-out``.
 
     Parameters

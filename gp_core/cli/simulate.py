@@ -1,4 +1,4 @@
-"""Commands that measure errors on many touches: ``simulate`` and ``compare``."""
+"""``gp-core simulate``: animals drawn from the scatter of the labelled ones (Figure 6 C, D)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from gp_core.cli.options import (
     Subparsers,
     add_command,
     add_json,
-    add_names,
     add_specimens,
     labelled_specimens,
     save_json,
@@ -31,79 +30,52 @@ from gp_core.cli.study_options import (
 from gp_core.disk import read_json
 from gp_core.errors import FileFormatError
 from gp_core.registration.jrmpc import ESTIMATION
-from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.simulation import SimulationReport, simulate
 
 __all__ = ["add"]
 
 
 def add(commands: Subparsers) -> None:
-    """Add the commands to the parser.
+    """Add the command to the parser.
 
     Parameters
     ----------
     commands : Subparsers
-        The subparsers of ``gp-core``, to which the commands are added.
+        The subparsers of ``gp-core``, to which the command is added.
     """
-    drawn = add_command(
+    parser = add_command(
         commands,
         "simulate",
-        run_simulate,
+        run,
         summary="draw animals from the scatter of the labelled ones and estimate them (Figure 6 C, D)",
         example="gp-core simulate labelled/ --figure figure6cd.png --physical skull1.json skull2.json",
     )
-    add_specimens(drawn)
-    drawn.add_argument("--n", type=int, default=1000, help="animals to draw a side; default: 1000")
-    drawn.add_argument(
+    add_specimens(parser)
+    parser.add_argument("--n", type=int, default=1000, help="animals to draw a side; default: 1000")
+    parser.add_argument(
         "--noise",
         type=float,
         default=0.0,
         metavar="MM",
         help="SD of the touch errors, mm a coordinate; default: 0",
     )
-    add_method(drawn)
-    add_features(drawn)
-    add_settings(drawn, "estimation")
-    add_seed(drawn)
-    add_workers(drawn, default=1)
-    drawn.add_argument(
+    add_method(parser)
+    add_features(parser)
+    add_settings(parser, "estimation")
+    add_seed(parser)
+    add_workers(parser, default=1)
+    parser.add_argument(
         "--physical",
         nargs="+",
         default=[],
         metavar="FILE",
         help="results of physical --json, drawn as circles",
     )
-    add_figure(drawn)
-    add_json(drawn)
-    versus = add_command(
-        commands,
-        "compare",
-        run_compare,
-        summary="compare JRMPC and the robust method for increasing touch errors",
-        example="gp-core compare --figure compare.png --csv compare.csv",
-    )
-    add_names(versus)
-    versus.add_argument(
-        "specimens",
-        nargs="*",
-        metavar="SPECIMENS",
-        help="landmark files of labelled animals, or folders; default: drawn from the published atlas",
-    )
-    versus.add_argument(
-        "--repeats", type=int, default=20, metavar="N", help="how often each side is touched; default: 20"
-    )
-    versus.add_argument(
-        "--animals", type=int, default=11, metavar="N", help="animals to draw for each repeat; default: 11"
-    )
-    add_settings(versus, "estimation")
-    add_seed(versus)
-    add_workers(versus)
-    versus.add_argument("--csv", metavar="FILE", help="write the table here")
-    add_figure(versus)
-    add_json(versus)
+    add_figure(parser)
+    add_json(parser)
 
 
-def run_simulate(args: argparse.Namespace) -> int:
+def run(args: argparse.Namespace) -> int:
     """Run ``gp-core simulate``.
 
     Parameters
@@ -168,54 +140,3 @@ def _simulation_lines(report: SimulationReport) -> Iterator[str]:
         )
     limits = groups["pooled"]["limits"]
     yield f"  limits: {limits['e_co_mm']} mm and {limits['e_ma_deg']} degrees, the paper's largest errors"
-
-
-def run_compare(args: argparse.Namespace) -> int:
-    """Run ``gp-core compare``.
-
-    Parameters
-    ----------
-    args : argparse.Namespace
-        The parsed options.
-
-    Returns
-    -------
-    int
-        Exit status; see `gp_core.cli.entry.main`.
-    """
-    specimens = labelled_specimens(args) if args.specimens else None
-    with executor_of(args) as executor:
-        report = compare(
-            specimens,
-            repeats=args.repeats,
-            n_animals=args.animals,
-            rng=rng_of(args),
-            settings=settings_of(args, ESTIMATION),
-            executor=executor,
-        )
-    save_json(args.json, {**report.as_dict(), "seed": args.seed})
-    if args.csv:
-        report.save_csv(args.csv)
-    save_figure_of(args.figure, "comparison", report)
-    for line in _comparison_lines(report):
-        say(line)
-    return 0
-
-
-def _comparison_lines(report: ComparisonReport) -> Iterator[str]:
-    yield f"{report.animals}: mean / p95 / max"
-    yield ""
-    yield (
-        f"  {'touched':<15} {'errors, mm':<17} {'E_CO mm   JRMPC':>21} {'robust':>21}"
-        f"   {'E_MA deg  JRMPC':>21} {'robust':>21}"
-    )
-    by_key = {(row.probe, row.condition, row.method): row.as_dict() for row in report.rows}
-    for probe, condition in dict.fromkeys((row.probe, row.condition) for row in report.rows):
-        jrmpc, robust = (by_key[probe, condition, method] for method in ("jrmpc", "robust"))
-        cells = [_cell(row[error]) for error in ("e_co_mm", "e_ma_deg") for row in (jrmpc, robust)]
-        yield f"  {probe:<15} {condition.label:<17} {cells[0]} {cells[1]}   {cells[2]} {cells[3]}"
-
-
-def _cell(summary: dict[str, float]) -> str:
-    decimals = 2 if summary["max"] < 30 else 1
-    return f"{' / '.join(f'{summary[name]:.{decimals}f}' for name in ('mean', 'p95', 'max')):>21}"
