@@ -39,8 +39,8 @@ from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.fonts import text_scale
 from gp_labeler.views.greys import greys_of
-from gp_labeler.views.hand import Hand
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.placement_tool import PlacementTool
 from gp_labeler.views.scene_overlay import paint_crosshair, paint_cut, paint_pointer
 from gp_labeler.views.theme import theme_of
 
@@ -99,7 +99,7 @@ class SceneView(QWidget):
         self.canvas = canvas(self)
         self.scene = Scene3D(self.canvas.target)
         workspace.meshes.scene = self.scene
-        self._hand = Hand(workspace)
+        self._placement = PlacementTool(workspace)
         self._finished = False
         self._stale, self._points_old, self._fitted = True, True, False
         self._source: SliceSource | None = None
@@ -390,14 +390,14 @@ class SceneView(QWidget):
             return
         x, y = pixel_of(self, event.position())
         if button is Button.LEFT and held is Modifier.NONE:
-            self._hand.press(self._mark_at(x, y), x, y)
-        if not self._hand.holds:
+            self._placement.press(self._mark_at(x, y), x, y)
+        if not self._placement.holds:
             self.scene.control.press(button, x, y, held)
 
     def mouseMoveEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         x, y = pixel_of(self, event.position())
-        if self._hand.holds:
-            if self._hand.move(x, y):
+        if self._placement.holds:
+            if self._placement.move(x, y):
                 self._drag_to(x, y)
                 self._point_at(x, y)
         elif event.buttons() == Qt.MouseButton.NoButton:
@@ -408,17 +408,17 @@ class SceneView(QWidget):
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         x, y = pixel_of(self, event.position())
-        clicked = self._hand.is_click if self._hand.holds else self.scene.control.release(x, y)
-        mark = self._hand.release()
+        clicked = self._placement.is_click if self._placement.holds else self.scene.control.release(x, y)
+        mark = self._placement.release()
         if event.button() == Qt.MouseButton.LeftButton and clicked:
             self._click(x, y, mark)
         elif event.button() == Qt.MouseButton.RightButton and clicked:
-            self._hand.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
+            self._placement.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         self._look_at(x, y, Modifier.NONE)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if event.button() == Qt.MouseButton.LeftButton:
-            self._hand.take_back()
+            self._placement.take_back()
             self.maximise_asked.emit()
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
@@ -433,7 +433,7 @@ class SceneView(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         arrow = _ARROWS.get(Qt.Key(event.key()))
         if event.key() == Qt.Key.Key_Escape and self._workspace.interaction.drag is not None:
-            self._hand.cancel()
+            self._placement.cancel()
         elif event.key() == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
             self._workspace.interaction.arm_replacing(False)
         elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
@@ -447,12 +447,12 @@ class SceneView(QWidget):
         super().leaveEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
-        self._hand.take_focus(self)
+        self._placement.take_focus(self)
         super().enterEvent(event)
 
     def _click(self, x: float, y: float, mark: str | None) -> None:
         point, how = self._aim(x, y)
-        self._hand.click(point, how, mark)
+        self._placement.click(point, how, mark)
 
     def _aim(self, x: float, y: float) -> tuple[FloatArray | None, How]:
         """Return what a pixel shows, bone or a slice's picture: the (3,) scan position, and which it is."""
@@ -483,7 +483,7 @@ class SceneView(QWidget):
     def _show_cursor(self, *_: object) -> None:
         """Show the pointer that says what a click here does."""
         if self._pointer is not None:
-            self.setCursor(self._hand.cursor(self._on_target, self._mark_at(*self._pointer)))
+            self.setCursor(self._placement.cursor(self._on_target, self._mark_at(*self._pointer)))
 
     def _point_at(self, x: float, y: float) -> FloatArray | None:
         """Take where the pointer is; return the (3,) scan position where a click would land."""

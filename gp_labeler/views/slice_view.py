@@ -21,8 +21,8 @@ from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.greys import drag_greys, greys_of
-from gp_labeler.views.hand import Hand, nudge
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.placement_tool import PlacementTool, nudge
 from gp_labeler.views.slice_layers import SliceLayer
 from gp_labeler.views.slice_painter import SlicePainter, reach_of
 
@@ -73,7 +73,7 @@ class SliceView(QWidget):
         self._whole: Shown | None = None
         self._painted: Shown | None = None  # what is on the screen, if all of it is up to date
         self.layers: list[SliceLayer] = []
-        self._control, self._hand = SliceControl(), Hand(workspace)
+        self._control, self._placement = SliceControl(), PlacementTool(workspace)
         self._painter = SlicePainter(workspace, self)
         self._greying: tuple[float, float] | None = None
         self._pointer: tuple[float, float] | None = None
@@ -229,8 +229,8 @@ class SliceView(QWidget):
         if self._control.press(button, x, y, held) or button is not Button.LEFT:
             return
         mark = self._mark_at(x, y)
-        self._hand.press(mark, x, y)
-        if mark is not None and self._hand.holds:
+        self._placement.press(mark, x, y)
+        if mark is not None and self._placement.holds:
             self._edge = self._edge_for(mark)
             self._grip = self._position_of(mark) - self.shown.pixel_to_scan([[x, y]])[0]
         elif self._workspace.interaction.tool == "grey":
@@ -252,7 +252,7 @@ class SliceView(QWidget):
         view = self._control.move(self.shown, x, y)
         if view is not self.shown:
             self._take(view)
-        elif self._hand.move(x, y):
+        elif self._placement.move(x, y):
             self._drag_to(here, free=bool(modifiers_of(event) & _FREES))
         elif self._greying is not None:
             self._change_greys(x, y)
@@ -265,10 +265,10 @@ class SliceView(QWidget):
         x, y = pixel_of(self, event.position())
         clicked = self._control.release(x, y)
         self._greying = None
-        dragged = self._hand.holds and not self._hand.is_click
-        mark = self._hand.release()
+        dragged = self._placement.holds and not self._placement.is_click
+        mark = self._placement.release()
         if clicked and event.button() == Qt.MouseButton.RightButton:
-            self._hand.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
+            self._placement.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         plain = event.button() == Qt.MouseButton.LeftButton and not modifiers_of(event)
         here = self.shown.pixel_to_scan([[x, y]])[0]
         if (
@@ -277,11 +277,11 @@ class SliceView(QWidget):
             and not dragged
             and (self._workspace.interaction.tool != "grey" or mark or self._workspace.interaction.replacing)
         ):
-            self._hand.click(here if self._is_inside(here) else None, How.SLICE, mark)
+            self._placement.click(here if self._is_inside(here) else None, How.SLICE, mark)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if event.button() == Qt.MouseButton.LeftButton:
-            self._hand.take_back()
+            self._placement.take_back()
             self.maximise_asked.emit()
 
     def wheelEvent(self, event: QWheelEvent) -> None:  # noqa: D102, N802
@@ -300,7 +300,7 @@ class SliceView(QWidget):
         key = Qt.Key(event.key())
         plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
         if key == Qt.Key.Key_Escape and self._workspace.interaction.drag is not None:
-            self._hand.cancel()
+            self._placement.cancel()
         elif key == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
             self._workspace.interaction.arm_replacing(False)
         elif key in _ARROWS and plain and self.source is not None:
@@ -316,14 +316,14 @@ class SliceView(QWidget):
         super().leaveEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
-        self._hand.take_focus(self)
+        self._placement.take_focus(self)
         super().enterEvent(event)
 
     def _show_cursor(self, *_: object) -> None:
         """Show the pointer that says what a click here does."""
         if self.shown is not None and self._pointer is not None:
             here = self.shown.pixel_to_scan([self._pointer])[0]
-            self.setCursor(self._hand.cursor(self._is_inside(here), self._mark_at(*self._pointer)))
+            self.setCursor(self._placement.cursor(self._is_inside(here), self._mark_at(*self._pointer)))
 
     def _nudge(self, right: float, down: float) -> None:
         """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""

@@ -15,13 +15,13 @@ from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.views.drawn import point_of
 from gp_labeler.views.panels.label.landmark_menu import landmark_menu
 
-__all__ = ["Hand", "nudge"]
+__all__ = ["PlacementTool", "nudge"]
 
 _TYPED_INTO = (QLineEdit, QTextEdit, QPlainTextEdit, QAbstractSpinBox)
 
 
-class Hand:
-    """The left hand of one view.
+class PlacementTool:
+    """The left button over one view.
 
     Parameters
     ----------
@@ -59,7 +59,10 @@ class Hand:
         """Take a release; return the mark it all began on."""
         mark, self._mark = self._mark, None
         if self._workspace.interaction.drag is not None:
-            self._guarded(self._workspace.interaction.end_drag)
+            try:
+                self._workspace.interaction.end_drag()
+            except GpError as error:
+                self._workspace.say(str(error), "warning")
         return mark
 
     def cancel(self) -> None:
@@ -77,25 +80,29 @@ class Hand:
         A point that is to do is placed, one that shall be re-placed moves here; else a mark is chosen, or the
         crosshair comes here. A click never moves a placed or suggested point just because its row is chosen.
         """
-        workspace = self._workspace
-        if workspace.interaction.replacing:
-            if position is not None:
-                self._guarded(lambda: self._place(position, how))
-                workspace.interaction.arm_replacing(False)
-            return
-        if workspace.interaction.tool == "touch":
-            if position is not None:
-                self._guarded(lambda: self._touch(position))
-            return
-        places = workspace.interaction.tool == "place" and self._is_to_place()
-        if mark is not None and not (places and self._is_to_do()):
+        effect, workspace = self._effect(mark), self._workspace
+        if effect == "choose" and mark is not None:
             workspace.labels.go_to(*point_of(mark))
-        elif position is None:
-            return
-        elif places:
-            self._guarded(lambda: self._place(position, how))
-        else:
+        elif position is not None and effect == "look":
             workspace.view.set_crosshair(position)
+        elif position is not None:
+            try:
+                (self._touch if effect == "touch" else self._place)(position, how)
+            except GpError as error:
+                workspace.say(str(error), "warning")
+            workspace.interaction.arm_replacing(False)
+
+    def _effect(self, mark: str | None) -> str:
+        """Return what a click does: ``place``, ``touch``, ``choose`` or ``look``."""
+        interaction = self._workspace.interaction
+        if interaction.replacing:
+            return "place"
+        if interaction.tool == "touch":
+            return "touch"
+        places = interaction.tool == "place" and self._is_to_place()
+        if mark is not None and not (places and self._is_to_do()):
+            return "choose"
+        return "place" if places else "look"
 
     def _is_to_place(self) -> bool:
         """Whether a point is chosen that is neither placed nor suggested anywhere."""
@@ -145,19 +152,13 @@ class Hand:
         self._placed = self._workspace.labels.place(position, how)
         return self._placed
 
-    def _touch(self, position: FloatArray) -> None:
+    def _touch(self, position: FloatArray, _: How) -> None:
         self._workspace.view.set_crosshair(position)
         self._workspace.pose.record(position, TouchHow.SCAN)
         self._placed = True
 
     def _can_drag(self, mark: str) -> bool:
         return self._workspace.interaction.tool != "touch" and not feature(point_of(mark)[1]).computed
-
-    def _guarded(self, edit: object) -> None:
-        try:
-            edit()  # type: ignore[operator]
-        except GpError as error:
-            self._workspace.say(str(error), "warning")
 
 
 def nudge(workspace: Workspace, offset: FloatArray) -> None:
