@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ast
+import os
+import re
 import subprocess
 import sys
 import zipfile
@@ -42,3 +45,55 @@ def test_a_warning_is_an_error_in_our_modules_only(tmp_path: Path, module: str, 
     command = [sys.executable, "-m", "pytest", "-q", *config, str(file)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == (0 if passes else 1), done.stdout
+
+
+ORDERED = {
+    "numpy": ("numpy", "gp_core"),
+    "scipy": ("scipy", "gp_core"),
+    "pyvista": ("pyvista", "gp_labeler/imaging"),
+    "pyvistaqt": ("pyvistaqt", "gp_labeler/views"),
+    "qtpy": ("qtpy", "gp_labeler/views"),
+    "scikit-image": ("skimage", "gp_labeler/imaging"),
+    "SimpleITK": ("SimpleITK", "gp_labeler/imaging"),
+}
+"""The packages that were ordered, with the module that is imported and the room where it serves first of all.
+
+PySide6, the eighth, comes by qtpy.
+"""
+
+
+def _requirements() -> str:
+    text = (_ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    return text.partition("\ndependencies = [")[2].partition("\nscanco = ")[0]
+
+
+def _imported(folder: Path) -> set[str]:
+    found: set[str] = set()
+    for path in folder.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Import):
+                found |= {alias.name.split(".")[0] for alias in node.names}
+            elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                found.add(node.module.split(".")[0])
+    return found
+
+
+@pytest.mark.parametrize("package", ORDERED)
+def test_an_ordered_package_is_required_and_serves(package: str) -> None:
+    module, room = ORDERED[package]
+    assert re.search(rf'^    "{package}>=[\d.]+"', _requirements(), re.MULTILINE)
+    assert module in _imported(_ROOT / room)
+
+
+def test_pyside6_is_the_qt_that_qtpy_takes() -> None:
+    assert re.search(r'^    "PySide6-Essentials>=[\d.]+', _requirements(), re.MULTILINE)
+    code = "import sys, gp_labeler.views.theme, qtpy; print(qtpy.API_NAME, 'PySide6.QtCore' in sys.modules)"
+    environment = {key: value for key, value in os.environ.items() if key != "QT_API"}
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, env=environment, cwd=_ROOT
+    )
+    assert done.stdout.split() == ["PySide6", "True"]
+
+
+def test_qt_is_imported_through_qtpy_alone() -> None:
+    assert {"PySide6", "PyQt6", "PyQt5", "PySide2"} & _imported(_ROOT / "gp_labeler" / "views") == set()
