@@ -22,6 +22,7 @@ from qtpy.QtWidgets import QApplication  # noqa: E402
 
 from gp_core import PROBE, Atlas, RigidTransform, Side, estimate_pose  # noqa: E402
 from gp_core.pose.expected_landmarks import expected_features  # noqa: E402
+from gp_labeler.scene.colours import DARK  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scene.pose import PoseActor  # noqa: E402
 from gp_labeler.scene.pose_data import (  # noqa: E402
@@ -36,7 +37,8 @@ from gp_labeler.scene.pose_data import (  # noqa: E402
 from gp_labeler.scene.scene3d import Scene3D  # noqa: E402
 from gp_labeler.scene.slice_view import SliceView  # noqa: E402
 from gp_labeler.scene.target import RenderTarget  # noqa: E402
-from gp_labeler.views.pose_slices import SlicePen  # noqa: E402
+from gp_labeler.views.painting.pose_slices import SlicePen  # noqa: E402
+from gp_labeler.views.painting.scene_overlay import SceneOverlay  # noqa: E402
 
 _SIZE = (800, 600)
 _REPEATS = 40
@@ -86,13 +88,16 @@ def main() -> None:
     page = QImage(*_SIZE, QImage.Format.Format_RGB32)
     views = [SliceView(plane, 0.1, np.zeros(2), 0.02, _SIZE) for plane in Plane]
 
+    overlay = SceneOverlay()
+
     def show(scene: PoseScene) -> None:
         scene3d.pose.show(scene)
         scene3d.pose.refresh(scene3d.camera.viewpoint())
+        overlay.place(scene3d, DARK)
 
     def draw(scene: PoseScene) -> None:
         scene3d.pose.show(scene)
-        scene3d.render()
+        nothing(scene)
 
     def paint(scene: PoseScene) -> None:
         for view in views:
@@ -108,6 +113,10 @@ def main() -> None:
 
     def nothing(_: PoseScene) -> None:
         scene3d.render()
+        overlay.place(scene3d, DARK)
+        painter = QPainter(page)
+        overlay.paint(painter)
+        painter.end()
 
     def usual(scene: PoseScene) -> None:
         """One estimate as the window shows it at first, in all four views."""

@@ -17,7 +17,7 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkProp
 from gp_core.validation import FloatArray
 from gp_labeler.scene.added_meshes import AddedMeshActors
 from gp_labeler.scene.bone import BoneActor
-from gp_labeler.scene.furniture import OrientationCube
+from gp_labeler.scene.orientation_cube import OrientationCube
 from gp_labeler.scene.pieces import Piece
 from gp_labeler.scene.stage import Stage
 from gp_labeler.scene.target import RenderTarget

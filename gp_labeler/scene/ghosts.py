@@ -1,4 +1,4 @@
-"""Where a feature is expected: a translucent ellipsoid with a clear outline."""
+"""Where a feature is expected: a translucent ellipsoid; its outline is painted over the frame."""
 
 from __future__ import annotations
 
@@ -14,12 +14,9 @@ from vtkmodules.vtkRenderingCore import vtkActor
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.labels import Label
-from gp_labeler.scene.lines2d import PixelLines
-from gp_labeler.scene.sprites import Text
 from gp_labeler.scene.stage import Stage, release, solid_actor
 
-__all__ = ["RADIUS_95", "Ghost", "GhostActor", "ellipse"]
+__all__ = ["RADIUS_95", "Ghost", "GhostActor", "ellipse", "outline_in"]
 
 RADIUS_95 = 2.7955
 """Square root of the 95 % point of chi squared with three degrees of freedom."""
@@ -73,7 +70,7 @@ def ellipse(centre: ArrayLike, covariance: ArrayLike, radius: float = RADIUS_95)
 
 
 class GhostActor:
-    """Draws ghosts.
+    """Draws the ellipsoids of ghosts.
 
     Parameters
     ----------
@@ -87,7 +84,6 @@ class GhostActor:
         self._stage, self._state = stage, state
         self._ghosts: tuple[Ghost, ...] = ()
         self._fills: list[vtkActor] = []
-        self._rings = PixelLines(stage.overlay)
 
     @property
     def ghosts(self) -> tuple[Ghost, ...]:
@@ -105,28 +101,10 @@ class GhostActor:
                 self._stage.base.AddActor(fill)
                 self._fills.append(fill)
 
-    def refresh(self, view: Viewpoint) -> list[Label]:
-        """Bring the outlines up to date with the camera, and return the labels to draw."""
-        colour, scale = self._stage.colours.states[self._state], self._stage.scale
-        rings = [ellipse(*_projected(ghost, view)) for ghost in self._ghosts]
-        widths = [(2.5 if ghost.active else 1.2) * scale for ghost in self._ghosts]
-        self._rings.draw(rings, [colour] * len(rings), widths)
-        return [
-            Label(
-                Text(ghost.label, self._stage.colours.word(self._state), bold=ghost.active),
-                _upper_right(ring),
-                3 * scale,
-                float(ghost.active),
-            )
-            for ghost, ring in zip(self._ghosts, rings, strict=True)
-            if ghost.label
-        ]
-
     def close(self) -> None:
-        """Let go of the ellipsoids and outlines."""
+        """Let go of the ellipsoids."""
         self._drop()
         self._ghosts = ()
-        self._rings.close()
 
     def _drop(self) -> None:
         for fill in self._fills:
@@ -153,15 +131,10 @@ def _ellipsoid(ghost: Ghost) -> vtkMatrix4x4:
     return matrix_of(matrix)
 
 
-def _projected(ghost: Ghost, view: Viewpoint) -> tuple[FloatArray, FloatArray]:
-    """Return mean (2,) and covariance (2, 2) of a ghost in pixels: its silhouette is the same ellipse."""
-    step = max(float(np.sqrt(np.trace(ghost.covariance))), 1e-3)
-    around = ghost.mean + step * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+def outline_in(view: Viewpoint, mean: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the silhouette, (65, 2) pixels, of the 95 % ellipsoid of a (3,) mean and (3, 3) covariance."""
+    step = max(float(np.sqrt(np.trace(covariance))), 1e-3)
+    around = mean + step * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     pixels = view.display(around)[:, :2]
     slope = (pixels[1:4] - pixels[4:7]).T / (2 * step)
-    return pixels[0], slope @ ghost.covariance @ slope.T
-
-
-def _upper_right(ring: FloatArray) -> FloatArray:
-    corner: FloatArray = ring[int((ring[:, 0] - ring[:, 1]).argmax())]
-    return corner
+    return ellipse(pixels[0], slope @ covariance @ slope.T)

@@ -9,13 +9,9 @@ from typing import NamedTuple
 import numpy as np
 
 from gp_core.validation import FloatArray
-from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.labels import Label
 from gp_labeler.scene.pose_data import PoseScene
-from gp_labeler.scene.sprites import Text
-from gp_labeler.scene.stage import Stage
 
-__all__ = ["REACH_MM", "Name", "Spot", "Written", "names_of", "texts_of", "written_in"]
+__all__ = ["REACH_MM", "Name", "Spot", "Written", "texts_of", "written_in"]
 
 Spot = tuple[FloatArray, float]
 """A (3,) scan position that labels leave free, and how far about it, logical pixels."""
@@ -116,21 +112,3 @@ def written_in(scene: PoseScene) -> Written:
     names, spots = tuple(texts_of(scene)), tuple(spots_of(scene))
     places = [name.place for name in names] + [place for place, _ in spots]
     return Written(names, np.array(places).reshape(-1, 3), tuple(gap for _, gap in spots))
-
-
-def names_of(scene: PoseScene, view: Viewpoint, stage: Stage) -> list[Label]:
-    """Return the labels of the 3D view; spots to leave free are labels without a text."""
-    names, places, gaps = written_in(scene)
-    if not len(places):
-        return []
-    pixels = view.display(places)[:, :2]
-    colours, scale = stage.colours, stage.scale
-    labels = [
-        Label(Text(name.text, colours.word(name.role)), pixel, name.gap * scale, name.rank)
-        for name, pixel in zip(names, pixels[: len(names)], strict=True)
-    ]
-    free = [
-        Label(Text("", colours.text), pixel, gap * scale, -2.0)
-        for gap, pixel in zip(gaps, pixels[len(names) :], strict=True)
-    ]
-    return labels + free

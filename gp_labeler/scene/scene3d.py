@@ -1,6 +1,7 @@
-"""The 3D view: bone, landmarks, ghosts, crosshair, slices, and what lies under a pixel.
+"""The 3D view: bone, ghosts, estimates, slices, where landmarks lie, and what is under a pixel.
 
-Adapters only draw what they are shown; who shows what when is for the view that owns the scene.
+Adapters only draw what they are shown; who shows what when is for the view that owns the scene. Landmarks,
+names, outlines and the scale bar are painted over the frame (`views.painting.scene_overlay`).
 """
 
 from __future__ import annotations
@@ -18,14 +19,12 @@ from gp_labeler.scene.backdrop import Backdrop, Sight
 from gp_labeler.scene.bone import BoneActor
 from gp_labeler.scene.camera import SceneCamera
 from gp_labeler.scene.colours import SceneColours, rgb
-from gp_labeler.scene.furniture import OrientationCube, ScaleBar
 from gp_labeler.scene.gestures import CameraControl
 from gp_labeler.scene.ghosts import GhostActor
-from gp_labeler.scene.hover import HoverActor
-from gp_labeler.scene.labels import LabelActor
-from gp_labeler.scene.marks import REFERENCE, MarkActor
+from gp_labeler.scene.marks import REFERENCE, MarkSet
+from gp_labeler.scene.orientation_cube import OrientationCube
 from gp_labeler.scene.pose import PoseActor
-from gp_labeler.scene.segments import CrosshairActor, SegmentActor
+from gp_labeler.scene.segments import SegmentActor
 from gp_labeler.scene.slice_planes import SlicePlaneActor
 from gp_labeler.scene.stage import Stage
 from gp_labeler.scene.target import RenderTarget
@@ -53,8 +52,10 @@ class Scene3D:
 
     Attributes
     ----------
-    bone, marks, ghosts, pose, lines, crosshair, hover, slices : adapters
+    bone, ghosts, pose, lines, slices : adapters
         What is drawn; each has ``show(...)``.
+    marks : MarkSet
+        The landmarks: where they are, and which are hidden.
     camera : SceneCamera
         Where it is seen from.
     control : CameraControl
@@ -80,13 +81,9 @@ class Scene3D:
         self.added = AddedMeshActors(self._stage)
         self.slices = SlicePlaneActor(self._stage)
         self.lines = SegmentActor(self._stage)
-        self.crosshair = CrosshairActor(self._stage)
         self.ghosts = GhostActor(self._stage)
         self.pose = PoseActor(self._stage)
-        self.marks = MarkActor(self._stage)
-        self.hover = HoverActor(self._stage)
-        self.labels = LabelActor(self._stage)
-        self.scale_bar = ScaleBar(self._stage)
+        self.marks = MarkSet()
         self.cube = OrientationCube(self._stage)
         target.add(self.cube.renderer)
         self._backdrop = Backdrop(self._stage, target, self.bone, self.added, self.cube)
@@ -104,15 +101,6 @@ class Scene3D:
     def scale(self, value: float) -> None:
         self._stage.scale = float(value)
 
-    @property
-    def text_scale(self) -> float:
-        """How much larger than normal text is."""
-        return self._stage.text_scale
-
-    @text_scale.setter
-    def text_scale(self, value: float) -> None:
-        self._stage.text_scale = float(value)
-
     def set_colours(self, colours: SceneColours) -> None:
         """Take a theme; lines and ghosts take it when they are shown next."""
         self._stage.colours = colours
@@ -122,16 +110,6 @@ class Scene3D:
         behind.SetBackground2(rgb(colours.top))
         self.bone.recolour()
         self.cube.recolour()
-
-    def set_ambient_occlusion(self, on: bool) -> None:
-        """Darken hollows, which shows depth; without a graphics card a frame then takes twice as long."""
-        bone, bounds = self._stage.bone, self.bounds
-        bone.SetUseSSAO(bool(on))
-        size = float(np.linalg.norm(bounds[1] - bounds[0]))
-        bone.SetSSAORadius(0.06 * size)
-        bone.SetSSAOBias(0.002 * size)
-        bone.SetSSAOKernelSize(48)
-        bone.SSAOBlurOn()
 
     @property
     def bounds(self) -> FloatArray:
@@ -219,7 +197,7 @@ class Scene3D:
         elif not (self._backdrop.is_fine(sight) or self._backdrop.will_do(sight)):
             self._refresh_cube()
             self._backdrop.draw_quickly(sight, self.camera.direction)
-        self._draw_points()
+        self._draw_over_bone()
 
     def advance(self, seconds: float) -> bool:
         """Draw more of the fine bone, in about so many seconds, unseen yet; return whether it is done."""
@@ -233,27 +211,15 @@ class Scene3D:
     def _refresh_cube(self) -> None:
         self.cube.refresh(self.camera.viewpoint(), self.camera)
 
-    def _draw_points(self) -> None:
-        """Draw what lies over the bone."""
-        view = self.camera.viewpoint()
-        hidden = self.hidden(self.marks.positions)
-        labels = self.marks.refresh(view, hidden, bone_opacity=self.bone.opacity)
-        self.labels.refresh(view, labels + self.ghosts.refresh(view) + self.pose.refresh(view))
-        self.hover.refresh(view)
-        self.scale_bar.refresh(view, self.camera)
+    def _draw_over_bone(self) -> None:
+        self.pose.refresh(self.camera.viewpoint())
         self._backdrop.restore()
         covered = self.cube.visible and bool(self.slices.images)  # a slice may stand before it
         over = (self.cube.renderer,) if covered else ()
         self.target.draw(self._stage.base, *over, self._stage.overlay)
 
     def _sight(self) -> Sight:
-        look = (
-            *self.bone.look,
-            self.added.look,
-            self.cube.visible,
-            self._stage.scale,
-            self._stage.bone.GetUseSSAO(),
-        )
+        look = (*self.bone.look, self.added.look, self.cube.visible, self._stage.scale)
         matrix = self.camera.viewpoint().matrix
         return Sight(matrix.tobytes(), self.target.size, look, self.bone.version)
 
@@ -332,20 +298,7 @@ class Scene3D:
     def close(self) -> None:
         """Let go of everything drawn, and of the target."""
         self._backdrop.close()
-        for adapter in (
-            self.cube,
-            self.scale_bar,
-            self.labels,
-            self.hover,
-            self.marks,
-            self.ghosts,
-            self.pose,
-            self.crosshair,
-            self.lines,
-            self.slices,
-            self.added,
-            self.bone,
-        ):
+        for adapter in (self.cube, self.ghosts, self.pose, self.lines, self.slices, self.added, self.bone):
             adapter.close()
         for renderer in (self._stage.overlay, self._stage.base, self._stage.bone):
             renderer.RemoveAllLights()

@@ -1,21 +1,18 @@
-"""Straight lines in the 3D view: the crosshair, and axes such as the modiolar one."""
+"""Straight lines in the 3D view, such as the modiolar axis."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import ArrayLike
 from vtkmodules.vtkFiltersSources import vtkLineSource
 from vtkmodules.vtkRenderingCore import vtkActor
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import triple
-from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.stage import Stage, release, solid_actor
 
-__all__ = ["CrosshairActor", "Segment", "SegmentActor"]
+__all__ = ["Segment", "SegmentActor"]
 
 _THROUGH_BONE = 0.35
 
@@ -83,39 +80,3 @@ class SegmentActor:
         actor.GetProperty().SetLineWidth(segment.width * self._stage.scale)
         actor.GetProperty().LightingOff()
         return actor
-
-
-class CrosshairActor:
-    """Draws the position that all views share as a cross with an open centre.
-
-    Parameters
-    ----------
-    stage : Stage
-        Where to draw.
-    """
-
-    def __init__(self, stage: Stage) -> None:
-        self._lines = SegmentActor(stage)
-
-    def show(self, point: ArrayLike | None, *, arm_mm: float = 4.0, gap_mm: float = 0.8) -> None:
-        """Draw the cross at a (3,) scan position, or none, each arm in the colour of the plane across it."""
-        if point is None or not np.isfinite(point).all():
-            self._lines.close()
-            return
-        middle = np.asarray(point, dtype=np.float64)
-        self._lines.show(
-            [
-                Segment(
-                    middle + sign * gap_mm * plane.normal,
-                    middle + sign * arm_mm * plane.normal,
-                    plane.colour,
-                    1.5,
-                )
-                for plane in Plane
-                for sign in (-1.0, 1.0)
-            ]
-        )
-
-    def close(self) -> None:
-        """Let go of the cross."""
-        self._lines.close()

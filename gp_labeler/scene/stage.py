@@ -27,9 +27,7 @@ class Stage:
     colours : SceneColours
         Theme.
     scale : float
-        Device pixels per logical pixel (high-DPI), by which texts and lines grow.
-    text_scale : float
-        How much larger than normal text is, by the user's choice.
+        Device pixels per logical pixel (high-DPI), by which lines grow.
     """
 
     bone: vtkRenderer
@@ -37,7 +35,6 @@ class Stage:
     overlay: vtkRenderer
     colours: SceneColours = DARK
     scale: float = 1.0
-    text_scale: float = 1.0
 
 
 def solid_actor(data: Any, colour: str, opacity: float = 1.0) -> vtkActor:

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
-from gp_labeler.views.strokes import round_pen
+from gp_labeler.views.painting.strokes import round_pen
 from gp_labeler.views.theme import Theme
 
 __all__ = ["SHAPES", "chip_pixmap", "draw_chip"]

@@ -24,7 +24,7 @@ from gp_core.landmarks.features import CODES, Side
 from gp_core.validation import FloatArray
 from gp_labeler.scene.schematic import FAR, Schematic, schematic_of
 from gp_labeler.views.fonts import CAPTION, HEADING, base_font, family, text_scale
-from gp_labeler.views.strokes import beside, round_pen, smooth
+from gp_labeler.views.painting.strokes import beside, round_pen, smooth
 from gp_labeler.views.theme import Theme, theme_of
 
 __all__ = ["FeaturePicture", "feature_picture"]

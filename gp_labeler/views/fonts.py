@@ -29,7 +29,7 @@ from qtpy.QtCore import QEvent, QObject, Qt
 from qtpy.QtGui import QFont, QFontDatabase, QFontInfo, QFontMetricsF
 from qtpy.QtWidgets import QApplication, QWidget
 
-from gp_labeler.scene.typeface import FAMILY, font_files
+from gp_labeler.views.typeface import FAMILY, font_files
 
 __all__ = [
     "BIG",

@@ -26,6 +26,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
+from gp_labeler.views.painting.reference_layer import ReferenceLayer
 from gp_labeler.views.panels.atlas.panel import AtlasPanel
 from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.panel_stack import PanelStack
@@ -36,7 +37,6 @@ from gp_labeler.views.panels.scan.welcome import Welcome
 from gp_labeler.views.panels.tracker.card import TrackerCard
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.views.reference_layer import ReferenceLayer
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.top_bar import TopBar

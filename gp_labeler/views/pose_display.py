@@ -11,7 +11,7 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import DrawnTip, PoseScene
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn_pose import pose_scene
-from gp_labeler.views.pose_overlay import PoseOverlay
+from gp_labeler.views.painting.pose_layer import PoseLayer
 from gp_labeler.views.view_grid import ViewGrid
 
 __all__ = ["PoseDisplay"]
@@ -31,7 +31,7 @@ class PoseDisplay(QObject):
     def __init__(self, workspace: Workspace, grid: ViewGrid) -> None:
         super().__init__(grid)
         self._workspace, self._grid = workspace, grid
-        self._overlays = [PoseOverlay(grid.slice_views[plane]) for plane in Plane]
+        self._overlays = [PoseLayer(grid.slice_views[plane]) for plane in Plane]
         self._tip: DrawnTip | None = None
         self._drawn = PoseScene()
         follow(self, workspace.pose.changed, self.show)

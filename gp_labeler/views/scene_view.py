@@ -37,11 +37,16 @@ from gp_labeler.views.bind import follow
 from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
-from gp_labeler.views.fonts import text_scale
+from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.greys import greys_of
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.painting.scene_overlay import (
+    SceneOverlay,
+    paint_crosshair,
+    paint_cut,
+    paint_pointer,
+)
 from gp_labeler.views.placement_tool import PlacementTool
-from gp_labeler.views.scene_overlay import paint_crosshair, paint_cut, paint_pointer
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["SceneView"]
@@ -98,6 +103,7 @@ class SceneView(QWidget):
         self._workspace = workspace
         self.canvas = canvas(self)
         self.scene = Scene3D(self.canvas.target)
+        self.overlay = SceneOverlay()
         workspace.meshes.scene = self.scene
         self._placement = PlacementTool(workspace)
         self._finished = False
@@ -166,7 +172,6 @@ class SceneView(QWidget):
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
         self.scene.set_colours(theme_of(self).scene)
-        self.scene.text_scale = text_scale(self)
         self._show_points()
 
     def voxel_pixels(self, position: FloatArray, voxel_mm: float) -> float:
@@ -262,7 +267,7 @@ class SceneView(QWidget):
         """Show points, lines and ghosts as they are when the next frame is drawn, however many changes on."""
         view = self._workspace.view.state
         self.scene.marks.size = GlyphSize() if view.glyph_mm is None else GlyphSize(view.glyph_mm, "mm")
-        self.scene.labels.visible = view.labels_visible
+        self.overlay.names_visible = view.labels_visible
         self.scene.marks.show_hidden = view.hidden_visible
         self._points_old = True
         self.redraw()
@@ -316,6 +321,10 @@ class SceneView(QWidget):
 
     def paint_over(self, painter: QPainter) -> None:
         """Paint what lies over the frame."""
+        painter.save()
+        painter.scale(1 / self.scene.scale, 1 / self.scene.scale)
+        self.overlay.paint(painter)
+        painter.restore()
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._workspace.scan.volume is not None:
             paint_crosshair(painter, self, self.scene, self._workspace.view.crosshair)
@@ -364,6 +373,7 @@ class SceneView(QWidget):
         self.scene.scale = self.devicePixelRatioF()
         self.scene.target.resize(*self.pixels)
         self.scene.render(quick=quick)
+        self.overlay.place(self.scene, theme_of(self).scene, TEXT * text_scale(self))
         self.canvas.take()
         self._stale, self._finished = False, self.scene.is_fine
         self.frame_drawn.emit()

@@ -22,9 +22,9 @@ from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.greys import drag_greys, greys_of
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
+from gp_labeler.views.painting.slice_layers import SliceLayer
+from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
 from gp_labeler.views.placement_tool import PlacementTool, nudge
-from gp_labeler.views.slice_layers import SliceLayer
-from gp_labeler.views.slice_painter import SlicePainter, reach_of
 
 __all__ = ["SliceView"]
 
@@ -74,7 +74,7 @@ class SliceView(QWidget):
         self._painted: Shown | None = None  # what is on the screen, if all of it is up to date
         self.layers: list[SliceLayer] = []
         self._control, self._placement = SliceControl(), PlacementTool(workspace)
-        self._painter = SlicePainter(workspace, self)
+        self.slice_painter = SlicePainter(workspace, self)
         self._greying: tuple[float, float] | None = None
         self._pointer: tuple[float, float] | None = None
         self._grip = np.zeros(3)
@@ -166,7 +166,7 @@ class SliceView(QWidget):
             self.hovered.emit(shown.pixel_to_scan([self._pointer])[0])
 
     def _repaint(self, *_: object) -> None:
-        self._painter.forget_points()
+        self.slice_painter.forget_points()
         self._painted = None
         self.update()
 
@@ -176,7 +176,7 @@ class SliceView(QWidget):
         self._on_crosshair(self._workspace.view.crosshair)
 
     def _on_reset(self) -> None:
-        self._painter.forget()  # also where it is not painted: else it would keep the scan before
+        self.slice_painter.forget()  # also where it is not painted: else it would keep the scan before
         self.update()
         if self._workspace.scan.volume is None:
             self.source = self.shown = self._edge = None
@@ -215,7 +215,7 @@ class SliceView(QWidget):
         if self.shown is not None and self.shown.size != self._size():
             self.shown = self._resized(self.shown)
         painter = QPainter(self)
-        self._painter.paint(painter)
+        self.slice_painter.paint(painter)
         painter.end()
         self._painted = self.shown
 
@@ -384,7 +384,7 @@ class SliceView(QWidget):
 
     def release(self) -> None:
         """Let go of the voxels."""
-        self._painter.forget()
+        self.slice_painter.forget()
         if self.source is not None:
             self.source.close()
         self.source = self.shown = None

@@ -7,7 +7,6 @@ import pytest
 from pose_cases import ALL, POSE, TRUTH, pose
 
 from gp_core import PROBE, Atlas, RigidTransform, Side, estimate_pose
-from gp_labeler.scene.label_layout import place_labels
 from gp_labeler.scene.pose_camera import along_axis, through_round_window
 from gp_labeler.scene.pose_data import (
     AXIS_MM,
@@ -19,6 +18,7 @@ from gp_labeler.scene.pose_data import (
 )
 from gp_labeler.scene.pose_names import texts_of
 from gp_labeler.scene.pose_rows import axes_of, dashes
+from gp_labeler.views.painting.label_layout import place_labels
 
 SIGNS = {Side.LEFT: 1.0, Side.RIGHT: -1.0}
 

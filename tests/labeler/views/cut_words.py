@@ -35,8 +35,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.scene import labels
-from gp_labeler.views import slice_painter
+from gp_labeler.views.painting import name_tags
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import ElidedLabel
 
@@ -400,7 +399,7 @@ def _painted_badly(texts: list[_Text]) -> Iterator[str]:
 @contextmanager
 def _placed() -> Iterator[list[tuple[np.ndarray, np.ndarray]]]:
     """Gather the boxes (left, top, right, bottom) of names that are placed in the views meanwhile."""
-    placed, place = [], slice_painter.place_labels
+    placed, place = [], name_tags.place_labels
 
     def placing(marks: object, sizes: object, view: tuple[int, int], **options: object) -> object:
         corners, shown = place(marks, sizes, view, **options)
@@ -408,11 +407,11 @@ def _placed() -> Iterator[list[tuple[np.ndarray, np.ndarray]]]:
         placed.append((np.hstack([corners, corners + size])[shown], np.array(view)))
         return corners, shown
 
-    slice_painter.place_labels = labels.place_labels = placing
+    name_tags.place_labels = placing
     try:
         yield placed
     finally:
-        slice_painter.place_labels = labels.place_labels = place
+        name_tags.place_labels = place
 
 
 def _names_in_views(placed: Iterable[tuple[np.ndarray, np.ndarray]]) -> Iterator[str]:

@@ -8,17 +8,16 @@ from pathlib import Path
 
 import pytest
 from fontTools.ttLib import TTFont
-from qtpy.QtGui import QFontDatabase, QFontInfo
+from qtpy.QtGui import QFont, QFontDatabase, QFontInfo
 from qtpy.QtWidgets import QApplication, QLabel
 from window_cases import ball_volume, settle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
 from gp_labeler.scene.colours import DARK, LIGHT, contrast
-from gp_labeler.scene.sprites import Text, text_image
-from gp_labeler.scene.typeface import FAMILY, font_file, font_files
 from gp_labeler.views import fonts
-from gp_labeler.views.word_pictures import word_picture
+from gp_labeler.views.painting.word_pictures import word_picture
+from gp_labeler.views.typeface import FAMILY, font_file, font_files
 
 _INVISIBLE = {"\N{ZERO WIDTH SPACE}", "\x7f"}
 
@@ -50,11 +49,11 @@ def test_the_window_is_drawn_in_the_font_of_the_dependency(make_window) -> None:
     assert {QFontInfo(label.font()).family() for label in shown} == {FAMILY}
 
 
-def test_words_in_3d_are_letters_of_that_font(monkeypatch) -> None:
-    ours = text_image(Text("RWA", "#FFFFFF"), 40, "#000000")
-    monkeypatch.setattr("gp_labeler.scene.sprites.font_file", lambda style: None)
-    vtks = text_image(Text("RWA", "#FFFFFF"), 40, "#000000")
-    assert ours.shape != vtks.shape
+def test_words_in_the_views_are_letters_of_that_font(qapp, monkeypatch) -> None:
+    ours = word_picture("RWA", 40, "#FFFFFF", 1.0).image
+    monkeypatch.setattr("gp_labeler.views.painting.word_pictures.base_font", QFont)
+    monkeypatch.setattr("gp_labeler.views.painting.word_pictures.family", lambda: "another")
+    assert word_picture("RWA", 40, "#FFFFFF", 1.0).image != ours
 
 
 def test_text_size_is_chosen_and_remembered(make_window) -> None:
@@ -96,11 +95,13 @@ def test_the_larger_text_of_the_desktop_is_followed(make_window, monkeypatch) ->
 def test_slices_and_3d_follow_the_text_size(qtbot, window) -> None:
     window.workspace.labels.place([10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
     settle(qtbot, window)
-    assert window.grid.scene_view.scene.text_scale == pytest.approx(fonts.desktop_scale())
+    overlay = window.grid.scene_view.overlay
+    assert overlay.text_size == pytest.approx(fonts.TEXT * fonts.desktop_scale())
     small, large = (word_picture("CA", size, "#FFFFFF", 1.0).box.height() for size in (13, 26))
     assert large == pytest.approx(2 * small, abs=2)
     window.set_text_size(200)
-    assert window.grid.scene_view.scene.text_scale == pytest.approx(2 * fonts.desktop_scale())
+    settle(qtbot, window)
+    assert overlay.text_size == pytest.approx(2 * fonts.TEXT * fonts.desktop_scale())
 
 
 def test_nothing_in_the_bar_moves_with_what_can_be_undone(qtbot, window) -> None:

@@ -33,8 +33,8 @@ from gp_labeler.scene.colours import DARK, rgb
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import PARTS, PoseScene
 from gp_labeler.scene.slice_view import SliceView as Shown
-from gp_labeler.views.pose_overlay import PoseOverlay
-from gp_labeler.views.pose_slices import SlicePen, region_section
+from gp_labeler.views.painting.pose_layer import PoseLayer
+from gp_labeler.views.painting.pose_slices import SlicePen, region_section
 from gp_labeler.views.slice_view import SliceView
 
 SIZE = (480, 400)
@@ -153,7 +153,7 @@ def test_names_stand_beside_what_is_near(qtbot) -> None:
     workspace = desk_with_scan()
     view = SliceView(workspace, Plane.CORONAL)
     qtbot.addWidget(view)
-    overlay = PoseOverlay(view)
+    overlay = PoseLayer(view)
     assert view.layers == [overlay]
     overlay.show(ALL)
     near = {name.text for name in overlay.names(through(MIDDLE), 1.0)}
@@ -171,7 +171,7 @@ def test_a_window_draws_it_with_its_slices_and_takes_it_away(qtbot, window) -> N
     there = view.shown.pixel_to_scan([(np.array(view.shown.size) - 1) / 2])[0]
     drawn = pose(T_scan_cochlea=placed(at=there))
     empty = view.grab().toImage()
-    overlay = PoseOverlay(view)
+    overlay = PoseLayer(view)
     overlay.show(PoseScene((drawn,)))
     image = view.grab().toImage()
     x, y = view.pixel_at(drawn.origin)

@@ -12,8 +12,8 @@ from gp_labeler.document.state import How
 from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
-from gp_labeler.views import slice_painter
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+from gp_labeler.views.painting import slice_painter
 
 ATLAS = Atlas.published()
 
@@ -67,7 +67,7 @@ def test_what_is_painted_follows(window, act) -> None:
     before = []
     for view in slices:
         view.grab()
-        before.append(view._painter._points)
+        before.append(view.slice_painter.points)
         assert len(before[-1].marks) == 5, "the four, and CO"
     ACTS[act](workspace)
     _wait_for_checks(workspace)
@@ -76,12 +76,10 @@ def test_what_is_painted_follows(window, act) -> None:
     assert wanted != _told(marks, ghosts, lines), "the act shows, else this says nothing"
     for view in slices:
         view.grab()
-        kept = view._painter._points
-        if kept is None:
-            assert view.source is None
-            continue
+        kept = view.slice_painter.points
         assert _told(kept.marks, kept.ghosts, kept.lines) == wanted
-        np.testing.assert_array_equal(kept.positions, [mark.position for mark in kept.marks])
+        places = np.reshape([mark.position for mark in kept.marks], (-1, 3))
+        np.testing.assert_array_equal(kept.positions, places)
 
 
 def test_a_doubted_point_shows_where_it_should_be(window, qtbot, monkeypatch) -> None:
@@ -94,12 +92,13 @@ def test_a_doubted_point_shows_where_it_should_be(window, qtbot, monkeypatch) ->
     settle(qtbot, window)  # doubts are known a moment before the views are told of them
     assert drawn_ghosts(workspace) != []
     view.grab()
-    (ghost,) = view._painter._points.ghosts
+    (ghost,) = view.slice_painter.points.ghosts
     assert (ghost.key, ghost.label) == ("L:RWL", "RWL?")
     assert np.linalg.norm(ghost.mean - (MIDDLE + ATLAS["RWL"])) < 0.5
     named: list[str] = []
-    take = lambda _, names, *__: named.extend(name.text for name in names)  # noqa: E731
-    monkeypatch.setattr(slice_painter, "_draw_names", take)
+    place = slice_painter.place_names
+    take = lambda tags, *a, **k: (named.extend(tag.text for tag in tags), place(tags, *a, **k))[1]  # noqa: E731
+    monkeypatch.setattr(slice_painter, "place_names", take)
     workspace.view.set_crosshair(MIDDLE + ATLAS["RWA"])
     view.zoom_to(MIDDLE + ATLAS["RWA"], 12.0)
     view.grab()

@@ -428,7 +428,7 @@ def test_the_slider_goes_through_the_slices(window) -> None:
 
 
 def test_the_axis_is_drawn_on_slices_where_it_passes() -> None:
-    from gp_labeler.views.slice_lines import near_part
+    from gp_labeler.views.painting.slice_lines import near_part
 
     start, end = np.array([0.0, 0, -4]), np.array([4.0, 0, 4])
     np.testing.assert_allclose(near_part(start, end, (-4, 4), 1.0), [[1.5, 0, -1], [2.5, 0, 1]])

@@ -12,9 +12,9 @@ from gp_core.landmarks.features import FEATURES
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import heading_width, pixels, text_width
 from gp_labeler.views.icons import draw_icon
+from gp_labeler.views.painting.strokes import round_pen
 from gp_labeler.views.panels.pose.touch_table_model import CLEAR, MISFIT, NAME, USE, XYZ, TouchRow
 from gp_labeler.views.panels.pose.wording import name_of
-from gp_labeler.views.strokes import round_pen
 from gp_labeler.views.theme import Theme
 
 __all__ = ["column_widths", "names_width", "paint_cell", "paint_ground"]

@@ -6,43 +6,39 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from qtpy.QtCore import QPointF, QRectF, Qt
-from qtpy.QtGui import QColor, QFontMetricsF, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
+from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import Ghost, ellipse
-from gp_labeler.scene.label_layout import lines_within, place_labels
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.segments import Segment
 from gp_labeler.scene.slice_view import SliceView as Shown
-from gp_labeler.scene.slice_view import scale_bar_length
 from gp_labeler.scene.slices import SliceImage, SliceSource
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
-from gp_labeler.views.fonts import TEXT, base_font, text_scale
-from gp_labeler.views.marker_pictures import marker_picture
-from gp_labeler.views.qt_paths import segments_path
-from gp_labeler.views.slice_layers import SliceName
-from gp_labeler.views.slice_lines import paint_lines
+from gp_labeler.views.fonts import TEXT, text_scale
+from gp_labeler.views.painting.marks import ACTIVE_GROWTH, paint_mark
+from gp_labeler.views.painting.name_tags import NameTag, paint_words, place_names
+from gp_labeler.views.painting.qt_paths import segments_path
+from gp_labeler.views.painting.scale_bar import paint_scale_bar
+from gp_labeler.views.painting.slice_lines import paint_lines
+from gp_labeler.views.painting.word_pictures import word_picture
 from gp_labeler.views.theme import Theme, theme_of
-from gp_labeler.views.word_pictures import word_picture
 
 if TYPE_CHECKING:
     from gp_labeler.views.slice_view import SliceView
 
-__all__ = ["SlicePainter", "reach_of"]
+__all__ = ["SlicePainter", "SlicePoints", "reach_of"]
 
 _REACH_MM = 1.0
 _CLOSE_PIXELS = 12.0
 """From so many logical pixels a millimetre on, points beside the slice are named too."""
 
-_BAR_SHARE = 0.3
+_BAR_PIXELS, _BAR_SHARE = 90.0, 0.3
 """Of the width of a small view: there the scale bar leaves the letter at the lower edge alone."""
-
-_TEXT, _HALO = "#E8EDF2", "#0B0F14"
-"""Slices are black in every theme, and what is written on them light."""
 
 
 def reach_of(source: SliceSource, plane: Plane) -> float:
@@ -50,7 +46,7 @@ def reach_of(source: SliceSource, plane: Plane) -> float:
     return max(_REACH_MM, 1.5 * source.step(plane))
 
 
-class _Points(NamedTuple):
+class SlicePoints(NamedTuple):
     """What of the labels is painted, as it was when one of them changed last."""
 
     marks: list[Mark]
@@ -59,7 +55,8 @@ class _Points(NamedTuple):
     lines: list[Segment]
 
     @classmethod
-    def of(cls, workspace: Workspace) -> _Points:
+    def of(cls, workspace: Workspace) -> SlicePoints:
+        """Ask for them."""
         marks = drawn_marks(workspace)
         positions = np.array([mark.position for mark in marks]).reshape(-1, 3)
         return cls(marks, positions, drawn_ghosts(workspace), drawn_segments(workspace, DARK))
@@ -84,8 +81,15 @@ class SlicePainter:
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
-        self._points: _Points | None = None
+        self._points: SlicePoints | None = None
         follow(view, workspace.scan.threshold_previewed, self._on_preview)
+
+    @property
+    def points(self) -> SlicePoints:
+        """The points, ghosts and lines that are painted."""
+        if self._points is None:
+            self._points = SlicePoints.of(self._workspace)
+        return self._points
 
     def forget(self) -> None:
         """Let go of the pictures."""
@@ -111,10 +115,17 @@ class SlicePainter:
         self._paint_ground(painter, view.source, view.shown, ratio)
         self._paint_crosshair(painter, view.shown, theme, ratio)
         self._paint_letters(painter, view.shown, ratio)
-        self._paint_scale_bar(painter, view.shown, ratio)
-        if self._points is None:
-            self._points = _Points.of(self._workspace)
-        points, reach = self._points, reach_of(view.source, view.plane)
+        paint_scale_bar(
+            painter,
+            view.shown.mm_per_pixel,
+            view.shown.size,
+            DARK,
+            ratio=ratio,
+            text=self._text,
+            longest=_BAR_PIXELS,
+            share=_BAR_SHARE,
+        )
+        points, reach = self.points, reach_of(view.source, view.plane)
         paint_lines(painter, points.lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
         for layer in view.layers:
             layer.paint(painter, view.shown, ratio)
@@ -122,7 +133,8 @@ class SlicePainter:
         names += self._paint_marks(painter, points, view.source, view.shown, ratio)
         if self._workspace.view.state.labels_visible:
             names += [name for layer in view.layers for name in layer.names(view.shown, ratio)]
-            _draw_names(painter, names, view.shown.size, ratio, self._text)
+            size = view.shown.size
+            paint_words(painter, place_names(names, size, ratio=ratio, text=self._text, halo=DARK.halo))
 
     @property
     def _text(self) -> float:
@@ -206,24 +218,13 @@ class SlicePainter:
             (top, width / 2, inset),
             (bottom, width / 2, height - inset),
         ):
-            word_picture(letter, self._text, _TEXT, ratio).draw_about(painter, x, y)
-
-    def _paint_scale_bar(self, painter: QPainter, shown: Shown, ratio: float) -> None:
-        width, height = shown.size
-        length, pixels = scale_bar_length(shown.mm_per_pixel, min(90 * ratio, _BAR_SHARE * width))
-        right, y = width - min(14 * ratio, 0.05 * width), height - 12 * ratio
-        for colour, thick in ((_HALO, 4.5), (_TEXT, 2.5)):
-            painter.setPen(QPen(QColor(colour), thick * ratio))
-            painter.drawLine(QPointF(right - pixels, y), QPointF(right, y))
-        word = word_picture(f"{length:g} mm", self._text, _TEXT, ratio, bold=False)
-        x = min(right - pixels / 2, width - word.box.width() / 2 - 4 * ratio) - word.box.center().x()
-        word.draw(painter, x, y - 6 * ratio - word.box.bottom())
+            word_picture(letter, self._text, DARK.text, ratio).draw_about(painter, x, y)
 
     def _paint_ghosts(
         self, painter: QPainter, ghosts: list[Ghost], shown: Shown, ratio: float
-    ) -> list[SliceName]:
+    ) -> list[NameTag]:
         """Paint where points are expected; return their names."""
-        names: list[SliceName] = []
+        names: list[NameTag] = []
         axes = np.stack([shown.plane.right, shown.plane.down])
         colour = QColor(_on_black("ghost"))
         for ghost in ghosts:
@@ -238,12 +239,12 @@ class SlicePainter:
             if ghost.label and in_view:
                 upper_right = corners[int((corners[:, 0] - corners[:, 1]).argmax())]
                 beside = np.clip(upper_right, 1.0, np.array(shown.size) - 1.0)
-                names.append(SliceName(ghost.label, beside, DARK.word("ghost"), 4.0, 3.0))
+                names.append(NameTag(ghost.label, beside, DARK.word("ghost"), 4.0, 3.0))
         return names
 
     def _paint_marks(
-        self, painter: QPainter, points: _Points, source: SliceSource, shown: Shown, ratio: float
-    ) -> list[SliceName]:
+        self, painter: QPainter, points: SlicePoints, source: SliceSource, shown: Shown, ratio: float
+    ) -> list[NameTag]:
         """Paint the points on the slice and close to it; return the names of those to be named."""
         marks, positions = points.marks, points.positions
         pixels, off = shown.scan_to_pixel(positions) + 0.5, np.abs(shown.off_slice(positions))
@@ -252,7 +253,16 @@ class SlicePainter:
         for n in np.flatnonzero(near):
             fade = 1.0 if in_slice[n] else 1.0 - 0.65 * off[n] / reach_of(source, shown.plane)
             radius = _radius(marks[n], self._workspace.view.state.glyph_mm, shown, ratio)
-            _draw_mark(painter, marks[n], pixels[n], radius, bool(in_slice[n]), float(fade), ratio)
+            paint_mark(
+                painter,
+                marks[n],
+                pixels[n],
+                radius,
+                DARK,
+                ratio=ratio,
+                opacity=float(fade),
+                full=bool(in_slice[n]),  # an outline where it lies behind or before the slice
+            )
         close = shown.mm_per_pixel * _CLOSE_PIXELS * ratio < 1.0
         named = [n for n in np.flatnonzero(near) if close or in_slice[n] or marks[n].active]
         return [_name(marks[n], pixels[n]) for n in named]
@@ -275,61 +285,9 @@ def _on_black(state: str) -> str:
 def _radius(mark: Mark, glyph_mm: float | None, shown: Shown, ratio: float) -> float:
     """Return how large a point is drawn, device pixels."""
     radius = 4.0 * ratio if glyph_mm is None else 0.5 * glyph_mm / shown.mm_per_pixel
-    return radius * (1.25 if mark.active else 1.0)
+    return radius * (ACTIVE_GROWTH if mark.active else 1.0)
 
 
-def _draw_mark(
-    painter: QPainter,
-    mark: Mark,
-    pixel: FloatArray,
-    radius: float,
-    in_slice: bool,
-    fade: float,
-    ratio: float,
-) -> None:
-    """Draw a point: full where the slice passes through it, its outline where it lies behind or before.
-
-    A suggested one is never full: what lies beneath it is to be judged.
-    """
-    shape, colour = _SHAPES.get(mark.state, "ball"), _on_black(mark.state)
-    in_slice = in_slice and mark.state != "suggested"
-    painter.save()
-    painter.setOpacity(fade)
-    picture = marker_picture(shape, radius, colour, full=in_slice, line=1.6 * ratio, halo=3.2 * ratio)
-    picture.draw(painter, pixel)
-    if mark.active:
-        painter.setPen(QPen(QColor(_on_black("active")), 1.8 * ratio))
-        painter.setBrush(Qt.BrushStyle.NoBrush)
-        painter.drawEllipse(QPointF(*pixel), radius + 4 * ratio, radius + 4 * ratio)
-    painter.restore()
-
-
-_SHAPES = {"computed": "rhomb", "doubtful": "triangle", "suggested": "square"}
-
-
-def _name(mark: Mark, pixel: FloatArray) -> SliceName:
+def _name(mark: Mark, pixel: FloatArray) -> NameTag:
     gap, rank = (12.0, 2.0) if mark.active else (8.0, 0.0)
-    return SliceName(mark.label, pixel, DARK.word(mark.state), gap, rank)
-
-
-def _draw_names(
-    painter: QPainter, names: list[SliceName], size: tuple[int, int], ratio: float, text: float
-) -> None:
-    font = base_font()
-    font.setPixelSize(round(text * ratio))
-    font.setBold(True)
-    metrics = QFontMetricsF(font)
-    high, step = metrics.capHeight() + 4 * ratio, metrics.lineSpacing()
-    lines = [lines_within(name.text, size[0] - 8 * ratio, metrics.horizontalAdvance) for name in names]
-    corners, shown = place_labels(
-        [name.pixel for name in names],
-        [(max(map(metrics.horizontalAdvance, of)), high + step * (len(of) - 1)) for of in lines],
-        size,
-        gaps=[name.gap * ratio for name in names],
-        ranks=[name.rank for name in names],
-    )
-    for n in np.flatnonzero(shown):
-        left, top = corners[n]
-        for row, line in enumerate(lines[n]):
-            word = word_picture(line, text, names[n].colour, ratio)
-            word.draw(painter, left, top + row * step + metrics.capHeight() + 2 * ratio)
+    return NameTag(mark.label, pixel, DARK.word(mark.state), gap, rank)

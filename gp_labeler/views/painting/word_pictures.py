@@ -1,4 +1,4 @@
-"""Words as they stand on a slice, with an edge that keeps them legible on bone; drawn once each, and kept."""
+"""Words as they stand on bone, with an edge that keeps them legible; drawn once each, and kept."""
 
 from __future__ import annotations
 
@@ -36,7 +36,9 @@ class WordPicture(NamedTuple):
         self.draw(painter, x - self.box.center().x(), y - self.box.center().y())
 
 
-def word_picture(text: str, size: float, colour: str, ratio: float, *, bold: bool = True) -> WordPicture:
+def word_picture(
+    text: str, size: float, colour: str, ratio: float, *, bold: bool = True, halo: str = DARK.halo
+) -> WordPicture:
     """Return the picture of a word.
 
     Parameters
@@ -48,13 +50,15 @@ def word_picture(text: str, size: float, colour: str, ratio: float, *, bold: boo
     ratio : float
         Device pixels for each logical one.
     bold : bool
+    halo : str
+        Colour of the edge.
     """
-    return _word_picture(text, size, colour, ratio, bold, family())
+    return _word_picture(text, size, colour, ratio, bold, halo, family())
 
 
 @lru_cache(_KEPT)
 def _word_picture(
-    text: str, size: float, colour: str, ratio: float, bold: bool, family_name: str
+    text: str, size: float, colour: str, ratio: float, bold: bool, halo: str, family_name: str
 ) -> WordPicture:
     font = base_font()
     font.setPixelSize(round(size * ratio))
@@ -67,7 +71,7 @@ def _word_picture(
     painter = QPainter(image)
     painter.setFont(font)
     painter.translate(-box.topLeft())
-    painter.setPen(QColor(DARK.halo))
+    painter.setPen(QColor(halo))
     for x, y in _around(edge / 2):
         painter.drawText(QPointF(x, y), text)
     painter.setPen(QColor(colour))

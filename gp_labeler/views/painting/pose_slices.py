@@ -22,7 +22,7 @@ from gp_labeler.scene.pose_data import (
 )
 from gp_labeler.scene.pose_names import REACH_MM
 from gp_labeler.scene.slice_view import SliceView as Shown
-from gp_labeler.views.pose_strokes import area, arrow, colour_of, hull, line, marker
+from gp_labeler.views.painting.pose_strokes import area, arrow, colour_of, hull, line, marker
 
 __all__ = ["SlicePen", "region_section"]
 

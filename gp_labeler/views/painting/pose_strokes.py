@@ -8,7 +8,7 @@ from qtpy.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.colours import DARK
-from gp_labeler.views.marker_pictures import marker_picture
+from gp_labeler.views.painting.marker_pictures import marker_picture
 
 __all__ = ["area", "arrow", "colour_of", "hull", "line", "marker", "polygon"]
 

@@ -10,14 +10,14 @@ from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.pose_names import written_in
 from gp_labeler.scene.slice_view import SliceView as Shown
-from gp_labeler.views.pose_slices import SlicePen
-from gp_labeler.views.slice_layers import SliceName
+from gp_labeler.views.painting.name_tags import NameTag, pose_tags
+from gp_labeler.views.painting.pose_slices import SlicePen
 from gp_labeler.views.slice_view import SliceView
 
-__all__ = ["PoseOverlay"]
+__all__ = ["PoseLayer"]
 
 
-class PoseOverlay(QObject):
+class PoseLayer(QObject):
     """A layer of a slice view, between its picture and its points.
 
     Parameters
@@ -47,17 +47,8 @@ class PoseOverlay(QObject):
         SlicePen(painter, shown, ratio, self._scene).draw()
         painter.restore()
 
-    def names(self, shown: Shown, ratio: float) -> list[SliceName]:
+    def names(self, shown: Shown, ratio: float) -> list[NameTag]:
         """Return what is written beside it, and what names leave free."""
-        names, places, gaps = written_in(self._scene)
-        pixels, off = shown.scan_to_pixel(places) + 0.5, np.abs(shown.off_slice(places))
-        written = [
-            SliceName(name.text, pixel, DARK.word(name.role), name.gap, name.rank)
-            for name, pixel, away in zip(names, pixels[: len(names)], off[: len(names)], strict=True)
-            if away <= name.reach_mm
-        ]
-        free = [
-            SliceName("", pixel, DARK.text, gap, -2.0)
-            for gap, pixel in zip(gaps, pixels[len(names) :], strict=True)
-        ]
-        return written + free
+        written = written_in(self._scene)
+        pixels, off = shown.scan_to_pixel(written.places) + 0.5, np.abs(shown.off_slice(written.places))
+        return pose_tags(written, pixels, DARK, off)

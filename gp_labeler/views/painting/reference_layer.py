@@ -15,9 +15,9 @@ from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.slice_view import SliceView as Shown
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_references
-from gp_labeler.views.marker_pictures import marker_picture
-from gp_labeler.views.slice_layers import SliceName
-from gp_labeler.views.slice_painter import reach_of
+from gp_labeler.views.painting.marks import paint_mark
+from gp_labeler.views.painting.name_tags import NameTag
+from gp_labeler.views.painting.slice_painter import reach_of
 
 if TYPE_CHECKING:
     from gp_labeler.views.slice_view import SliceView
@@ -50,24 +50,14 @@ class ReferenceLayer(QObject):
 
     def paint(self, painter: QPainter, shown: Shown, ratio: float) -> None:
         """Paint those near the slice, in device pixels; `ratio` of them are a logical one."""
-        picture = marker_picture(
-            "inverted",
-            _RADIUS * ratio,
-            DARK.states["reference"],
-            full=False,
-            line=1.5 * ratio,
-            halo=3 * ratio,
-        )
-        painter.save()
-        for _, pixel, share in self._near(shown):
-            painter.setOpacity(1.0 - _FADE * share)
-            picture.draw(painter, pixel)
-        painter.restore()
+        for mark, pixel, share in self._near(shown):
+            opacity = 1.0 - _FADE * share
+            paint_mark(painter, mark, pixel, _RADIUS * ratio, DARK, ratio=ratio, opacity=opacity)
 
-    def names(self, shown: Shown, ratio: float) -> list[SliceName]:
+    def names(self, shown: Shown, ratio: float) -> list[NameTag]:
         """Return their names, which give way to those of landmarks."""
         colour = DARK.word("reference")
-        return [SliceName(mark.label, pixel, colour, 7.0, -1.0) for mark, pixel, _ in self._near(shown)]
+        return [NameTag(mark.label, pixel, colour, 7.0, -1.0) for mark, pixel, _ in self._near(shown)]
 
     def _near(self, shown: Shown) -> list[tuple[Mark, FloatArray, float]]:
         """Return the points near the slice, their pixels, and how far off it they are: 0 on it, 1 at most."""

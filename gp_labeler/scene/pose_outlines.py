@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,26 +12,64 @@ from gp_core.landmarks.features import Side
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.mean_cochlea import duct_curve
 from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.ghosts import ellipse
-from gp_labeler.scene.pose_data import DrawnPose
+from gp_labeler.scene.ghosts import outline_in
+from gp_labeler.scene.pose_data import DrawnPose, PoseScene
 
-__all__ = ["coil_edges", "outline_of", "ring"]
+__all__ = ["ScreenLine", "coil_edges", "outlines_of"]
 
 _PER_TURN = 72
 """So many that an edge stays smooth where the duct runs towards the eye."""
 
-
-def outline_of(pose: DrawnPose, view: Viewpoint) -> FloatArray:
-    """Return the (N, 2) silhouette of the 95 % ellipsoid of CO."""
-    covariance = pose.covariance[:3, :3]
-    step = max(float(np.sqrt(np.trace(covariance))), 1e-3)
-    around = pose.origin + step * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    pixels = view.display(around)[:, :2]
-    slope = (pixels[1:4] - pixels[4:7]).T / (2 * step)
-    return ellipse(pixels[0], slope @ covariance @ slope.T)
+_RING = 12.0
+"""Radius of the ring round a suspect touch, logical pixels."""
 
 
-def ring(place: FloatArray, view: Viewpoint, radius: float) -> FloatArray:
+class ScreenLine(NamedTuple):
+    """An open line to paint over the frame (its first point again at the end closes it).
+
+    Parameters
+    ----------
+    pixels : (N, 2) float array
+        Whole numbers are the centres of pixels.
+    role : str
+        Colour: a state of the theme, or ``halo``.
+    width : float
+        Logical pixels.
+    """
+
+    pixels: FloatArray
+    role: str
+    width: float
+
+
+def outlines_of(scene: PoseScene, view: Viewpoint, ratio: float) -> list[ScreenLine]:
+    """Return the outlines of all estimates, of suspect touches and of paths, as they are seen.
+
+    Parameters
+    ----------
+    scene : PoseScene
+    view : Viewpoint
+        The projection of the frame.
+    ratio : float
+        Device pixels for each logical one.
+    """
+    seen, lines = scene.seen, []
+    if seen.shows("region"):
+        for pose in seen.poses:
+            outline = outline_in(view, pose.origin, pose.covariance[:3, :3])
+            lines.append(ScreenLine(outline, pose.role, 1.6))
+    if seen.shows("cochlea"):
+        lines += [ScreenLine(edge, pose.role, 1.3) for pose in seen.poses for edge in coil_edges(pose, view)]
+    for touch in seen.touches:
+        if touch.suspect:
+            lines.append(ScreenLine(_ring(touch.position, view, _RING * ratio), "doubtful", 2.0))
+    for path in seen.paths:
+        pixels = view.display(path)[:, :2]
+        lines += [ScreenLine(pixels, "halo", 6.0), ScreenLine(pixels, "path", 2.5)]
+    return lines
+
+
+def _ring(place: FloatArray, view: Viewpoint, radius: float) -> FloatArray:
     """Return a closed circle, (N, 2), about a (3,) scan position."""
     turn = np.linspace(0, 2 * np.pi, 33)
     circle: FloatArray = view.display(place[None])[0, :2] + radius * np.stack(

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from overlay_cases import frame_of
 from pose_cases import (
     ALL,
     DATA,
@@ -31,16 +32,19 @@ from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.scene.colours import DARK, LIGHT, rgb
 from gp_labeler.scene.pose_camera import along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import PARTS, PoseScene
+from gp_labeler.scene.pose_names import written_in
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.target import RenderTarget
+from gp_labeler.views.painting.name_tags import pose_tags
+from gp_labeler.views.painting.scene_overlay import SceneOverlay
 
 ONLY = {part: frozenset({part}) for part in PARTS}
 
 
 @pytest.fixture
-def scene() -> Iterator[Scene3D]:
+def scene(qapp) -> Iterator[Scene3D]:
     made = Scene3D(RenderTarget.offscreen(480, 360))
-    made.scale_bar.visible = made.cube.visible = False
+    made.cube.visible = False
     made.camera.view_from("A")
     made.camera.focus_on(MIDDLE, across_mm=14.0)
     yield made
@@ -66,7 +70,7 @@ def test_origin_and_axis_are_seen_also_through_bone(scene, in_bone) -> None:
     if in_bone:
         scene.bone.show([extract_isosurface(scan_of([(MIDDLE, 7.0)], np.eye(3)), 100.0)])
     scene.pose.show(PoseScene((POSE,), parts=ONLY["estimate"]))
-    seen = like(scene.image(), DARK.states["pose"])
+    seen = like(frame_of(scene), DARK.states["pose"])
     for point in (POSE.origin, POSE.tip - 0.4 * POSE.axis):
         assert is_seen(scene, seen, point)
     assert not is_seen(scene, seen, POSE.origin - 4.0 * POSE.axis)
@@ -74,7 +78,7 @@ def test_origin_and_axis_are_seen_also_through_bone(scene, in_bone) -> None:
 
 def test_two_estimates_and_the_labelled_one_have_colours_of_their_own(scene) -> None:
     scene.pose.show(replace(ALL, parts=ONLY["estimate"] | ONLY["truth"]))
-    image = scene.image()
+    image = frame_of(scene)
     for role, drawn in (("pose", POSE), ("pose_2", SECOND), ("truth", TRUTH)):
         seen = like(image, DARK.states[role])
         assert is_seen(scene, seen, drawn.origin)
@@ -97,44 +101,43 @@ def test_two_estimates_and_the_labelled_one_have_colours_of_their_own(scene) -> 
 )
 def test_every_part_is_drawn_where_it_is(scene, part, role, place) -> None:
     scene.pose.show(replace(ALL, parts=ONLY[part]))
-    assert is_seen(scene, like(scene.image(), DARK.states[role]), place)
+    assert is_seen(scene, like(frame_of(scene), DARK.states[role]), place)
 
 
 @pytest.mark.parametrize("part", [*DATA, "tip"])
 def test_what_is_hidden_is_not_drawn(scene, part) -> None:
-    scene.labels.visible = False
     scene.pose.show(ALL)
-    everything = scene.image()
+    everything = frame_of(scene, names=False)
     scene.pose.show(replace(ALL, parts=ALL.parts - {part}))
-    hidden = scene.image()
+    hidden = frame_of(scene, names=False)
     assert (hidden != everything).any()
     scene.pose.show(without(part))
-    np.testing.assert_array_equal(hidden, scene.image())
+    np.testing.assert_array_equal(hidden, frame_of(scene, names=False))
 
 
 @pytest.mark.parametrize("part", ["estimate", "region", "cochlea", "names"])
 def test_parts_of_an_estimate_are_shown_alone_or_not_at_all(scene, part) -> None:
-    nothing = scene.image()
+    nothing = frame_of(scene)
     scene.pose.show(replace(ALL, parts=frozenset()))
-    np.testing.assert_array_equal(scene.image(), nothing)
+    np.testing.assert_array_equal(frame_of(scene), nothing)
     scene.pose.show(replace(ALL, parts=ONLY[part] | ONLY["estimate"]))
-    assert (scene.image() != nothing).any()
+    assert (frame_of(scene) != nothing).any()
 
 
 def test_opacity_fades_all(scene) -> None:
-    nothing = scene.image().astype(float)
+    nothing = frame_of(scene).astype(float)
     strength = []
     for opacity in (0.0, 0.4, 1.0):
         scene.pose.show(replace(ALL, opacity=opacity, parts=ALL.parts - {"names"}))
-        strength.append(np.abs(scene.image() - nothing).sum())
+        strength.append(np.abs(frame_of(scene) - nothing).sum())
     assert strength[0] == 0
     assert 0.2 < strength[1] / strength[2] < 0.9
 
 
 def test_the_region_is_as_large_as_the_covariance_says(scene) -> None:
-    nothing = scene.image()
+    nothing = frame_of(scene)
     scene.pose.show(PoseScene((POSE,), parts=ONLY["region"]))
-    seen = (scene.image() != nothing).any(axis=2)
+    seen = (frame_of(scene) != nothing).any(axis=2)
     for axis, sigma in ((0, np.sqrt(0.03)), (2, np.sqrt(0.01))):
         rim = POSE.origin - 2.795 * sigma * np.eye(3)[axis]  # the cone is on the other side
         assert is_seen(scene, seen, rim)
@@ -147,7 +150,7 @@ def test_a_right_ear_is_coiled_the_other_way(scene) -> None:
     for side in Side:
         scene.pose.show(PoseScene((pose(side=side),), parts=ONLY["cochlea"]))
         place_camera(scene.camera, along_axis(POSE))
-        columns = np.nonzero(like(scene.image(), DARK.states["pose"]))[1]
+        columns = np.nonzero(like(frame_of(scene), DARK.states["pose"]))[1]
         ends.append(np.array([columns.min(), columns.max()]) - scene.display_of(POSE.origin[None])[0, 0])
     assert abs(ends[0].sum()) > 2.0  # the first half turn is wider than the second
     np.testing.assert_allclose(ends[0], -ends[1][::-1], atol=2.0)
@@ -155,9 +158,9 @@ def test_a_right_ear_is_coiled_the_other_way(scene) -> None:
 
 def test_a_probe_out_of_sight_is_grey(scene) -> None:
     scene.pose.show(PoseScene(tip=TIP))
-    assert like(scene.image(), DARK.states["touch"]).any()
+    assert like(frame_of(scene), DARK.states["touch"]).any()
     scene.pose.show_tip(replace(TIP, visible=False))
-    image = scene.image()
+    image = frame_of(scene)
     assert not like(image, DARK.states["touch"]).any()
     assert (image != image[0, 0]).any()
     scene.pose.show_tip(None)
@@ -176,27 +179,31 @@ def test_cameras_look_along_the_axis_and_through_the_window(scene) -> None:
     np.testing.assert_allclose(origin, (np.array(scene.target.size) - 1) / 2, atol=1e-6)
 
 
-def test_names_are_written_where_nothing_else_is(scene) -> None:
-    labels = {label.text.text: label for label in scene.pose.refresh(scene.camera.viewpoint())}
-    assert labels == {}
+def test_names_are_written_in_the_colours_of_what_they_name(scene) -> None:
+    overlay = SceneOverlay()
+    overlay.place(scene, DARK)
+    assert overlay.names == []
     scene.pose.show(ALL)
-    labels = {label.text.text: label for label in scene.pose.refresh(scene.camera.viewpoint())}
-    assert labels["robust · off 2.50 mm, 0.0°"].text.colour == DARK.word("pose")
-    assert labels["MN ?"].text.colour == DARK.word("doubtful")
+    overlay.place(scene, DARK)
+    assert {"robust · off 2.50 mm, 0.0°", "MN ?"} <= set(overlay.names)
+    written = written_in(scene.pose.scene)
+    tags = {tag.text: tag for tag in pose_tags(written, written.places[:, :2], DARK)}
+    assert tags["robust · off 2.50 mm, 0.0°"].colour == DARK.word("pose")
+    assert tags["MN ?"].colour == DARK.word("doubtful")
 
 
 def test_a_theme_recolours_what_is_drawn(scene) -> None:
     scene.pose.show(PoseScene((POSE,)))
     scene.set_colours(LIGHT)
-    assert is_seen(scene, like(scene.image(), LIGHT.states["pose"]), POSE.origin)
+    assert is_seen(scene, like(frame_of(scene, colours=LIGHT), LIGHT.states["pose"]), POSE.origin)
 
 
 def test_showing_nothing_takes_everything_away(scene) -> None:
-    empty = scene.image()
+    empty = frame_of(scene)
     scene.pose.show(ALL)
-    assert (scene.image() != empty).any()
+    assert (frame_of(scene) != empty).any()
     scene.pose.show(PoseScene())
-    np.testing.assert_array_equal(scene.image(), empty)
+    np.testing.assert_array_equal(frame_of(scene), empty)
     assert scene.pose.poses == ()
 
 
