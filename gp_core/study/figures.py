@@ -452,12 +452,12 @@ def comparison(report: ComparisonReport) -> Figure:
 
 def _compared(ax: Axes, rows: Sequence[ComparisonRow], error: str) -> None:
     conditions = list(dict.fromkeys(row.condition for row in rows))
-    for method, name, colour, shift in (("jrmpc", "JRMPC", ACCENT, -0.15), ("robust", "robust", LEFT, 0.15)):
+    for method, colour, shift in (("jrmpc", ACCENT, -0.15), ("robust", LEFT, 0.15)):
         found = [row.as_dict()[error] for row in rows if row.method == method]
         x = np.arange(len(conditions)) + shift
         mean, p95, highest = ([summary[key] for summary in found] for key in ("mean", "p95", "max"))
         ax.vlines(x, mean, p95, color=colour, lw=1.6)
-        ax.plot(x, mean, "o", color=colour, ms=4.5, label=name)
+        ax.plot(x, mean, "o", color=colour, ms=4.5, label=METHOD_NAMES[method])
         ax.plot(x, highest, "x", color=colour, ms=4, mew=0.9)
     ax.set_yscale("log")
     ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))

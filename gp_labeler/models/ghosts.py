@@ -13,7 +13,7 @@ import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
-from gp_core.constants import DEFINING_FEATURES
+from gp_core.constants import CHI2_3_95, DEFINING_FEATURES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
 from gp_core.landmarks.sets import LandmarkSet, Status
@@ -26,9 +26,6 @@ Predict = Callable[[LandmarkSet], Mapping[str, tuple[FloatArray, FloatArray]]]
 """Mean (3,) and covariance (3, 3) of every feature, given some: `gp_core.atlas.prediction.predict`."""
 
 N_FOR_GHOSTS = 3
-
-CHI2_95 = 7.815
-"""95 % quantile of the squared distance of a point from its mean, in standard deviations, in space."""
 
 N_REMEMBERED = 24
 
@@ -65,7 +62,7 @@ class Ghost:
     @property
     def radius_95(self) -> float:
         """Radius that holds the point with 95 %, mm, along the least certain direction."""
-        return float(np.sqrt(CHI2_95 * max(np.linalg.eigvalsh(self.covariance)[-1], 0.0)))
+        return float(np.sqrt(CHI2_3_95 * max(np.linalg.eigvalsh(self.covariance)[-1], 0.0)))
 
     @property
     def suggestion(self) -> Suggestion:

@@ -14,6 +14,7 @@ from html import escape
 
 import numpy as np
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.landmarks.features import CODES
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_labeler.document.specimen_file import application
@@ -23,7 +24,6 @@ from gp_labeler.models.estimate import Estimate
 
 __all__ = ["PoseReport"]
 
-_METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
 _WAYS = {
     "features": "features both touched and labelled",
     "skull": "skull features",
@@ -107,7 +107,7 @@ class PoseReport:
 
     def _poses(self) -> str:
         poses = self.estimate.poses
-        heads = "".join(f"<th>{_METHODS.get(method, method)}</th>" for method in poses)
+        heads = "".join(f"<th>{METHOD_NAMES.get(method, method)}</th>" for method in poses)
         rows = "".join(
             f"<tr><td>{name}</td>{''.join(f'<td>{text}</td>' for text in texts)}</tr>"
             for name, texts in self._rows()
@@ -163,8 +163,10 @@ class PoseReport:
         many = len(self.estimate.poses) > 1
         for method, pose in self.estimate.poses.items():
             for text in pose.warnings:
-                yield f"{_METHODS[method]}: {text}" if many else text
-        yield from (f"{_METHODS.get(name, name)}: {text}" for name, text in self.estimate.problems.items())
+                yield f"{METHOD_NAMES[method]}: {text}" if many else text
+        yield from (
+            f"{METHOD_NAMES.get(name, name)}: {text}" for name, text in self.estimate.problems.items()
+        )
         registered = self.estimate.registered
         if registered is not None and registered.fiducials is not None:
             yield from (f"registration: {text}" for text in registered.fiducials.warnings)

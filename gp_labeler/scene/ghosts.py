@@ -11,6 +11,7 @@ from vtkmodules.vtkCommonMath import vtkMatrix4x4
 from vtkmodules.vtkFiltersSources import vtkSphereSource
 from vtkmodules.vtkRenderingCore import vtkActor
 
+from gp_core.constants import CHI2_3_95
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.camera import Viewpoint
@@ -18,8 +19,8 @@ from gp_labeler.scene.stage import Stage, release, solid_actor
 
 __all__ = ["RADIUS_95", "Ghost", "GhostActor", "ellipse", "outline_in"]
 
-RADIUS_95 = 2.7955
-"""Square root of the 95 % point of chi squared with three degrees of freedom."""
+RADIUS_95 = CHI2_3_95**0.5
+"""95 % radius of a three-dimensional Gaussian, in standard deviations."""
 
 _FILL = 0.16
 _CORNERS = 65

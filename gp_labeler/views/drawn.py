@@ -7,11 +7,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from gp_core.atlas.label_check import HEAD_MM
+from gp_core.constants import CHI2_3_95
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
-from gp_labeler.models.ghosts import CHI2_95
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import SceneColours
@@ -108,7 +108,7 @@ def drawn_ghosts(workspace: Workspace) -> list[Ghost]:
 
 def _region(key: str, suggestion: Suggestion, radius_95: float) -> Ghost:
     """Return where a suggested point lies with 95 %; the point itself is a mark and bears the name."""
-    covariance = radius_95**2 / CHI2_95 * np.eye(3)
+    covariance = radius_95**2 / CHI2_3_95 * np.eye(3)
     return Ghost(key, np.array(suggestion.position), covariance, "", active=True)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.pose.mixture import UNDECIDED
 from gp_core.validation import FloatArray
 from gp_labeler.document.touches import Touches
@@ -22,8 +23,6 @@ from gp_labeler.scene.pose_data import (
 )
 
 __all__ = ["pose_scene"]
-
-_METHOD_WORDS = {"robust": "robust", "jrmpc": "JRMPC"}
 
 
 def pose_scene(workspace: Workspace, *, tip: DrawnTip | None = None) -> PoseScene:
@@ -66,7 +65,7 @@ def _poses(estimate: Estimate) -> tuple[DrawnPose, ...]:
         DrawnPose.of(
             pose,
             T_scan_touches,
-            label=_METHOD_WORDS[method] if many else f"CO ±{pose.radius_95:.1f} mm",
+            label=METHOD_NAMES[method] if many else f"CO ±{pose.radius_95:.1f} mm",
         )
         for method, pose in estimate.poses.items()
     ]

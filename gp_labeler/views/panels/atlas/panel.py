@@ -17,6 +17,7 @@ from qtpy.QtWidgets import (
 )
 
 from gp_core.atlas.label_check import Finding
+from gp_core.constants import METHOD_NAMES
 from gp_labeler.document.animals import Animals
 from gp_labeler.jobs.atlas import FEWEST_ANIMALS, FitAtlas
 from gp_labeler.jobs.runner import Task
@@ -33,7 +34,6 @@ from gp_labeler.views.panels.scan.import_wording import sentence
 __all__ = ["AtlasPanel"]
 
 _WIDEST = 1000
-_METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
 
 
 class AtlasPanel(QWidget):
@@ -355,7 +355,7 @@ class LeaveOneOutCard(Card):
         if trial is None:
             return []
         return [
-            [_METHODS[method], f"{co:.2f}", f"{co_max:.2f}", f"{axis:.1f}", f"{axis_max:.1f}"]
+            [METHOD_NAMES[method], f"{co:.2f}", f"{co_max:.2f}", f"{axis:.1f}", f"{axis_max:.1f}"]
             for method, (co, co_max, axis, axis_max) in trial.figures.items()
         ]
 

@@ -18,6 +18,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.disk import write_bytes, write_text
 from gp_labeler.jobs.physical import PhysicalResult, PhysicalTest
 from gp_labeler.jobs.runner import Task
@@ -28,7 +29,6 @@ from gp_labeler.views.prompts import Prompts
 
 __all__ = ["PhysicalDialog"]
 
-_METHODS = {"robust": "Robust", "jrmpc": "JRMPC"}
 _WAYS = {"names": "skull features by name", "icp": "skull features by ICP", "surface": "bone surface"}
 _FIGURE_WIDTH = 620
 
@@ -86,7 +86,7 @@ class PhysicalDialog(QDialog):
             cells = (
                 _WAYS.get(row.registration, row.registration),
                 f"{fre[row.registration]:.2f} mm",
-                _METHODS.get(row.method, row.method),
+                METHOD_NAMES.get(row.method, row.method),
                 f"{row.e_co_mm:.2f} mm",
                 f"{row.e_ma_deg:.1f}°",
             )
@@ -94,7 +94,7 @@ class PhysicalDialog(QDialog):
                 self.rows.addWidget(text_label(text), n, column)
         for text in result.report.warnings:
             method, colon, words = text.partition(": ")
-            self.findings.addWidget(Notice("warning", f"{_METHODS.get(method, method)}{colon}{words}"))
+            self.findings.addWidget(Notice("warning", f"{METHOD_NAMES.get(method, method)}{colon}{words}"))
         if len({row.method for row in result.report.rows}) == 1:
             hint = "JRMPC takes part where the atlas was fitted from labelled animals (step Atlas)."
             self.findings.addWidget(Notice("info", hint))

@@ -8,6 +8,7 @@ from pathlib import Path
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
+from gp_core.constants import METHOD_NAMES
 from gp_labeler.document import touching
 from gp_labeler.models.estimate import Estimate
 from gp_labeler.models.workspace import Workspace
@@ -16,7 +17,7 @@ from gp_labeler.views.fonts import HEADING, styled
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, Segments, link, numbers
 from gp_labeler.views.panels.parts import Card, text_label
-from gp_labeler.views.panels.pose.wording import METHOD_WORDS, fine_mm, sentence
+from gp_labeler.views.panels.pose.wording import fine_mm, sentence
 
 __all__ = ["RegistrationCard"]
 
@@ -170,7 +171,7 @@ def _errors(estimate: Estimate) -> str:
     for method in estimate.poses:
         found = estimate.errors(method)
         if found is not None:
-            name = f"{METHOD_WORDS[method]}: " if len(estimate.poses) > 1 else ""
+            name = f"{METHOD_NAMES[method]}: " if len(estimate.poses) > 1 else ""
             lines.append(f"{name}CO {fine_mm(found[0])}, axis {found[1]:.1f}°")
     return "\n".join(lines) or NONE
 

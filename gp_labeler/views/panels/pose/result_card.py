@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QGridLayout, QWidget
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.quality import pose_quality
 from gp_labeler.models.estimate import Estimate
@@ -18,7 +19,6 @@ from gp_labeler.views.panels.card_parts import Notices, Verdict, link, numbers
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose.wording import (
-    METHOD_WORDS,
     allowance_text,
     fine_mm,
     gain_text,
@@ -178,7 +178,7 @@ class _TwoPoses(QWidget):
 
     def show_poses(self, estimate: Estimate) -> None:
         methods = [method for method in estimate.settings.methods if method in estimate.poses]
-        columns = [_column(METHOD_WORDS[method], estimate.poses[method]) for method in methods]
+        columns = [_column(METHOD_NAMES[method], estimate.poses[method]) for method in methods]
         names = ("", "CO x", "y", "z", "Axis x", "y", "z", "95 % within", "Cone")
         for cells, name, *values in zip(self.cells, names, *columns, strict=True):
             for cell, value in zip(cells, (name, *values), strict=True):
@@ -215,7 +215,7 @@ def _waiting(text: str) -> str:
 def _notices(workspace: Workspace, estimate: Estimate) -> Iterator[tuple[str, ...]]:
     for method in estimate.settings.methods:
         if method in estimate.problems:
-            yield ("error", f"{METHOD_WORDS[method]}: {estimate.problems[method]}")
+            yield ("error", f"{METHOD_NAMES[method]}: {estimate.problems[method]}")
     if "jrmpc" in workspace.pose.settings.methods and not workspace.pose.joint_ready:
         yield ("info", "JRMPC is being made ready; that takes some seconds once.")
     for reason in workspace.pose.file_doubts:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import RenameSpecimen
 from gp_labeler.models.workspace import Workspace
@@ -44,7 +45,7 @@ class EstimateSettingsCard(Card):
         self.specimen.setAccessibleName("Name of the specimen")
         self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
-        self.method = Segments({"robust": "Robust", "jrmpc": "JRMPC", "both": "Both"}, _HINTS)
+        self.method = Segments({**METHOD_NAMES, "both": "Both"}, _HINTS)
         self.noise = NumberField("Probe noise", widest="automatic")
         self.noise.step = 0.05
         self.noise.setPlaceholderText("automatic")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from gp_core.constants import METHOD_NAMES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, feature
 from gp_core.pose.cochlea_pose import CochleaPose
@@ -14,7 +15,6 @@ from gp_labeler.models.estimate import Estimate
 from gp_labeler.views.bind import NONE, degrees_text
 
 __all__ = [
-    "METHOD_WORDS",
     "allowance_text",
     "change_text",
     "fine_mm",
@@ -29,7 +29,6 @@ __all__ = [
     "unit_triple",
 ]
 
-METHOD_WORDS = {"robust": "Robust", "jrmpc": "JRMPC"}
 
 _MINUS = "\N{MINUS SIGN}"
 _LITTLE_MM = 0.1
@@ -144,7 +143,7 @@ def touch_text(name: str, touch: Touch | None, estimate: Estimate | None) -> str
     for method, pose in () if estimate is None else estimate.poses.items():
         if name in pose.residuals:
             lines.append(
-                f"{METHOD_WORDS[method]}: {fine_mm(pose.residuals[name])} from where the atlas has it"
+                f"{METHOD_NAMES[method]}: {fine_mm(pose.residuals[name])} from where the atlas has it"
             )
         if name in pose.suspects:
             lines.append("It does not fit the other points")
