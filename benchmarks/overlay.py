@@ -35,7 +35,7 @@ from gp_labeler.scene.pose_data import (  # noqa: E402
     PoseScene,
 )
 from gp_labeler.scene.scene3d import Scene3D  # noqa: E402
-from gp_labeler.scene.slice_view import SliceView  # noqa: E402
+from gp_labeler.scene.slice_viewport import SliceViewport  # noqa: E402
 from gp_labeler.scene.target import RenderTarget  # noqa: E402
 from gp_labeler.views.painting.pose_slices import SlicePen  # noqa: E402
 from gp_labeler.views.painting.scene_overlay import SceneOverlay  # noqa: E402
@@ -86,7 +86,7 @@ def main() -> None:
     scene3d = Scene3D(RenderTarget.offscreen(*_SIZE))
     scene3d.camera.focus_on(np.zeros(3), across_mm=16.0)
     page = QImage(*_SIZE, QImage.Format.Format_RGB32)
-    views = [SliceView(plane, 0.1, np.zeros(2), 0.02, _SIZE) for plane in Plane]
+    views = [SliceViewport(plane, 0.1, np.zeros(2), 0.02, _SIZE) for plane in Plane]
 
     overlay = SceneOverlay()
 
@@ -108,7 +108,7 @@ def main() -> None:
 
     def anew(scene: PoseScene) -> None:
         scene3d.pose.close()
-        scene3d.pose = PoseActor(scene3d._stage)
+        scene3d.pose = PoseActor(scene3d.layers)
         draw(scene)
 
     def nothing(_: PoseScene) -> None:

@@ -48,7 +48,7 @@ def main() -> None:
     rest(window)
     n = sum(surface.n_triangles for surface in window.workspace.bone.surfaces)
     quick = sum(surface.n_triangles for surface in window.workspace.bone.quick_surfaces)
-    print(f"{n / 1e6:.2f} million triangles, a stand-in of {quick / 1e3:.0f} thousand")
+    print(f"{n / 1e6:.2f} million triangles, a preview mesh of {quick / 1e3:.0f} thousand")
     whole = whole_redraw_seconds(window)
     print(f"the scene drawn whole: {1e3 * whole:.0f} ms\n")
     print(f"{'while':<46}{'answers':>8}{'median':>8}{'p95':>8}{'longest':>9}{'of whole':>10}{'bone':>6}")

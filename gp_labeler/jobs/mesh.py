@@ -11,8 +11,8 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.mesh_files import read_mesh
+from gp_labeler.imaging.preview_mesh import coarse_surface
 from gp_labeler.imaging.progress import Progress as Told
-from gp_labeler.imaging.stand_in import coarse_surface
 from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, extract_isosurface, overview_stride
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
@@ -29,7 +29,7 @@ QUICK_TRIANGLES = 45_000
 
 @dataclass(frozen=True)
 class Meshes:
-    """The bone as it is drawn: parts that do not overlap, and a coarse stand-in while the camera moves."""
+    """The bone as it is drawn: parts that do not overlap, and a preview mesh while the camera moves."""
 
     parts: tuple[Surface, ...] = ()
     quick: tuple[Surface, ...] = ()
@@ -68,7 +68,7 @@ class MeshOverview:
         return "Making the bone surface"
 
     def run(self, progress: Progress) -> Meshes:
-        """Mesh all of it, and a stand-in of few triangles."""
+        """Mesh all of it, and a preview mesh of few triangles."""
         stride = overview_stride(self.volume)
         whole = _mesh(self, progress, end=0.8, stride=stride)
         if whole.n_triangles <= QUICK_TRIANGLES:

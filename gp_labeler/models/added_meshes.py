@@ -118,7 +118,7 @@ class AddedMeshesModel:
         """
         if name not in self._meshes:
             shown = ", ".join(self._meshes) or "none"
-            raise GpError(f"no mesh is called {name!r}", remedy=f"Shown: {shown}.")
+            raise GpError(f"no mesh is called {name!r}", remedy=f"SliceViewport: {shown}.")
         del self._meshes[name]
         if self.scene is not None:
             self.scene.remove_mesh(name)

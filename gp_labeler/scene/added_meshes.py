@@ -9,7 +9,7 @@ from vtkmodules.vtkRenderingCore import vtkProp3D
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
-from gp_labeler.scene.stage import Stage, release
+from gp_labeler.scene.render_layers import RenderLayers, release
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -25,12 +25,12 @@ class AddedMeshActors:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, layers: RenderLayers) -> None:
+        self._layers = layers
         self._actors: dict[str, Any] = {}
         self._version = 0
 
@@ -46,7 +46,7 @@ class AddedMeshActors:
         self.remove(name)
         actor.SetPickable(False)
         actor.SetVisibility(False)  # it is shown for the moment in which it is drawn
-        self._stage.bone.AddActor(actor)
+        self._layers.bone.AddActor(actor)
         self._actors[name] = actor
         self._version += 1
         return actor
@@ -56,7 +56,7 @@ class AddedMeshActors:
         actor = self._actors.pop(name, None)
         if actor is None:
             return False
-        release(self._stage.bone, actor)
+        release(self._layers.bone, actor)
         self._version += 1
         return True
 

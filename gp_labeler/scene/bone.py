@@ -14,8 +14,8 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import Surface, SurfaceHit
 from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.cut import CutPlane
-from gp_labeler.scene.pieces import Piece, pieces_of
-from gp_labeler.scene.stage import Stage
+from gp_labeler.scene.mesh_chunks import MeshChunk, chunks_of
+from gp_labeler.scene.render_layers import RenderLayers
 
 __all__ = ["BoneActor"]
 
@@ -30,19 +30,19 @@ that is cut through: behind a cut it is seen just where that lies in bone."""
 class BoneActor:
     """Draws surfaces, and answers what lies under a ray.
 
-    What is drawn when is for the `Backdrop`: it asks for actors, and draws them one after the other.
+    What is drawn when is for the `BoneFrameCache`: it asks for actors, and draws them one after the other.
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, layers: RenderLayers) -> None:
+        self._layers = layers
         self._surfaces: tuple[Surface, ...] = ()
-        self._fine: list[Piece] = []
-        self._quick: list[Piece] = []
+        self._fine: list[MeshChunk] = []
+        self._quick: list[MeshChunk] = []
         self._look, self._inside = vtkProperty(), vtkProperty()
         self._opacity = 1.0
         self._visible = True
@@ -60,12 +60,12 @@ class BoneActor:
         surfaces : sequence of Surface
             Parts that do not overlap, such as an overview with a hole (`Surface.outside`) and what fills it.
         quick : sequence of Surface
-            A coarser stand-in, drawn while the camera is dragged; picking always uses `surfaces`.
+            A coarser preview mesh, drawn while the camera is dragged; picking always uses `surfaces`.
         """
         self._drop()
         self._surfaces = tuple(surfaces)
-        self._fine = [piece for surface in surfaces for piece in pieces_of(surface)]
-        self._quick = [Piece(surface, 0, surface.n_triangles) for surface in quick if surface.n_triangles]
+        self._fine = [piece for surface in surfaces for piece in chunks_of(surface)]
+        self._quick = [MeshChunk(surface, 0, surface.n_triangles) for surface in quick if surface.n_triangles]
         self.version += 1
 
     @property
@@ -75,7 +75,7 @@ class BoneActor:
 
     @property
     def has_quick(self) -> bool:
-        """Whether there is a coarser stand-in."""
+        """Whether there is a coarser preview mesh."""
         return bool(self._quick)
 
     @property
@@ -118,15 +118,15 @@ class BoneActor:
     @property
     def look(self) -> tuple[object, ...]:
         """Everything but the meshes on which it depends how the bone looks."""
-        return self._stage.colours, self._opacity, self._visible, self._cut
+        return self._layers.colours, self._opacity, self._visible, self._cut
 
     def recolour(self) -> None:
-        """Take the colours of the stage's theme."""
+        """Take the colours of the theme."""
         self._apply()
 
     def groups(
         self, direction: FloatArray, *, quick: bool = False, at_once: bool = False
-    ) -> list[list[Piece]]:
+    ) -> list[list[MeshChunk]]:
         """Return what is drawn one after the other to make a frame.
 
         Parameters
@@ -135,7 +135,7 @@ class BoneActor:
             Into the scene. Nearer pieces of solid bone come first, as they hide others; of transparent bone,
             they come last, as they lie over others.
         quick : bool
-            The stand-in, where there is one.
+            The preview mesh, where there is one.
         at_once : bool
             All pieces in one group.
         """
@@ -146,9 +146,9 @@ class BoneActor:
         pieces = sorted(pieces, key=lambda piece: order * float(piece.middle @ direction))
         return [pieces] if at_once or quick else [[piece] for piece in pieces]
 
-    def actors(self, pieces: Sequence[Piece]) -> list[vtkActor]:
+    def actors(self, pieces: Sequence[MeshChunk]) -> list[vtkActor]:
         """Return what draws pieces, invisible yet."""
-        made = [piece.actor(self._stage.bone, self._look, self._plane) for piece in pieces]
+        made = [piece.actor(self._layers.bone, self._look, self._plane) for piece in pieces]
         solid = self._cut is not None and self._opacity == 1
         for actor in made:
             actor.SetBackfaceProperty(cast(Any, self._inside if solid else None))
@@ -191,7 +191,7 @@ class BoneActor:
         return self._visible and self._opacity > _BARELY_THERE
 
     def _apply(self) -> None:
-        colour = rgb(self._stage.colours.bone)
+        colour = rgb(self._layers.colours.bone)
         self._look.SetColor(*colour)
         self._look.SetOpacity(self._opacity)
         self._look.SetAmbient(0.10)
@@ -205,7 +205,7 @@ class BoneActor:
 
     def _drop(self) -> None:
         for piece in (*self._fine, *self._quick):
-            piece.close(self._stage.bone)
+            piece.close(self._layers.bone)
         self._fine, self._quick = [], []
 
 

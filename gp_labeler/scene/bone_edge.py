@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.slices import VolumeSlicer
 
 __all__ = ["BoneEdge", "nearest_on_segments"]
 
@@ -17,7 +17,7 @@ class BoneEdge:
 
     Parameters
     ----------
-    source : SliceSource
+    source : VolumeSlicer
         The scan.
     plane : Plane
         Which way it is cut.
@@ -25,7 +25,7 @@ class BoneEdge:
         Where bone begins.
     """
 
-    def __init__(self, source: SliceSource, plane: Plane, threshold: float) -> None:
+    def __init__(self, source: VolumeSlicer, plane: Plane, threshold: float) -> None:
         self.source, self.plane, self.threshold = source, plane, threshold
         self._position = self._snapped = float("nan")
         self._segments = np.empty((0, 2, 2))

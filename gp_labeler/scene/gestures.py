@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from enum import Enum, Flag, auto
 from typing import Protocol
 
-from gp_labeler.scene.slice_view import SliceView
+from gp_labeler.scene.slice_viewport import SliceViewport
 
-__all__ = ["Button", "CameraControl", "Drag", "Modifier", "SliceControl", "Turnable", "drag_of"]
+__all__ = ["Button", "CameraControl", "DragMode", "Modifier", "SliceControl", "Turnable", "drag_of"]
 
 CLICK_PIXELS = 4.0
 """A press and release nearer than this is a click, not a drag."""
@@ -38,7 +38,7 @@ class Modifier(Flag):
     ALT = auto()
 
 
-class Drag(Enum):
+class DragMode(Enum):
     """What a drag does to a view."""
 
     NONE = auto()
@@ -48,13 +48,13 @@ class Drag(Enum):
     ZOOM = auto()
 
 
-def drag_of(button: Button, modifiers: Modifier = Modifier.NONE) -> Drag:
+def drag_of(button: Button, modifiers: Modifier = Modifier.NONE) -> DragMode:
     """Return what dragging with a button means."""
     if button is Button.RIGHT:
-        return Drag.ZOOM
+        return DragMode.ZOOM
     if button is Button.MIDDLE or Modifier.SHIFT in modifiers:
-        return Drag.PAN
-    return Drag.SPIN if Modifier.CTRL in modifiers else Drag.ROTATE
+        return DragMode.PAN
+    return DragMode.SPIN if Modifier.CTRL in modifiers else DragMode.ROTATE
 
 
 class Turnable(Protocol):
@@ -70,12 +70,12 @@ class Turnable(Protocol):
 class _Gesture:
     """The drag that is going on."""
 
-    drag: Drag = Drag.NONE
+    drag: DragMode = DragMode.NONE
     start: tuple[float, float] = (0.0, 0.0)
     last: tuple[float, float] = (0.0, 0.0)
     is_click: bool = False
 
-    def begin(self, drag: Drag, x: float, y: float) -> None:
+    def begin(self, drag: DragMode, x: float, y: float) -> None:
         self.drag, self.start, self.last, self.is_click = drag, (x, y), (x, y), True
 
     def step(self, x: float, y: float) -> tuple[float, float]:
@@ -103,7 +103,7 @@ class CameraControl:
     @property
     def dragging(self) -> bool:
         """Whether a button is down and the mouse has moved: time to draw quickly rather than finely."""
-        return self._gesture.drag is not Drag.NONE and not self._gesture.is_click
+        return self._gesture.drag is not DragMode.NONE and not self._gesture.is_click
 
     def press(self, button: Button, x: float, y: float, modifiers: Modifier = Modifier.NONE) -> None:
         """Take a press of a button."""
@@ -112,18 +112,18 @@ class CameraControl:
     def move(self, x: float, y: float) -> bool:
         """Take a movement; return whether the view has changed and must be drawn."""
         gesture = self._gesture
-        if gesture.drag is Drag.NONE:
+        if gesture.drag is DragMode.NONE:
             return False
         before = gesture.start if gesture.is_click else gesture.last
         gesture.step(x, y)
         if gesture.is_click:
             return False  # a hand that trembles while it clicks does not turn the head
         dx, dy = x - before[0], y - before[1]
-        if gesture.drag is Drag.ROTATE:
+        if gesture.drag is DragMode.ROTATE:
             self._camera.rotate(dx, dy)
-        elif gesture.drag is Drag.SPIN:
+        elif gesture.drag is DragMode.SPIN:
             self._camera.spin(before, (x, y))
-        elif gesture.drag is Drag.PAN:
+        elif gesture.drag is DragMode.PAN:
             self._camera.pan(before, (x, y))
         else:
             self._camera.zoom(_ZOOM_PER_PIXEL ** (-dy))
@@ -132,7 +132,7 @@ class CameraControl:
     def release(self, x: float, y: float) -> bool:
         """Take a release; return whether the whole was a click, which left the camera as it was."""
         self.move(x, y)
-        clicked = self._gesture.drag is not Drag.NONE and self._gesture.is_click
+        clicked = self._gesture.drag is not DragMode.NONE and self._gesture.is_click
         self.cancel()
         return clicked
 
@@ -155,15 +155,15 @@ class SliceControl:
     def press(self, button: Button, x: float, y: float, modifiers: Modifier = Modifier.NONE) -> bool:
         """Take a press; return whether its drag is one that moves the view."""
         drag = drag_of(button, modifiers)
-        self._gesture.begin(drag if drag in (Drag.PAN, Drag.ZOOM) else Drag.NONE, x, y)
-        return self._gesture.drag is not Drag.NONE
+        self._gesture.begin(drag if drag in (DragMode.PAN, DragMode.ZOOM) else DragMode.NONE, x, y)
+        return self._gesture.drag is not DragMode.NONE
 
-    def move(self, view: SliceView, x: float, y: float) -> SliceView:
+    def move(self, view: SliceViewport, x: float, y: float) -> SliceViewport:
         """Take a movement; return the view that follows from it (the same where nothing changes)."""
         dx, dy = self._gesture.step(x, y)
-        if self._gesture.drag is Drag.PAN:
+        if self._gesture.drag is DragMode.PAN:
             return view.panned(dx, dy)
-        if self._gesture.drag is Drag.ZOOM and dy:
+        if self._gesture.drag is DragMode.ZOOM and dy:
             return view.zoomed(_ZOOM_PER_PIXEL ** (-dy), about=self._gesture.start)
         return view
 
@@ -175,8 +175,8 @@ class SliceControl:
         return clicked
 
     def wheel(
-        self, view: SliceView, notches: float, x: float, y: float, modifiers: Modifier, step: float
-    ) -> SliceView:
+        self, view: SliceViewport, notches: float, x: float, y: float, modifiers: Modifier, step: float
+    ) -> SliceViewport:
         """Take a turn of the wheel: slices of `step` mm, or with Ctrl zoom about the pointer."""
         if Modifier.CTRL in modifiers:
             return view.zoomed(_ZOOM_PER_NOTCH**notches, about=(x, y))

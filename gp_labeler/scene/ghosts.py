@@ -15,9 +15,9 @@ from gp_core.constants import CHI2_3_95
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.camera import Viewpoint
-from gp_labeler.scene.stage import Stage, release, solid_actor
+from gp_labeler.scene.render_layers import RenderLayers, release, solid_actor
 
-__all__ = ["RADIUS_95", "Ghost", "GhostActor", "ellipse", "outline_in"]
+__all__ = ["RADIUS_95", "GhostActor", "GhostEllipsoid", "ellipse", "outline_in"]
 
 RADIUS_95 = CHI2_3_95**0.5
 """95 % radius of a three-dimensional Gaussian, in standard deviations."""
@@ -27,7 +27,7 @@ _CORNERS = 65
 
 
 @dataclass(frozen=True, eq=False)
-class Ghost:
+class GhostEllipsoid:
     """The expected place of a feature.
 
     Parameters
@@ -75,31 +75,31 @@ class GhostActor:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     state : str
         Whose colour of the theme they have.
     """
 
-    def __init__(self, stage: Stage, state: str = "ghost") -> None:
-        self._stage, self._state = stage, state
-        self._ghosts: tuple[Ghost, ...] = ()
+    def __init__(self, layers: RenderLayers, state: str = "ghost") -> None:
+        self._layers, self._state = layers, state
+        self._ghosts: tuple[GhostEllipsoid, ...] = ()
         self._fills: list[vtkActor] = []
 
     @property
-    def ghosts(self) -> tuple[Ghost, ...]:
+    def ghosts(self) -> tuple[GhostEllipsoid, ...]:
         """What is drawn."""
         return self._ghosts
 
-    def show(self, ghosts: Sequence[Ghost]) -> None:
+    def show(self, ghosts: Sequence[GhostEllipsoid]) -> None:
         """Draw these ghosts in place of those before."""
         self._drop()
         self._ghosts = tuple(ghosts)
         for ghost in self._ghosts:
             if ghost.active:
-                fill = solid_actor(_ball(), self._stage.colours.states[self._state], _FILL)
+                fill = solid_actor(_ball(), self._layers.colours.states[self._state], _FILL)
                 fill.SetUserMatrix(_ellipsoid(ghost))
-                self._stage.base.AddActor(fill)
+                self._layers.base.AddActor(fill)
                 self._fills.append(fill)
 
     def close(self) -> None:
@@ -109,7 +109,7 @@ class GhostActor:
 
     def _drop(self) -> None:
         for fill in self._fills:
-            release(self._stage.base, fill)
+            release(self._layers.base, fill)
         self._fills = []
 
 
@@ -122,7 +122,7 @@ def _ball() -> object:
     return source.GetOutput()
 
 
-def _ellipsoid(ghost: Ghost) -> vtkMatrix4x4:
+def _ellipsoid(ghost: GhostEllipsoid) -> vtkMatrix4x4:
     """Place the unit ball as the 95 % ellipsoid."""
     values, axes = np.linalg.eigh(ghost.covariance)
     axes[:, 0] *= np.sign(np.linalg.det(axes))  # a mirrored ball would turn its faces inward, and be black

@@ -8,7 +8,7 @@ from vtkmodules.vtkRenderingCore import vtkRenderer
 from gp_labeler.imaging.vtk_arrays import triple
 from gp_labeler.scene.camera import SceneCamera, Viewpoint
 from gp_labeler.scene.colours import rgb
-from gp_labeler.scene.stage import Stage
+from gp_labeler.scene.render_layers import RenderLayers
 
 __all__ = ["OrientationCube"]
 
@@ -23,12 +23,12 @@ class OrientationCube:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Its renderer joins the same window.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, layers: RenderLayers) -> None:
+        self._layers = layers
         self.visible = True
         self.renderer = vtkRenderer()
         self.renderer.SetLayer(1)
@@ -50,8 +50,8 @@ class OrientationCube:
         self.recolour()
 
     def recolour(self) -> None:
-        """Take the colours of the stage's theme."""
-        colours = self._stage.colours
+        """Take the colours of the theme."""
+        colours = self._layers.colours
         face = self._cube.GetCubeProperty()
         face.SetColor(rgb(colours.bone))
         face.SetAmbient(0.35)
@@ -69,7 +69,7 @@ class OrientationCube:
     def refresh(self, view: Viewpoint, camera: SceneCamera) -> None:
         """Turn with the camera, and keep the size in pixels."""
         width, height = view.size
-        scale = self._stage.scale
+        scale = self._layers.scale
         side, margin = min(_CUBE_PIXELS * scale, _CUBE_SHARE * width), _MARGIN_PIXELS * scale / 2
         self.renderer.SetViewport(
             margin / width,

@@ -11,8 +11,8 @@ from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.pose_bodies import PoseBodies
 from gp_labeler.scene.pose_data import DrawnPose, DrawnTip, PoseScene
 from gp_labeler.scene.pose_glyphs import SolidActor
-from gp_labeler.scene.pose_rows import Solid, axes_of, marks_of, sizes_of
-from gp_labeler.scene.stage import Stage
+from gp_labeler.scene.pose_rows import PoseSolid, axes_of, marks_of, sizes_of
+from gp_labeler.scene.render_layers import RenderLayers
 
 __all__ = ["PoseActor"]
 
@@ -22,17 +22,17 @@ class PoseActor:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
-        self._scene, self._colours = PoseScene(), stage.colours
-        self._axis_solids: list[Solid] = []
-        self._mark_solids: list[Solid] = []
+    def __init__(self, layers: RenderLayers) -> None:
+        self._layers = layers
+        self._scene, self._colours = PoseScene(), layers.colours
+        self._axis_solids: list[PoseSolid] = []
+        self._mark_solids: list[PoseSolid] = []
         self._bodies: list[PoseBodies] = []
-        self._axes, self._marks = SolidActor(stage, 1.0), SolidActor(stage)
+        self._axes, self._marks = SolidActor(layers, 1.0), SolidActor(layers)
 
     @property
     def scene(self) -> PoseScene:
@@ -46,10 +46,10 @@ class PoseActor:
 
     def show(self, scene: PoseScene) -> None:
         """Draw this in place of what was before."""
-        self._scene, self._colours = scene, self._stage.colours
+        self._scene, self._colours = scene, self._layers.colours
         self._axis_solids, self._mark_solids = axes_of(scene), marks_of(scene)
         while len(self._bodies) < len(scene.poses):
-            self._bodies.append(PoseBodies(self._stage))
+            self._bodies.append(PoseBodies(self._layers))
         for n, body in enumerate(self._bodies):
             body.show(scene.poses[n] if n < len(scene.poses) else None, scene)
 
@@ -60,7 +60,7 @@ class PoseActor:
 
     def refresh(self, view: Viewpoint) -> None:
         """Bring sizes up to date with the camera."""
-        if self._colours is not self._stage.colours:
+        if self._colours is not self._layers.colours:
             self.show(self._scene)
         for actor, solids in ((self._axes, self._axis_solids), (self._marks, self._mark_solids)):
             self._place(actor, solids, view)
@@ -74,10 +74,10 @@ class PoseActor:
         self._axes.close()
         self._marks.close()
 
-    def _place(self, actor: SolidActor, solids: list[Solid], view: Viewpoint) -> None:
-        states = self._stage.colours.states
+    def _place(self, actor: SolidActor, solids: list[PoseSolid], view: Viewpoint) -> None:
+        states = self._layers.colours.states
         places, along = (np.array([getattr(s, n) for s in solids]).reshape(-1, 3) for n in ("place", "along"))
-        pixel_mm = self._stage.scale * view.pixel_sizes(places) if solids else np.empty(0)
+        pixel_mm = self._layers.scale * view.pixel_sizes(places) if solids else np.empty(0)
         colours = {role: np.rint(np.array(rgb(states[role])) * 255) for role in {s.role for s in solids}}
         actor.set(
             places,

@@ -14,7 +14,7 @@ from gp_labeler.imaging.vtk_arrays import matrix_of
 from gp_labeler.scene.colours import rgb
 from gp_labeler.scene.ghosts import RADIUS_95
 from gp_labeler.scene.pose_data import AXIS_MM, DrawnPose, PoseScene
-from gp_labeler.scene.stage import Stage, release, solid_actor
+from gp_labeler.scene.render_layers import RenderLayers, release, solid_actor
 
 if TYPE_CHECKING:
     import pyvista as pv
@@ -30,14 +30,14 @@ class PoseBodies:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     """
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, layers: RenderLayers) -> None:
         import pyvista as pv  # takes 0.6 s: not before there is an estimate to draw
 
-        self._stage = stage
+        self._layers = layers
         duct, core = cochlea_tubes(Side.LEFT)
         ball = pv.Sphere(radius=1.0, theta_resolution=40, phi_resolution=24)
         cone = pv.Cone(  # from its apex in the origin to a rim of radius 1 about x = 1
@@ -60,7 +60,7 @@ class PoseBodies:
             "region": _ellipsoid(pose),
             "cone": pose.T_scan_cochlea @ np.diag([AXIS_MM, radius, radius, 1.0]),
         }
-        colour = rgb(self._stage.colours.states[pose.role])
+        colour = rgb(self._layers.colours.states[pose.role])
         for name, actor in self._actors.items():
             actor.SetUserMatrix(matrix_of(places.get(name, pose.T_scan_cochlea)))
             actor.GetProperty().SetColor(*colour)
@@ -69,16 +69,16 @@ class PoseBodies:
     def close(self) -> None:
         """Let go of the actors."""
         for actor in self._actors.values():
-            release(self._stage.overlay, actor)
+            release(self._layers.overlay, actor)
         self._actors = {}
 
     def _add(self, shape: pv.PolyData) -> vtkActor:
-        actor = solid_actor(shape, self._stage.colours.states["pose"])
+        actor = solid_actor(shape, self._layers.colours.states["pose"])
         actor.VisibilityOff()
         actor.GetProperty().SetAmbient(0.3)
         actor.GetProperty().SetDiffuse(0.8)
         actor.GetProperty().BackfaceCullingOn()
-        self._stage.overlay.AddActor(actor)
+        self._layers.overlay.AddActor(actor)
         return actor
 
 

@@ -12,7 +12,7 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_vtk
 from gp_labeler.scene.pose_solids import solid_mesh
-from gp_labeler.scene.stage import Stage, release
+from gp_labeler.scene.render_layers import RenderLayers, release
 
 __all__ = ["SolidActor"]
 
@@ -25,19 +25,19 @@ class SolidActor:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     through : float
         Opacity of what bone hides.
     """
 
-    def __init__(self, stage: Stage, through: float = 0.5) -> None:
+    def __init__(self, layers: RenderLayers, through: float = 0.5) -> None:
         self._data = vtkPolyData()
-        layers = ((stage.base, 1.0), (stage.overlay, through))
-        self._layers = [
+        opacities = ((layers.base, 1.0), (layers.overlay, through))
+        self._actors = [
             (renderer, _actor(self._data, renderer), opacity)
-            for renderer, opacity in layers
-            if through < 1.0 or renderer is stage.overlay
+            for renderer, opacity in opacities
+            if through < 1.0 or renderer is layers.overlay
         ]
 
     def set(
@@ -64,7 +64,7 @@ class SolidActor:
         opacity : float
             From 0 to 1.
         """
-        for _, actor, full in self._layers:
+        for _, actor, full in self._actors:
             actor.SetVisibility(len(places) > 0 and opacity > 0)
             actor.GetProperty().SetOpacity(full * opacity)
         if not len(places):
@@ -81,9 +81,9 @@ class SolidActor:
 
     def close(self) -> None:
         """Let go of the actors."""
-        for renderer, actor, _ in self._layers:
+        for renderer, actor, _ in self._actors:
             release(renderer, actor)
-        self._layers = []
+        self._actors = []
 
     @staticmethod
     def _part(

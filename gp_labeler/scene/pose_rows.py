@@ -28,7 +28,7 @@ __all__ = [
     "DIAMOND",
     "HEAD",
     "ROD",
-    "Solid",
+    "PoseSolid",
     "axes_of",
     "dashes",
     "marks_of",
@@ -46,7 +46,7 @@ _TRAIL_AT_MOST = 48
 
 
 @dataclass(frozen=True, eq=False)
-class Solid:
+class PoseSolid:
     """A small solid; along its direction it is so long, across so thick, each the larger of mm and pixels.
 
     Parameters
@@ -69,14 +69,14 @@ class Solid:
     thick: tuple[float, float]
 
 
-def axes_of(scene: PoseScene) -> list[Solid]:
+def axes_of(scene: PoseScene) -> list[PoseSolid]:
     """Return the solids of estimated and labelled axes, as far as they are shown."""
     seen = scene.seen
     poses = seen.poses if scene.shows("estimate") else ()
     return _flat([*map(_pose, poses), *map(_truth, seen.truths)])
 
 
-def marks_of(scene: PoseScene) -> list[Solid]:
+def marks_of(scene: PoseScene) -> list[PoseSolid]:
     """Return the solids of points, error vectors and the probe, as far as they are shown."""
     seen = scene.seen
     found = _flat(map(_vector, seen.vectors))
@@ -93,66 +93,66 @@ def dashes(length: float, style: str) -> list[tuple[float, float]]:
     return [(float(s), float(min(s + dash, length))) for s in starts]
 
 
-def _flat(many: Iterable[Iterable[Solid]]) -> list[Solid]:
+def _flat(many: Iterable[Iterable[PoseSolid]]) -> list[PoseSolid]:
     return [solid for some in many for solid in some]
 
 
-def _pose(pose: DrawnPose) -> Iterator[Solid]:
+def _pose(pose: DrawnPose) -> Iterator[PoseSolid]:
     for start, end in dashes(AXIS_MM + BEHIND_MM - 0.8 * _HEAD_MM, pose.style):
         place = pose.tail + start * pose.axis
-        yield Solid(ROD, place, pose.axis, pose.role, (end - start, 0.0), (0.15, 2.6))
-    yield Solid(HEAD, pose.tip, pose.axis, pose.role, (_HEAD_MM, 9.0), (0.55, 8.0))
+        yield PoseSolid(ROD, place, pose.axis, pose.role, (end - start, 0.0), (0.15, 2.6))
+    yield PoseSolid(HEAD, pose.tip, pose.axis, pose.role, (_HEAD_MM, 9.0), (0.55, 8.0))
     shape = _MARKERS.get(pose.role, BALL)
     size = (0.5, 8.0) if shape == BALL else (0.62, 10.0)
-    yield Solid(shape, pose.origin, pose.axis, pose.role, size, size)
+    yield PoseSolid(shape, pose.origin, pose.axis, pose.role, size, size)
 
 
-def _truth(truth: DrawnTruth) -> Iterator[Solid]:
+def _truth(truth: DrawnTruth) -> Iterator[PoseSolid]:
     length = float(np.linalg.norm(truth.tip - truth.tail))
-    yield Solid(ROD, truth.tail, truth.axis, "truth", (length, 0.0), (0.09, 2.0))
-    yield Solid(CUBE, truth.origin, truth.axis, "truth", (0.42, 7.0), (0.42, 7.0))
+    yield PoseSolid(ROD, truth.tail, truth.axis, "truth", (length, 0.0), (0.09, 2.0))
+    yield PoseSolid(CUBE, truth.origin, truth.axis, "truth", (0.42, 7.0), (0.42, 7.0))
     for end in (truth.tip, truth.tail):
-        yield Solid(ROD, end, truth.axis, "truth", (0.05, 1.5), (0.26, 6.0))
+        yield PoseSolid(ROD, end, truth.axis, "truth", (0.05, 1.5), (0.26, 6.0))
 
 
-def _vector(vector: DrawnVector) -> Iterator[Solid]:
+def _vector(vector: DrawnVector) -> Iterator[PoseSolid]:
     if vector.length < 1e-6:
         return
     along, bold = (vector.end - vector.start) / vector.length, 1.8 if vector.is_long else 1.0
-    yield Solid(ROD, vector.start, along, vector.role, (vector.length, 0.0), (0.03, 1.6 * bold))
+    yield PoseSolid(ROD, vector.start, along, vector.role, (vector.length, 0.0), (0.03, 1.6 * bold))
     head = (min(0.3 * bold, 0.6 * vector.length), 0.0)
-    yield Solid(HEAD, vector.end, along, vector.role, head, (0.12 * bold, 5.0 * bold))
+    yield PoseSolid(HEAD, vector.end, along, vector.role, head, (0.12 * bold, 5.0 * bold))
 
 
-def _feature(feature: DrawnFeature) -> Solid:
-    return Solid(DIAMOND, feature.position, _UP, feature.role, (0.12, 6.0), (0.12, 6.0))
+def _feature(feature: DrawnFeature) -> PoseSolid:
+    return PoseSolid(DIAMOND, feature.position, _UP, feature.role, (0.12, 6.0), (0.12, 6.0))
 
 
-def _touch(touch: DrawnTouch) -> Solid:
+def _touch(touch: DrawnTouch) -> PoseSolid:
     role = "doubtful" if touch.suspect else "touch" if touch.used else "unseen"
     grown = 1.25 if touch.suspect else 1.0
-    return Solid(DIAMOND, touch.position, _UP, role, (0.3, 15.0 * grown), (0.18, 9.0 * grown))
+    return PoseSolid(DIAMOND, touch.position, _UP, role, (0.3, 15.0 * grown), (0.18, 9.0 * grown))
 
 
-def _tip(tip: DrawnTip) -> list[Solid]:
+def _tip(tip: DrawnTip) -> list[PoseSolid]:
     role = "touch" if tip.visible else "unseen"
     trail = tip.trail[-_TRAIL_AT_MOST:]
     sizes = np.linspace(3.5, 7.0, len(trail))
     found = [
-        Solid(DIAMOND, place, _UP, role, (0.0, float(size)), (0.0, float(size)))
+        PoseSolid(DIAMOND, place, _UP, role, (0.0, float(size)), (0.0, float(size)))
         for place, size in zip(trail, sizes, strict=True)
     ]
     if tip.handle is None:
-        return [*found, Solid(BALL, tip.position, _UP, role, (0.3, 8.0), (0.3, 8.0))]
+        return [*found, PoseSolid(BALL, tip.position, _UP, role, (0.3, 8.0), (0.3, 8.0))]
     up = tip.handle / max(float(np.linalg.norm(tip.handle)), 1e-9)
     return [
         *found,
-        Solid(HEAD, tip.position, -up, role, (_NEEDLE_MM, 0.0), (0.4, 5.0)),
-        Solid(ROD, tip.position + _NEEDLE_MM * up, up, role, (_HANDLE_MM, 0.0), (0.4, 5.0)),
+        PoseSolid(HEAD, tip.position, -up, role, (_NEEDLE_MM, 0.0), (0.4, 5.0)),
+        PoseSolid(ROD, tip.position + _NEEDLE_MM * up, up, role, (_HANDLE_MM, 0.0), (0.4, 5.0)),
     ]
 
 
-def sizes_of(solids: Sequence[Solid], pixel_mm: FloatArray) -> FloatArray:
+def sizes_of(solids: Sequence[PoseSolid], pixel_mm: FloatArray) -> FloatArray:
     """Return the (N, 3) length and thickness (twice) of solids, mm, where a pixel is so large."""
     long, thick = (np.array([getattr(s, name) for s in solids]).reshape(-1, 2) for name in ("long", "thick"))
     grown = [np.maximum(size[:, 0], size[:, 1] * pixel_mm) for size in (long, thick)]

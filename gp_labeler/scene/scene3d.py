@@ -15,8 +15,8 @@ from vtkmodules.vtkRenderingCore import vtkLight, vtkRenderer
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import SurfaceHit
 from gp_labeler.scene.added_meshes import AddedMeshActors
-from gp_labeler.scene.backdrop import Backdrop, Sight
 from gp_labeler.scene.bone import BoneActor
+from gp_labeler.scene.bone_frame_cache import BoneFrameCache, RenderKey
 from gp_labeler.scene.camera import SceneCamera
 from gp_labeler.scene.colours import SceneColours, rgb
 from gp_labeler.scene.gestures import CameraControl
@@ -24,9 +24,9 @@ from gp_labeler.scene.ghosts import GhostActor
 from gp_labeler.scene.marks import REFERENCE, MarkSet
 from gp_labeler.scene.orientation_cube import OrientationCube
 from gp_labeler.scene.pose import PoseActor
+from gp_labeler.scene.render_layers import RenderLayers
 from gp_labeler.scene.segments import SegmentActor
 from gp_labeler.scene.slice_planes import SlicePlaneActor
-from gp_labeler.scene.stage import Stage
 from gp_labeler.scene.target import RenderTarget
 
 if TYPE_CHECKING:
@@ -65,7 +65,7 @@ class Scene3D:
     def __init__(self, target: RenderTarget) -> None:
         self.target = target
         bone, base, overlay = vtkRenderer(), vtkRenderer(), vtkRenderer()
-        self._stage = Stage(bone, base, overlay)
+        self.layers = RenderLayers(bone, base, overlay)
         base.EraseOff()  # it is drawn against the depths of the bone
         overlay.SetLayer(1)
         overlay.InteractiveOff()
@@ -77,34 +77,34 @@ class Scene3D:
         self._room = _Room(bone)
         self.camera = SceneCamera(bone.GetActiveCamera(), lambda: target.size)
         self.control = CameraControl(self.camera)
-        self.bone = BoneActor(self._stage)
-        self.added = AddedMeshActors(self._stage)
-        self.slices = SlicePlaneActor(self._stage)
-        self.lines = SegmentActor(self._stage)
-        self.ghosts = GhostActor(self._stage)
-        self.pose = PoseActor(self._stage)
+        self.bone = BoneActor(self.layers)
+        self.added = AddedMeshActors(self.layers)
+        self.slices = SlicePlaneActor(self.layers)
+        self.lines = SegmentActor(self.layers)
+        self.ghosts = GhostActor(self.layers)
+        self.pose = PoseActor(self.layers)
         self.marks = MarkSet()
-        self.cube = OrientationCube(self._stage)
+        self.cube = OrientationCube(self.layers)
         target.add(self.cube.renderer)
-        self._backdrop = Backdrop(self._stage, target, self.bone, self.added, self.cube)
+        self._bone_frames = BoneFrameCache(self.layers, target, self.bone, self.added, self.cube)
         self._behind: tuple[object, dict[bytes, bool]] = (None, {})
-        self.set_colours(self._stage.colours)
+        self.set_colours(self.layers.colours)
         self.camera.view_from("A")
         self.camera.fit(_EMPTY_BOUNDS)
 
     @property
     def scale(self) -> float:
         """Device pixels per logical pixel."""
-        return self._stage.scale
+        return self.layers.scale
 
     @scale.setter
     def scale(self, value: float) -> None:
-        self._stage.scale = float(value)
+        self.layers.scale = float(value)
 
     def set_colours(self, colours: SceneColours) -> None:
         """Take a theme; lines and ghosts take it when they are shown next."""
-        self._stage.colours = colours
-        behind = self._stage.bone
+        self.layers.colours = colours
+        behind = self.layers.bone
         behind.GradientBackgroundOn()
         behind.SetBackground(rgb(colours.bottom))
         behind.SetBackground2(rgb(colours.top))
@@ -174,12 +174,12 @@ class Scene3D:
     @property
     def is_fine(self) -> bool:
         """Whether the bone as it was to be seen in the last frame is drawn finely, and kept."""
-        return self._backdrop.is_fine(self._sight())
+        return self._bone_frames.is_fine(self._render_key())
 
     @property
     def n_bone_frames(self) -> int:
         """How often bone has been drawn."""
-        return self._backdrop.n_drawn
+        return self._bone_frames.n_drawn
 
     def render(self, *, quick: bool = False) -> None:
         """Draw one frame; the bone anew only where it or the camera has changed.
@@ -187,46 +187,46 @@ class Scene3D:
         Parameters
         ----------
         quick : bool
-            Where the bone must be drawn anew, draw its coarser stand-in, if there is one; `advance` then
+            Where the bone must be drawn anew, draw its coarser preview mesh, if there is one; `advance` then
             draws it finely.
         """
         self._set_clipping()
-        sight = self._sight()
+        key = self._render_key()
         if not quick:
-            self._advance(sight)
-        elif not (self._backdrop.is_fine(sight) or self._backdrop.will_do(sight)):
+            self._advance(key)
+        elif not (self._bone_frames.is_fine(key) or self._bone_frames.differs_only_in_mesh(key)):
             self._refresh_cube()
-            self._backdrop.draw_quickly(sight, self.camera.direction)
+            self._bone_frames.draw_quickly(key, self.camera.direction)
         self._draw_over_bone()
 
     def advance(self, seconds: float) -> bool:
         """Draw more of the fine bone, in about so many seconds, unseen yet; return whether it is done."""
         self._set_clipping()
-        return self._advance(self._sight(), seconds)
+        return self._advance(self._render_key(), seconds)
 
-    def _advance(self, sight: Sight, seconds: float = np.inf) -> bool:
+    def _advance(self, key: RenderKey, seconds: float = np.inf) -> bool:
         self._refresh_cube()
-        return self._backdrop.advance(sight, self.camera.direction, seconds)
+        return self._bone_frames.advance(key, self.camera.direction, seconds)
 
     def _refresh_cube(self) -> None:
         self.cube.refresh(self.camera.viewpoint(), self.camera)
 
     def _draw_over_bone(self) -> None:
         self.pose.refresh(self.camera.viewpoint())
-        self._backdrop.restore()
+        self._bone_frames.restore()
         covered = self.cube.visible and bool(self.slices.images)  # a slice may stand before it
         over = (self.cube.renderer,) if covered else ()
-        self.target.draw(self._stage.base, *over, self._stage.overlay)
+        self.target.draw(self.layers.base, *over, self.layers.overlay)
 
-    def _sight(self) -> Sight:
-        look = (*self.bone.look, self.added.look, self.cube.visible, self._stage.scale)
+    def _render_key(self) -> RenderKey:
+        look = (*self.bone.look, self.added.look, self.cube.visible, self.layers.scale)
         matrix = self.camera.viewpoint().matrix
-        return Sight(matrix.tobytes(), self.target.size, look, self.bone.version)
+        return RenderKey(matrix.tobytes(), self.target.size, look, self.bone.version)
 
     def forget(self) -> None:
         """Draw everything anew: the context of OpenGL in which pictures were kept is gone."""
         self.target.forget()
-        self._backdrop.forget()
+        self._bone_frames.forget()
 
     def image(self, width: int | None = None, height: int | None = None) -> NDArray[np.uint8]:
         """Draw a frame, of another size where given, and return it, (h, w, 3)."""
@@ -262,7 +262,7 @@ class Scene3D:
         slack = _HIDDEN_SLACK_VOXELS * max((s.voxel_mm for s in self.bone.surfaces), default=0.0)
         if not slack or not len(scan):
             return np.zeros(len(scan), dtype=bool)
-        seen = (self._sight(), self.slices.images)
+        seen = (self._render_key(), self.slices.images)
         if self._behind[0] != seen:
             self._behind = (seen, {})
         known = self._behind[1]
@@ -297,10 +297,10 @@ class Scene3D:
 
     def close(self) -> None:
         """Let go of everything drawn, and of the target."""
-        self._backdrop.close()
+        self._bone_frames.close()
         for adapter in (self.cube, self.ghosts, self.pose, self.lines, self.slices, self.added, self.bone):
             adapter.close()
-        for renderer in (self._stage.overlay, self._stage.base, self._stage.bone):
+        for renderer in (self.layers.overlay, self.layers.base, self.layers.bone):
             renderer.RemoveAllLights()
             renderer.RemoveAllViewProps()
         self.target.close()
@@ -314,7 +314,7 @@ class Scene3D:
 
     def _drawn_bounds(self) -> FloatArray:
         boxes = [self.bounds, np.stack([self.camera.focus - 5.0, self.camera.focus + 5.0])]
-        for renderer in (self._stage.base, self._stage.overlay):
+        for renderer in (self.layers.base, self.layers.overlay):
             drawn = np.array(renderer.ComputeVisiblePropBounds()).reshape(3, 2).T
             if (drawn[0] <= drawn[1]).all():
                 boxes.append(drawn)

@@ -10,7 +10,7 @@ from vtkmodules.vtkRenderingCore import vtkActor
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import triple
-from gp_labeler.scene.stage import Stage, release, solid_actor
+from gp_labeler.scene.render_layers import RenderLayers, release, solid_actor
 
 __all__ = ["Segment", "SegmentActor"]
 
@@ -42,12 +42,12 @@ class SegmentActor:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, layers: RenderLayers) -> None:
+        self._layers = layers
         self._near: list[vtkActor] = []
         self._through: list[vtkActor] = []
 
@@ -56,8 +56,8 @@ class SegmentActor:
         self.close()
         for segment in segments:
             for renderer, actors, opacity in (
-                (self._stage.base, self._near, 1.0),
-                (self._stage.overlay, self._through, _THROUGH_BONE),
+                (self._layers.base, self._near, 1.0),
+                (self._layers.overlay, self._through, _THROUGH_BONE),
             ):
                 actor = self._line(segment, opacity)
                 renderer.AddActor(actor)
@@ -66,9 +66,9 @@ class SegmentActor:
     def close(self) -> None:
         """Let go of the lines."""
         for actor in self._near:
-            release(self._stage.base, actor)
+            release(self._layers.base, actor)
         for actor in self._through:
-            release(self._stage.overlay, actor)
+            release(self._layers.overlay, actor)
         self._near, self._through = [], []
 
     def _line(self, segment: Segment, opacity: float) -> vtkActor:
@@ -77,6 +77,6 @@ class SegmentActor:
         line.SetPoint2(triple(segment.end))
         line.Update()
         actor = solid_actor(line.GetOutput(), segment.colour, opacity)
-        actor.GetProperty().SetLineWidth(segment.width * self._stage.scale)
+        actor.GetProperty().SetLineWidth(segment.width * self._layers.scale)
         actor.GetProperty().LightingOff()
         return actor

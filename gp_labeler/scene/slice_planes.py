@@ -13,8 +13,8 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkTexture
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import to_vtk, triple
+from gp_labeler.scene.render_layers import RenderLayers, release, solid_actor
 from gp_labeler.scene.slices import SliceImage
-from gp_labeler.scene.stage import Stage, release, solid_actor
 from gp_labeler.scene.window_level import WindowLevel
 
 __all__ = ["SlicePlaneActor"]
@@ -25,12 +25,12 @@ class SlicePlaneActor:
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Where to draw.
     """
 
-    def __init__(self, stage: Stage) -> None:
-        self._stage = stage
+    def __init__(self, layers: RenderLayers) -> None:
+        self._layers = layers
         self._actors: list[vtkActor] = []
         self._images: tuple[SliceImage, ...] = ()
 
@@ -48,9 +48,9 @@ class SlicePlaneActor:
             edges.Update()
             frame = solid_actor(edges.GetOutput(), image.plane.colour)
             frame.GetProperty().LightingOff()
-            frame.GetProperty().SetLineWidth(1.5 * self._stage.scale)
+            frame.GetProperty().SetLineWidth(1.5 * self._layers.scale)
             for actor in (picture, frame):
-                self._stage.base.AddActor(actor)
+                self._layers.base.AddActor(actor)
                 self._actors.append(actor)
 
     @property
@@ -75,7 +75,7 @@ class SlicePlaneActor:
         """Let go of the pictures."""
         self._images = ()
         for actor in self._actors:
-            release(self._stage.base, actor)
+            release(self._layers.base, actor)
         self._actors = []
 
 

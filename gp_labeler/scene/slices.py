@@ -19,7 +19,7 @@ from gp_labeler.scene.contour import level_segments
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.window_level import WindowLevel
 
-__all__ = ["SliceImage", "SliceSource"]
+__all__ = ["SliceImage", "VolumeSlicer"]
 
 _STRAIGHT = 1e-4
 """Off-axis part of a direction below which voxel rows run along the scan's axes: 0.1 voxel in a thousand."""
@@ -84,7 +84,7 @@ class SliceImage:
         return segments
 
 
-class SliceSource:
+class VolumeSlicer:
     """Cuts slices out of one volume: its voxels where they lie along the scan's axes, resampled where not.
 
     Parameters

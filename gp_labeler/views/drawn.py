@@ -15,7 +15,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import SceneColours
-from gp_labeler.scene.ghosts import Ghost
+from gp_labeler.scene.ghosts import GhostEllipsoid
 from gp_labeler.scene.marks import REFERENCE, Mark
 from gp_labeler.scene.segments import Segment
 
@@ -85,7 +85,7 @@ def _shown_at(landmarks: LandmarkSet, code: str) -> FloatArray | None:
     return None if suggestion is None else np.array(suggestion.position)
 
 
-def drawn_ghosts(workspace: Workspace) -> list[Ghost]:
+def drawn_ghosts(workspace: Workspace) -> list[GhostEllipsoid]:
     """Return where the active point is expected: to do, suggested, or doubted where it was placed."""
     document, labels = workspace.document, workspace.labels
     side, code = labels.active.side, labels.active.code
@@ -97,19 +97,19 @@ def drawn_ghosts(workspace: Workspace) -> list[Ghost]:
         away = doubt.deviation_of(code)
         if away is None or away.distance > HEAD_MM:  # such a place would mean nothing
             return []
-        return [Ghost(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]
+        return [GhostEllipsoid(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]
     suggestion = document.landmarks(side).suggested.get(code)
     if suggestion is not None and suggestion.radius_95 is not None:
         return [_region(key_of(side, code), suggestion, suggestion.radius_95)]
     if ghost is None:
         return []
-    return [Ghost(key_of(side, code), ghost.position, ghost.covariance, f"{code}?", active=True)]
+    return [GhostEllipsoid(key_of(side, code), ghost.position, ghost.covariance, f"{code}?", active=True)]
 
 
-def _region(key: str, suggestion: Suggestion, radius_95: float) -> Ghost:
+def _region(key: str, suggestion: Suggestion, radius_95: float) -> GhostEllipsoid:
     """Return where a suggested point lies with 95 %; the point itself is a mark and bears the name."""
     covariance = radius_95**2 / CHI2_3_95 * np.eye(3)
-    return Ghost(key, np.array(suggestion.position), covariance, "", active=True)
+    return GhostEllipsoid(key, np.array(suggestion.position), covariance, "", active=True)
 
 
 def drawn_segments(workspace: Workspace, colours: SceneColours) -> list[Segment]:

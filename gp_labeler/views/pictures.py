@@ -38,7 +38,7 @@ def picture(window: MainWindow, what: str, size: tuple[int, int] | None = None) 
         In pixels; by default as on the screen. A view shows the same middle at a zoom to match.
     """
     grid = window.grid
-    grid.scene_view.redraw()  # not the coarse stand-in of a moving camera
+    grid.scene_view.redraw()  # not the coarse preview mesh of a moving camera
     if what == "slices":
         return _slices(list(grid.slice_views.values()), size)
     if what == "3d":

@@ -2,7 +2,7 @@
 
 What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over
 the last frame; points are drawn over a kept picture of the bone. While the bone is drawn anew, a little at a
-time, a coarse stand-in is shown. A picture of the widget (`grab`) always shows the finished frame.
+time, a coarse preview mesh is shown. A picture of the widget (`grab`) always shows the finished frame.
 """
 
 from __future__ import annotations
@@ -32,13 +32,12 @@ from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
-from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.views.bind import follow
 from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.fonts import TEXT, text_scale
-from gp_labeler.views.greys import greys_of
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.scene_overlay import (
     SceneOverlay,
@@ -47,6 +46,7 @@ from gp_labeler.views.painting.scene_overlay import (
     paint_pointer,
 )
 from gp_labeler.views.placement_tool import PlacementTool
+from gp_labeler.views.slice_window_level import window_level_of
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["SceneView"]
@@ -108,7 +108,7 @@ class SceneView(QWidget):
         self._placement = PlacementTool(workspace)
         self._finished = False
         self._stale, self._points_old, self._fitted = True, True, False
-        self._source: SliceSource | None = None
+        self._source: VolumeSlicer | None = None
         self._slices_old = False
         self._hover: FloatArray | None = None
         self._pointer: tuple[float, float] | None = None
@@ -231,10 +231,10 @@ class SceneView(QWidget):
         if volume is None or not shown:
             self._source = None
         elif self._source is None or self._source.volume is not volume:
-            self._source = SliceSource(volume)
+            self._source = VolumeSlicer(volume)
         source, middle = self._source, self._workspace.view.crosshair
         images = [source.image(plane, float(middle[plane.axis])) for plane in Plane] if source else []
-        self.scene.slices.show(images, greys_of(self._workspace))
+        self.scene.slices.show(images, window_level_of(self._workspace))
 
     def _on_crosshair(self, position: FloatArray) -> None:
         self._show_slices()

@@ -15,16 +15,16 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.bone_edge import BoneEdge
 from gp_labeler.scene.gestures import Button, Modifier, SliceControl
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slice_view import SliceView as Shown
-from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.slice_viewport import SliceViewport
+from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks, point_of
-from gp_labeler.views.greys import drag_greys, greys_of
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.slice_layers import SliceLayer
 from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
 from gp_labeler.views.placement_tool import PlacementTool, nudge
+from gp_labeler.views.slice_window_level import drag_window_level, window_level_of
 
 __all__ = ["SliceView"]
 
@@ -68,14 +68,14 @@ class SliceView(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.plane = plane
         self._workspace = workspace
-        self.source: SliceSource | None = None
-        self.shown: Shown | None = None
-        self._whole: Shown | None = None
-        self._painted: Shown | None = None  # what is on the screen, if all of it is up to date
+        self.source: VolumeSlicer | None = None
+        self.shown: SliceViewport | None = None
+        self._whole: SliceViewport | None = None
+        self._painted: SliceViewport | None = None  # what is on the screen, if all of it is up to date
         self.layers: list[SliceLayer] = []
         self._control, self._placement = SliceControl(), PlacementTool(workspace)
         self.slice_painter = SlicePainter(workspace, self)
-        self._greying: tuple[float, float] | None = None
+        self._level_drag: tuple[float, float] | None = None
         self._pointer: tuple[float, float] | None = None
         self._grip = np.zeros(3)
         self._edge: BoneEdge | None = None
@@ -86,7 +86,7 @@ class SliceView(QWidget):
     def reset(self) -> None:
         """Show the whole slice."""
         if self.source is not None:
-            self._whole = Shown.fitted(self.source, self.plane, self._size())
+            self._whole = SliceViewport.fitted(self.source, self.plane, self._size())
             self._take(self._whole.at(self._position()))
 
     def go_to(self, position: FloatArray) -> None:
@@ -131,7 +131,7 @@ class SliceView(QWidget):
 
     def window_level(self) -> WindowLevel:
         """Return the grey scale: what the user set, else what suits the volume."""
-        return greys_of(self._workspace)
+        return window_level_of(self._workspace)
 
     def _listen(self) -> None:
         workspace = self._workspace
@@ -158,7 +158,7 @@ class SliceView(QWidget):
         ):
             follow(self, signal, self._repaint)
 
-    def _take(self, shown: Shown) -> None:
+    def _take(self, shown: SliceViewport) -> None:
         """Show another part of the scan, and tell what now lies under the pointer, which may rest."""
         self.shown = shown
         self.update()
@@ -171,7 +171,7 @@ class SliceView(QWidget):
         self.update()
 
     def _on_volume(self, volume: Volume) -> None:
-        self.source = SliceSource(volume)
+        self.source = VolumeSlicer(volume)
         self.reset()
         self._on_crosshair(self._workspace.view.crosshair)
 
@@ -199,11 +199,11 @@ class SliceView(QWidget):
             crosshair[self.plane.axis] = self.source.snap(self.plane, position)
             self._workspace.view.set_crosshair(crosshair)
 
-    def _resized(self, shown: Shown) -> Shown:
+    def _resized(self, shown: SliceViewport) -> SliceViewport:
         """Return the view at the widget's size: the whole slice if it was whole, else the same, larger."""
         whole = self._whole
         if self.source is not None and whole is not None and shown.looks_like(whole):
-            self._whole = Shown.fitted(self.source, self.plane, self._size())
+            self._whole = SliceViewport.fitted(self.source, self.plane, self._size())
             return self._whole.at(shown.position)
         return shown.resized(*self._size()).zoomed(min(self._size()) / min(shown.size))
 
@@ -234,7 +234,7 @@ class SliceView(QWidget):
             self._edge = self._edge_for(mark)
             self._grip = self._position_of(mark) - self.shown.pixel_to_scan([[x, y]])[0]
         elif self._workspace.interaction.tool == "grey":
-            self._greying = (x, y)
+            self._level_drag = (x, y)
         elif self._workspace.interaction.tool == "look":
             self._workspace.view.set_crosshair(self.shown.pixel_to_scan([[x, y]])[0])
 
@@ -254,8 +254,8 @@ class SliceView(QWidget):
             self._take(view)
         elif self._placement.move(x, y):
             self._drag_to(here, free=bool(modifiers_of(event) & _FREES))
-        elif self._greying is not None:
-            self._change_greys(x, y)
+        elif self._level_drag is not None:
+            self._change_window_level(x, y)
         elif self._workspace.interaction.tool == "look" and event.buttons() == Qt.MouseButton.LeftButton:
             self._workspace.view.set_crosshair(here)
 
@@ -264,7 +264,7 @@ class SliceView(QWidget):
             return
         x, y = pixel_of(self, event.position())
         clicked = self._control.release(x, y)
-        self._greying = None
+        self._level_drag = None
         dragged = self._placement.holds and not self._placement.is_click
         mark = self._placement.release()
         if clicked and event.button() == Qt.MouseButton.RightButton:
@@ -354,11 +354,13 @@ class SliceView(QWidget):
         ):
             self._workspace.interaction.drag_to(to, How.SLICE)
 
-    def _change_greys(self, x: float, y: float) -> None:
-        assert self._greying is not None
+    def _change_window_level(self, x: float, y: float) -> None:
+        assert self._level_drag is not None
         ratio = self.devicePixelRatioF()
-        drag_greys(self._workspace, (x - self._greying[0]) / ratio, (y - self._greying[1]) / ratio)
-        self._greying = (x, y)
+        drag_window_level(
+            self._workspace, (x - self._level_drag[0]) / ratio, (y - self._level_drag[1]) / ratio
+        )
+        self._level_drag = (x, y)
 
     def _is_inside(self, position: FloatArray) -> bool:
         return self._workspace.scan.volume is not None and bool(

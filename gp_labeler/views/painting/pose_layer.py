@@ -9,7 +9,7 @@ from qtpy.QtGui import QPainter
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.pose_names import written_in
-from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.views.painting.name_tags import NameTag, pose_tags
 from gp_labeler.views.painting.pose_slices import SlicePen
 from gp_labeler.views.slice_view import SliceView
@@ -41,13 +41,13 @@ class PoseLayer(QObject):
         self._scene = scene
         self._view.update()
 
-    def paint(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+    def paint(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         """Paint it, in device pixels; `ratio` of them are a logical one."""
         painter.save()
         SlicePen(painter, shown, ratio, self._scene).draw()
         painter.restore()
 
-    def names(self, shown: Shown, ratio: float) -> list[NameTag]:
+    def names(self, shown: SliceViewport, ratio: float) -> list[NameTag]:
         """Return what is written beside it, and what names leave free."""
         written = written_in(self._scene)
         pixels, off = shown.scan_to_pixel(written.places) + 0.5, np.abs(shown.off_slice(written.places))

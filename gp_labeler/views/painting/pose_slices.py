@@ -21,7 +21,7 @@ from gp_labeler.scene.pose_data import (
     PoseScene,
 )
 from gp_labeler.scene.pose_names import REACH_MM
-from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.views.painting.pose_strokes import area, arrow, colour_of, hull, line, marker
 
 __all__ = ["SlicePen", "region_section"]
@@ -35,7 +35,7 @@ _MARKERS = {"pose": "ball", "pose_2": "diamond"}
 _TRAIL_AT_MOST = 48
 
 
-def region_section(pose: DrawnPose, shown: Shown) -> FloatArray | None:
+def region_section(pose: DrawnPose, shown: SliceViewport) -> FloatArray | None:
     """Return the (N, 2) pixels of the outline in which a slice cuts the 95 % ellipsoid of CO, or None."""
     across = shown.plane.normal
     flat = np.stack([shown.plane.right, shown.plane.down])
@@ -66,7 +66,7 @@ class SlicePen:
         What there is, and which parts of it are shown.
     """
 
-    def __init__(self, painter: QPainter, shown: Shown, ratio: float, scene: PoseScene) -> None:
+    def __init__(self, painter: QPainter, shown: SliceViewport, ratio: float, scene: PoseScene) -> None:
         self._painter, self._shown, self._ratio = painter, shown, ratio
         self._scene = scene
 

@@ -12,7 +12,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.marks import Mark
-from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_references
 from gp_labeler.views.painting.marks import paint_mark
@@ -48,18 +48,18 @@ class ReferenceLayer(QObject):
     def _repaint(self) -> None:
         self._view.update()
 
-    def paint(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+    def paint(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         """Paint those near the slice, in device pixels; `ratio` of them are a logical one."""
         for mark, pixel, share in self._near(shown):
             opacity = 1.0 - _FADE * share
             paint_mark(painter, mark, pixel, _RADIUS * ratio, DARK, ratio=ratio, opacity=opacity)
 
-    def names(self, shown: Shown, ratio: float) -> list[NameTag]:
+    def names(self, shown: SliceViewport, ratio: float) -> list[NameTag]:
         """Return their names, which give way to those of landmarks."""
         colour = DARK.word("reference")
         return [NameTag(mark.label, pixel, colour, 7.0, -1.0) for mark, pixel, _ in self._near(shown)]
 
-    def _near(self, shown: Shown) -> list[tuple[Mark, FloatArray, float]]:
+    def _near(self, shown: SliceViewport) -> list[tuple[Mark, FloatArray, float]]:
         """Return the points near the slice, their pixels, and how far off it they are: 0 on it, 1 at most."""
         marks = drawn_references(self._workspace)
         if not marks or self._view.source is None:

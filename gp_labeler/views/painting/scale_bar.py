@@ -6,7 +6,7 @@ from qtpy.QtCore import QPointF
 from qtpy.QtGui import QColor, QPainter, QPen
 
 from gp_labeler.scene.colours import SceneColours
-from gp_labeler.scene.slice_view import scale_bar_length
+from gp_labeler.scene.slice_viewport import scale_bar_length
 from gp_labeler.views.painting.word_pictures import word_picture
 
 __all__ = ["paint_scale_bar"]

@@ -14,7 +14,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.models.view import Cut
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.colours import DARK, SceneColours
-from gp_labeler.scene.ghosts import Ghost, outline_in
+from gp_labeler.scene.ghosts import GhostEllipsoid, outline_in
 from gp_labeler.scene.planes import Plane, letter_of, position_text
 from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.pose_names import written_in
@@ -126,7 +126,7 @@ class SceneOverlay:
                 share=_BAR_SHARE,
             )
 
-    def _outlines(self, ghosts: Sequence[Ghost], rings: Sequence[FloatArray]) -> list[_Line]:
+    def _outlines(self, ghosts: Sequence[GhostEllipsoid], rings: Sequence[FloatArray]) -> list[_Line]:
         colour = self._colours.states["ghost"]
         return [
             _Line(polygon(ring + 0.5), colour, (2.5 if ghost.active else 1.2) * self._ratio, 1.0)
@@ -141,7 +141,9 @@ class SceneOverlay:
         ]
 
 
-def _ghost_tags(ghosts: Sequence[Ghost], rings: Sequence[FloatArray], colours: SceneColours) -> list[NameTag]:
+def _ghost_tags(
+    ghosts: Sequence[GhostEllipsoid], rings: Sequence[FloatArray], colours: SceneColours
+) -> list[NameTag]:
     return [
         NameTag(ghost.label, _upper_right(ring) + 0.5, colours.word("ghost"), 3.0, float(ghost.active))
         for ghost, ring in zip(ghosts, rings, strict=True)

@@ -6,7 +6,7 @@ from typing import Protocol
 
 from qtpy.QtGui import QPainter
 
-from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.views.painting.name_tags import NameTag
 
 __all__ = ["SliceLayer"]
@@ -15,8 +15,8 @@ __all__ = ["SliceLayer"]
 class SliceLayer(Protocol):
     """Something drawn over slices."""
 
-    def paint(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+    def paint(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         """Paint it, in device pixels; `ratio` of them are a logical one."""
 
-    def names(self, shown: Shown, ratio: float) -> list[NameTag]:
+    def names(self, shown: SliceViewport, ratio: float) -> list[NameTag]:
         """Return what is written beside it."""

@@ -10,7 +10,7 @@ from qtpy.QtGui import QColor, QPainter, QPen
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.segments import Segment
-from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_viewport import SliceViewport
 
 __all__ = ["near_part", "paint_lines"]
 
@@ -38,7 +38,13 @@ def near_part(
 
 
 def paint_lines(
-    painter: QPainter, segments: Sequence[Segment], shown: Shown, *, reach: float, colour: str, ratio: float
+    painter: QPainter,
+    segments: Sequence[Segment],
+    shown: SliceViewport,
+    *,
+    reach: float,
+    colour: str,
+    ratio: float,
 ) -> None:
     """Paint the near parts of lines."""
     for segment in segments:

@@ -11,12 +11,12 @@ from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap, QP
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
-from gp_labeler.scene.ghosts import Ghost, ellipse
+from gp_labeler.scene.ghosts import GhostEllipsoid, ellipse
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.segments import Segment
-from gp_labeler.scene.slice_view import SliceView as Shown
-from gp_labeler.scene.slices import SliceImage, SliceSource
+from gp_labeler.scene.slice_viewport import SliceViewport
+from gp_labeler.scene.slices import SliceImage, VolumeSlicer
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.fonts import TEXT, text_scale
@@ -41,7 +41,7 @@ _BAR_PIXELS, _BAR_SHARE = 90.0, 0.3
 """Of the width of a small view: there the scale bar leaves the letter at the lower edge alone."""
 
 
-def reach_of(source: SliceSource, plane: Plane) -> float:
+def reach_of(source: VolumeSlicer, plane: Plane) -> float:
     """Return how far off a slice points are still drawn on it, mm."""
     return max(_REACH_MM, 1.5 * source.step(plane))
 
@@ -51,7 +51,7 @@ class SlicePoints(NamedTuple):
 
     marks: list[Mark]
     positions: FloatArray
-    ghosts: list[Ghost]
+    ghosts: list[GhostEllipsoid]
     lines: list[Segment]
 
     @classmethod
@@ -77,10 +77,10 @@ class SlicePainter:
         self._workspace, self._view = workspace, view
         self._preview: float | None = None
         self._slice: SliceImage | None = None
-        self._where: tuple[SliceSource | None, float] = (None, 0.0)
+        self._where: tuple[VolumeSlicer | None, float] = (None, 0.0)
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
-        self._ground: tuple[Shown, SliceSource, object, QPixmap] | None = None
+        self._ground: tuple[SliceViewport, VolumeSlicer, object, QPixmap] | None = None
         self._points: SlicePoints | None = None
         follow(view, workspace.scan.threshold_previewed, self._on_preview)
 
@@ -144,7 +144,9 @@ class SlicePainter:
     def _on_preview(self, threshold: float | None) -> None:
         self._preview = threshold
 
-    def _paint_ground(self, painter: QPainter, source: SliceSource, shown: Shown, ratio: float) -> None:
+    def _paint_ground(
+        self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport, ratio: float
+    ) -> None:
         """Paint the slice and the edge of bone, from what is kept while nothing of them changes."""
         view, workspace = self._view.window_level(), self._workspace
         looks = (view, self._preview, workspace.scan.threshold, workspace.view.state.outline_visible)
@@ -160,7 +162,7 @@ class SlicePainter:
             kept = self._ground = (shown, source, looks, picture)
         painter.drawPixmap(QPointF(0, 0), kept[3])
 
-    def _paint_image(self, painter: QPainter, source: SliceSource, shown: Shown) -> None:
+    def _paint_image(self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport) -> None:
         position = source.snap(shown.plane, shown.position)
         if self._slice is None or self._slice_is_old(source, position):
             self._slice = source.image(shown.plane, position)
@@ -173,10 +175,10 @@ class SlicePainter:
         (left, top), (right, bottom) = shown.image_corners(self._slice)
         painter.drawImage(QRectF(left, top, right - left, bottom - top), self._picture[1])
 
-    def _slice_is_old(self, source: SliceSource, position: float) -> bool:
+    def _slice_is_old(self, source: VolumeSlicer, position: float) -> bool:
         return self._where[0] is not source or self._where[1] != position
 
-    def _paint_outline(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+    def _paint_outline(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         threshold = self._workspace.scan.threshold if self._preview is None else self._preview
         if threshold is None or self._slice is None or not self._workspace.view.state.outline_visible:
             return
@@ -193,7 +195,7 @@ class SlicePainter:
         painter.drawPath(self._outline[1])
         painter.restore()
 
-    def _paint_crosshair(self, painter: QPainter, shown: Shown, theme: Theme, ratio: float) -> None:
+    def _paint_crosshair(self, painter: QPainter, shown: SliceViewport, theme: Theme, ratio: float) -> None:
         """Paint the other two slices as dashed lines in their colours."""
         x, y = shown.scan_to_pixel(self._workspace.view.crosshair[None])[0] + 0.5
         width, height = shown.size
@@ -208,7 +210,7 @@ class SlicePainter:
             else:
                 painter.drawLine(QPointF(0, y), QPointF(width, y))
 
-    def _paint_letters(self, painter: QPainter, shown: Shown, ratio: float) -> None:
+    def _paint_letters(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         width, height = shown.size
         left, right, top, bottom = shown.plane.letters
         inset = self._text * ratio
@@ -221,7 +223,7 @@ class SlicePainter:
             word_picture(letter, self._text, DARK.text, ratio).draw_about(painter, x, y)
 
     def _paint_ghosts(
-        self, painter: QPainter, ghosts: list[Ghost], shown: Shown, ratio: float
+        self, painter: QPainter, ghosts: list[GhostEllipsoid], shown: SliceViewport, ratio: float
     ) -> list[NameTag]:
         """Paint where points are expected; return their names."""
         names: list[NameTag] = []
@@ -243,7 +245,7 @@ class SlicePainter:
         return names
 
     def _paint_marks(
-        self, painter: QPainter, points: SlicePoints, source: SliceSource, shown: Shown, ratio: float
+        self, painter: QPainter, points: SlicePoints, source: VolumeSlicer, shown: SliceViewport, ratio: float
     ) -> list[NameTag]:
         """Paint the points on the slice and close to it; return the names of those to be named."""
         marks, positions = points.marks, points.positions
@@ -282,7 +284,7 @@ def _on_black(state: str) -> str:
     return DARK.states[state]
 
 
-def _radius(mark: Mark, glyph_mm: float | None, shown: Shown, ratio: float) -> float:
+def _radius(mark: Mark, glyph_mm: float | None, shown: SliceViewport, ratio: float) -> float:
     """Return how large a point is drawn, device pixels."""
     radius = 4.0 * ratio if glyph_mm is None else 0.5 * glyph_mm / shown.mm_per_pixel
     return radius * (ACTIVE_GROWTH if mark.active else 1.0)

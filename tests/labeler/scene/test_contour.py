@@ -12,7 +12,7 @@ from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk
 from gp_labeler.scene.bone_edge import BoneEdge, nearest_on_segments
 from gp_labeler.scene.contour import level_segments
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.slices import VolumeSlicer
 
 
 def of_vtk(values: np.ndarray, level: float) -> np.ndarray:
@@ -54,7 +54,7 @@ def test_a_circle_is_a_closed_line_of_its_length() -> None:
 
 
 def test_the_nearest_point_of_the_edge_lies_on_bone(ball) -> None:
-    edge = BoneEdge(SliceSource(ball), Plane.CORONAL, 1000.0)
+    edge = BoneEdge(VolumeSlicer(ball), Plane.CORONAL, 1000.0)
     middle = np.array(ball.extent.mean(axis=0))
     for angle in np.linspace(0, 2 * np.pi, 12):
         towards = np.array([np.cos(angle), 0, np.sin(angle)])

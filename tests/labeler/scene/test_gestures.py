@@ -8,9 +8,9 @@ from vtkmodules.vtkRenderingCore import vtkCamera
 
 from gp_core.errors import GeometryError, GpError
 from gp_labeler.scene.camera import VIEWPOINTS, SceneCamera
-from gp_labeler.scene.gestures import Button, CameraControl, Drag, Modifier, SliceControl, drag_of
+from gp_labeler.scene.gestures import Button, CameraControl, DragMode, Modifier, SliceControl, drag_of
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slice_view import SliceView
+from gp_labeler.scene.slice_viewport import SliceViewport
 
 SIZE = (401, 301)
 RIGHT_AND_UP = {"A": "LS", "P": "RS", "L": "PS", "R": "AS", "S": "RA", "I": "LA"}
@@ -142,19 +142,19 @@ def test_state_comes_back_exactly_and_nonsense_does_not(camera: SceneCamera) -> 
 @pytest.mark.parametrize(
     ("button", "modifiers", "drag"),
     [
-        (Button.LEFT, Modifier.NONE, Drag.ROTATE),
-        (Button.LEFT, Modifier.CTRL, Drag.SPIN),
-        (Button.LEFT, Modifier.SHIFT, Drag.PAN),
-        (Button.MIDDLE, Modifier.NONE, Drag.PAN),
-        (Button.RIGHT, Modifier.NONE, Drag.ZOOM),
+        (Button.LEFT, Modifier.NONE, DragMode.ROTATE),
+        (Button.LEFT, Modifier.CTRL, DragMode.SPIN),
+        (Button.LEFT, Modifier.SHIFT, DragMode.PAN),
+        (Button.MIDDLE, Modifier.NONE, DragMode.PAN),
+        (Button.RIGHT, Modifier.NONE, DragMode.ZOOM),
     ],
 )
-def test_the_mapping_is_slicers(button: Button, modifiers: Modifier, drag: Drag) -> None:
+def test_the_mapping_is_slicers(button: Button, modifiers: Modifier, drag: DragMode) -> None:
     assert drag_of(button, modifiers) is drag
 
 
 def test_slice_gestures() -> None:
-    view = SliceView(Plane.AXIAL, 5.0, np.array([10.0, 20.0]), 0.1, SIZE)
+    view = SliceViewport(Plane.AXIAL, 5.0, np.array([10.0, 20.0]), 0.1, SIZE)
     control = SliceControl()
     assert not control.press(Button.LEFT, 10, 10)
     assert control.move(view, 60, 60) is view

@@ -20,12 +20,12 @@ from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.surface import Surface, extract_isosurface
 from gp_labeler.scene.camera import VIEWPOINTS
 from gp_labeler.scene.colours import DARK, LIGHT
-from gp_labeler.scene.ghosts import Ghost
+from gp_labeler.scene.ghosts import GhostEllipsoid
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.segments import Segment
-from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.target import RenderTarget
 from gp_labeler.scene.window_level import WindowLevel
 
@@ -157,13 +157,13 @@ def test_the_mark_under_the_pointer_is_named(scene: Scene3D, ball: Surface) -> N
 def test_a_ghost_is_bright_inside_whichever_way_it_is_long(scene: Scene3D, spread: tuple[float, ...]) -> None:
     scene.camera.focus_on(MIDDLE, across_mm=20)
     without = scene.image()[120, 160].astype(int)
-    scene.ghosts.show([Ghost("L:IN", MIDDLE, np.diag(spread), active=True)])
+    scene.ghosts.show([GhostEllipsoid("L:IN", MIDDLE, np.diag(spread), active=True)])
     assert (scene.image()[120, 160] > without + 8).all()
 
 
 def test_lines_and_slices_are_drawn_and_taken_away(scene: Scene3D) -> None:
     volume = scan_of([(BALL, RADIUS)], np.eye(3))
-    source = SliceSource(volume)
+    source = VolumeSlicer(volume)
     scene.camera.view_from("A")
     scene.camera.rotate(40, 30)
     scene.camera.focus_on(MIDDLE, across_mm=14)
@@ -189,7 +189,7 @@ def test_lines_and_slices_are_drawn_and_taken_away(scene: Scene3D) -> None:
 
 def test_slices_in_3d_show_the_marker_where_it_is(scene: Scene3D) -> None:
     volume = scan_of([(BALL, 1.0)], DIRECTIONS["mirrored"])
-    source = SliceSource(volume)
+    source = VolumeSlicer(volume)
     for plane, letter in zip(Plane, "SLA", strict=True):
         scene.slices.show([source.image(plane, BALL[plane.axis])], WindowLevel(0, 200))
         scene.camera.view_from(letter)
@@ -200,7 +200,7 @@ def test_slices_in_3d_show_the_marker_where_it_is(scene: Scene3D) -> None:
 
 
 def test_a_slice_before_the_cube_does_not_hide_it(scene: Scene3D) -> None:
-    source = SliceSource(scan_of([(BALL, 1.0)], np.eye(3)))
+    source = VolumeSlicer(scan_of([(BALL, 1.0)], np.eye(3)))
     scene.camera.view_from("A")
     scene.camera.focus_on(MIDDLE, across_mm=4)
     slices = [source.image(Plane.CORONAL, BALL[1])]
@@ -266,9 +266,9 @@ def test_real_landmarks_are_seen_on_the_real_skull(scene: Scene3D, shared_data: 
 
 
 def _drawn_objects(scene: Scene3D) -> list[weakref.ref[object]]:
-    stage = scene._stage
-    found: list[object] = [stage.bone, stage.base, stage.overlay, scene.cube.renderer, scene.target.window]
-    for renderer in (stage.bone, stage.base, stage.overlay):
+    layers = scene.layers
+    found: list[object] = [layers.bone, layers.base, layers.overlay, scene.cube.renderer, scene.target.window]
+    for renderer in (layers.bone, layers.base, layers.overlay):
         props = renderer.GetViewProps()
         found += [props.GetItemAsObject(n) for n in range(props.GetNumberOfItems())]
     return [weakref.ref(thing) for thing in found]
@@ -278,9 +278,9 @@ def test_closing_lets_every_vtk_object_go(ball: Surface) -> None:
     scene = Scene3D(RenderTarget.offscreen(100, 80))
     scene.bone.show([ball], quick=[ball])
     scene.marks.show([Mark("a", BALL, "CA", active=True)])
-    scene.ghosts.show([Ghost("b", BALL, np.eye(3), "IN?", active=True)])
+    scene.ghosts.show([GhostEllipsoid("b", BALL, np.eye(3), "IN?", active=True)])
     scene.lines.show([Segment(BALL - 1, BALL + 1, "#FF00FF")])
-    source = SliceSource(scan_of([(BALL, RADIUS)], DIRECTIONS["oblique"]))
+    source = VolumeSlicer(scan_of([(BALL, RADIUS)], DIRECTIONS["oblique"]))
     scene.slices.show([source.image(Plane.AXIAL, BALL[2])], WindowLevel(0, 200))
     scene.render()
     objects = _drawn_objects(scene)
@@ -374,12 +374,14 @@ def test_a_point_more_is_drawn_without_drawing_the_bone_again(scene: Scene3D, ba
         nonlocal drawn
         drawn += 1
 
-    scene._stage.bone.AddObserver("StartEvent", count)
+    scene.layers.bone.AddObserver("StartEvent", count)
     seen, behind = BALL - np.array([1, RADIUS, 1]), BALL + np.array([-1, RADIUS, 0.5])
     for marks in ([Mark("a", seen, "CA")], [Mark("a", seen, "CA"), Mark("b", behind, "CB", "computed")], []):
         scene.marks.show(marks)
         scene.lines.show([Segment(mark.position, BALL, "#FF00FF") for mark in marks])
-        scene.ghosts.show([Ghost("c", mark.position, np.eye(3) / 9, "IN?", active=True) for mark in marks])
+        scene.ghosts.show(
+            [GhostEllipsoid("c", mark.position, np.eye(3) / 9, "IN?", active=True) for mark in marks]
+        )
         frame = scene.image()
         assert (frame != bare).any() == bool(marks)
     np.testing.assert_array_equal(frame, bare)  # and nothing is left of them
@@ -399,7 +401,7 @@ def test_bone_drawn_in_pieces_is_the_same_bone(
     scene.fit()
     whole = scene.image().astype(int)
     assert len(scene.bone.groups(scene.camera.direction)) == 1
-    monkeypatch.setattr("gp_labeler.scene.pieces.pieces_of.__defaults__", (ball.n_triangles // 7,))
+    monkeypatch.setattr("gp_labeler.scene.mesh_chunks.chunks_of.__defaults__", (ball.n_triangles // 7,))
     scene.bone.show([ball])
     assert len(scene.bone.groups(scene.camera.direction)) == 7
     assert not scene.is_fine
@@ -419,7 +421,7 @@ def test_bone_drawn_in_pieces_is_the_same_bone(
 def test_a_camera_that_moves_while_bone_is_drawn_begins_anew(
     scene: Scene3D, ball: Surface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("gp_labeler.scene.pieces.pieces_of.__defaults__", (ball.n_triangles // 5,))
+    monkeypatch.setattr("gp_labeler.scene.mesh_chunks.chunks_of.__defaults__", (ball.n_triangles // 5,))
     scene.bone.show([ball], quick=[ball])
     scene.fit()
     scene.camera.zoom(1.5)

@@ -12,14 +12,14 @@ from scene_cases import DIRECTIONS, MIDDLE, scan_of
 from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.planes import Plane, letter_of, position_text
-from gp_labeler.scene.slice_view import SliceView, scale_bar_length
-from gp_labeler.scene.slices import SliceSource
+from gp_labeler.scene.slice_viewport import SliceViewport, scale_bar_length
+from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.window_level import WindowLevel
 
 MARKER = MIDDLE + np.array([2.5, -1.7, 3.1])
 
 
-def _painted(source: SliceSource, view: SliceView) -> np.ndarray:
+def _painted(source: VolumeSlicer, view: SliceViewport) -> np.ndarray:
     """Sample a slice as a painter would: the value at the centre of each pixel of the view."""
     image = source.image(view.plane, view.position)
     width, height = view.size
@@ -36,9 +36,9 @@ def _painted(source: SliceSource, view: SliceView) -> np.ndarray:
 @pytest.mark.parametrize("name", DIRECTIONS)
 def test_a_bright_marker_appears_where_it_is(name: str, plane: Plane) -> None:
     volume = scan_of([(MARKER, 0.8)], DIRECTIONS[name])
-    source = SliceSource(volume)
+    source = VolumeSlicer(volume)
     assert source.oblique == name.startswith("oblique")
-    view = SliceView.fitted(source, plane, (180, 150)).at(source.snap(plane, MARKER[plane.axis]))
+    view = SliceViewport.fitted(source, plane, (180, 150)).at(source.snap(plane, MARKER[plane.axis]))
     painted = _painted(source, view)
     rows, columns = np.nonzero(painted > 100)
     expected = view.scan_to_pixel(MARKER[None])[0]
@@ -58,10 +58,10 @@ def test_patient_left_is_on_the_right_of_the_screen_and_the_nose_on_the_left(nam
         MIDDLE + np.array([0, -4, 0]),
         MIDDLE + np.array([0, 0, 4]),
     )
-    source = SliceSource(scan_of([(left, 1.0), (anterior, 0.7), (superior, 0.5)], DIRECTIONS[name]))
+    source = VolumeSlicer(scan_of([(left, 1.0), (anterior, 0.7), (superior, 0.5)], DIRECTIONS[name]))
     seen = {}
     for plane in Plane:
-        view = SliceView.fitted(source, plane, (120, 120)).at(source.snap(plane, MIDDLE[plane.axis]))
+        view = SliceViewport.fitted(source, plane, (120, 120)).at(source.snap(plane, MIDDLE[plane.axis]))
         painted = _painted(source, view) > 100
         seen[plane] = [painted[:, 70:].sum(), painted[:, :50].sum(), painted[:50].sum(), painted[70:].sum()]
     assert [bool(n) for n in seen[Plane.AXIAL]] == [True, False, True, False]  # left: right; anterior: top
@@ -88,7 +88,7 @@ def test_straight_slices_are_the_voxels_themselves() -> None:
     ]
     for direction in directions:
         volume = Volume.from_parts(array, (0.1, 0.2, 0.3), (5, 6, 7), direction)
-        source = SliceSource(volume)
+        source = VolumeSlicer(volume)
         for plane in Plane:
             low, high = source.limits(plane)
             image = source.image(plane, low + 0.4 * (high - low))
@@ -104,7 +104,7 @@ def test_straight_slices_are_the_voxels_themselves() -> None:
 
 def test_every_slice_can_be_reached_and_no_other() -> None:
     volume = scan_of([(MIDDLE, 2.0)], DIRECTIONS["permuted"])
-    source = SliceSource(volume)
+    source = VolumeSlicer(volume)
     for plane in Plane:
         low, high = source.limits(plane)
         n = round((high - low) / source.step(plane)) + 1
@@ -119,7 +119,7 @@ def test_every_slice_can_be_reached_and_no_other() -> None:
 def test_the_outline_is_where_the_mesh_is_cut(name: str) -> None:
     volume = scan_of([(MARKER, 2.0), (MIDDLE - 3, 1.0)], DIRECTIONS[name])
     surface = extract_isosurface(volume, 100, smallest_mm=0)
-    source = SliceSource(volume)
+    source = VolumeSlicer(volume)
     for plane in Plane:
         image = source.image(plane, MARKER[plane.axis])
         outline = image.outline(100)
@@ -131,10 +131,10 @@ def test_the_outline_is_where_the_mesh_is_cut(name: str) -> None:
 
 
 def test_pixels_and_positions_are_inverse_and_the_view_moves_as_told() -> None:
-    source = SliceSource(scan_of([(MIDDLE, 2.0)], np.eye(3)))
+    source = VolumeSlicer(scan_of([(MIDDLE, 2.0)], np.eye(3)))
     rng = np.random.default_rng(4)
     for plane in Plane:
-        view = SliceView.fitted(source, plane, (301, 201))
+        view = SliceViewport.fitted(source, plane, (301, 201))
         pixels = rng.uniform(-50, 350, (20, 2))
         points = view.pixel_to_scan(pixels)
         assert view.scan_to_pixel(points) == pytest.approx(pixels)
@@ -180,7 +180,7 @@ def test_greys_are_right_for_small_differences_of_large_values(dtype: str, offse
 def test_nothing_is_black_and_the_preview_is_tinted() -> None:
     volume = scan_of([(MIDDLE, 2.0)], np.eye(3))
     window = WindowLevel.of(volume)
-    image = SliceSource(volume).image(Plane.AXIAL, MIDDLE[2])
+    image = VolumeSlicer(volume).image(Plane.AXIAL, MIDDLE[2])
     rgb = image.rgb(window, threshold=100)
     bone = image.values >= 100
     assert (rgb[bone, 0] > rgb[bone, 2]).all()
@@ -205,7 +205,7 @@ def test_words_and_scale_bars() -> None:
 
 def test_straight_slices_are_quick() -> None:
     volume = Volume(np.zeros((256, 256, 256), np.uint16), np.diag([0.1, 0.1, 0.1, 1]))
-    source, window = SliceSource(volume), WindowLevel(0, 100)
+    source, window = VolumeSlicer(volume), WindowLevel(0, 100)
     source.image(Plane.AXIAL, 3.0).grey(window)
     costs = []
     for n in range(30):

@@ -209,7 +209,7 @@ def test_showing_nothing_takes_everything_away(scene) -> None:
 
 def _props(scene: Scene3D) -> list[object]:
     found = []
-    for renderer in (scene._stage.base, scene._stage.overlay):
+    for renderer in (scene.layers.base, scene.layers.overlay):
         props = renderer.GetViewProps()
         found += [props.GetItemAsObject(n) for n in range(props.GetNumberOfItems())]
     return found

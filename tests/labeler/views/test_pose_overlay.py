@@ -32,7 +32,7 @@ from gp_labeler.imaging.mean_cochlea import duct_curve
 from gp_labeler.scene.colours import DARK, rgb
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import PARTS, PoseScene
-from gp_labeler.scene.slice_view import SliceView as Shown
+from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.views.painting.pose_layer import PoseLayer
 from gp_labeler.views.painting.pose_slices import SlicePen, region_section
 from gp_labeler.views.slice_view import SliceView
@@ -41,12 +41,12 @@ SIZE = (480, 400)
 ONLY = {part: frozenset({part}) for part in PARTS}
 
 
-def through(point: np.ndarray, plane: Plane = Plane.CORONAL) -> Shown:
+def through(point: np.ndarray, plane: Plane = Plane.CORONAL) -> SliceViewport:
     flat = plane.flat(MIDDLE[None])[0]
-    return Shown(plane, float(plane.depth(np.reshape(point, (1, 3)))[0]), flat, 0.03, SIZE)
+    return SliceViewport(plane, float(plane.depth(np.reshape(point, (1, 3)))[0]), flat, 0.03, SIZE)
 
 
-def painted(scene: PoseScene, shown: Shown) -> np.ndarray:
+def painted(scene: PoseScene, shown: SliceViewport) -> np.ndarray:
     page = QImage(*SIZE, QImage.Format.Format_RGB888)
     page.fill(0)
     painter = QPainter(page)
@@ -63,7 +63,7 @@ def like(image: np.ndarray, role: str) -> np.ndarray:
     return (length > 60) & (image @ wanted > 0.98 * length * np.linalg.norm(wanted))
 
 
-def is_seen(seen: np.ndarray, shown: Shown, point: np.ndarray, within: int = 2) -> bool:
+def is_seen(seen: np.ndarray, shown: SliceViewport, point: np.ndarray, within: int = 2) -> bool:
     x, y = np.rint(shown.scan_to_pixel(np.reshape(point, (1, 3)))[0]).astype(int)
     return bool(seen[y - within : y + within + 1, x - within : x + within + 1].any())
 
@@ -126,7 +126,7 @@ def test_the_cochlea_is_cut_where_its_curve_crosses_the_slice(side, plane) -> No
     assert not any(is_seen(image.any(axis=2), shown, p, 0) for p in elsewhere)
 
 
-def _is_clear(point: np.ndarray, others: np.ndarray, shown: Shown) -> bool:
+def _is_clear(point: np.ndarray, others: np.ndarray, shown: SliceViewport) -> bool:
     """Whether no part of the coil near the slice, nor the modiolus, lies over a point."""
     pixel = shown.scan_to_pixel(point[None])[0]
     axis = POSE.at(np.linspace([-1.0, 0, 0], [4.4, 0, 0], 40))

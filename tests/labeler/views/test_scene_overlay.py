@@ -12,7 +12,7 @@ from scene_cases import MIDDLE, scan_of
 
 from gp_labeler.imaging.surface import Surface, extract_isosurface
 from gp_labeler.scene.colours import DARK, LIGHT
-from gp_labeler.scene.ghosts import RADIUS_95, Ghost, ellipse
+from gp_labeler.scene.ghosts import RADIUS_95, GhostEllipsoid, ellipse
 from gp_labeler.scene.marks import GlyphSize, Mark
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.target import RenderTarget
@@ -153,7 +153,7 @@ def test_hidden_marks_are_faint_or_left_out_but_for_the_active_one(scene: Scene3
 
 def test_a_ghost_is_outlined_by_its_95_percent_ellipse(scene: Scene3D) -> None:
     covariance = np.diag([0.8, 0.3, 0.1])
-    scene.ghosts.show([Ghost("L:IN", MIDDLE, covariance, active=True)])
+    scene.ghosts.show([GhostEllipsoid("L:IN", MIDDLE, covariance, active=True)])
     scene.camera.view_from("A")
     scene.camera.focus_on(MIDDLE, across_mm=12)
     rows, columns = np.nonzero(_coloured(frame_of(scene), DARK.states["ghost"]))
@@ -199,7 +199,7 @@ def test_at_twice_the_resolution_the_picture_is_the_same_but_finer(ball: Surface
         states = ("placed", "computed", "doubtful", "suggested", "reference")
         places = MIDDLE + np.array([[3.0 * (n - 2), 0, 2.0] for n in range(5)])
         scene.marks.show([Mark(s, p, s, s, s == "placed") for s, p in zip(states, places, strict=True)])
-        scene.ghosts.show([Ghost("g", MIDDLE - [0, 0, 2], np.diag([0.3, 0.2, 0.1]), "IN?")])
+        scene.ghosts.show([GhostEllipsoid("g", MIDDLE - [0, 0, 2], np.diag([0.3, 0.2, 0.1]), "IN?")])
         frames.append(frame_of(scene, SceneOverlay(), colours).astype(float))
         scene.close()
     coarse, fine = frames

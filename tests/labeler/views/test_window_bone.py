@@ -174,7 +174,7 @@ def test_a_click_draws_no_bone_and_a_turn_draws_it_finely_once_it_rests(qtbot, w
     view.frame_drawn.connect(lambda: fine.append(scene.is_fine))
     QTest.keyClick(view, Qt.Key.Key_Left)
     qtbot.waitUntil(lambda: len(fine) > 1 and fine[-1])
-    assert not fine[0], "the stand-in first"
+    assert not fine[0], "the preview mesh first"
     QTest.keyClick(view, Qt.Key.Key_Left)
     view.grab()  # a picture is finished, however little time there was
     assert scene.is_fine

@@ -253,7 +253,7 @@ def test_the_window_says_once_that_accepted_ghosts_are_suggestions_now(qtbot, wi
     assert sum("accepted ghost" in text for text, _ in said) == 1
 
 
-# Shown
+# SliceViewport
 
 
 def test_it_has_a_shape_of_its_own_everywhere(suggested) -> None:

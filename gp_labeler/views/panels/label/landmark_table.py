@@ -39,7 +39,7 @@ _ROOMY_ROW = 24
 """Height of a row where there is room, logical pixels at the normal text size."""
 
 _FEWEST_ROWS = 6
-"""Shown in a low window, which scrolls the table."""
+"""SliceViewport in a low window, which scrolls the table."""
 
 _WIDEST_STATES = (*(state.value for state in PointState), "by itself", "99.9 mm")
 _CHIP, _PAD = 12, 8

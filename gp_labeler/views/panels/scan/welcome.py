@@ -43,7 +43,7 @@ _N_RECENT, _AROUND = 7, 24
 
 
 class Welcome(QWidget):
-    """Shown where no scan is open.
+    """SliceViewport where no scan is open.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ def tracker_words(workspace: Workspace) -> str:
 
 
 class TrackerCard(Card):
-    """Shown while a tracker is asked for.
+    """SliceViewport while a tracker is asked for.
 
     Parameters
     ----------

@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slices import SliceImage, SliceSource
+from gp_labeler.scene.slices import SliceImage, VolumeSlicer
 
-__all__ = ["SliceView", "scale_bar_length"]
+__all__ = ["SliceViewport", "scale_bar_length"]
 
 _FINEST, _COARSEST = 1e-4, 10.0
 """Limits of zoom, mm per pixel."""
@@ -24,7 +24,7 @@ _MARGIN = 1.06
 
 
 @dataclass(frozen=True, eq=False)
-class SliceView:
+class SliceViewport:
     """A view of one plane: never changed in place, so a widget keeps the current one.
 
     Parameters
@@ -48,7 +48,7 @@ class SliceView:
     size: tuple[int, int]
 
     @classmethod
-    def fitted(cls, source: SliceSource, plane: Plane, size: tuple[int, int]) -> SliceView:
+    def fitted(cls, source: VolumeSlicer, plane: Plane, size: tuple[int, int]) -> SliceViewport:
         """Make the view that shows a whole volume, at its middle slice."""
         extent = source.volume.extent
         corners = plane.flat(extent)
@@ -80,35 +80,35 @@ class SliceView:
         """Return the (2, 2) painter's coordinates (corners of pixels) between which an image is stretched."""
         return self.flat_to_pixel(image.edges) + 0.5
 
-    def zoomed(self, factor: float, about: ArrayLike | None = None) -> SliceView:
+    def zoomed(self, factor: float, about: ArrayLike | None = None) -> SliceViewport:
         """Return the view magnified, keeping what is under a pixel (the middle by default) where it is."""
         zoom = float(np.clip(self.mm_per_pixel / factor, _FINEST, _COARSEST))
         pixel = (np.array(self.size) - 1) / 2 if about is None else np.asarray(about, dtype=np.float64)
         offset = (pixel - (np.array(self.size) - 1) / 2) * (self.mm_per_pixel - zoom)
         return replace(self, mm_per_pixel=zoom, centre=self.centre + offset)
 
-    def panned(self, dx: float, dy: float) -> SliceView:
+    def panned(self, dx: float, dy: float) -> SliceViewport:
         """Return the view with its content dragged by so many pixels."""
         return replace(self, centre=self.centre - np.array([dx, dy]) * self.mm_per_pixel)
 
-    def resized(self, width: int, height: int) -> SliceView:
+    def resized(self, width: int, height: int) -> SliceViewport:
         """Return the view at another size, with the same middle and zoom."""
         return replace(self, size=(int(width), int(height)))
 
-    def looks_like(self, other: SliceView) -> bool:
+    def looks_like(self, other: SliceViewport) -> bool:
         """Whether it has the middle and the zoom of another view, of whatever slice and size."""
         return self.mm_per_pixel == other.mm_per_pixel and bool((self.centre == other.centre).all())
 
-    def at(self, position: float) -> SliceView:
+    def at(self, position: float) -> SliceViewport:
         """Return the view of the slice at another position, mm."""
         return replace(self, position=float(position))
 
-    def centred(self, point: ArrayLike) -> SliceView:
+    def centred(self, point: ArrayLike) -> SliceViewport:
         """Return the view with a (3,) scan position on its slice and in its middle."""
         scan = np.asarray(point, dtype=np.float64).reshape(1, 3)
         return replace(self, centre=self.plane.flat(scan)[0], position=float(self.plane.depth(scan)[0]))
 
-    def showing(self, point: ArrayLike, margin: float = 0.1) -> SliceView:
+    def showing(self, point: ArrayLike, margin: float = 0.1) -> SliceViewport:
         """Return the view of the slice through a (3,) scan position, shifted only if that lies outside."""
         scan = np.asarray(point, dtype=np.float64).reshape(1, 3)
         there = self.at(float(self.plane.depth(scan)[0]))

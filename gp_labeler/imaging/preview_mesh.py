@@ -15,7 +15,7 @@ _FIRST_VOXELS = 2.0
 
 
 def coarse_surface(surface: Surface, n_triangles: int) -> Surface:
-    """Return a stand-in of at most so many triangles, to be looked at while the camera moves.
+    """Return a preview mesh of at most so many triangles, to be looked at while the camera moves.
 
     All points in a box become one, their mean. Thin walls, which a coarser isosurface would lose, stay.
 

@@ -9,17 +9,17 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkRenderer
 
 from gp_labeler.scene.colours import DARK, SceneColours, rgb
 
-__all__ = ["Stage", "release", "solid_actor"]
+__all__ = ["RenderLayers", "release", "solid_actor"]
 
 
 @dataclass
-class Stage:
+class RenderLayers:
     """The renderers of one scene.
 
     Parameters
     ----------
     bone : vtkRenderer
-        Bone alone: drawn when it or the camera changes, and kept (`Backdrop`).
+        Bone alone: drawn when it or the camera changes, and kept (`BoneFrameCache`).
     base : vtkRenderer
         What bone may hide: drawn over it, against its depths.
     overlay : vtkRenderer

@@ -12,11 +12,11 @@ from vtkmodules.vtkRenderingCore import vtkActor, vtkPolyDataMapper, vtkProperty
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.surface import Surface
 from gp_labeler.imaging.vtk_arrays import cells_of, points_of, to_numpy, to_vtk
-from gp_labeler.scene.stage import release
+from gp_labeler.scene.render_layers import release
 
-__all__ = ["PIECE_TRIANGLES", "Piece", "pieces_of"]
+__all__ = ["CHUNK_TRIANGLES", "MeshChunk", "chunks_of"]
 
-PIECE_TRIANGLES = 16_000
+CHUNK_TRIANGLES = 16_000
 """About 10 ms without a graphics card: input waits for one piece at most."""
 
 _SAMPLES = 200
@@ -24,7 +24,7 @@ _SPREAD = 4
 """A piece whose corners are spread over more of the table of points, in times its size, gets its own."""
 
 
-class Piece:
+class MeshChunk:
     """Some triangles of a surface, which become an actor when they are drawn for the first time.
 
     Parameters
@@ -83,11 +83,11 @@ class Piece:
         return mesh
 
 
-def pieces_of(surface: Surface, n_triangles: int = PIECE_TRIANGLES) -> list[Piece]:
+def chunks_of(surface: Surface, n_triangles: int = CHUNK_TRIANGLES) -> list[MeshChunk]:
     """Return a surface in pieces of about so many triangles, neighbours in the mesh together."""
     n = surface.n_triangles
     edges = np.linspace(0, n, max(1, round(n / n_triangles)) + 1).astype(int).tolist()
-    return [Piece(surface, first, last) for first, last in pairwise(edges) if last > first]
+    return [MeshChunk(surface, first, last) for first, last in pairwise(edges) if last > first]
 
 
 def _clip(actor: vtkActor, plane: vtkPlane | None) -> None:

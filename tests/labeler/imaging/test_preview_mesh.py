@@ -1,11 +1,11 @@
-"""The stand-in of a surface: few triangles, in the same place, thin walls kept."""
+"""The preview mesh of a surface: few triangles, in the same place, thin walls kept."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from gp_labeler.imaging.stand_in import coarse_surface
+from gp_labeler.imaging.preview_mesh import coarse_surface
 from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.volume import Volume
 

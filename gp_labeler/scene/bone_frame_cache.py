@@ -17,12 +17,12 @@ from vtkmodules.vtkRenderingCore import vtkActor2D, vtkPolyDataMapper2D, vtkProp
 from gp_core.validation import FloatArray
 from gp_labeler.scene.added_meshes import AddedMeshActors
 from gp_labeler.scene.bone import BoneActor
+from gp_labeler.scene.mesh_chunks import MeshChunk
 from gp_labeler.scene.orientation_cube import OrientationCube
-from gp_labeler.scene.pieces import Piece
-from gp_labeler.scene.stage import Stage
+from gp_labeler.scene.render_layers import RenderLayers
 from gp_labeler.scene.target import RenderTarget
 
-__all__ = ["Backdrop", "Sight"]
+__all__ = ["BoneFrameCache", "RenderKey"]
 
 _STRIP_PIXELS = 100_000
 """Edges of so many pixels are smoothed at a time."""
@@ -35,7 +35,7 @@ _COARSEST = 3
 
 
 @dataclass(frozen=True)
-class Sight:
+class RenderKey:
     """Everything on which the picture of the bone depends.
 
     Parameters
@@ -56,12 +56,12 @@ class Sight:
     mesh: int
 
 
-class Backdrop:
+class BoneFrameCache:
     """Draws and keeps the picture of the bone.
 
     Parameters
     ----------
-    stage : Stage
+    layers : RenderLayers
         Its renderer ``bone`` is drawn here alone.
     target : RenderTarget
         Where.
@@ -75,66 +75,66 @@ class Backdrop:
 
     def __init__(
         self,
-        stage: Stage,
+        layers: RenderLayers,
         target: RenderTarget,
         bone: BoneActor,
         added: AddedMeshActors,
         cube: OrientationCube,
     ) -> None:
-        self._stage, self._target, self._bone, self._added, self._cube = stage, target, bone, added, cube
+        self._layers, self._target, self._bone, self._added, self._cube = layers, target, bone, added, cube
         self._smoother, self._nothing = _smoother()
         target.add(self._smoother)
         self._kept, self._next = "bone", "bone to be"
-        self._shown: Sight | None = None
+        self._shown: RenderKey | None = None
         self._fine = False
         self._work: Iterator[None] | None = None
-        self._work_for: Sight | None = None
+        self._work_for: RenderKey | None = None
         self._coarseness = 1
         self._warm = -1
         self.n_drawn = 0
         """How often bone has been drawn, a frame in pieces once."""
 
-    def is_fine(self, sight: Sight) -> bool:
+    def is_fine(self, key: RenderKey) -> bool:
         """Whether the picture that is kept shows just that, finely."""
-        return self._fine and self._shown == sight
+        return self._fine and self._shown == key
 
-    def will_do(self, sight: Sight) -> bool:
+    def differs_only_in_mesh(self, key: RenderKey) -> bool:
         """Whether the picture that is kept may stand until the fine one is there: only meshes are newer."""
-        return self._shown is not None and self._fine and replace(self._shown, mesh=sight.mesh) == sight
+        return self._shown is not None and self._fine and replace(self._shown, mesh=key.mesh) == key
 
-    def draw_quickly(self, sight: Sight, direction: FloatArray) -> None:
-        """Draw the coarse stand-in and keep the picture; without a stand-in, draw the bone itself."""
+    def draw_quickly(self, key: RenderKey, direction: FloatArray) -> None:
+        """Draw the coarse preview mesh and keep the picture; without a preview mesh, draw the bone itself."""
         if not self._bone.has_quick:
-            self.advance(sight, direction)
+            self.advance(key, direction)
             return
-        (width, height), n = sight.size, self._coarseness
+        (width, height), n = key.size, self._coarseness
         part = (max(1, width // n), max(1, height // n))
         start = time.perf_counter()
-        self._draw_stand_in(part, sight.size, direction)
+        self._draw_preview(part, key.size, direction)
         self._target.keep(self._kept, part=part)
         self._target.restore(self._kept)
         self._add_cube(self._kept)
-        self._shown, self._fine = sight, False
+        self._shown, self._fine = key, False
         self.n_drawn += 1
         self._adapt(time.perf_counter() - start)
 
-    def advance(self, sight: Sight, direction: FloatArray, seconds: float = np.inf) -> bool:
+    def advance(self, key: RenderKey, direction: FloatArray, seconds: float = np.inf) -> bool:
         """Draw more of the bone, in about so many seconds; return whether the picture is done, and kept.
 
         Parameters
         ----------
-        sight : Sight
+        key : RenderKey
             What is to be seen; another one than last time begins a new picture.
         direction : (3,) float array
             Into the scene.
         seconds : float
             After which to stop, at the end of a piece.
         """
-        if self.is_fine(sight):
+        if self.is_fine(key):
             return True
         end = time.perf_counter() + seconds
-        if self._work is None or self._work_for != sight:
-            self._work, self._work_for = self._steps(sight, direction), sight
+        if self._work is None or self._work_for != key:
+            self._work, self._work_for = self._steps(key, direction), key
         else:
             self._target.restore(self._next)
         for _ in self._work:
@@ -144,7 +144,7 @@ class Backdrop:
         self._target.keep(self._next)
         self._add_cube(self._next)
         self._kept, self._next = self._next, self._kept
-        self._shown, self._fine = sight, True
+        self._shown, self._fine = key, True
         self._work = self._work_for = None
         self.n_drawn += 1
         return True
@@ -163,34 +163,36 @@ class Backdrop:
         self._work = None
         self._smoother.RemoveAllViewProps()
 
-    def _steps(self, sight: Sight, direction: FloatArray) -> Iterator[None]:
+    def _steps(self, key: RenderKey, direction: FloatArray) -> Iterator[None]:
         """Draw a fine picture, stopping after each piece and each strip."""
-        if self._bone.has_quick and self._warm != sight.mesh:
-            self._draw_stand_in((1, 1), sight.size, direction)  # so that the first turn does not wait for it
-            self._warm = sight.mesh
+        if self._bone.has_quick and self._warm != key.mesh:
+            self._draw_preview((1, 1), key.size, direction)  # so that the first turn does not wait for it
+            self._warm = key.mesh
             yield
-        groups = self._bone.groups(direction, at_once=bool(self._stage.bone.GetUseSSAO()))
+        groups = self._bone.groups(direction, at_once=bool(self._layers.bone.GetUseSSAO()))
         drawn = bool(groups or self._added.names)
         for n, actors in enumerate(self._batches(groups)):
-            self._stage.bone.SetErase(n == 0)
+            self._layers.bone.SetErase(n == 0)
             self._draw(actors)
             yield
-        n_strips = max(1, round(sight.size[0] * sight.size[1] / _STRIP_PIXELS)) if drawn else 0
+        n_strips = max(1, round(key.size[0] * key.size[1] / _STRIP_PIXELS)) if drawn else 0
         for n in range(n_strips):
             self._smoother.SetViewport(0.0, n / n_strips, 1.0, (n + 1) / n_strips)
             self._target.draw(self._smoother)
             yield
 
-    def _draw_stand_in(self, part: tuple[int, int], whole: tuple[int, int], direction: FloatArray) -> None:
-        """Draw the stand-in into the lower left part of the picture."""
-        renderer = self._stage.bone
+    def _draw_preview(self, part: tuple[int, int], whole: tuple[int, int], direction: FloatArray) -> None:
+        """Draw the preview mesh into the lower left part of the picture."""
+        renderer = self._layers.bone
         renderer.SetViewport(0.0, 0.0, part[0] / whole[0], part[1] / whole[1])
         for n, actors in enumerate(self._batches(self._bone.groups(direction, quick=True), quick=True)):
             renderer.SetErase(n == 0)
             self._draw(actors)
         renderer.SetViewport(0.0, 0.0, 1.0, 1.0)
 
-    def _batches(self, groups: list[list[Piece]], *, quick: bool = False) -> Iterator[Sequence[vtkProp3D]]:
+    def _batches(
+        self, groups: list[list[MeshChunk]], *, quick: bool = False
+    ) -> Iterator[Sequence[vtkProp3D]]:
         """Return what is drawn one after the other: solid first, so that transparent bone lies over it."""
         solid, clear = (self._added.actors(solid=each, quick=quick) for each in (True, False))
         if solid or not groups:
@@ -203,7 +205,7 @@ class Backdrop:
     def _draw(self, actors: Sequence[vtkProp3D]) -> None:
         for actor in actors:
             actor.VisibilityOn()
-        self._target.draw(self._stage.bone)
+        self._target.draw(self._layers.bone)
         for actor in actors:
             actor.VisibilityOff()
 
