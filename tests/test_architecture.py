@@ -73,6 +73,12 @@ def test_no_module_imports_in_a_circle(package: str) -> None:
         pytest.fail(f"import cycle: {' <- '.join(error.args[1])}")
 
 
+def test_the_core_speaks_the_words_of_the_field() -> None:
+    command = [sys.executable, "tools/words", "gp_core", "tests/core", "docs/glossary.md", "docs/method.md"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=_ROOT)
+    assert done.returncode == 0, done.stdout
+
+
 def test_the_core_brings_no_window_with_it() -> None:
     heavy = ("PySide6", "PyQt6", "qtpy", "vtk", "vtkmodules", "pyvista", "SimpleITK", "skimage", "numba")
     code = (
