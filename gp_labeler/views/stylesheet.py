@@ -118,7 +118,7 @@ QListView::item:selected { background: $selected; color: $text; }
 QMenuBar { background: $window; color: $text; }
 QMenuBar::item { padding: 4px 10px; background: transparent; border-radius: 4px; }
 QMenuBar::item:selected { background: $hover; }
-QMenu { background: $card; border: 1px solid $border_strong; padding: 4px; }
+QMenu { background: $card; border: 1px solid $border_strong; padding: 4px; menu-scrollable: 1; }
 QMenu::item { padding: 5px 24px 5px 12px; border-radius: 4px; }
 QMenu::item:selected { background: $selected; }
 QMenu::item:disabled { color: $faint; }

@@ -20,6 +20,7 @@ from gp_labeler.views.theme import theme_of
 __all__ = ["ViewFrame", "ViewGrid"]
 
 _HEADER_HEIGHT, _GAP = 24, 6
+_ROWS = (("3d", "axial"), ("sagittal", "coronal"))
 CLOSE_MM = 12.0
 """Across a view that looks closely at a point."""
 
@@ -89,6 +90,13 @@ class ViewHeader(QWidget):
         self.where.setVisible(words <= room)
         if self._slider is not None:
             self._slider.set_room(words + self._row.spacing() + self._slider.minimumWidth() <= room)
+
+    @property
+    def least_width(self) -> int:
+        """The width at which its name is whole, logical pixels."""
+        margins = self._row.contentsMargins()
+        around = margins.left() + margins.right() + 3 * self._row.spacing()
+        return self.title.sizeHint().width() + self._button.minimumWidth() + around
 
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: N802
         super().resizeEvent(event)
@@ -164,7 +172,7 @@ class ViewGrid(QWidget):
         self.slice_views = {plane: SliceView(workspace, plane) for plane in Plane}
         self.frames = {"3d": ViewFrame("3d", self.scene_view)}
         self.frames |= {p.value: ViewFrame(p.value, self.slice_views[p]) for p in Plane}
-        self._rows = [self._row("3d", "axial"), self._row("sagittal", "coronal")]
+        self._rows = [self._row(*names) for names in _ROWS]
         self._column = QSplitter(Qt.Orientation.Vertical)
         for row in self._rows:
             self._column.addWidget(row)
@@ -173,7 +181,8 @@ class ViewGrid(QWidget):
         whole.setContentsMargins(0, 0, 0, 0)
         whole.addWidget(self._column)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
-        self.setMinimumWidth(2 * self.scene_view.minimumWidth() + _GAP)
+        self._narrow = False
+        fit(self, self._ask_for_room)
         self._listen()
         self._lay_out()
         workspace.interaction.visible_area = self
@@ -253,12 +262,32 @@ class ViewGrid(QWidget):
         for frame in self.frames.values():
             frame.header.say_where("")
 
+    def _ask_for_room(self) -> None:
+        """Ask for the width of one view, in which no word of a header is cut."""
+        headers = [frame.header.least_width for frame in self.frames.values()]
+        self._least = max(self.scene_view.minimumWidth(), *headers)
+        self.setMinimumWidth(self._least)
+        self._check_room()
+
+    def _check_room(self) -> None:
+        """Show two views, one over the other, where the panel leaves no room for two beside each other."""
+        narrow = self.width() < 2 * self._least + _GAP
+        if narrow != self._narrow:
+            self._narrow = narrow
+            self._rows[0].setOrientation(Qt.Orientation.Vertical if narrow else Qt.Orientation.Horizontal)
+            self._lay_out()
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
+        super().resizeEvent(event)
+        self._check_room()
+
     def _lay_out(self) -> None:
         layout = self._workspace.view.state.layout
+        shown = {"four-up": _ROWS[0] if self._narrow else (*_ROWS[0], *_ROWS[1])}.get(layout, (layout,))
         for name, frame in self.frames.items():
-            frame.setVisible(layout in ("four-up", name))
-        for row, names in zip(self._rows, (("3d", "axial"), ("sagittal", "coronal")), strict=True):
-            row.setVisible(layout == "four-up" or layout in names)
+            frame.setVisible(name in shown)
+        for row, names in zip(self._rows, _ROWS, strict=True):
+            row.setVisible(not set(names).isdisjoint(shown))
 
     def _say_where(self, plane: Plane, position: float) -> None:
         self.frames[plane.value].header.say_where(position_text(plane, position))

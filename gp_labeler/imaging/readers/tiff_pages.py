@@ -69,12 +69,13 @@ def full_page(tif: tifffile.TiffFile, path: Path) -> tifffile.TiffPage:
 def orientation_of(page: tifffile.TiffPage) -> int:
     """Return the value of the tag Orientation, 1 to 8; 1 where it is missing or makes no sense."""
     value = page.tags.valueof(ORIENTATION_TAG, default=1)
-    return value if isinstance(value, int) and 1 <= value <= 8 else 1
+    return int(value) if isinstance(value, int) and 1 <= value <= 8 else 1  # an enumeration in old tifffile
 
 
 def check_orientations(pages: Sequence[tifffile.TiffPage], path: Path) -> None:
     """Raise `VolumeError` where slices of one file are turned differently; the first may speak for all."""
-    said = {page.tags.valueof(ORIENTATION_TAG, default=None) for page in pages[1:]} - {None}
+    found = {page.tags.valueof(ORIENTATION_TAG, default=None) for page in pages[1:]} - {None}
+    said = {int(value) if isinstance(value, int) else value for value in found}
     if said - {orientation_of(pages[0])}:
         values = names([str(value) for value in sorted({*said, orientation_of(pages[0])})])
         raise VolumeError(

@@ -23,6 +23,8 @@ SMALL, USUAL, LARGE = (853, 512), (1280, 800), (1366, 768)
 
 FAMILIES = ("DejaVu Sans", "Liberation Sans", "Noto Sans", "Inter")
 FULLEST = ("first page", "scan", "label, both sides", "pose, a mistouch", "atlas, tried out", "open a stack")
+TALL_MENUS = ((130, SMALL), (150, SMALL))
+"""Text sizes at which menus are taller than a screen: they scroll there."""
 WHOLE = "GP_CUT_WORDS" in os.environ
 """Whether the whole matrix is walked, as ``tools/cut-words`` does."""
 
@@ -39,11 +41,13 @@ def looks(state: str) -> list[tuple[str | None, int, tuple[int, int], str]]:
     installed = [name for name in FAMILIES if name in QFontDatabase.families()]
     if not WHOLE:  # to restyle a window takes its time: other fonts have a look at the fullest states
         others = [(name, 100, SMALL, "dark") for name in installed] if state in FULLEST else []
-        return [(None, 100, SMALL, "dark"), *others]
+        large = [(None, 150, SMALL, "dark")] if state in FULLEST else []
+        return [(None, 100, SMALL, "dark"), *others, *large]
     scale = QApplication.primaryScreen().devicePixelRatio()
     screens = [(round(w / scale), round(h / scale)) for w, h in ((1280, 800), (1366, 768), (1440, 900))]
     found = [(name, 100, screen, "dark") for name in (None, *installed) for screen in screens]
-    return found + [(None, size, screens[0], "light") for size in (85, 115, 130, 150)]
+    large = [(None, size, SMALL, "dark") for size in (115, 130, 150)]
+    return found + large + [(None, size, screens[0], "light") for size in (85, 115, 130, 150)]
 
 
 def test_no_word_is_cut_in_any_state(make_window, tmp_path, family) -> None:
@@ -62,6 +66,8 @@ def test_no_word_is_cut_in_any_state(make_window, tmp_path, family) -> None:
                 width, height = screen if isinstance(root, GuideWindow) else root.size().toTuple()
                 root.resize(min(width, screen[0]), min(height, screen[1]))
             lines = cut_words(root, own=OWN, screen=screen)
+            if (size, screen) in TALL_MENUS:
+                lines = [line for line in lines if not line.startswith("menu ")]
             found.extend(f"{state}, {name}, {size} %, {screen}, {theme}: {line}" for line in lines)
 
     walk_states(window, tmp_path, look)

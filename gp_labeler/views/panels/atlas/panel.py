@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from qtpy.QtCore import QSize, Qt, Signal
+from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import (
     QBoxLayout,
     QCheckBox,
@@ -34,6 +35,8 @@ from gp_labeler.views.panels.scan.import_wording import sentence
 __all__ = ["AtlasPanel"]
 
 _WIDEST = 1000
+_TWO_COLUMNS = 640
+"""From which width there is room for two columns; logical pixels at the normal text size."""
 
 
 class AtlasPanel(QWidget):
@@ -71,10 +74,20 @@ class AtlasPanel(QWidget):
         self._area = scrolled(content)
         self._area.setAlignment(Qt.AlignmentFlag.AlignHCenter | Qt.AlignmentFlag.AlignTop)
         layout.addWidget(self._area)
-        self.set_wide(False)
+        self._is_alone, self._is_wide = False, True
+        fit(self, self._share_columns)
 
     def set_wide(self, wide: bool) -> None:
-        """Take all the width there is, in two columns, where there is no scan beside."""
+        """Take all the width there is, where there is no scan beside."""
+        self._is_alone = wide
+        self._share_columns()
+
+    def _share_columns(self) -> None:
+        """Lie in two columns where there is room for them."""
+        wide = self._is_alone and self.width() >= pixels(self, _TWO_COLUMNS)
+        if wide == self._is_wide:
+            return
+        self._is_wide = wide
         ways = QBoxLayout.Direction
         self._columns.setDirection(ways.LeftToRight if wide else ways.TopToBottom)
         column = self._left if wide else self._right
@@ -83,6 +96,10 @@ class AtlasPanel(QWidget):
                 other.removeWidget(card)
             column.insertWidget(column.count() - 1, card)  # before the stretch
         self._area.updateGeometry()  # which no layout asks for while the panel is hidden
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802 - Qt's name
+        super().resizeEvent(event)
+        self._share_columns()
 
     def sizeHint(self) -> QSize:  # noqa: D102, N802 - Qt's name
         least, table = self.minimumSizeHint(), self.labels.table

@@ -18,7 +18,7 @@ from qtpy.QtWidgets import (
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import LabelNames, parse_label
 from gp_labeler.views.bind import blocked
-from gp_labeler.views.panels.parts import emptied, text_label
+from gp_labeler.views.panels.parts import ElidedLabel, emptied, text_label
 
 __all__ = ["LabNamesTable"]
 
@@ -120,7 +120,7 @@ class LabNamesTable(QWidget):
             self._allow_side(name)
             if name in chosen:
                 self._set(name, chosen[name])
-            self._rows.addWidget(text_label(name), row, 0)
+            self._rows.addWidget(ElidedLabel(name), row, 0)
             for column, box in enumerate((self._boxes[name], self._sides[name]), start=1):
                 box.setSizePolicy(QSizePolicy.Policy.Preferred, QSizePolicy.Policy.Fixed)  # never squeezed
                 box.currentIndexChanged.connect(lambda _, name=name: self._tell(name))
