@@ -29,7 +29,7 @@ NOISE_MM = 0.1
 COLUMNS = ("side found", "exchange found", "exchange named")
 
 Check = Callable[[LandmarkSet], tuple[bool, set[frozenset[str]], set[str]]]
-"""Whether the side is called the other one, the pairs called exchanged, and the labels that are doubted."""
+"""Whether the side is called the other one, the pairs called exchanged, and the labels that are outliers."""
 
 
 def new_check(atlas: Atlas) -> Check:
@@ -39,10 +39,10 @@ def new_check(atlas: Atlas) -> Check:
     def check(landmarks: LandmarkSet) -> tuple[bool, set[frozenset[str]], set[str]]:
         found = check_side(landmarks, atlas)
         pairs = {frozenset(f.landmarks) for f in found.findings if f.kind == "exchanged"}
-        doubted = {
+        outliers = {
             code for f in found.findings if f.is_problem and f.kind != "other side" for code in f.landmarks
         }
-        return found.is_other_side, pairs, doubted
+        return found.is_other_side, pairs, outliers
 
     return check
 
@@ -95,10 +95,10 @@ def trials(check: Check, atlas: Atlas, n: int, n_trials: int, seed: int) -> dict
     for landmarks, (a, b) in ears(atlas, n, n_trials, seed):
         found["side found"].append(check(LandmarkSet(landmarks.points, landmarks.side.other))[0])
         exchanged = landmarks.with_point(a, landmarks[b]).with_point(b, landmarks[a])
-        _, pairs, doubted = check(exchanged)
+        _, pairs, outliers = check(exchanged)
         is_named = pairs == {frozenset((a, b))}
         found["exchange named"].append(is_named)
-        found["exchange found"].append(is_named or {a, b} <= doubted)
+        found["exchange found"].append(is_named or {a, b} <= outliers)
     return found
 
 
@@ -108,9 +108,9 @@ def false_alarms(check: Check, atlas: Atlas, n: int, n_trials: int, seed: int) -
     spent = 0.0
     for landmarks, _ in ears(atlas, n, n_trials, seed + 1):
         begin = time.perf_counter()
-        is_other, pairs, doubted = check(landmarks)
+        is_other, pairs, outliers = check(landmarks)
         spent += time.perf_counter() - begin
-        alarms += bool(is_other or pairs or doubted)
+        alarms += bool(is_other or pairs or outliers)
     return alarms, 1000 * spent / n_trials
 
 

@@ -1,6 +1,6 @@
 """How fast an estimate with all that is drawn of it is shown again, without bone: in 3D and on three slices.
 
-Moving what is there is compared, in the same run, with making it anew. Run from the project's root:
+Moving what is there is compared, in the same run, with making it again. Run from the project's root:
 python benchmarks/overlay.py
 """
 
@@ -106,7 +106,7 @@ def main() -> None:
             SlicePen(painter, view, 1.0, scene).draw()
             painter.end()
 
-    def anew(scene: PoseScene) -> None:
+    def remade(scene: PoseScene) -> None:
         scene3d.pose.close()
         scene3d.pose = PoseActor(scene3d.layers)
         draw(scene)
@@ -130,7 +130,7 @@ def main() -> None:
         ("3D: moved, and drawn", moved),
         ("three slices painted", _best(paint, scenes)),
         ("one estimate, 3D and three slices", _best(usual, scenes)),
-        ("peer: made anew, and drawn", _best(anew, scenes)),
+        ("peer: remade and drawn", _best(remade, scenes)),
     ]
     scene3d.pose.show(PoseScene())
     rows.append(("an empty frame", _best(nothing, scenes)))

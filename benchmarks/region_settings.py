@@ -63,19 +63,19 @@ _CAREFUL_TIMES = 5
 def main() -> None:
     """Print every candidate, and what is chosen."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--herds", type=int, default=30, metavar="N", help="of 11 animals each")
+    parser.add_argument("--cohorts", type=int, default=30, metavar="N", help="of 11 animals each")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
     for lines in (_share, _odd, _undecided):
-        for line in lines(args.herds, args.seed):
+        for line in lines(args.cohorts, args.seed):
             sys.stdout.write(f"{line}\n")
             sys.stdout.flush()
 
 
-def _rows(herds: int, seed: int, labels: tuple[str, ...]) -> list[ConditionRow]:
+def _rows(cohorts: int, seed: int, labels: tuple[str, ...]) -> list[ConditionRow]:
     """Measure conditions of six touches."""
     cases = [case for case in touch_conditions() if case.label in labels and case.codes == PROBE]
-    return list(conditions(repeats=herds, rng=np.random.default_rng(seed), cases=cases).rows)
+    return list(conditions(repeats=cohorts, rng=np.random.default_rng(seed), cases=cases).rows)
 
 
 def _with_share(share: float) -> Callable[..., FloatArray]:
@@ -95,14 +95,14 @@ def _held(rows: list[ConditionRow], *regions: str) -> float:
     return float(np.mean([row.held(region) for row in rows for region in regions]))
 
 
-def _share(herds: int, seed: int) -> Iterator[str]:
+def _share(cohorts: int, seed: int) -> Iterator[str]:
     words = ("tip offset", "soft tissue", "knocked marker", "drift")
     labels = tuple(f"{word} {size}" for word in words for size in (0.2, 0.5))
     held = {}
     yield "share   held, %   radius grown without noise"
     for share in _SHARES:
         with mock.patch.object(SystematicError, "covariance", _with_share(share)):
-            rows = _rows(herds, seed, (*labels, "noise 0"))
+            rows = _rows(cohorts, seed, (*labels, "noise 0"))
         plain = next(row for row in rows if row.condition.group == "noise")
         held[share] = _held([row for row in rows if row is not plain], "radius_mm", "cone_deg")
         yield f"{share:5.2f}   {100 * held[share]:7.2f}   {plain.as_dict()['radius_mm_growth']:.3f}"
@@ -110,13 +110,13 @@ def _share(herds: int, seed: int) -> Iterator[str]:
     yield f"chosen: {chosen}; in use: 0\n"
 
 
-def _odd(herds: int, seed: int) -> Iterator[str]:
+def _odd(cohorts: int, seed: int) -> Iterator[str]:
     held = {}
     yield "odd     cone holds with MN off at 0.1, 0.25 mm, %   radius grown without noise"
     for odd in _ODDS:
         labels = ("noise 0", "MN 3 mm off, noise 0.1", "MN 3 mm off, noise 0.25")
         with mock.patch.object(systematic, "OUTLIER_SQUARED_SHARED", odd):
-            plain, *off = _rows(herds, seed, labels)
+            plain, *off = _rows(cohorts, seed, labels)
         each = [_held([row], "cone_deg") for row in off]
         held[odd] = min(each)
         cones = " ".join(f"{100 * share:7.2f}" for share in each)
@@ -125,16 +125,16 @@ def _odd(herds: int, seed: int) -> Iterator[str]:
     yield f"chosen: {chosen:.2f}; in use: {systematic.OUTLIER_SQUARED_SHARED:.2f}\n"
 
 
-def _undecided(herds: int, seed: int) -> Iterator[str]:
+def _undecided(cohorts: int, seed: int) -> Iterator[str]:
     rng = np.random.default_rng(seed)
     cases = [c for c in touch_conditions(("side", "names", "noise")) if c.codes == PROBE]
     careful = [case for case in cases if case.label in ("noise 0", "noise 0.1")]
     mistaken = [case for case in cases if case.group != "noise"]
     odds: list[float] = []
     found: dict[str, list[tuple[CochleaPose, float, float]]] = {case.label: [] for case in mistaken}
-    for herd in range(herds):
+    for cohort in range(cohorts):
         atlas = perturbed_atlas(Atlas.published(), rng=rng)
-        animals = [draw_animal(atlas, rng=rng, name=f"{herd} {i}") for i in range(11)]
+        animals = [draw_animal(atlas, rng=rng, name=f"{cohort} {i}") for i in range(11)]
         for held_out, truth in zip(*held_out_sides(animals, PROBE), strict=True):
             for case in _CAREFUL_TIMES * careful:
                 odds.append(_other_side(_estimated(case, held_out, truth, rng)[0]))
@@ -169,9 +169,9 @@ def _other_side(pose: CochleaPose) -> float:
 def _holds(poses: list[tuple[CochleaPose, float, float]], limit: float) -> float:
     """Return how often radius and cone hold the truth, the lesser of both."""
     with mock.patch.object(mixture, "UNDECIDED", limit):
-        anew = [(replace(pose), mm, degrees) for pose, mm, degrees in poses]
-        radius = np.mean([mm <= pose.radius_95 for pose, mm, _ in anew])
-        cone = np.mean([degrees <= np.degrees(pose.cone_95) for pose, _, degrees in anew])
+        again = [(replace(pose), mm, degrees) for pose, mm, degrees in poses]
+        radius = np.mean([mm <= pose.radius_95 for pose, mm, _ in again])
+        cone = np.mean([degrees <= np.degrees(pose.cone_95) for pose, _, degrees in again])
     return float(min(radius, cone))
 
 

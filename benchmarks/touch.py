@@ -105,7 +105,7 @@ def _touches(
 
 
 def _whole_paints(window: MainWindow) -> FloatArray:
-    """Return ms that the window takes to paint everything anew, with nothing changed."""
+    """Return ms that the window takes to repaint everything, with nothing changed."""
     taken = []
     for _ in range(_REPEATS):
         start = time.perf_counter()

@@ -221,7 +221,7 @@ CASES: tuple[tuple[str, Callable[[MainWindow], None]], ...] = (
     ("bone is drawn finely from 3 new viewpoints", refine),
     ("a cut moves through bone, 10 steps", cut),
     ("a mesh is made in the background", mesh),
-    ("a threshold is set: meshed anew and shown", mesh_and_show),
+    ("a threshold is set: meshed again and shown", mesh_and_show),
 )
 
 
