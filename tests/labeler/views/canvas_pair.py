@@ -120,7 +120,8 @@ def same_pictures(trial: Trial) -> dict:
     trial.rest(painted, native)
     found = {"ratio": native.devicePixelRatioF(), "pixels": int(np.prod(native.scene.target.size))}
     found["grab"] = differing(pixels(painted.grab().toImage()), pixels(native.grab().toImage()))
-    found["screen"] = differing(on_screen(painted), on_screen(native))
+    shown = on_screen(painted), on_screen(native)
+    found["screen"], found["screen_most"] = differing(*shown), int(np.abs(shown[0] - shown[1]).max())
     over_of(native).lower()
     native.redraw()
     trial.rest(native)

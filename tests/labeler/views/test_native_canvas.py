@@ -49,8 +49,10 @@ def _trial(*arguments: str, **environment: str) -> dict:
 def test_both_canvases_show_the_same_pixels_and_answer_alike(ratio: str) -> None:
     found = _trial("same", QT_SCALE_FACTOR=ratio)
     assert found["ratio"] == float(ratio)
-    assert (found["grab"], found["screen"], found["early_grab"]) == (0, 0, 0)
-    assert found["control"] > 100  # the same with the overlay beneath the canvas: the comparison sees it
+    assert (found["grab"], found["early_grab"]) == (0, 0)
+    assert found["screen"] < 50
+    assert found["screen_most"] <= 1  # of 255: translucent edges of names are rounded before and after
+    assert found["control"] > 1000  # the same with the overlay beneath the canvas: the comparison sees it
     assert found["picks"] == 400
     assert found["hits"] > 100
     assert found["frames_for_a_ring"] == 0
