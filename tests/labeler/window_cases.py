@@ -6,6 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from qtpy.QtGui import QImage
 
 from gp_labeler.imaging.volume import Volume
 
@@ -114,3 +115,9 @@ def settle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
     qtbot.wait(10)
     view = window.grid.scene_view  # drawn in an event of its own, which a busy machine may put off
     qtbot.waitUntil(lambda: not (view.is_stale and view.isVisible()), timeout=int(1000 * seconds))
+
+
+def image_bytes(image: QImage) -> np.ndarray:
+    """Return the bytes of a picture, whichever binding Qt has."""
+    bits = image.constBits()
+    return np.frombuffer(bits.asarray(image.sizeInBytes()) if hasattr(bits, "asarray") else bits, np.uint8)

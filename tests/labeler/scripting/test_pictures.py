@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from qtpy.QtGui import QImage
-from window_cases import MIDDLE, VOXEL_MM, settle
+from window_cases import MIDDLE, VOXEL_MM, image_bytes, settle
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.planes import Plane
@@ -27,7 +27,7 @@ def spotted() -> Volume:
 
 def pixels(image: QImage) -> np.ndarray:
     image = image.convertToFormat(QImage.Format.Format_RGB888)
-    rows = np.array(image.constBits()).reshape(image.height(), image.bytesPerLine())
+    rows = image_bytes(image).reshape(image.height(), image.bytesPerLine())
     return rows[:, : 3 * image.width()].reshape(image.height(), image.width(), 3)
 
 

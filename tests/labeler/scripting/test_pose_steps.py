@@ -10,7 +10,7 @@ import pytest
 from qtpy.QtGui import QImage
 from scipy.spatial.transform import Rotation
 from script_cases import content, run
-from window_cases import MIDDLE
+from window_cases import MIDDLE, image_bytes
 
 from gp_core import PROBE, Atlas, RigidTransform, Side, estimate_pose, read_touches
 from gp_core.landmarks.features import CODES
@@ -62,7 +62,7 @@ def test_touches_are_laid_on_the_labels_of_the_same_names(tmp_path, labels) -> N
     assert report.poses[0]["registered_by"] == "features"
     assert report.files == ["pose.json", "pose.tfm", "on.png", "off.png"]
     on, off = (QImage(str(tmp_path / "out" / f"{name}.png")).convertToFormat(RGB) for name in ("on", "off"))
-    rows = [np.array(image.constBits()).reshape(image.height(), -1).astype(int) for image in (on, off)]
+    rows = [image_bytes(image).reshape(image.height(), -1).astype(int) for image in (on, off)]
     assert np.count_nonzero(np.abs(rows[0] - rows[1]) > 60) > 600  # channels of pixels: it is drawn
 
 

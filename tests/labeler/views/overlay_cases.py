@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from qtpy.QtGui import QImage, QPainter
+from window_cases import image_bytes
 
 from gp_labeler.scene.colours import DARK, SceneColours
 from gp_labeler.scene.scene3d import Scene3D
@@ -31,7 +32,4 @@ def frame_of(
 def pixels_of(image: QImage, channels: int = 3) -> np.ndarray:
     """Return the (h, w, channels) red, green, blue and opacity of a picture."""
     plain = image.convertToFormat(QImage.Format.Format_RGBA8888)
-    bits = plain.constBits()
-    size = plain.sizeInBytes()
-    data = np.frombuffer(bits.asarray(size) if hasattr(bits, "asarray") else bits, np.uint8, size)
-    return data.reshape(plain.height(), plain.width(), 4)[..., :channels].copy()
+    return image_bytes(plain).reshape(plain.height(), plain.width(), 4)[..., :channels].copy()

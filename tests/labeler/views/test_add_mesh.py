@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from PySide6.QtGui import QImage
-from window_cases import BALL_MM, MIDDLE, settle
+from window_cases import BALL_MM, MIDDLE, image_bytes, settle
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.surface_files import write_mesh
@@ -35,7 +35,7 @@ def file(tmp_path) -> Path:
 
 def _pixels(window) -> np.ndarray:
     image = window.grid.scene_view.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
-    return np.array(image.constBits()).reshape(image.height(), image.width(), 4)[..., :3].astype(int)
+    return image_bytes(image).reshape(image.height(), image.width(), 4)[..., :3].astype(int)
 
 
 def test_the_menu_adds_it_and_takes_it_away(qtbot, window, file) -> None:

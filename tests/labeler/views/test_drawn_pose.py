@@ -38,6 +38,8 @@ from gp_labeler.scene.target import RenderTarget
 from gp_labeler.views.painting.name_tags import pose_tags
 from gp_labeler.views.painting.scene_overlay import SceneOverlay
 
+pytestmark = pytest.mark.any_binding
+
 ONLY = {part: frozenset({part}) for part in PARTS}
 
 

@@ -19,6 +19,8 @@ from gp_labeler.views import fonts
 from gp_labeler.views.painting.word_pictures import word_picture
 from gp_labeler.views.typeface import FAMILY, font_file, font_files
 
+pytestmark = pytest.mark.any_binding
+
 _INVISIBLE = {"\N{ZERO WIDTH SPACE}", "\x7f"}
 
 

@@ -16,6 +16,8 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.parts import Notice
 
+pytestmark = pytest.mark.any_binding
+
 _CLICK = Qt.MouseButton.LeftButton
 
 

@@ -28,6 +28,8 @@ from gp_labeler.views.panels.scan.import_dialog import ImportDialog
 from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 
+pytestmark = pytest.mark.any_binding
+
 CLICK = Qt.MouseButton.LeftButton
 
 

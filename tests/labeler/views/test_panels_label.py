@@ -34,7 +34,10 @@ from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme, contrast
 
-pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
+pytestmark = [
+    pytest.mark.any_binding,
+    pytest.mark.usefixtures("qapp"),  # without one, Qt aborts at the first picture
+]
 
 LEFT, RIGHT = Side.LEFT, Side.RIGHT
 CLICK = Qt.MouseButton.LeftButton

@@ -11,6 +11,7 @@ from panel_cases import ATLAS, PANEL_WIDTH, actions_of, deliver, desk_with_scan,
 from qtpy.QtCore import QEvent, QModelIndex, QObject, QSize
 from qtpy.QtGui import QColor, QImage, QPixmap, QRegion
 from qtpy.QtWidgets import QApplication, QDialog, QWidget
+from window_cases import image_bytes
 
 from gp_core import PROBE
 from gp_core.atlas.sampling import draw_animal
@@ -81,7 +82,7 @@ def pixels(image: QImage | QPixmap) -> np.ndarray:
     plain = (image.toImage() if isinstance(image, QPixmap) else image).convertToFormat(
         QImage.Format.Format_ARGB32_Premultiplied
     )
-    return np.frombuffer(plain.constBits(), np.uint8).reshape(plain.height(), -1, 4).astype(int)
+    return image_bytes(plain).reshape(plain.height(), -1, 4).astype(int)
 
 
 def is_same(a: np.ndarray, b: np.ndarray) -> bool:

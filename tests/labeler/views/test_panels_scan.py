@@ -24,6 +24,8 @@ from gp_labeler.views.panels.scan.panel import ScanPanel, facts_of
 from gp_labeler.views.panels.scan.welcome import Welcome
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme
 
+pytestmark = pytest.mark.any_binding
+
 CLICK = Qt.MouseButton.LeftButton
 
 

@@ -7,7 +7,7 @@ import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtGui import QImage
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, image_bytes, settle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -49,7 +49,7 @@ def shown(qtbot, window, tmp_path):
 
 def _pixels(view) -> np.ndarray:
     image = view.grab().toImage().convertToFormat(QImage.Format.Format_RGB32)
-    return np.array(image.constBits()).reshape(image.height(), image.width(), 4)[..., :3].astype(int)
+    return image_bytes(image).reshape(image.height(), image.width(), 4)[..., :3].astype(int)
 
 
 def _pixel(view, position) -> QPoint:

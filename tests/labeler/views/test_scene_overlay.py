@@ -21,6 +21,8 @@ from gp_labeler.views.painting.marker_pictures import marker_picture
 from gp_labeler.views.painting.marks import place_marks, tags_of
 from gp_labeler.views.painting.scene_overlay import SceneOverlay
 
+pytestmark = pytest.mark.any_binding
+
 BALL, RADIUS = MIDDLE + np.array([1.0, 0.5, -0.7]), 3.0
 SHAPES = ("ball", "diamond", "triangle", "square", "inverted")
 

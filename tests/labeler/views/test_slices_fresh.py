@@ -15,6 +15,8 @@ from gp_labeler.scene.colours import DARK
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.painting import slice_painter
 
+pytestmark = pytest.mark.any_binding
+
 ATLAS = Atlas.published()
 
 

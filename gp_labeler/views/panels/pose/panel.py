@@ -132,6 +132,8 @@ class PosePanel(QWidget):
         layout.addWidget(self._area)
 
     def _connect(self) -> None:
+        self._leave_timer = QTimer(self, interval=0, singleShot=True)
+        self._leave_timer.timeout.connect(self._leave_name)
         self.head.specimen.returnPressed.connect(self._leave_name)
         pose = self._workspace.pose
         for signal in (pose.changed, pose.target_changed):
@@ -142,7 +144,7 @@ class PosePanel(QWidget):
         if self._stale:
             self.refresh()
         if not event.spontaneous():
-            QTimer.singleShot(0, self, self._leave_name)
+            self._leave_timer.start()
 
     def _leave_name(self) -> None:
         """Take the keys from the specimen's name: J records a touch, and is no letter of it."""
