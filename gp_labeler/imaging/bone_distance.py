@@ -80,7 +80,7 @@ def _nearest(
         return np.inf, None
     stride = max(1, int(np.ceil((np.prod(high - low) / _MOST_VOXELS) ** (1 / 3))))
     i, j, k = (slice(a, b, stride) for a, b in zip(low, high, strict=True))
-    voxels = low + stride * np.argwhere(volume.array[k, j, i] >= threshold)[:, ::-1]
+    voxels = low + stride * np.argwhere(volume.voxels.read(k, j, i) >= threshold)[:, ::-1]
     # along the axes of the voxels, mm, from the faces of each
     away = np.abs(voxels - volume.scan_to_voxel(point[None])[0]) * spacing
     distances = np.linalg.norm(np.maximum(away - spacing / 2, 0), axis=1)
@@ -96,5 +96,5 @@ def _is_no_speck(volume: Volume, threshold: float, voxels: NDArray[np.intp]) -> 
     """Return which voxels (N, 3) of bone have others about them."""
     steps = np.array(list(product((-1, 0, 1), repeat=3)))
     i, j, k = np.clip(voxels[:, None] + steps, 0, np.asarray(volume.size) - 1).transpose(2, 0, 1)
-    enough: NDArray[np.bool_] = (volume.array[k, j, i] >= threshold).sum(axis=1) >= _FEWEST_OF_27
+    enough: NDArray[np.bool_] = (volume.voxels.at(k, j, i) >= threshold).sum(axis=1) >= _FEWEST_OF_27
     return enough

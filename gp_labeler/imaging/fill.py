@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Fill", "find_fill", "replace_fill"]
+__all__ = ["Fill", "Replacement", "find_fill", "replace_fill", "replacement_of"]
 
 _Array = NDArray[Any]
 _Mask = NDArray[np.bool_]
@@ -74,26 +74,42 @@ def find_fill(array: _Array, known: float | None = None) -> tuple[Fill, ...]:
     return tuple(found)
 
 
-def replace_fill(array: _Array, fills: tuple[Fill, ...]) -> tuple[float | None, tuple[str, ...]]:
-    """Put one value below all measured ones wherever a scan has a fill.
+@dataclass(frozen=True)
+class Replacement:
+    """What stands where nothing was measured.
+
+    Parameters
+    ----------
+    below : float
+        A value below all measured ones; the lowest where the type has none.
+    has_room : bool
+        Whether it is below all measured ones.
+    notes : tuple of str
+        What was found, for the record.
+    """
+
+    below: float = 0.0
+    has_room: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def fill(self) -> float | None:
+        """The value that counts as fill; None where measured voxels have it too."""
+        return self.below if self.has_room else None
+
+
+def replacement_of(array: _Array, fills: tuple[Fill, ...]) -> Replacement:
+    """Find one value below all measured ones, for wherever a scan has a fill.
 
     Parameters
     ----------
     array : (z, y, x) array
-        Grey values; changed.
+        Grey values, read plane by plane.
     fills : tuple of Fill
         What `find_fill` found.
-
-    Returns
-    -------
-    value : float or None
-        What now stands where nothing was measured; None where the type has no value below all others, so
-        that the lowest had to be taken.
-    notes : tuple of str
-        What was done, for the record.
     """
     if not fills:
-        return None, ()
+        return Replacement()
     counts, low, high = np.zeros(len(fills), dtype=np.int64), np.inf, -np.inf
     for plane in array:
         nothing = np.zeros(plane.shape, dtype=bool)
@@ -109,11 +125,15 @@ def replace_fill(array: _Array, fills: tuple[Fill, ...]) -> tuple[float | None, 
     below, room = _below(low, high, array.dtype)
     if len(fills) == 1 and np.isnan(fills[0].value) and counts[0] < _FEWEST * array.size:
         below, room = low, False  # a few holes, not a part that lies outside
-    for plane in array:
-        nothing = np.logical_or.reduce([fill.where(plane) for fill in fills])
-        plane[nothing] = below
     notes = tuple(_note(fill, int(n), array.size) for fill, n in zip(fills, counts, strict=True) if n)
-    return (below if room else None), notes
+    return Replacement(below, room, notes)
+
+
+def replace_fill(array: _Array, fills: tuple[Fill, ...], replacement: Replacement) -> None:
+    """Put the replacement wherever a (z, y, x) scan in memory has a fill."""
+    for plane in array if fills else ():
+        nothing = np.logical_or.reduce([fill.where(plane) for fill in fills])
+        plane[nothing] = replacement.below
 
 
 def _note(fill: Fill, n: int, size: int) -> str:

@@ -58,13 +58,11 @@ class Histogram:
 
 def histogram_of(volume: Volume, *, bins: int = _BINS) -> Histogram:
     """Count the grey values of a regular subsample of a scan, without the few brightest; takes some 10 ms."""
-    array = volume.array
-    stride = max(1, int(np.ceil((array.size / _SAMPLES) ** (1 / 3))))
-    sample = volume.measured(array[::stride, ::stride, ::stride].astype(np.float64))
+    sample = volume.measured(volume.voxels.sample(_SAMPLES).astype(np.float64))
     low, high = float(sample.min()), float(np.percentile(sample, 99.97))
     if not high > low:
         high = low + 1.0
-    if array.dtype.kind in "iu":  # bins of as many whole numbers each, or some would look rarer than others
+    if volume.dtype.kind in "iu":  # bins of as many whole numbers each, or some would look rarer than others
         width = max(1, round((high - low) / bins))
         bins = max(1, int(np.ceil((high - low) / width)))
         high = low + bins * width

@@ -18,7 +18,7 @@ from gp_core.errors import GpError
 from gp_core.validation import FloatArray, as_points, check_option
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
-from gp_labeler.imaging.threshold import surface_level
+from gp_labeler.imaging.threshold import LEVEL_SAMPLES, surface_level
 from gp_labeler.imaging.volume import GreyArray, Volume
 from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of
 
@@ -36,13 +36,15 @@ SMALLEST_PART_MM = 1.0
 _CUT_BY_VTK = ("int8", "uint8", "int16", "uint16", "float32")
 """Flying edges subtracts neighbours in the voxels' own type (VTK 9.7): wider integers wrap around."""
 
+_SLAB_VOXELS = 1 << 26
+
 _FLOAT32_MAX = 1e30
 """Far beyond all grey values, and small enough for a difference of two to be finite."""
 
 
 def overview_stride(volume: Volume, n_voxels: int = OVERVIEW_VOXELS) -> int:
     """Return the stride at which a first look of a volume takes at most about `n_voxels` voxels."""
-    return max(1, int(np.ceil((volume.array.size / n_voxels) ** (1 / 3) - 1e-9)))
+    return max(1, int(np.ceil((volume.voxels.size / n_voxels) ** (1 / 3) - 1e-9)))
 
 
 def box_around(centre: ArrayLike, half_mm: float) -> FloatArray:
@@ -111,7 +113,7 @@ def extract_isosurface(
     report = Report(progress, cancel)
     report(0.0)
     region = _region(volume, box)
-    level = surface_level(threshold, volume.array)
+    level = surface_level(threshold, volume.voxels.sample(LEVEL_SAMPLES))
     mesh = METHODS[method](*_image(volume, region, stride, level))
     if volume.is_mirrored:
         _turn_over(mesh)
@@ -129,7 +131,8 @@ def extract_isosurface(
 
 
 def _no_surface(volume: Volume, threshold: float, box: ArrayLike | None) -> GpError:
-    low, high = float(np.nanmin(volume.array)), float(np.nanmax(volume.array))
+    extremes = np.array([(np.nanmin(plane), np.nanmax(plane)) for plane in volume.voxels.planes()])
+    low, high = float(np.nanmin(extremes)), float(np.nanmax(extremes))
     where = "in the volume" if box is None else "in the box"
     return GpError(
         f"no surface {where} at threshold {threshold:g}; the volume's values are {low:g} to {high:g}",
@@ -163,14 +166,12 @@ def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tup
     import pyvista as pv  # takes 0.6 s: not before the window shows
 
     (i0, j0, k0), (i1, j1, k1) = region.astype(int)
-    part = volume.array[k0 : k1 + 1, j0 : j1 + 1, i0 : i1 + 1]
+    k, j, i = slice(k0, k1 + 1), slice(j0, j1 + 1), slice(i0, i1 + 1)
     first = region[:1]
     if stride > 1:
-        from gp_labeler.imaging.coarse import means_of_cubes  # numba, as above
-
-        part, first = means_of_cubes(part, stride, level), first + (stride - 1) / 2
+        part, first = _means(volume, (k, j, i), stride, level), first + (stride - 1) / 2
         level = 0.0
-    elif part.dtype.name not in _CUT_BY_VTK:
+    elif (part := volume.voxels.read(k, j, i)).dtype.name not in _CUT_BY_VTK:
         part, level = _heights(part, level), 0.0
     image = pv.ImageData(
         dimensions=part.shape[::-1],
@@ -180,6 +181,16 @@ def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tup
     )
     image.GetPointData().SetScalars(to_vtk(np.ascontiguousarray(part).ravel(), "values", share=True))
     return image, level
+
+
+def _means(volume: Volume, box: tuple[slice, slice, slice], stride: int, level: float) -> GreyArray:
+    """Return the means of cubes of a box, read a slab at a time, so that a mapped scan stays in its file."""
+    from gp_labeler.imaging.coarse import means_of_cubes  # numba, as above
+
+    k, j, i = box
+    layers = max(stride, _SLAB_VOXELS // ((j.stop - j.start) * (i.stop - i.start)) // stride * stride)
+    slabs = (slice(first, min(first + layers, k.stop)) for first in range(k.start, k.stop, layers))
+    return np.concatenate([means_of_cubes(volume.voxels.read(slab, j, i), stride, level) for slab in slabs])
 
 
 def _heights(values: GreyArray, level: float) -> NDArray[np.float32]:

@@ -10,11 +10,15 @@ from numpy.typing import NDArray
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.imaging.voxels import Voxels
 
-__all__ = ["holds_integers", "propose_threshold", "surface_level"]
+__all__ = ["LEVEL_SAMPLES", "holds_integers", "propose_threshold", "surface_level"]
 
 _BINS = 256
 _SAMPLES = 500_000
+LEVEL_SAMPLES = 500_000
+"""Voxels that are asked whether a scan holds whole numbers."""
+
 _TAILS_PERCENT = (0.05, 99.9)
 """Metal and teeth are few and very bright; left in, they stretch the histogram and pull the threshold up."""
 
@@ -49,7 +53,7 @@ def propose_threshold(volume: Volume) -> float:
     ----------
     Otsu 1979, doi:10.1109/TSMC.1979.4310076; Liao, Chen and Chung 2001, J. Inf. Sci. Eng. 17, 713-727.
     """
-    values = _block_means(volume.array, volume.fill)
+    values = _block_means(volume.voxels, volume.fill)
     values = values[np.isfinite(values)]
     low, high = np.percentile(values, _TAILS_PERCENT) if len(values) else (0.0, 0.0)
     if not low < high:
@@ -76,18 +80,18 @@ def _otsu(histogram: tuple[NDArray[Any], FloatArray], classes: int) -> list[floa
     return [float(threshold) for threshold in found]
 
 
-def _block_means(array: NDArray[Any], fill: float | None) -> FloatArray:
+def _block_means(voxels: Voxels, fill: float | None) -> FloatArray:
     """Average 2 x 2 x 2 blocks on a coarse grid: noise falls by 2.8, and large scans stay quick.
 
     A block that holds a voxel that was not measured has no mean.
     """
-    stride = max(1, int(np.ceil((array.size / _SAMPLES) ** (1 / 3))))
-    span = [max(1, n - 1) for n in array.shape]
+    stride = max(1, int(np.ceil((voxels.size / _SAMPLES) ** (1 / 3))))
+    span = [max(1, n - 1) for n in voxels.shape]
     total = np.zeros(1)
     for corner in np.ndindex(2, 2, 2):
-        shift = [c if n > 1 else 0 for c, n in zip(corner, array.shape, strict=True)]
-        block = tuple(slice(s, n + s, stride) for s, n in zip(shift, span, strict=True))
-        values = array[block].astype(np.float64)
+        shift = [c if n > 1 else 0 for c, n in zip(corner, voxels.shape, strict=True)]
+        k, j, i = (slice(s, n + s, stride) for s, n in zip(shift, span, strict=True))
+        values = voxels.read(k, j, i).astype(np.float64)
         if fill is not None:
             values[values == fill] = np.nan
         total = total + values
@@ -98,7 +102,7 @@ def holds_integers(array: NDArray[Any]) -> bool:
     """Whether the values are whole numbers, also where they are stored as floats (seen from a sample)."""
     if not np.issubdtype(array.dtype, np.floating):
         return True
-    stride = max(1, int(np.ceil((array.size / _SAMPLES) ** (1 / 3))))
+    stride = max(1, int(np.ceil((array.size / LEVEL_SAMPLES) ** (1 / 3))))
     sample = array[::stride, ::stride, ::stride]
     sample = sample[np.isfinite(sample)]
     return bool(np.array_equal(sample, np.rint(sample)))

@@ -1,10 +1,10 @@
-"""A scan in memory: grey voxels and where they lie."""
+"""A scan: grey voxels and where they lie."""
 
 from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -15,16 +15,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GeometryError
 from gp_core.validation import FloatArray, as_points
+from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, Voxels
 
 if TYPE_CHECKING:
     import pyvista as pv
 
 __all__ = ["GreyArray", "Volume"]
 
-GreyArray = NDArray[Any]
-
 _PERCENTILES = (0.1, 99.9)
 _SAMPLES = 1_000_000
+_SLAB_BYTES = 1 << 26
 _BLOCK = 8192  # words of 8 bytes: one sum stands for 64 KiB of voxels
 
 
@@ -32,13 +32,13 @@ _BLOCK = 8192  # words of 8 bytes: one sum stands for 64 KiB of voxels
 class Volume:
     """One grey channel on a regular grid, in the scan frame.
 
-    Voxel indices are (i, j, k) = (x, y, z) in all methods, while `array` is indexed ``[k, j, i]``. An index
-    names the *centre* of its voxel.
+    Voxel indices are (i, j, k) = (x, y, z) in all methods, while `voxels` are indexed ``[k, j, i]``. An index
+    names the *centre* of its voxel. Size, type and geometry are there without any voxel being read.
 
     Parameters
     ----------
-    array : (z, y, x) array
-        Grey values; made C-contiguous, of native byte order and read-only.
+    voxels : Voxels or (z, y, x) array
+        Grey values. An array is made C-contiguous, of native byte order and read-only.
     T_scan_voxel : (4, 4) array_like
         Affine from voxel index to LPS mm: direction (possibly mirrored) times spacing, and origin.
     name : str
@@ -65,7 +65,7 @@ class Volume:
     ((6, 5, 4), (0.1, 0.1, 0.2))
     """
 
-    array: GreyArray
+    voxels: Voxels
     T_scan_voxel: FloatArray
     name: str = "volume"
     path: Path | None = None
@@ -74,12 +74,8 @@ class Volume:
     fill: float | None = None
 
     def __post_init__(self) -> None:
-        array = np.asarray(self.array)
-        if array.ndim != 3 or 0 in array.shape:
-            raise GeometryError(f"a volume must be (z, y, x), got shape {array.shape}")
-        array = np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("=")).view()
-        array.setflags(write=False)
-        object.__setattr__(self, "array", array)
+        if not isinstance(self.voxels, Voxels):
+            object.__setattr__(self, "voxels", ArrayVoxels(self.voxels))
         object.__setattr__(self, "T_scan_voxel", _checked_affine(self.T_scan_voxel))
 
     @classmethod
@@ -96,12 +92,22 @@ class Volume:
         axes = np.eye(3) if direction is None else np.asarray(direction, dtype=np.float64)
         affine[:3, :3] = axes * np.asarray(spacing, dtype=np.float64)
         affine[:3, 3] = origin
-        return cls(array, affine, **rest)
+        return cls(ArrayVoxels(array), affine, **rest)
+
+    @property
+    def array(self) -> GreyArray:
+        """All voxels as one (z, y, x) array, for scripts and small scans; the program reads parts of them."""
+        return self.voxels.whole()
+
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """Type of the grey values."""
+        return self.voxels.dtype
 
     @property
     def size(self) -> tuple[int, int, int]:
         """Voxels along i, j, k."""
-        nz, ny, nx = self.array.shape
+        nz, ny, nx = self.voxels.shape
         return nx, ny, nz
 
     @property
@@ -168,7 +174,7 @@ class Volume:
         inside = self.contains(points)
         values = np.full(len(inside), np.nan)
         i, j, k = np.floor(self.scan_to_voxel(points)[inside] + 0.5).astype(np.intp).T
-        values[inside] = self.array[k, j, i]
+        values[inside] = self.voxels.at(k, j, i)
         return values
 
     def value_at(self, point: ArrayLike) -> float | None:
@@ -179,11 +185,10 @@ class Volume:
     @cached_property
     def intensity_range(self) -> tuple[float, float]:
         """The 0.1 and 99.9 percentiles of a regular subsample: where a window may start."""
-        flat = self.array.reshape(-1)
-        step = max(1, flat.size // _SAMPLES)
-        while math.gcd(step, self.array.shape[2]) > 1:  # else the samples would walk down columns
+        step = max(1, self.voxels.size // _SAMPLES)
+        while math.gcd(step, self.voxels.shape[2]) > 1:  # else the samples would walk down columns
             step += 1
-        low, high = np.percentile(self.measured(flat[::step]), _PERCENTILES)
+        low, high = np.percentile(self.measured(self.voxels.every(step)), _PERCENTILES)
         return float(low), float(high)
 
     def measured(self, values: GreyArray) -> GreyArray:
@@ -218,15 +223,27 @@ class Volume:
         count to 0.0001 mm.
         """
         digest = hashlib.blake2b(digest_size=16)
-        digest.update(f"{self.array.shape}{self.array.dtype.str[1:]}".encode())
+        digest.update(f"{self.voxels.shape}{self.dtype.str[1:]}".encode())
         digest.update((np.round(self.T_scan_voxel, 4) + 0.0).astype("<f8").tobytes())  # + 0.0: no minus zero
-        raw = self.array.reshape(-1).view(np.uint8)
-        whole = raw.size - raw.size % (8 * _BLOCK)
-        blocks = raw[:whole].view("<u8").reshape(-1, _BLOCK)
-        digest.update(blocks.sum(axis=1, dtype=np.uint64).astype("<u8").tobytes())
-        digest.update(np.ascontiguousarray(blocks[::64]).tobytes())
-        digest.update(raw[whole:].tobytes())
+        sums, samples, n, rest = [], [], 0, np.zeros(0, np.uint8)
+        for raw in self._bytes():
+            raw = np.concatenate([rest, raw]) if rest.size else raw
+            whole = raw.size - raw.size % (8 * _BLOCK)
+            blocks, rest = raw[:whole].view("<u8").reshape(-1, _BLOCK), raw[whole:]
+            sums.append(blocks.sum(axis=1, dtype=np.uint64).astype("<u8").tobytes())
+            samples.append(blocks[-n % 64 :: 64].tobytes())
+            n += len(blocks)
+        for part in (*sums, *samples, rest.tobytes()):
+            digest.update(part)
         return digest.hexdigest()
+
+    def _bytes(self) -> Iterator[NDArray[np.uint8]]:
+        """Yield the voxels as bytes, a few planes at a time."""
+        nz, ny, nx = self.voxels.shape
+        n = max(1, _SLAB_BYTES // (ny * nx * self.dtype.itemsize))
+        for k in range(0, nz, n):
+            slab = self.voxels.read(slice(k, k + n), slice(None), slice(None))
+            yield np.ascontiguousarray(slab).reshape(-1).view(np.uint8)
 
 
 def _checked_affine(affine: ArrayLike) -> FloatArray:

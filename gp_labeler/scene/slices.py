@@ -14,6 +14,7 @@ from vtkmodules.vtkImagingCore import vtkImageReslice
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.imaging.voxels import ArrayVoxels
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
 from gp_labeler.scene.contour import level_segments
 from gp_labeler.scene.planes import Plane
@@ -99,7 +100,8 @@ class VolumeSlicer:
         off_axis = np.abs(volume.direction).copy()
         off_axis[np.arange(3), self._axis_of] = 0.0
         self.oblique = bool(off_axis.max() > _STRAIGHT)
-        self._reslice = _reslice(volume) if self.oblique else None
+        in_memory = isinstance(volume.voxels, ArrayVoxels)
+        self._reslice = _reslice(volume) if self.oblique and in_memory else None
 
     def close(self) -> None:
         """Let go of the voxels."""
@@ -141,26 +143,29 @@ class VolumeSlicer:
             forward = volume.direction[:, axis] @ direction > 0
             flips.append(1 if forward else -1)
             index[0, axis] = 0 if forward else volume.size[axis] - 1
-        rows_first = volume.array.transpose(2 - down, 2 - right, 2 - across)  # array is indexed [k, j, i]
-        values = rows_first[:: flips[0], :: flips[1], int(index[0, across])]
+        cut = volume.voxels.plane(across, int(index[0, across]))
+        values = (cut if down > right else cut.T)[:: flips[0], :: flips[1]]  # its axes are z, y, x
         corner = volume.voxel_to_scan(index)
         step = np.array([volume.spacing[right], volume.spacing[down]])
         return SliceImage(values, plane, float(corner[0, plane.axis]), plane.flat(corner)[0], step)
 
     def _resampled(self, plane: Plane, position: float) -> SliceImage:
         """Interpolate on a straight grid that covers the whole volume."""
-        assert self._reslice is not None
         step = self.step(plane)
         corners = plane.flat(self.volume.extent)
         low, high = corners.min(axis=0) + step / 2, corners.max(axis=0) - step / 2
         width, height = (int(n) for n in np.maximum(np.ceil((high - low) / step - 1e-6), 0) + 1)
+        origin = plane.scan(low[None], position)[0]
+        if self._reslice is None:
+            values = _interpolated(self.volume, origin, plane, step, (height, width))
+            return SliceImage(values, plane, position, low, np.array([step, step]))
         T_scan_screen = np.eye(4)
         T_scan_screen[:3, 0], T_scan_screen[:3, 1], T_scan_screen[:3, 2] = (
             plane.right,
             plane.down,
             plane.normal,
         )
-        T_scan_screen[:3, 3] = plane.scan(low[None], position)[0]
+        T_scan_screen[:3, 3] = origin
         to_voxel = vtkMatrixToLinearTransform()
         to_voxel.SetInput(matrix_of(self.volume.T_voxel_scan @ T_scan_screen))
         self._reslice.SetResliceTransform(to_voxel)
@@ -170,6 +175,26 @@ class VolumeSlicer:
         scalars = self._reslice.GetOutput().GetPointData().GetScalars()
         values = to_numpy(scalars).reshape(height, width).copy()
         return SliceImage(values, plane, position, low, np.array([step, step]))
+
+
+def _interpolated(
+    volume: Volume, origin: FloatArray, plane: Plane, step: float, shape: tuple[int, int]
+) -> NDArray[Any]:
+    """Interpolate linearly between voxels that stay in their file, as `vtkImageReslice` does in memory."""
+    down, right = np.indices(shape).reshape(2, -1)
+    index = volume.scan_to_voxel(origin + step * (right[:, None] * plane.right + down[:, None] * plane.down))
+    last = np.array(volume.size) - 1
+    inside = np.all((index >= -0.5) & (index <= last + 0.5), axis=1)
+    index = index[inside].clip(0, last)
+    first = np.minimum(index.astype(np.intp), np.maximum(last - 1, 0))
+    total = np.zeros(len(index))
+    for corner in np.ndindex(2, 2, 2):
+        weight = np.where(corner, index - first, 1 - (index - first)).prod(axis=1)
+        i, j, k = np.minimum(first + corner, last).T
+        total += weight * volume.voxels.at(k, j, i)
+    values = np.full(shape[0] * shape[1], volume.intensity_range[0], volume.dtype)
+    values[inside] = np.rint(total) if volume.dtype.kind in "iu" else total
+    return values.reshape(shape)
 
 
 def _reslice(volume: Volume) -> vtkImageReslice:

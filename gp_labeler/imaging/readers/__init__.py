@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gp_labeler.imaging.fill import find_fill, replace_fill
+from gp_labeler.imaging.fill import find_fill, replace_fill, replacement_of
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
@@ -22,8 +22,9 @@ from gp_labeler.imaging.readers.grey import needs_float64
 from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.plan import ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, quiet
-from gp_labeler.imaging.readers.source import assemble
+from gp_labeler.imaging.readers.source import assemble, mapped_part
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, MappedVoxels, Voxels
 
 __all__ = [
     "READABLE",
@@ -88,6 +89,7 @@ def read_volume(
     *,
     progress: Progress | None = None,
     cancel: Callable[[], bool] | None = None,
+    mapped: bool | None = None,
     **options: Any,
 ) -> Volume:
     """Load a scan as one grey volume in LPS mm.
@@ -98,6 +100,10 @@ def read_volume(
         File or folder, or what `inspect_volume` returned.
     progress, cancel : callable, optional
         Told the fraction done; asked whether to stop.
+    mapped : bool, optional
+        Leave the voxels in their file, which the system then reads where they are needed: NRRD, MetaImage and
+        NIfTI that are neither packed nor scaled. By default only scans that would take more than half of this
+        machine's memory. The file must not be changed or cut while it is open.
     **options
         Fields of `ImportOptions`: `spacing`, `series`, `channel`, `accept`, `reverse`, `stride`, `region`.
         They come with the volume as `choices`, and read the same again.
@@ -105,7 +111,8 @@ def read_volume(
     Raises
     ------
     VolumeError
-        Something must be decided first (before anything big is loaded), or the data are damaged.
+        Something must be decided first (before anything big is loaded), the data are damaged, or the file
+        cannot be mapped.
     Cancelled
         `cancel` said so.
 
@@ -116,7 +123,7 @@ def read_volume(
     plan = _planned(path, options, Report(None, cancel))
     if plan.errors:
         raise VolumeError.of(plan.errors, plan.path)
-    return _load(plan, Report(progress, cancel))
+    return _load(plan, Report(progress, cancel), mapped)
 
 
 def read_preview(
@@ -124,7 +131,7 @@ def read_preview(
 ) -> Volume:
     """Load a coarse picture of a plan, whatever stands against it; a missing voxel size counts as 1 mm."""
     backward = plan.options.reverse if reverse is None else reverse
-    return _load(plan.with_options(stride=plan.preview_stride, reverse=backward), Report(None, cancel))
+    return _load(plan.with_options(stride=plan.preview_stride, reverse=backward), Report(None, cancel), False)
 
 
 def _planned(path: PathOrPlan, options: dict[str, Any], report: Report) -> ImportPlan:
@@ -144,20 +151,16 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
     return inspect_path(path, options, report)
 
 
-def _load(plan: ImportPlan, report: Report) -> Volume:
+def _load(plan: ImportPlan, report: Report, mapped: bool | None) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
-        _check_memory(plan)
-        array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
-        wide = needs_float64(plan.stored_dtype, array)
-        if wide:
-            array = assemble(plan.source, plan.size, np.float64, plan.options, report)
-        fill, filled = replace_fill(array, find_fill(array, plan.fill))
+        stored = _map_of(plan, mapped)
+        voxels, fill, notes = _in_memory(plan, report) if stored is None else _in_file(plan, stored, report)
         volume = Volume(
-            array,
+            voxels,
             plan.T_scan_voxel(),
             name=plan.name,
             path=Path(plan.path).resolve(),
-            notes=(*plan.all_notes(narrowed=not wide), *filled),
+            notes=notes,
             choices=plan.options.as_json(),
             fill=fill,
         )
@@ -165,12 +168,63 @@ def _load(plan: ImportPlan, report: Report) -> Volume:
     return volume
 
 
-def _check_memory(plan: ImportPlan) -> None:
-    """Refuse what no memory of this machine can hold, where the system says how much it has."""
+def _in_memory(plan: ImportPlan, report: Report) -> tuple[Voxels, float | None, tuple[str, ...]]:
+    """Read the voxels; return them, the value of those that were not measured, and what was done."""
+    _check_memory(plan)
+    array = assemble(plan.source, plan.size, plan.dtype, plan.options, report)
+    wide = needs_float64(plan.stored_dtype, array)
+    if wide:
+        array = assemble(plan.source, plan.size, np.float64, plan.options, report)
+    fills = find_fill(array, plan.fill)
+    replacement = replacement_of(array, fills)
+    replace_fill(array, fills, replacement)
+    notes = (*plan.all_notes(narrowed=not wide), *replacement.notes)
+    return ArrayVoxels(array), replacement.fill, notes
+
+
+def _in_file(
+    plan: ImportPlan, stored: GreyArray, report: Report
+) -> tuple[Voxels, float | None, tuple[str, ...]]:
+    """Leave the voxels in their file; what stands for nothing is replaced whenever some are read."""
+    fills = find_fill(stored, plan.fill)
+    report(0.5)
+    replacement = replacement_of(stored, fills)
+    report(1.0)
+    notes = (*plan.all_notes(narrowed=False), *replacement.notes, "its voxels stay in the file")
+    return MappedVoxels(stored, fills, replacement.below), replacement.fill, notes
+
+
+def _map_of(plan: ImportPlan, mapped: bool | None) -> GreyArray | None:
+    """Return the file as it is mapped, if that is asked for, or needed and possible.
+
+    Raises
+    ------
+    VolumeError
+        It is asked for, and cannot be.
+    """
+    if mapped is False or (mapped is None and plan.n_bytes <= _memory() / 2):
+        return None
+    is_kept = plan.stored_dtype.name == plan.dtype.name
+    stored = mapped_part(plan.source, plan.size, plan.options) if is_kept else None
+    if mapped and stored is None:
+        raise VolumeError(
+            "its voxels cannot be shown as they are stored: they are packed, scaled or in several files",
+            remedy="Open it without mapping, or save it as raw NRRD.",
+        )
+    return stored
+
+
+def _memory() -> float:
+    """Return the bytes of memory that this machine has; infinity where the system does not say."""
     try:
-        there = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     except (AttributeError, ValueError, OSError):
-        return
+        return float("inf")
+
+
+def _check_memory(plan: ImportPlan) -> None:
+    """Refuse what no memory of this machine can hold."""
+    there = _memory()
     if plan.n_bytes > there:
         need, have = (f"{n / (1 << 30):.0f} GB" for n in (plan.n_bytes, there))
         raise VolumeError(

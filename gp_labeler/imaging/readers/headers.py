@@ -123,7 +123,7 @@ class Layout:
         """Return what makes the (y, x) grey plane of a stored one."""
         more = [axis for axis in range(self.space[2]) if axis not in self.space]
         if not more:
-            return lambda plane: to_grey(plane, channel)
+            return to_grey if channel is None else lambda plane: to_grey(plane, channel)
         last = self.space[2] - 1
         taken = 0 if channel is None and self.listed else channel
         return lambda plane: to_grey(np.moveaxis(plane, last - more[0], -1), taken)

@@ -28,6 +28,7 @@ __all__ = [
     "SliceSource",
     "assemble",
     "in_threads",
+    "mapped_part",
     "nearest_there",
     "open_stream",
     "window",
@@ -116,6 +117,14 @@ class RawSource:
             return (Problem("short-file", text, remedy="Copy it again."),)
         text = f"{self.path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete"
         return (Problem("short-file", text, remedy="Copy it again."),)
+
+    def mapped(self) -> Plane | None:
+        """Return the (z, y, x) file as a memory map, if its values can be shown as they are stored."""
+        as_stored = self.compression == "none" and self.plane_step is None and self.finish is to_grey
+        if not as_stored or len(self.plane_shape) != 2:
+            return None
+        shape = (self.n_planes, *self.plane_shape)
+        return np.memmap(self.path, self.dtype, "r", self.offset + self.skip, shape)
 
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise; each is good until the next."""
@@ -214,6 +223,17 @@ def assemble(
         volume[len(k) - 1 - n if options.reverse else n] = plane[ys, xs]
     report(1.0)
     return volume
+
+
+def mapped_part(source: SliceSource, size: tuple[int, int, int], options: ImportOptions) -> Plane | None:
+    """Return the wanted part of a volume of `size` (x, y, z) as a mapped file, or None where it cannot be."""
+    whole = source.mapped() if isinstance(source, RawSource) else None
+    if whole is None:
+        return None
+    i, j, k = window(size, options)
+    planes = whole[: size[2]][:: -1 if options.reverse else 1]  # a list of volumes begins with the first
+    part: Plane = planes[k.start : k.stop : k.step, j.start : j.stop : j.step, i.start : i.stop : i.step]
+    return part
 
 
 def window(size: tuple[int, int, int], options: ImportOptions) -> tuple[range, range, range]:

@@ -93,7 +93,7 @@ def facts_of(volume: Volume) -> dict[str, str]:
         "Name": volume.name,
         "Voxels": f"{size_text(volume.size)} of {spacing_text(volume.spacing)}",
         "Size": f"{lengths} mm",
-        "Values": f"{volume.array.dtype}, {_memory(volume.array.nbytes)}",
+        "Values": f"{volume.dtype}, {_memory(volume.voxels.nbytes)}",
         "Axes": _axes(volume),
     }
     if volume.path is not None:

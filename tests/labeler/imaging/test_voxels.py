@@ -1,0 +1,168 @@
+"""Voxels in memory and voxels left in their file are one scan: the same values, slices and surfaces."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+import SimpleITK
+
+from gp_labeler.imaging.bone_distance import bone_distances
+from gp_labeler.imaging.histogram import histogram_of
+from gp_labeler.imaging.readers import VolumeError, read_volume
+from gp_labeler.imaging.surface import extract_isosurface
+from gp_labeler.imaging.threshold import propose_threshold
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, MappedVoxels
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.slices import VolumeSlicer
+
+SIZE, SPACING = (44, 38, 33), (0.5, 0.5, 0.6)
+TURNED = (0.8, -0.6, 0.0, 0.6, 0.8, 0.0, 0.0, 0.0, 1.0)
+"""A head that was scanned askew: slices along the body are cut across the voxels."""
+
+
+def ball(dtype: str = "int16") -> GreyArray:
+    """A ball of bone in air with a little noise; outside the scanner's circle stands -2000, where it fits."""
+    k, j, i = np.indices(SIZE[::-1])
+    away = np.sqrt((i - 21) ** 2 + (j - 19) ** 2 + (k - 16) ** 2)
+    grey = np.random.default_rng(1).normal(0, 8, away.shape) + np.where(away < 11, 900, 40)
+    if np.dtype(dtype).kind != "u":
+        grey[:, np.hypot(i[0] - 21.5, j[0] - 18.5) > 18] = -2000
+    return grey.clip(0 if np.dtype(dtype).kind == "u" else None, None).astype(dtype)
+
+
+def written(path: Path, array: GreyArray, *, packed: bool = False, turned: bool = False) -> Path:
+    image = SimpleITK.GetImageFromArray(array)
+    image.SetSpacing(SPACING)
+    image.SetOrigin((-2.0, 1.0, 3.0))
+    if turned:
+        image.SetDirection(TURNED)
+    SimpleITK.WriteImage(image, str(path), packed)
+    return path
+
+
+def big_endian(path: Path, array: GreyArray) -> Path:
+    """Write a raw NRRD whose numbers have their high byte first."""
+    head = (
+        f"NRRD0004\ntype: int16\ndimension: 3\nspace: left-posterior-superior\n"
+        f"sizes: {' '.join(map(str, SIZE))}\nspace directions: (0.5,0,0) (0,0.5,0) (0,0,0.6)\n"
+        "space origin: (-2,1,3)\nkinds: domain domain domain\nendian: big\nencoding: raw\n\n"
+    )
+    path.write_bytes(head.encode() + array.astype(">i2").tobytes())
+    return path
+
+
+def assert_same_scan(mapped: Volume, held: Volume) -> None:
+    """Everything that is measured and shown is the same."""
+    assert isinstance(mapped.voxels, MappedVoxels)
+    assert isinstance(held.voxels, ArrayVoxels)
+    assert (mapped.size, mapped.dtype, mapped.fill) == (held.size, held.dtype, held.fill)
+    assert mapped.checksum == held.checksum
+    assert mapped.intensity_range == held.intensity_range
+    np.testing.assert_array_equal(mapped.array, held.array)
+    np.testing.assert_array_equal(histogram_of(mapped).heights, histogram_of(held).heights)
+    threshold = propose_threshold(held)
+    assert propose_threshold(mapped) == threshold
+    points = {"CA": held.voxel_to_scan([[20.0, 18, 15]])[0], "IN": held.voxel_to_scan([[2.0, 18, 15]])[0]}
+    assert bone_distances(mapped, threshold, points) == bone_distances(held, threshold, points)
+    for stride in (1, 2):
+        one, other = (extract_isosurface(v, threshold, stride=stride).points for v in (mapped, held))
+        np.testing.assert_array_equal(one, other)
+    for plane in Plane:
+        position = float(held.extent[:, plane.axis].mean())
+        one, other = (VolumeSlicer(v).image(plane, position) for v in (mapped, held))
+        np.testing.assert_allclose(one.values, other.values, atol=1)
+        np.testing.assert_array_equal(one.edges, other.edges)
+
+
+@pytest.mark.parametrize("dtype", ["int16", "uint8", "uint16", "float32"])
+@pytest.mark.parametrize("suffix", [".nrrd", ".mha", ".mhd", ".nii"])
+def test_a_mapped_file_is_the_scan_that_is_read(suffix: str, dtype: str, tmp_path: Path) -> None:
+    path = written(tmp_path / f"ball{suffix}", ball(dtype))
+    assert_same_scan(read_volume(path, mapped=True), read_volume(path, mapped=False))
+
+
+@pytest.mark.parametrize(
+    "options",
+    [{"reverse": True}, {"stride": 2}, {"region": ((4, 40), (2, 36), (3, 30)), "stride": 3, "reverse": True}],
+    ids=str,
+)
+def test_parts_of_a_file_and_reversed_slices_can_be_mapped(options: dict, tmp_path: Path) -> None:
+    path = written(tmp_path / "ball.nrrd", ball())
+    one, other = (read_volume(path, mapped=mapped, **options) for mapped in (True, False))
+    np.testing.assert_array_equal(one.array, other.array)
+    assert one.checksum == other.checksum
+    np.testing.assert_allclose(one.T_scan_voxel, other.T_scan_voxel)
+
+
+def test_the_byte_order_of_another_machine_is_read_as_ours(tmp_path: Path) -> None:
+    path = big_endian(tmp_path / "ball.nrrd", ball())
+    assert_same_scan(read_volume(path, mapped=True), read_volume(path, mapped=False))
+
+
+def test_slices_across_the_voxels_of_a_mapped_file_are_interpolated(tmp_path: Path) -> None:
+    path = written(tmp_path / "ball.nrrd", ball(), turned=True)
+    mapped, held = read_volume(path, mapped=True), read_volume(path, mapped=False)
+    assert VolumeSlicer(held).oblique
+    assert_same_scan(mapped, held)
+
+
+@pytest.mark.parametrize("name", ["packed.nrrd", "packed.mha", "packed.nii.gz", "scaled.nii"])
+def test_what_cannot_be_mapped_is_refused_in_one_sentence(name: str, tmp_path: Path) -> None:
+    path = written(tmp_path / name, ball(), packed=name.startswith("packed"))
+    if name == "scaled.nii":
+        raw = bytearray(path.read_bytes())
+        raw[112:120] = np.array([2.0, 1.0], "<f4").tobytes()  # scl_slope, scl_inter
+        path.write_bytes(raw)
+    with pytest.raises(VolumeError, match=r"cannot be shown as they are stored.*raw NRRD"):
+        read_volume(path, mapped=True)
+    assert isinstance(read_volume(path).voxels, ArrayVoxels)
+
+
+def test_a_scan_of_more_than_half_of_the_memory_stays_in_its_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = written(tmp_path / "ball.nrrd", ball())
+    pages = {"SC_PHYS_PAGES": ball().nbytes, "SC_PAGE_SIZE": 1}
+    monkeypatch.setattr(os, "sysconf", lambda name: pages[name])
+    volume = read_volume(path)
+    assert isinstance(volume.voxels, MappedVoxels)
+    assert "its voxels stay in the file" in volume.notes
+
+
+class InParts(ArrayVoxels):
+    """Refuses to be read as a whole, as a scan larger than the memory would."""
+
+    def read(self, k: slice, j: slice, i: slice) -> GreyArray:
+        part = super().read(k, j, i)
+        if part.size > self.size / 4:
+            raise MemoryError("somebody asks for the whole scan")
+        return part
+
+
+def test_slices_measures_and_surfaces_never_ask_for_the_whole_scan() -> None:
+    rng = np.random.default_rng(0)
+    array = rng.normal(0, 5, (170, 160, 150)).astype(np.float32)  # larger than every subsample
+    array[60:100, 60:100, 60:100] += 500
+    volume = Volume(InParts(array), np.diag([0.1, 0.1, 0.1, 1.0]))
+    assert volume.intensity_range[0] < 0
+    threshold = propose_threshold(volume)
+    assert 100 < threshold < 400
+    assert histogram_of(volume).high > threshold
+    centre = volume.voxel_to_scan([[80.0, 80, 80]])[0]
+    assert bone_distances(volume, threshold, {"CA": centre}) == {"CA": 0.0}
+    assert volume.value_at(centre) > 400
+    for plane in Plane:
+        assert VolumeSlicer(volume).image(plane, float(centre[plane.axis])).values.max() > 400
+    box = np.stack([centre - 2.5, centre + 2.5])
+    assert extract_isosurface(volume, threshold, box=box, smallest_mm=0).n_triangles
+
+
+@pytest.mark.parametrize("step", [1, 7, 1000, 10**6])
+def test_every_so_many_th_value_is_the_same_however_it_is_read(step: int) -> None:
+    array = ball()
+    for voxels in (ArrayVoxels(array), MappedVoxels(array)):
+        np.testing.assert_array_equal(voxels.every(step), array.reshape(-1)[::step])
