@@ -88,9 +88,7 @@ class Atlas:
         self._check_covariance("covariance", self.covariance, least=1e-9)
         self._check_covariance("scatter", self.scatter, least=-1e-9)
         if self.n_samples < 1:
-            raise GpError(
-                f"the atlas {self.name!r} must be fitted to at least one side, got {self.n_samples}"
-            )
+            raise GpError(f"the atlas {self.name!r} must be of at least one side, got {self.n_samples}")
         landmarks = LandmarkSet.from_mapping(dict(zip(codes, self.mean, strict=True)), "L")
         check_plausible_size(landmarks, strict=True)
         cochlea_frame(landmarks)  # raises if the four features determine no frame
@@ -106,13 +104,11 @@ class Atlas:
         """Check magnitude, symmetry and positive definiteness."""
         size = np.abs(matrix).max()
         if size > _LARGEST_VARIANCE_MM2:
-            raise GpError(
-                f"the {name} of atlas {self.name!r} is larger than the variation between any animals"
-            )
+            raise GpError(f"the {name} of atlas {self.name!r} is larger than any animals differ")
         if np.abs(matrix - matrix.T).max() > 1e-9 * size:
             raise GpError(f"the {name} of atlas {self.name!r} is not symmetric")
         if np.linalg.eigvalsh(matrix).min() < least * size or not matrix.diagonal().min() > 0:
-            raise GpError(f"the {name} of atlas {self.name!r} is not positive definite")
+            raise GpError(f"the {name} of atlas {self.name!r} is not positive")
 
     @staticmethod
     def published() -> Atlas:
@@ -179,7 +175,7 @@ class Atlas:
             raise FileFormatError(f"is a damaged atlas: {error.problem}", file=path, remedy=remedy) from None
         except (TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError):
             raise FileFormatError(
-                "is a damaged atlas: numbers or names are in the wrong place", file=path, remedy=remedy
+                "is a damaged atlas: numbers or names are not where they should be", file=path, remedy=remedy
             ) from None
 
     def save(self, path: str | PathLike[str]) -> None:

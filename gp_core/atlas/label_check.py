@@ -405,7 +405,7 @@ def _not_placed(landmarks: LandmarkSet) -> Iterator[Finding]:
         if row.computed or row.code in landmarks:
             continue
         if landmarks.status(row.code) is Status.UNSEEN:
-            yield _finding(landmarks, "unseen", (row.code,), "marked as not visible")
+            yield _finding(landmarks, "unseen", (row.code,), "marked as one that cannot be seen")
         elif landmarks.status(row.code) is Status.SUGGESTED:
             yield _finding(landmarks, "suggested", (row.code,), "suggested, but nobody has confirmed it yet")
         else:
@@ -449,7 +449,7 @@ def _require_enough(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]
     )
     if width < _LEAST_WIDTH * expected:
         raise GpError(
-            "the placed features lie at one place or on one line, and do not determine its orientation",
+            "the placed features lie at one place or on one line, and do not tell how the head is turned",
             remedy="Place one that lies apart, and check that the labels are in mm.",
         )
 

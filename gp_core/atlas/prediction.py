@@ -99,7 +99,7 @@ def _check_rotation(information: FloatArray) -> None:
     )
     if not np.linalg.eigvalsh(about_middle)[0] > UNKNOWN_ANGLE_SD**-2:
         raise GeometryError(
-            "the placed features lie at one place or on one line, and do not determine its orientation",
+            "the placed features lie at one place or on one line, and do not tell how the head is turned",
             remedy="Place one that lies apart, and check that the labels are in mm.",
         )
 

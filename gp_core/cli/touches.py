@@ -119,4 +119,4 @@ def _tip(word: str) -> FloatArray:
     try:
         return np.array(content["tip_offset_mm"], dtype=np.float64)
     except (KeyError, TypeError, ValueError):
-        raise FileFormatError("has no tip_offset_mm", file=word, remedy=remedy) from None
+        raise FileFormatError("holds no tip_offset_mm", file=word, remedy=remedy) from None

@@ -108,5 +108,5 @@ def _point(name: str, fields: list[str], number: int, file: str | PathLike[str])
     if point.position is None or is_sentinel(point.position):
         return LabelledPoint(name, None, Status.UNSEEN)
     if name == _UNUSED:
-        _log.warning("%s: ignored the numbers in line %d, which no feature has", file, number)
+        _log.warning("%s: passed over the numbers in line %d, which no feature has", file, number)
     return point

@@ -201,7 +201,7 @@ def labelled_point(
         return LabelledPoint(label, None, status, description, provenance=about, round=round_)
     position = parse_position(coordinates, file=file, landmark=label)
     if position is None:
-        _log.warning("%s: landmark %s is marked as placed but has no position", file, label)
+        _log.warning("%s: landmark %s is said to be placed but has no position", file, label)
         return LabelledPoint(label, None, Status.TO_DO, description)
     if flip_xy:
         position[:2] *= -1.0

@@ -129,7 +129,7 @@ def _point_lists(
         if isinstance(markup, dict) and kind == "Fiducial":
             found.append(markup)
         elif kind not in told:
-            _log.warning("%s: ignored a markup of type %s", file, shown(kind))
+            _log.warning("%s: passed over a markup of type %s", file, shown(kind))
     if not found:
         raise FileFormatError(
             f"holds no point list (type 'Fiducial'); its markups are: {', '.join(kinds[:5]) or 'none'}",

@@ -56,7 +56,7 @@ def read_pose(path: str | PathLike[str]) -> CochleaPose:
         raise FileFormatError(f"is a damaged pose: {error.problem}", file=path, remedy=_REMEDY) from None
     except (TypeError, ValueError, AttributeError, OverflowError):
         raise FileFormatError(
-            "is a damaged pose: numbers or names are in the wrong place", file=path, remedy=_REMEDY
+            "is a damaged pose: numbers or names are not where they should be", file=path, remedy=_REMEDY
         ) from None
     return pose
 
@@ -89,7 +89,7 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         ("modiolar_axis", T_touches_cochlea.rotation[:, 0]),
     ):
         if not np.allclose(_numbers(content, key, (3,)), meant, rtol=0, atol=_AGREE):
-            raise GpError(f"its {key} contradicts its transform")
+            raise GpError(f"its {key} is not that of its transform")
     covariance = _covariance(content)
     round_window = content.get("round_window", "expected")
     if round_window not in ROUND_WINDOWS:
@@ -131,14 +131,14 @@ def _hypothesis(content: dict[str, Any], frame: str) -> Hypothesis:
 def _covariance(content: dict[str, Any]) -> FloatArray:
     covariance = _numbers(content, "covariance", (6, 6))
     if not np.array_equal(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -_AGREE:
-        raise GpError("its covariance is not positive semidefinite and symmetric")
+        raise GpError("its covariance is none")
     return covariance
 
 
 def _probability(value: Any) -> float:
     number = _number(value)
     if not 0 <= number <= 1:
-        raise GpError(f"{shown(value)} is not a probability")
+        raise GpError(f"{shown(value)} stands for a probability")
     return number
 
 
@@ -151,19 +151,19 @@ def _numbers(content: dict[str, Any], key: str, shape: tuple[int, ...]) -> Float
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-        raise GpError(f"{shown(value)} is not a number")
+        raise GpError(f"{shown(value)} stands for a number")
     return float(value)
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise GpError(f"{shown(value)} is not a name")
+        raise GpError(f"{shown(value)} stands for a name")
     return value
 
 
 def _texts(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list):
-        raise GpError(f"{shown(value)} is not a list")
+        raise GpError(f"{shown(value)} stands for a list")
     return tuple(_text(text) for text in value)
 
 
@@ -172,5 +172,5 @@ def _pair(value: Any) -> tuple[str, str] | None:
         return None
     names = _texts(value)
     if len(names) != 2:
-        raise GpError(f"{shown(value)} is not a pair of names")
+        raise GpError(f"{shown(value)} stands for two names")
     return names[0], names[1]

@@ -65,7 +65,7 @@ def _suffix(path: str | PathLike[str]) -> str:
     if found is None:
         check_file(path)
         raise FileFormatError(
-            "is not a known kind of landmark file", file=path, remedy=f"Give {', '.join(_READERS)}."
+            "is no kind of landmark file that is known", file=path, remedy=f"Give {', '.join(_READERS)}."
         )
     return found
 
@@ -325,7 +325,7 @@ def _one_side(points: PointList, side: Side) -> PointList:
     lost = next((label for label in without if not feature(label).shared), None)
     if lost is not None:
         raise FeatureError(
-            "has no side, although other points of the file have one",
+            "tells no side, although other points of the file do",
             file=points.source,
             landmark=lost,
             remedy=f"Call it {lost}_L or {lost}_R.",
@@ -417,7 +417,7 @@ def _check_axis(positions: dict[str, FloatArray], points: PointList) -> None:
     ca, cb = (positions.get(code, np.full(3, np.nan)) for code in ("CA", "CB"))
     if np.linalg.norm(ca - cb) < _SAME_PLACE_MM:
         raise GeometryError(
-            "CA and CB are at the same place, so they define no axis",
+            "CA and CB are at the same place, so they give no axis",
             file=points.source,
             landmark="CA",
             remedy="Place one of them again.",

@@ -42,7 +42,7 @@ def read_stl(path: str | PathLike[str]) -> Surface:
     if corners is None:
         corners = _text(raw)
     if corners is None or not len(corners) or not np.isfinite(corners).all():
-        raise FileFormatError("is not an STL surface", file=path, remedy=_REMEDY)
+        raise FileFormatError("is no surface in STL", file=path, remedy=_REMEDY)
     return Surface(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 

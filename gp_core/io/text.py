@@ -142,7 +142,7 @@ def split_fields(line: str, delimiter: str, number: int, file: str | PathLike[st
         return [field.strip() for field in next(csv.reader([line], delimiter=delimiter, strict=True))]
     except csv.Error as error:
         raise FileFormatError(
-            f"line {number} cannot be split into columns ({error})", file=file, remedy="Correct its quotes."
+            f"line {number} cannot be split into columns ({error})", file=file, remedy="Mend its quotes."
         ) from None
 
 

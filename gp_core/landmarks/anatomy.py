@@ -78,7 +78,7 @@ def modiolar_axis(ca: ArrayLike, cb: ArrayLike) -> FloatArray:
     length = np.linalg.norm(axis, axis=-1, keepdims=True)
     if (length < _SMALLEST_MM).any():
         raise GeometryError(
-            "CA and CB are at the same place, so they define no axis",
+            "CA and CB are at the same place, so they give no axis",
             landmark="CA",
             remedy="Place one of them again.",
         )

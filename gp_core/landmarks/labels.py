@@ -144,7 +144,7 @@ class LabelNames:
                 raise FeatureError("has two codes", landmark=theirs[:40], remedy="Keep one of them.")
             if ours.strip() and not _is_known(parse_label(ours).name):
                 raise FeatureError(
-                    f"cannot stand for {ours[:40]!r}, which is not a feature{near_matches(ours[:40], CODES)}",
+                    f"cannot stand for {ours[:40]!r}, which is no feature{near_matches(ours[:40], CODES)}",
                     landmark=theirs[:40],
                     remedy=f"The features are {' '.join(CODES)}.",
                 )

@@ -213,7 +213,7 @@ def _as_rotation(axes: str) -> FloatArray:
     if rotation.shape != (3, 3) or round(float(np.linalg.det(rotation))) != 1:
         raise GpError(
             f"axes must name x, y and z once each, right-handed, such as 'z,-y,x', got {axes!r}",
-            remedy="Reverse one: a path for the other ear is mirrored by its side, not by its axes.",
+            remedy="Turn one about: a path of the other ear is mirrored by its side, not by its axes.",
         )
     return rotation
 

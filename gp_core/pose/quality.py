@@ -61,16 +61,16 @@ def pose_quality(pose: CochleaPose) -> PoseQuality:
         return found
     radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
     if radius > _POOR_MM or cone > _POOR_DEG:
-        return PoseQuality("danger", "Poor", "The true cochlea may lie far from this one.")
+        return PoseQuality("danger", "Poor", "The true cochlea may lie well beside this one.")
     if pose.warnings or pose.suspects:
         return PoseQuality(
-            "warning", "Look twice", "The pose is usable only if the remarks below are acceptable."
+            "warning", "Look twice", "The pose is usable only if what is said below is all right."
         )
     if radius > _GOOD_MM or cone > _GOOD_DEG:
         return PoseQuality(
-            "warning", "Fair", "Less certain than with six careful touches; touch more features."
+            "warning", "Fair", "Less sure than six careful touches make it; touch more features."
         )
-    return PoseQuality("good", "Good", "The touches agree, and there are enough of them.")
+    return PoseQuality("good", "Good", "The touches agree, and are as many as a sure pose needs.")
 
 
 def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
@@ -78,9 +78,9 @@ def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
     if pose.side_state == "wrong":
         return PoseQuality("danger", "Check the side", "The touches look like those of the other ear.")
     if pose.names_state == "wrong":
-        return PoseQuality("danger", "Check the names", "The names of two touches look exchanged.")
+        return PoseQuality("danger", "Check the names", "Two touches look as if each had the other's name.")
     if pose.names_state == "undecided":
-        return PoseQuality("danger", "Names undecided", "The names of two touches may be exchanged.")
+        return PoseQuality("danger", "Names undecided", "Two touches may each have the other's name.")
     if pose.side_state == "undecided":
         return PoseQuality(
             "warning",

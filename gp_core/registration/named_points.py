@@ -271,7 +271,7 @@ def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     if not math.isfinite(solution.neg_log_posterior):
         weighted_procrustes(model.mean, touches, names=model.codes)
         raise GeometryError(
-            "no pose moves these points near the atlas", remedy="Check units, names and coordinates."
+            "no pose brings these points near the atlas", remedy="Check units, names and coordinates."
         )
     n = len(touches)
     if n > 3 and solution.weights.min() < _OUTLIER_WEIGHT:

@@ -235,7 +235,7 @@ def _check_frames(poses: FloatArray, kept: NDArray[np.bool_], seen: NDArray[np.b
     n_kept, n_seen = int(kept.sum()), int(seen.sum())
     if n_seen >= _FEWEST and not _is_rigid(poses[seen]).any():
         raise GeometryError(
-            f"none of the {n_seen} poses is a rigid transform",
+            f"none of the {n_seen} poses is a rigid motion",
             remedy="Export 4x4 matrices row by row, or quaternions under a header (qw,qx,qy,qz,tx,ty,tz).",
         )
     if n_seen < _FEWEST:
@@ -246,13 +246,13 @@ def _check_frames(poses: FloatArray, kept: NDArray[np.bool_], seen: NDArray[np.b
         )
     if n_kept < _FEWEST or n_kept < (1 - _MOST_LEFT_OUT) * n_seen:
         raise GeometryError(
-            f"only {n_kept} of {n_seen} frames agree on the position of the tip",
+            f"only {n_kept} of {n_seen} frames agree on where the tip is",
             remedy=_KEEP_STILL,
         )
     spread = _spread_deg(poses[kept, :3, :3])
     if spread < _LEAST_SPREAD_DEG:
         raise GeometryError(
-            f"the marker rotated too little, or about one axis only: {spread:.1f} degrees in "
+            f"the marker turned too little, or about one axis only, to show its tip: {spread:.1f} degrees in "
             f"the direction that moved least, at least {_LEAST_SPREAD_DEG:g} needed",
             remedy="Tilt the probe by 30 degrees to all sides, its tip at rest.",
         )

@@ -64,7 +64,7 @@ def check_labels(specimens: Sequence[Specimen], codes: Iterable[str]) -> None:
         )
     for name in names:
         if names.count(name) > 1:
-            raise GpError("two animals have this name", specimen=name, remedy="Give them different names.")
+            raise GpError("two animals have this name", specimen=name, remedy="Name them apart.")
     needed = dict.fromkeys([*DEFINING_FEATURES, *WINDOW_FEATURES, *codes])
     for specimen in specimens:
         for side, landmarks in specimen.sides.items():

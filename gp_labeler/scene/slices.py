@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from contourpy import LineType, contour_generator
 from numpy.typing import NDArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
@@ -16,11 +17,10 @@ from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.voxels import ArrayVoxels
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
-from gp_labeler.scene.contour import level_segments
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.window_level import WindowLevel
 
-__all__ = ["SliceImage", "VolumeSlicer"]
+__all__ = ["SliceImage", "VolumeSlicer", "level_segments"]
 
 _STRAIGHT = 1e-4
 """Off-axis part of a direction below which voxel rows run along the scan's axes: 0.1 voxel in a thousand."""
@@ -83,6 +83,22 @@ class SliceImage:
         pixels = level_segments(self.values, surface_level(threshold, self.values[None]))
         segments: FloatArray = self.origin + self.step * pixels
         return segments
+
+
+def level_segments(values: NDArray[Any], level: float) -> FloatArray:
+    """Return the (M, 2, 2) line segments, columns and rows, along which (h, w) values pass a level.
+
+    Not VTK's flying edges: they share their threads with the meshing in the background, and make the window
+    wait for it.
+    """
+    found: Any = contour_generator(z=values, line_type=LineType.ChunkCombinedOffset).lines(level)
+    (points,), (offsets,) = found
+    if points is None:
+        return np.empty((0, 2, 2))
+    is_end = np.zeros(len(points), dtype=bool)
+    is_end[offsets[1:] - 1] = True
+    begins = np.flatnonzero(~is_end)
+    return np.stack([points[begins], points[begins + 1]], axis=1)
 
 
 class VolumeSlicer:

@@ -141,7 +141,7 @@ def test_of_several_transforms_one_must_be_named(tmp_path) -> None:
             lambda p: np.concatenate([p[:, :, :3], p[:, :, 3:] * [[1e-3], [1e-3], [1e-3], [1]]], axis=2),
             "metres",
         ),
-        (lambda p: p * [[1.2, 1, 1, 1]], "none of the 80 poses is a rigid transform"),
+        (lambda p: p * [[1.2, 1, 1, 1]], "none of the 80 poses is a rigid motion"),
     ],
 )
 def test_poses_that_cannot_be_meant_are_refused_in_words(spoil, said) -> None:

@@ -171,7 +171,7 @@ def test_stl_text_and_binary_are_the_same(tmp_path: Path) -> None:
 )
 def test_what_is_no_stl_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "bone.stl").write_bytes(content)
-    with pytest.raises(GpError, match=r"bone.stl: is not an STL surface"):
+    with pytest.raises(GpError, match=r"bone.stl: is no surface in STL"):
         read_stl(tmp_path / "bone.stl")
     with pytest.raises(GpError, match="does not exist"):
         read_stl(tmp_path / "none.stl")

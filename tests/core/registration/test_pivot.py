@@ -133,9 +133,7 @@ def test_too_little_rotation_is_refused() -> None:
         recorded(tilt=0.0, spin=170.0),  # about the shaft only: the tip may be anywhere along it
         np.tile(recorded(1), (50, 1, 1)),
     ):
-        with pytest.raises(
-            GeometryError, match=r"rotated too little, or about one axis only.*Tilt the probe"
-        ):
+        with pytest.raises(GeometryError, match=r"turned too little, or about one axis only.*Tilt the probe"):
             calibrate_pivot(poses)
 
 
@@ -160,7 +158,7 @@ def test_what_is_no_recording_is_refused() -> None:
     for wrong in wrongs:
         with pytest.raises(GpError, match="marker poses must"):
             calibrate_pivot(wrong)
-    with pytest.raises(GeometryError, match="none of the 30 poses is a rigid transform"):
+    with pytest.raises(GeometryError, match="none of the 30 poses is a rigid motion"):
         calibrate_pivot(np.zeros((30, 4, 4)))
 
 

@@ -52,12 +52,7 @@ def wait_for(condition, seconds: float = DEADLINE_SECONDS) -> bool:
 @pytest.fixture
 def study():
     process = subprocess.Popen(
-        STUDY,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # a background shell ignores it
+        STUDY, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True, text=True
     )
     yield process
     if process.poll() is None:

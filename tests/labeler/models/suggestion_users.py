@@ -12,9 +12,9 @@ from document_cases import Editing
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.prediction import predict
 from gp_core.atlas.sampling import draw_animal
+from gp_core.constants import CHI2_3_95
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
-from gp_labeler.models.ghosts import CHI2_95
 from gp_labeler.models.workflow import OPENING, Active, next_point
 
 SEES_MM = 0.1
@@ -46,7 +46,7 @@ class Coverage:
             ghost = editing.labels.ghosts(side)[code]
             editing.labels.accept_ghost(side=side, code=code)
             off = ghost.position - truth[code]
-            held = bool(off @ np.linalg.solve(ghost.covariance, off) <= CHI2_95)
+            held = bool(off @ np.linalg.solve(ghost.covariance, off) <= CHI2_3_95)
             self.by_stage.setdefault(stage, []).append(held)
             self.by_feature.setdefault(code, []).append(held)
 

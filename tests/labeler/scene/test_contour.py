@@ -10,9 +10,8 @@ from vtkmodules.vtkFiltersCore import vtkFlyingEdges2D
 
 from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk
 from gp_labeler.scene.bone_edge import BoneEdge, nearest_on_segments
-from gp_labeler.scene.contour import level_segments
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slices import VolumeSlicer
+from gp_labeler.scene.slices import VolumeSlicer, level_segments
 
 
 def of_vtk(values: np.ndarray, level: float) -> np.ndarray:

@@ -61,7 +61,7 @@ def refused(done, *words: str) -> None:
 
 @pytest.mark.parametrize("command", COMMANDS, ids=lambda words: words[0])
 def test_without_the_extra_it_says_how_to_install_it(command, tmp_path) -> None:
-    blocked = ("PySide6", "SimpleITK", "vtkmodules", "pyigtl", "psygnal", "platformdirs", "superqt")
+    blocked = ("PySide6", "SimpleITK", "vtkmodules", "pyigtl", "psygnal", "platformdirs")
     done = run(tmp_path, *command, blocked=blocked, DISPLAY=":0")
     refused(done, "is not installed", 'pip install "gp-labeler[app]"')
 

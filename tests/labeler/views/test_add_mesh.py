@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import pyvista as pv
-from PySide6.QtGui import QImage
+from qtpy.QtGui import QImage
 from window_cases import BALL_MM, MIDDLE, image_bytes, settle
 
 from gp_core.errors import GpError
