@@ -27,7 +27,7 @@ from gp_labeler.document.specimen_file import application
 from gp_labeler.document.specimen_json import Document, document_of, state_of
 from gp_labeler.document.state import SpecimenState
 
-__all__ = ["Entry", "Journal", "JournalContent", "read_journal"]
+__all__ = ["Entry", "Journal", "JournalContent", "base_line", "read_journal", "record_line"]
 
 VERSION = 1
 _MAX_BYTES = 1_000_000_000
@@ -133,7 +133,7 @@ class Journal:
             path.parent.mkdir(parents=True, exist_ok=True)
         except OSError as error:
             raise GpError(f"cannot be made: {error.strerror}", file=path.parent) from None
-        line = _base_line(base, specimen_file, saved)
+        line = base_line(base, specimen_file, saved)
         write_bytes(path, line)
         return cls(path, n_bytes=len(line), n_records=1, document=base)
 
@@ -174,7 +174,7 @@ class Journal:
         """
         changes = difference(self._document, document)
         record = {"kind": kind, "n": self._n_records, "text": text, "time": time, "changes": changes}
-        line = _line(record if edit is None else record | {"edit": edit})
+        line = record_line(record if edit is None else record | {"edit": edit})
         try:
             self._write(line)
         except OSError as error:
@@ -210,7 +210,7 @@ class Journal:
         GpError
             It cannot be written; the journal goes on as it was.
         """
-        line = _base_line(base, specimen_file, saved)
+        line = base_line(base, specimen_file, saved)
         self.close()
         try:
             write_bytes(self.path, line)
@@ -231,9 +231,10 @@ class Journal:
             self.path.unlink()
 
 
-def _base_line(base: Document, specimen_file: Path | None, saved: str | None) -> bytes:
+def base_line(base: Document, specimen_file: Path | None, saved: str | None) -> bytes:
+    """Return the first line of a journal; the arguments are those of `Journal.create`."""
     header = {"kind": "base", "n": 0, "version": VERSION, "application": application(), "document": base}
-    return _line(header | {"specimen_file": specimen_file and str(specimen_file), "saved": saved})
+    return record_line(header | {"specimen_file": specimen_file and str(specimen_file), "saved": saved})
 
 
 def _opened(path: Path) -> BinaryIO:
@@ -314,7 +315,8 @@ def _damage(n_lost: int, has_header: bool, path: Path) -> str:
     return f"{edits}, also in what had been saved before; what was edited since is here. A copy is kept"
 
 
-def _line(record: Mapping[str, Any]) -> bytes:
+def record_line(record: Mapping[str, Any]) -> bytes:
+    """Return a record as a line, with its checksum."""
     text = dumped(record)
     return f'{{"record":{text},"crc32":{zlib.crc32(text.encode())}}}\n'.encode()
 

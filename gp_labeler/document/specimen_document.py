@@ -24,6 +24,7 @@ from gp_labeler.document.opening import LoadedSpecimen, new_specimen, open_speci
 from gp_labeler.document.recovery import Recovery
 from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.document.state import How, Provenance, SpecimenState, changed_points, measured
+from gp_labeler.document.store import SpecimenStore
 from gp_labeler.document.volume_reference import VolumeLike, VolumeReference
 
 __all__ = ["SpecimenDocument", "VolumeChangedError", "utc_now"]
@@ -115,6 +116,10 @@ class SpecimenDocument:
         """What the user works on, remembered with every edit."""
         self.measure: Callable[[LandmarkSet], ScanEvidence] | None = None
         """Tells how far the points of a side lie from the bone of the scan; None without a scan."""
+        self.history: History[SpecimenState]
+        """What can be undone and redone."""
+        self.store: SpecimenStore
+        """Keeps it safe on disk."""
         self._thread = threading.get_ident()
         self._abandoned: SpecimenState | None = None
         self._hold(begun)
@@ -124,7 +129,7 @@ class SpecimenDocument:
     @property
     def state(self) -> SpecimenState:
         """The specimen as it stands."""
-        return self._history.state
+        return self.history.state
 
     @property
     def volume(self) -> VolumeLike | None:
@@ -134,7 +139,7 @@ class SpecimenDocument:
     @property
     def path(self) -> Path | None:
         """The specimen file; None where it was never saved."""
-        return self._store.specimen_file
+        return self.store.specimen_file
 
     @property
     def location(self) -> str:
@@ -161,13 +166,13 @@ class SpecimenDocument:
     @property
     def undo_text(self) -> str | None:
         """What undo would take back, such as ``place FPP left``; None where there is nothing."""
-        step = self._history.to_undo
+        step = self.history.to_undo
         return None if step is None else step.text
 
     @property
     def redo_text(self) -> str | None:
         """What redo would do again; None where there is nothing."""
-        step = self._history.to_redo
+        step = self.history.to_redo
         return None if step is None else step.text
 
     def landmarks(self, side: Side | str) -> LandmarkSet:
@@ -213,7 +218,7 @@ class SpecimenDocument:
         self._abandoned = self.state
 
     def _hold(self, specimen: LoadedSpecimen) -> None:
-        self._history, self._store = specimen.history, specimen.store
+        self.history, self.store = specimen.history, specimen.store
         self._clean = self.state if specimen.saved is None else specimen.saved
         self._was_dirty = self.dirty
         self._volume: VolumeLike | None = None
@@ -248,8 +253,8 @@ class SpecimenDocument:
         if new == old:
             return False
         text = edit.text
-        self._store.record("merge" if merge else "edit", text, new, time=self.now(), edit=edit)
-        self._history.push(text, new, focus=self.focus, merge=merge)
+        self.store.record("merge" if merge else "edit", text, new, time=self.now(), edit=edit)
+        self.history.push(text, new, focus=self.focus, merge=merge)
         self._announce(old)
         self.edited.emit(edit, merge)
         return True
@@ -269,12 +274,12 @@ class SpecimenDocument:
 
     def _step(self, kind: str) -> bool:
         self._check_thread()
-        upcoming = self._history.to_undo if kind == "undo" else self._history.to_redo
+        upcoming = self.history.to_undo if kind == "undo" else self.history.to_redo
         if upcoming is None:
             return False
         old = self.state
-        self._store.record(kind, upcoming.text, upcoming.state, time=self.now())
-        (self._history.undo if kind == "undo" else self._history.redo)(focus=self.focus)
+        self.store.record(kind, upcoming.text, upcoming.state, time=self.now())
+        (self.history.undo if kind == "undo" else self.history.redo)(focus=self.focus)
         self._announce(old)
         self.focus_restored.emit(upcoming.focus)
         self.stepped.emit(kind)
@@ -349,7 +354,7 @@ class SpecimenDocument:
         choices = getattr(volume, "choices", {}) if import_choices is None else import_choices
         self._refer_to(reference, choices, f"open {reference.name}")
         self._volume = volume
-        warning = self._store.claim_volume(reference.path)
+        warning = self.store.claim_volume(reference.path)
         self.volume_changed.emit(volume)
         return () if warning is None else (warning,)
 
@@ -374,8 +379,8 @@ class SpecimenDocument:
         old, new = self.state, self.state.on_volume(reference, choices)
         if new == old:
             return
-        self._store.record("change", text, new, time=self.now())
-        self._history.change_all(lambda state: state.on_volume(reference, choices))
+        self.store.record("change", text, new, time=self.now())
+        self.history.change_all(lambda state: state.on_volume(reference, choices))
         if old.volume is None:  # to have opened a scan is nothing to be asked about
             self._clean = self._clean.on_volume(reference, choices)
         self._announce(old)
@@ -390,7 +395,7 @@ class SpecimenDocument:
     def save(self, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> Path:
         """Save the specimen; see `SpecimenStore.save` for arguments and errors."""
         self._check_thread()
-        file = self._store.save(self.measured_state, path, overwrite=overwrite)
+        file = self.store.save(self.measured_state, path, overwrite=overwrite)
         self._clean = self.state
         self.saved.emit(file)
         self._announce_dirty()
@@ -402,7 +407,7 @@ class SpecimenDocument:
         Unsaved edits stay in the journal, and are offered at the next start, unless the user wants to
         `discard` them.
         """
-        self._store.close(keep_journal=self.dirty and not discard)
+        self.store.close(keep_journal=self.dirty and not discard)
         self._volume = self.measure = None
 
 

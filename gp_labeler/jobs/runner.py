@@ -259,6 +259,11 @@ class QueueDispatcher:
     def __init__(self) -> None:
         self._calls: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
 
+    @property
+    def n_waiting(self) -> int:
+        """How many calls wait to be made."""
+        return self._calls.qsize()
+
     def __call__(self, call: Callable[[], None]) -> None:
         """Take a call, from any thread."""
         self._calls.put(call)

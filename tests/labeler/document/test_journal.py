@@ -18,7 +18,7 @@ from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.document import journal as journal_module
 from gp_labeler.document.edits import PlacePoint
-from gp_labeler.document.journal import Journal, read_journal
+from gp_labeler.document.journal import Journal, base_line, read_journal, record_line
 from gp_labeler.document.json_changes import difference, dumped, patched
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.lock import FileLock, InUseError
@@ -52,7 +52,7 @@ def act(document, sequence, folder):
 
 def abandon(document):
     """Let go of the lock without tidying up, as a killed program does."""
-    document._store.close(keep_journal=True)
+    document.store.close(keep_journal=True)
 
 
 @quick
@@ -97,8 +97,8 @@ def test_replaying_the_journal_gives_the_last_state_and_its_undo(sequence):
         with contextlib.ExitStack() as stack:
             stack.callback(again.close, discard=True)
             assert text_of(again.state) == text_of(expected)
-            while document._history.to_undo and again._history.to_undo:
-                assert again._history.undo().text == document._history.undo().text
+            while document.history.to_undo and again.history.to_undo:
+                assert again.history.undo().text == document.history.undo().text
                 assert text_of(again.state) == text_of(document.state)
 
 
@@ -264,8 +264,8 @@ def test_a_kill_between_saving_and_tidying_offers_nothing(tmp_path):
 def _lines_before_tidying(document):
     base = document_of(state_of({}))
     changes = difference(base, document_of(document.state))
-    yield journal_module._base_line(base, document.path, None)
-    yield journal_module._line({"kind": "edit", "n": 1, "text": "edit notes", "time": "", "changes": changes})
+    yield base_line(base, document.path, None)
+    yield record_line({"kind": "edit", "n": 1, "text": "edit notes", "time": "", "changes": changes})
 
 
 def test_opening_asks_about_what_was_left(tmp_path):
@@ -328,9 +328,7 @@ def test_what_is_no_journal_is_left_alone(tmp_path):
     folder.mkdir()
     (folder / "a.jsonl").write_text("rubbish\n")
     (folder / "b.jsonl").write_bytes(b"")
-    (folder / "c.jsonl").write_bytes(
-        journal_module._line({"kind": "base", "n": 0, "version": 99, "document": {}})
-    )
+    (folder / "c.jsonl").write_bytes(record_line({"kind": "base", "n": 0, "version": 99, "document": {}}))
     assert find_recoveries(tmp_path) == ()
     assert len(list(folder.glob("*.jsonl"))) == 3
     with pytest.raises(FileFormatError, match="is not a journal, or all of it is damaged"):

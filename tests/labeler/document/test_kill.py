@@ -63,7 +63,7 @@ def test_killed_at_any_moment_nothing_confirmed_is_lost(tmp_path, seed):
 
 def _accepted(confirmed: list[str], document) -> set[str]:
     """The last confirmed state, or what one more step made of it: killed between journal and print."""
-    history = document._history
+    history = document.history
     neighbours = {text_of(step.state) for step in (history.to_undo, history.to_redo) if step is not None}
     one_more = {text_of(document.state)} if confirmed[-1] in neighbours else set()
     return {confirmed[-1], *one_more}

@@ -96,7 +96,7 @@ def test_cancel_stops_and_delivers_nothing(jobs, queue):
 def test_a_result_that_came_too_late_is_not_delivered(jobs, queue):
     results = []
     task = jobs.submit(Double(1), results.append)
-    while not queue._calls.qsize() > 1:  # progress and result wait for delivery
+    while not queue.n_waiting > 1:  # progress and result wait for delivery
         time.sleep(0.001)
     task.cancel()
     queue.deliver_until_idle(jobs)
