@@ -121,7 +121,7 @@ def pose_rows() -> Iterator[Action]:
               hint="In the frame of the touches, for a robot", group="out")
     yield row("physical", "Test against the scan…", (), lambda w, ui: ui.show_physical(),
               lambda w: _has_pose(w) and bool(w.document.state.skull),
-              hint="The paper's physical test: a touched skull held against its own labelled scan",
+              hint="The paper's physical test: a touched skull compared with its own labelled scan",
               group="out")
     yield row("accept", "Accept the estimate", (), _judge("accept"), _has_pose,
               hint="Keeps the verdict in the specimen", group="verdict", icon="check")

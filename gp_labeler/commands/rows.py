@@ -55,7 +55,7 @@ def _is_free(workspace: Workspace) -> bool:
 
 def _is_settled(workspace: Workspace) -> bool:
     mark = _mark(workspace)
-    return mark is not None and mark.settled
+    return mark is not None and mark.decided
 
 
 def _is_placed(workspace: Workspace) -> bool:
@@ -193,7 +193,7 @@ def _toggle_check(workspace: Workspace, ui: Ui) -> None:
 
 
 def _all_locked(workspace: Workspace) -> bool:
-    marks = [mark for mark in workspace.document.state.landmarks.values() if mark.settled]
+    marks = [mark for mark in workspace.document.state.landmarks.values() if mark.decided]
     return bool(marks) and all(mark.locked for mark in marks)
 
 

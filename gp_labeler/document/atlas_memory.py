@@ -42,7 +42,7 @@ class AtlasSource:
 class AtlasMemory:
     """The source of the atlas chosen last, in a small file of the state directory.
 
-    Damaged it counts as empty, and where it cannot be written it is let be: nobody's work hangs on it.
+    Damaged it counts as empty, and where it cannot be written, that is ignored: it is a convenience.
 
     Parameters
     ----------

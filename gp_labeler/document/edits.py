@@ -169,7 +169,7 @@ class SuggestPoints:
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the suggestions of what is still to do; raises `GpError` for CO."""
         wanted = {point_key(self.side, code): value for code, value in self.suggestions.items()}
-        open_keys = [key for key in wanted if not state.landmarks.get(key, TO_DO).settled]
+        open_keys = [key for key in wanted if not state.landmarks.get(key, TO_DO).decided]
         require_free(state, open_keys)
         new = {key: Landmark(suggestion=wanted[key], provenance=self.provenance) for key in open_keys}
         return state.with_landmarks(new)
@@ -285,7 +285,7 @@ class LockPoints:
         changes = {}
         for side, code in self.points:
             landmark = state.landmark(side, code)
-            if self.locked and not landmark.settled:
+            if self.locked and not landmark.decided:
                 raise GpError(
                     f"{point_text(Side.parse(side), code)} is still to do; there is nothing to lock"
                 )

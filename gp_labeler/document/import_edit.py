@@ -22,7 +22,7 @@ class ImportLandmarks:
     Parameters
     ----------
     landmarks : tuple of LandmarkSet
-        One or both sides, scan frame. A computed CO in them is not taken: it is computed anew.
+        One or both sides, scan frame. A computed CO in them is not taken: it is computed again.
     provenance : Provenance
         Of those points that bring none of their own.
     known : mapping of (Side, str) to Provenance
@@ -63,7 +63,7 @@ class ImportLandmarks:
         changes = {
             key: mark
             for key, mark in self._marks().items()
-            if not state.landmarks.get(key, TO_DO).settled
+            if not state.landmarks.get(key, TO_DO).decided
             or (self.replace_placed and mark.suggestion is None)
         }
         moved = [key for key, mark in changes.items() if _moves(state.landmarks.get(key, TO_DO), mark)]

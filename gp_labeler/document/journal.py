@@ -203,7 +203,7 @@ class Journal:
         return self._file
 
     def restart(self, base: Document, *, specimen_file: Path | None, saved: str | None) -> None:
-        """Begin anew at `base`, which is saved; the arguments are those of `create`.
+        """Begin again at `base`, which is saved; the arguments are those of `create`.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""Where a session keeps what outlives it: journals and locks, in one folder for each user."""
+"""Where the program keeps what outlives it: journals and locks, in one folder for each user."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 UNSAVED = "unsaved-"
-"""Journals whose name begins so belong to one session only, which was never saved."""
+"""Journals whose name begins so belong to one window only, which was never saved."""
 
 
 def default_directory() -> Path:

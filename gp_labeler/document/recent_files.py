@@ -16,8 +16,7 @@ __all__ = ["RecentFiles"]
 class RecentFiles:
     """Files opened last, newest first, kept in a small file of the state directory.
 
-    A list that cannot be read counts as empty, and one that cannot be written is let be: nobody's work hangs
-    on it.
+    A list that cannot be read counts as empty, and errors of writing it are ignored: it is a convenience.
 
     Parameters
     ----------

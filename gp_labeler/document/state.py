@@ -119,7 +119,7 @@ class Landmark:
             object.__setattr__(self, "checked_by", "")
 
     @property
-    def settled(self) -> bool:
+    def decided(self) -> bool:
         """Whether a person has decided: it was placed, or looked for and not seen."""
         return self.unseen or self.position is not None
 
@@ -286,7 +286,7 @@ def measured(state: SpecimenState, measure: Callable[[LandmarkSet], ScanEvidence
 
 
 def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Side, str]]:
-    """Return the points in which two states differ: IN on both sides, and CO where it was computed anew."""
+    """Return the points in which two states differ: IN on both sides, and CO where it was computed again."""
     changed = set()
     for side, code in old.landmarks.keys() | new.landmarks.keys():
         if old.landmarks.get((side, code)) != new.landmarks.get((side, code)):

@@ -1,4 +1,4 @@
-"""What of a session is safe on disk: its specimen file, its journal and its locks."""
+"""What of a document is safe on disk: its specimen file, its journal and its locks."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _log = logging.getLogger(__name__)
 
 
 class SpecimenStore:
-    """Keeps one session safe.
+    """Keeps one document safe.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ class SpecimenStore:
     def begin(
         cls, directory: Path | None, state: SpecimenState, specimen_file: Path | None = None
     ) -> SpecimenStore:
-        """Begin to keep a session that stands at `state`.
+        """Begin to keep a document that is at `state`.
 
         Raises
         ------
@@ -105,7 +105,7 @@ class SpecimenStore:
     def save(
         self, state: SpecimenState, path: str | PathLike[str] | None = None, *, overwrite: bool = False
     ) -> Path:
-        """Write the specimen file and begin the journal anew.
+        """Write the specimen file and begin the journal again.
 
         Parameters
         ----------
@@ -114,7 +114,7 @@ class SpecimenStore:
         path : path, optional
             Where; by default where it was last. The suffix is added where it lacks.
         overwrite : bool
-            Whether a file may be replaced that is not the one this session wrote or read last.
+            Whether a file may be replaced that is not the one this document wrote or read last.
 
         Returns
         -------
@@ -208,7 +208,7 @@ class SpecimenStore:
             raise
 
     def _rebase(self, target: Path, state: SpecimenState, lock: FileLock | None) -> None:
-        """Begin the journal anew at what was saved; under another name where it was saved under another."""
+        """Begin the journal again at what was saved; under another name where it was saved under another."""
         old_journal, old_lock = self._journal, self._lock
         try:
             if lock is None and old_journal is not None:
@@ -219,7 +219,7 @@ class SpecimenStore:
                     old_journal.remove()
                 _let_go(old_lock)
         except GpError as error:  # saved it is, and the old journal still tells the same
-            _log.warning("the journal could not be begun anew after saving: %s", error)
+            _log.warning("the journal could not be begun again after saving: %s", error)
         self.specimen_file = target
 
 

@@ -10,7 +10,7 @@ __all__ = ["VolumeLike", "VolumeReference"]
 
 
 class VolumeLike(Protocol):
-    """What a session needs to know of a volume; `gp_labeler.imaging.volume.Volume` is one."""
+    """What a document needs to know of a volume; `gp_labeler.imaging.volume.Volume` is one."""
 
     @property
     def name(self) -> str: ...  # noqa: D102

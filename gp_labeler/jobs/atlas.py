@@ -133,7 +133,7 @@ class Recalled:
 
 @dataclass(frozen=True)
 class RecallAtlas:
-    """Read the atlas that was chosen last, or fit it anew; the published one where that cannot be."""
+    """Read the atlas that was chosen last, or fit it again; the published one where that cannot be."""
 
     source: AtlasSource
     title = "Loading the atlas"

@@ -1,7 +1,7 @@
 """Long work off the UI thread: frozen jobs in, results delivered on the thread that asked.
 
-A job is a frozen value with a `title` and `run(progress)`. It knows neither session nor window; what it makes
-is delivered through the dispatcher, so that only the main thread ever changes a session.
+A job is a frozen value with a `title` and `run(progress)`. It knows neither document nor window; what it
+makes is delivered through the dispatcher, so that only the main thread ever changes the document.
 """
 
 from __future__ import annotations
@@ -139,7 +139,7 @@ class Jobs:
     ----------
     dispatcher : callable, optional
         Brings results to the main thread (Qt: a queued signal; scripts: a `QueueDispatcher`). By default they
-        are delivered on the worker's thread, which no session accepts.
+        are delivered on the worker's thread, which no document accepts.
     n_workers : int
         Threads.
     """

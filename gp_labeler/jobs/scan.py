@@ -82,7 +82,7 @@ class Demo:
 
 
 def phantom_seed(name: str) -> int | None:
-    """Return the seed of a phantom by the name of its scan, which is in no file: it can be made anew."""
+    """Return the seed of a phantom by the name of its scan, which is in no file: it can be made again."""
     found = re.fullmatch(r"phantom-(\d+)", name)
     return int(found[1]) if found else None
 

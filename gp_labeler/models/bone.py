@@ -105,7 +105,7 @@ class BoneModel:
 
     def mesh_ears(self, half_mm: float | None = None) -> None:
         """Mesh around the ears at full resolution now, wherever their place is known."""
-        self._mesh_ears(half_mm=half_mm, anew=True)
+        self._mesh_ears(half_mm=half_mm, again=True)
 
     def save_mesh(self, path: Path) -> None:
         """Write the whole bone surface at full resolution, in the background."""
@@ -141,7 +141,7 @@ class BoneModel:
     def _on_landmarks(self, _: object) -> None:
         self._mesh_ears()
 
-    def _mesh_ears(self, *, half_mm: float | None = None, anew: bool = False) -> None:
+    def _mesh_ears(self, *, half_mm: float | None = None, again: bool = False) -> None:
         """Mesh around each ear at full resolution, once its place is known and where that adds anything."""
         volume, threshold = self._scan.volume, self._scan.threshold
         coarse = any(part.stride > 1 for part in self._overview.parts)
@@ -149,7 +149,7 @@ class BoneModel:
             return
         self._half = half_mm or self._half
         middles = {side: place for side in Side if (place := self._ear(side)) is not None}
-        if not anew and not any(self._is_news(side, place) for side, place in middles.items()):
+        if not again and not any(self._is_news(side, place) for side, place in middles.items()):
             return
         self._ears = middles
         boxes = {side: box_around(place, self._half) for side, place in middles.items()}

@@ -1,6 +1,6 @@
-"""The cochlea of one side estimated from its touches, and held against the scan where there is one.
+"""The cochlea of one side estimated from its touches, and compared with the scan where there is one.
 
-Nothing here changes: an `Estimate` is made anew whenever touches, labels, settings or the atlas change.
+Nothing here changes: an `Estimate` is made again whenever touches, labels, settings or the atlas change.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ __all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", 
 
 REGISTRATIONS = ("auto", "features", "skull")
 _SAME_MM, _SAME_DEG = 0.001, 0.01
-"""Up to here a pose is the one that was judged: it is computed anew each time."""
+"""Up to here a pose is the one that was judged: it is computed again each time."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class EstimateSettings:
     probe_noise : float, optional
         Scale of an ordinary touch error, mm a coordinate; None: found from the touches.
     registration : str
-        By what touches are laid into the scan: ``features`` labelled and touched, ``skull`` features, or
+        By what touches are registered to the scan: ``features`` labelled and touched, ``skull`` features, or
         ``auto``, the skull's where there are enough.
     round_window : str
         Which round window y of the cochlea frame points to: ``touched`` or ``expected``.
@@ -134,7 +134,7 @@ class Estimate:
     poses : mapping of str to CochleaPose
         By method, in the frame of the touches.
     problems : mapping of str to str
-        Why a method has no pose, or (``registration``) why the touches cannot be laid into the scan.
+        Why a method has no pose, or (``registration``) why the touches cannot be registered to the scan.
     registered : Registered, optional
     truth : RigidTransform, optional
         ``T_scan_cochlea`` of the labels, x along the modiolar axis on both sides.

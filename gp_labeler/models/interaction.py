@@ -142,7 +142,7 @@ class InteractionModel:
         """
         is_ghost = code in self._labels.ghosts(side)
         where = self._labels.place_of(side, code)
-        if where is None or self._document.state.landmark(side, code).settled:
+        if where is None or self._document.state.landmark(side, code).decided:
             point = point_text(side, code)
             raise GpError(f"{point} is not suggested, so there is nothing to confirm", landmark=code)
         if self._had_to_come_close(side, code, where):

@@ -69,16 +69,16 @@ class LabelChecks:
                 self._known[key] = found
         return found
 
-    def near_doubts(self, landmarks: LandmarkSet) -> Mapping[str, Finding]:
+    def known_problems(self, landmarks: LandmarkSet) -> Mapping[str, Finding]:
         """Return the doubts where they are known, else as the last edit leaves those before it; at once.
 
         What other points are doubted for waits for the next check, lest all doubts blink at every edit; a
-        point that was moved is held against the place where the others expect it, which stays.
+        point that was moved is compared with the place where the others expect it, which stays.
         """
         known = self.known(landmarks)
         return self._carried(landmarks) if known is None else known.problems
 
-    def settle(self, landmarks: LandmarkSet, found: SideCheck) -> None:
+    def remember(self, landmarks: LandmarkSet, found: SideCheck) -> None:
         """Take the check of a side from which the doubts after the next edit follow."""
         with self._lock:
             self._latest[landmarks.side] = landmarks, found
@@ -122,7 +122,7 @@ class CheckLabels:
         """Check."""
         progress(0.0)
         found = self.checks.found(self.landmarks)
-        self.checks.settle(self.landmarks, found)
+        self.checks.remember(self.landmarks, found)
         return found
 
     @property

@@ -78,7 +78,7 @@ class LabelsModel:
     """Another atlas is behind ghosts and doubts; they also follow the landmarks, without this signal."""
     checked = Signal()
     """Labels were checked: ask for `deviations` again."""
-    doubts_changed = Signal()
+    problems_changed = Signal()
     """Some of them are doubtful: ask `point_states(side, wait=False)` again."""
 
     def __init__(
@@ -128,17 +128,17 @@ class LabelsModel:
         """Return where the points to do of one side are expected."""
         return self._expectations.ghosts(self.document.landmarks(side), self.document.landmarks(side.other))
 
-    def doubts(self, side: Side) -> Mapping[str, Finding]:
+    def problems(self, side: Side) -> Mapping[str, Finding]:
         """Return what is doubted of the points of one side, by feature; this may take some 50 ms."""
         return self._checks.found(self.document.landmarks(side)).problems
 
-    def near_doubts(self, side: Side) -> Mapping[str, Finding]:
-        """Return `doubts` as far as they can be told at once."""
-        return self._checks.near_doubts(self.document.landmarks(side))
+    def known_problems(self, side: Side) -> Mapping[str, Finding]:
+        """Return `problems` as far as they can be told at once."""
+        return self._checks.known_problems(self.document.landmarks(side))
 
     def is_other_side(self, side: Side) -> bool:
         """Whether one side is known to be labelled under the name of the other; at once, see `checking`."""
-        return any(doubt.kind == "other side" for doubt in self.near_doubts(side).values())
+        return any(problem.kind == "other side" for problem in self.known_problems(side).values())
 
     def deviations(self, side: Side) -> Mapping[str, Deviation] | None:
         """Return how far the labels of one side are from where the atlas expects them; None while unknown."""
@@ -152,11 +152,11 @@ class LabelsModel:
     def point_states(self, side: Side, *, wait: bool = True) -> dict[str, PointState]:
         """Return how far every feature of one side is, in the table's order.
 
-        Without `wait`, doubts are `near_doubts`: run `checking`, then ask again.
+        Without `wait`, doubts are `known_problems`: run `checking`, then ask again.
         """
         ghosts, state = self.ghosts(side), self.document.state
-        doubts = self.doubts(side) if wait else self.near_doubts(side)
-        return {code: point_state(state, side, code, ghosts=ghosts, doubts=doubts) for code in CODES}
+        problems = self.problems(side) if wait else self.known_problems(side)
+        return {code: point_state(state, side, code, ghosts=ghosts, problems=problems) for code in CODES}
 
     def progress(self, side: Side) -> Progress:
         """Return how many of the 20 points of one side are done."""
@@ -336,7 +336,7 @@ class LabelsModel:
             (side, code)
             for side in Side
             for code in codes
-            if self.document.state.landmark(side, code).settled
+            if self.document.state.landmark(side, code).decided
         ]
         points = [(side, code) for side, code in settled if not (feature(code).shared and side is Side.RIGHT)]
         return bool(points) and self.document.do(LockPoints(tuple(points), locked))
@@ -412,10 +412,10 @@ class LabelsModel:
     def _check(self, sides: Iterable[Side], *, after: float) -> None:
         """Find the doubts of some sides in the background."""
         for side in sides:
-            done = partial(self._take_checked, bool(self.near_doubts(side)))
+            done = partial(self._take_checked, bool(self.known_problems(side)))
             self._jobs.submit(self.checking(side), done, key=f"checking {side.value}", after=after)
 
-    def _take_checked(self, showed_doubts: bool, found: SideCheck) -> None:
+    def _take_checked(self, showed_problems: bool, found: SideCheck) -> None:
         self.checked.emit()
-        if showed_doubts or found.problems:
-            self.doubts_changed.emit()  # else all points look as they did
+        if showed_problems or found.problems:
+            self.problems_changed.emit()  # else all points look as they did

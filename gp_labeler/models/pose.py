@@ -199,7 +199,7 @@ class PoseModel:
         """Return by how much the pose moves, mm and degrees, if a touch is left out, or taken in again."""
         return self._estimator.without(self._document.state, name)
 
-    def judge(self, verdict: str, *, by: str = "", note: str = "") -> PoseCheck:
+    def record_verdict(self, verdict: str, *, by: str = "", note: str = "") -> PoseCheck:
         """Keep a person's verdict on the estimate, ``accept`` or ``reject``, in the specimen.
 
         Raises
@@ -262,7 +262,7 @@ class PoseModel:
         """What is touched on this side, left out or not."""
         return self._touched()
 
-    def aim(self, name: str) -> None:
+    def set_target(self, name: str) -> None:
         """Choose what is touched next."""
         self._skipped -= {(self.side, name)}
         self._aim(name)

@@ -142,7 +142,7 @@ class PoseReport:
     def _registration(self) -> str:
         registered, placed = self.estimate.registered, self.estimate.in_scan()
         if registered is None or placed is None:
-            return "<p>Not laid into a scan.</p>"
+            return "<p>Not registered to a scan.</p>"
         text = f"In the scan by {_WAYS[registered.way]}"
         if registered.fiducials is not None:
             text += (

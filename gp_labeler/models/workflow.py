@@ -80,7 +80,12 @@ def progress(state: SpecimenState, side: Side) -> Progress:
 
 
 def point_state(
-    state: SpecimenState, side: Side, code: str, *, ghosts: Mapping[str, Ghost], doubts: Mapping[str, Finding]
+    state: SpecimenState,
+    side: Side,
+    code: str,
+    *,
+    ghosts: Mapping[str, Ghost],
+    problems: Mapping[str, Finding],
 ) -> PointState:
     """Return how far a point is; a point that a person checked is not doubted."""
     if feature(code).computed:
@@ -94,7 +99,7 @@ def point_state(
         return PointState.GHOST if code in ghosts else PointState.TO_DO
     if landmark.checked:
         return PointState.CHECKED
-    return PointState.DOUBTFUL if code in doubts else PointState.PLACED
+    return PointState.DOUBTFUL if code in problems else PointState.PLACED
 
 
 def placing_order(ghosts: Mapping[str, Ghost]) -> tuple[str, ...]:
@@ -126,11 +131,11 @@ def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Act
             order = order[at + 1 :] + order[:at]
         for code in order:
             mark = state.landmark(side, code)
-            if not mark.settled and mark.suggestion is None:
+            if not mark.decided and mark.suggestion is None:
                 return Active(side, code)
         if suggested := _by_doubt(state, side, after=active.code if side is active.side else None):
             return Active(side, suggested[0])
-    if active.code is not None and not state.landmark(active.side, active.code).settled:
+    if active.code is not None and not state.landmark(active.side, active.code).decided:
         return active
     return Active(active.side)
 
@@ -147,7 +152,7 @@ def click_text(state: SpecimenState, active: Active) -> str:
     """Say what the next click does."""
     if active.code is None:
         left = any(
-            not state.landmark(side, f.code).settled for side in Side for f in FEATURES if not f.computed
+            not state.landmark(side, f.code).decided for side in Side for f in FEATURES if not f.computed
         )
         return "Choose a feature to place" if left else "Everything is placed · drag a point to move it"
     point, landmark = point_text(active.side, active.code), state.landmark(active.side, active.code)

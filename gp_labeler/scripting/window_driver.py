@@ -76,7 +76,7 @@ class WindowDriver:
         self.window.show()
         QTest.qWaitForWindowExposed(self.window)
         self.window.activateWindow()
-        self.settle()
+        self.wait_until_idle()
 
     def _hear(self, text: str, level: str) -> None:
         self.messages.append((text, level))
@@ -108,7 +108,7 @@ class WindowDriver:
 
     # Waiting
 
-    def settle(self, *, in_passing: bool = True) -> None:
+    def wait_until_idle(self, *, in_passing: bool = True) -> None:
         """Wait until all background work is done and delivered, and all is drawn.
 
         Parameters

@@ -1,4 +1,4 @@
-"""Qt widgets: they show what `Session` holds and pass on what a person does; no numbers are computed here."""
+"""Qt widgets: they show what document and models hold, and pass on what a person does."""
 
 from gp_labeler.system.qt_binding import choose_binding
 

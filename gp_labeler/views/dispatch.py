@@ -10,7 +10,7 @@ __all__ = ["QtDispatcher"]
 
 
 class QtDispatcher(QObject):
-    """A dispatcher for `session.jobs.Jobs`; make it on the thread that calls are to be made on."""
+    """A dispatcher for `jobs.runner.Jobs`; make it on the thread that calls are to be made on."""
 
     _handed_in = Signal(object)
 

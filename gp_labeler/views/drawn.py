@@ -1,4 +1,4 @@
-"""What of a session is drawn in every view: marks, ghosts and lines, before a view makes pixels of them."""
+"""What of a workspace is drawn in every view: marks, ghosts and lines, before a view makes pixels of them."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def drawn_ghosts(workspace: Workspace) -> list[GhostEllipsoid]:
     if code is None or not workspace.view.state.ghosts_visible:
         return []
     ghost = labels.ghosts(side).get(code)
-    doubt = labels.near_doubts(side).get(code)
+    doubt = labels.known_problems(side).get(code)
     if doubt is not None and labels.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
         away = doubt.deviation_of(code)
         if away is None or away.distance > HEAD_MM:  # such a place would mean nothing

@@ -145,7 +145,7 @@ class GuideWindow(QWidget):
 
     def _redo(self) -> None:
         if self._to_redo is not None:
-            self._workspace.pose.aim(self._to_redo)
+            self._workspace.pose.set_target(self._to_redo)
 
     def _on_recorded(self, name: str) -> None:
         self._last, self._refusal = (self._workspace.pose.side, name), ""

@@ -277,7 +277,7 @@ class MainWindow(QMainWindow):
         return super().event(event)
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
-        if not self.ui.settle():
+        if not self.ui.resolve_unsaved():
             event.ignore()
             return
         self._remember()

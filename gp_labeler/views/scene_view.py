@@ -160,7 +160,7 @@ class SceneView(QWidget):
         self.redraw()
 
     def cut(self, plane: str) -> None:
-        """Cut the bone open through the crosshair, by one of `session.view.CUTS`; the nearer side goes."""
+        """Cut the bone open through the crosshair, by one of `models.view.CUTS`; the nearer side goes."""
         normal = into = self.scene.camera.direction
         if plane != "view":
             axis = Plane(plane).normal
@@ -200,7 +200,7 @@ class SceneView(QWidget):
             workspace.document.landmarks_changed,
             workspace.labels.active_changed,
             workspace.labels.ghosts_changed,
-            workspace.labels.doubts_changed,
+            workspace.labels.problems_changed,
         ):
             follow(self, signal, self._show_points)
         for signal in (

@@ -149,7 +149,7 @@ class SliceView(QWidget):
             workspace.document.landmarks_changed,
             workspace.labels.active_changed,
             workspace.labels.ghosts_changed,
-            workspace.labels.doubts_changed,
+            workspace.labels.problems_changed,
             workspace.scan.threshold_changed,
             workspace.scan.threshold_previewed,
             workspace.view.changed,

@@ -1,4 +1,4 @@
-"""Window and level of the slices, as the session has them."""
+"""Window and level of the slices, as the view model has them."""
 
 from __future__ import annotations
 

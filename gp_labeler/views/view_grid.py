@@ -159,7 +159,7 @@ class ViewGrid(QWidget):
     Parameters
     ----------
     workspace : Workspace
-        What is shown; its session says in which layout.
+        What is shown; its view says in which layout.
     """
 
     hovered = Signal(object)

@@ -68,7 +68,7 @@ class WindowUi(AtlasUi, PoseUi):
         goes_on = is_atlas_file(path) or (
             self._workspace.document.lacks_scan and not path.name.endswith(SUFFIX)
         )
-        if not goes_on and not self.settle():
+        if not goes_on and not self.resolve_unsaved():
             return
         self._remember_folder(path)
         try:
@@ -85,7 +85,7 @@ class WindowUi(AtlasUi, PoseUi):
 
     def begin(self) -> None:
         """Begin a new specimen without a scan, once unsaved edits are settled."""
-        if self.settle():
+        if self.resolve_unsaved():
             self._workspace.document.begin()
             self._window.set_step("pose")
 
@@ -107,7 +107,7 @@ class WindowUi(AtlasUi, PoseUi):
 
     def open_demo(self) -> None:
         """Open the phantom, once unsaved edits are settled."""
-        if self.settle():
+        if self.resolve_unsaved():
             self._workspace.scan.open_demo()
 
     def save(self, *, ask: bool = False) -> bool:
@@ -130,7 +130,7 @@ class WindowUi(AtlasUi, PoseUi):
         self._workspace.say(f"Saved {saved.name}")
         return True
 
-    def settle(self) -> bool:
+    def resolve_unsaved(self) -> bool:
         """Settle what is not saved before something else is opened; return whether to go on."""
         document = self._workspace.document
         if not document.dirty:

@@ -79,7 +79,7 @@ class UseAtlas(Step):
             workspace.atlas.use_published()
         else:
             workspace.atlas.open(driver.to_read(self.path or ""))
-        driver.settle()
+        driver.wait_until_idle()
         return f"{len(workspace.atlas.specimens)} animals" if workspace.atlas.specimens else self.path or ""
 
 

@@ -57,7 +57,7 @@ class EditStep(Step):
         if isinstance(edit, PlacePoint):
             workspace.view.set_crosshair(edit.position)
         if isinstance(edit, SetThreshold):
-            driver.settle()
+            driver.wait_until_idle()
 
 
 EDIT_STEPS: Mapping[str, type[EditStep]] = MappingProxyType(

@@ -50,7 +50,7 @@ class Expect(Step):
     pose_within: float | None = None
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
-        driver.settle()
+        driver.wait_until_idle()
         found = []
         if self.feature is not None:
             found.append(self._point(driver, feature(self.feature).code))

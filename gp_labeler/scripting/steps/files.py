@@ -56,7 +56,7 @@ class Import(Step):
         )
         for note in notes:
             driver.workspace.say(note, "warning")
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Reference(Step):
             driver.workspace.references.show(*[driver.to_read(file) for file in self.files])
         else:
             driver.workspace.references.clear()
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,7 @@ class AddMesh(Step):
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         _ = driver.voxel  # a scan must be there
         name = driver.workspace.meshes.add(driver.to_read(self.file), name=self.name, **self.options)
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
         return name
 
 
@@ -125,7 +125,7 @@ class RemoveMesh(Step):
             driver.workspace.meshes.clear()
         else:
             driver.workspace.meshes.remove(self.name)
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
 
 
 @dataclass(frozen=True)

@@ -205,7 +205,7 @@ class Screenshot(Step):
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         _check(self.what, "what", PICTURES)
-        driver.settle()
+        driver.wait_until_idle()
         for view in driver.window.grid.views:
             leave(view)
         size = None if self.size is None else _pixels(self.size)
@@ -239,7 +239,7 @@ class Key(Step):
         view.setFocus()
         for _ in range(self.times):
             press_keys(view, self.keys)
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
 
 
 @dataclass(frozen=True)
@@ -271,7 +271,7 @@ class Act(Step):
         since = len(driver.messages)
         if not driver.window.commands.run(self.id):
             raise GpError(" ".join(driver.warnings(since)) or f"{self.id} was not done")
-        driver.settle()
+        driver.wait_until_idle()
         driver.wrote(*(file for file in saves if file.is_file()))
 
 
@@ -296,7 +296,7 @@ class Undo(Step):
                 raise GpError("there is nothing to undo")
             undone.append(text)
             driver.window.commands.run("edit.undo")
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
         return ", ".join(undone)
 
 

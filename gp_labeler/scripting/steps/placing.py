@@ -67,7 +67,7 @@ class Place(Step):
         if self.at != "ghost" and driver.shown_at(self.side, code) is not None:
             driver.workspace.interaction.arm_replacing()  # a click alone leaves a point where it is
         name = self._hit(driver, code)
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
         if driver.workspace.document.state is before:
             why = " ".join(text for text, _ in driver.messages[since:]) or "nothing was hit"
             raise GpError(f"{code} {self.side.word} was not placed: {why}", landmark=code)
@@ -172,7 +172,7 @@ class Put(Step):
             document.do(PlacePoint(self.side, code, self.at, found, verb="nudge"), merge=True)
         else:
             labels.place(self.at, how, side=self.side, code=code)
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
 
 
 def _how(word: str) -> How:
@@ -214,7 +214,7 @@ class Suggest(Step):
             for code, at in self.points.items()
         }
         document.do(SuggestPoints(self.side, suggestions, document.provenance(How.GHOST)))
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
         return f"{labels.progress(self.side).n_suggested} suggested"
 
 
@@ -248,10 +248,10 @@ class Confirm(Step):
         if off is not None and self.within is not None and off > self.within:
             return self._refuse(driver, code, off)
         for _ in range(_MOST_LOOKS):
-            if driver.workspace.document.state.landmark(self.side, code).settled:
+            if driver.workspace.document.state.landmark(self.side, code).decided:
                 break
             driver.window.commands.run("point.confirm")
-            driver.settle(in_passing=False)
+            driver.wait_until_idle(in_passing=False)
         if driver.placed(self.side, code) is None:
             raise GpError(f"{code} {self.side.word} has no suggestion to confirm", landmark=code)
         return "" if off is None else f"{off:.3f} mm from there"
@@ -342,7 +342,7 @@ class Drag(Step):
         there = (here[0] + self.by[0], here[1] + self.by[1]) if self.by else view.pixel_at(np.array(self.to))
         since = len(driver.messages)
         drag(view, here, there)
-        driver.settle(in_passing=False)
+        driver.wait_until_idle(in_passing=False)
         end = driver.placed(self.side, code)
         if end is None or np.allclose(start, end, atol=1e-9):
             why = " ".join(text for text, _ in driver.messages[since:]) or "it is where it was"

@@ -28,7 +28,7 @@ __all__ = ["CarryPath", "Estimate", "Estimated", "Overlay", "Report", "Verdict"]
 
 @dataclass(frozen=True, eq=False)
 class Estimated:
-    """A cochlea that a step estimated, held against what is known of it.
+    """A cochlea that a step estimated, compared with what is known of it.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ class Verdict(Step):
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         current_estimate(driver, self.side)
-        check = driver.workspace.pose.judge(self.verdict, by=self.by, note=self.note)
+        check = driver.workspace.pose.record_verdict(self.verdict, by=self.by, note=self.note)
         return f"{check.verdict} by {check.by}"
 
 

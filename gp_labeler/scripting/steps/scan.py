@@ -80,7 +80,7 @@ class Open(Step):
             )
         else:
             self._open(driver, driver.to_read(self.path or ""))
-        driver.settle()
+        driver.wait_until_idle()
         volume = driver.workspace.scan.volume
         if volume is None:
             raise GpError(driver.trouble(0) or "no scan was opened")
@@ -93,7 +93,7 @@ class Open(Step):
             driver.workspace.document.begin()
         else:
             driver.workspace.open_specimen(driver.to_read(self.labels))
-        driver.settle()
+        driver.wait_until_idle()
         return f"{driver.workspace.document.state.specimen}, without a scan"
 
     def _open(self, driver: WindowDriver, path: Path) -> None:
@@ -132,7 +132,7 @@ def _take_labels(driver: WindowDriver, file: Path) -> None:
         raise GpError(f"belongs to another scan: {'; '.join(differences)}", file=file)
     workspace.scan.accept(volume)
     workspace.scan.truth = truth
-    driver.settle()
+    driver.wait_until_idle()
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class Spacing(Step):
 
 @dataclass(frozen=True)
 class Threshold(Step):
-    """Set the grey value at which bone begins, and mesh anew.
+    """Set the grey value at which bone begins, and mesh again.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ class Threshold(Step):
     def run(self, driver: WindowDriver) -> None:  # noqa: D102
         _ = driver.voxel  # a scan must be there
         driver.workspace.scan.set_threshold(self.value)
-        driver.settle()
+        driver.wait_until_idle()
 
 
 @dataclass(frozen=True)
@@ -196,5 +196,5 @@ class Mesh(Step):
             file = driver.to_write(self.save)
             driver.workspace.bone.save_mesh(file)
             driver.wrote(file)
-        driver.settle()
+        driver.wait_until_idle()
         return f"{sum(part.n_triangles for part in driver.workspace.bone.surfaces)} triangles"

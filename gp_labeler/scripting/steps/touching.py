@@ -1,4 +1,4 @@
-"""Steps that take what was touched with the probe, and lay it into the scan."""
+"""Steps that take what was touched with the probe, and register it to the scan."""
 
 from __future__ import annotations
 
@@ -237,7 +237,7 @@ class Register(Step):
 
 def current_estimate(driver: WindowDriver, side: Side) -> Estimate:
     """Return the estimate of a side as it stands; raises `GpError` where there is none."""
-    driver.settle()  # the atlas may still be loading
+    driver.wait_until_idle()  # the atlas may still be loading
     driver.workspace.pose.choose(side=side)
     estimate = driver.workspace.pose.estimate
     if estimate is None:

@@ -112,7 +112,7 @@ def test_locked_points_stay_whatever_is_done(before, after):
     editing = Editing()
     done(editing, before)
     editing.labels.lock_all()
-    locked = {key: mark for key, mark in editing.document.state.landmarks.items() if mark.settled}
+    locked = {key: mark for key, mark in editing.document.state.landmarks.items() if mark.decided}
     assert all(mark.locked for mark in locked.values())  # but nothing that is only suggested
     unlocking = [edit for edit in after if not isinstance(edit, (LockPoints, CheckPoint))]
     for state in done(editing, unlocking):

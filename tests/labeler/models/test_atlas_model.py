@@ -295,7 +295,7 @@ def test_stopping_the_atlas_of_the_last_time_leaves_the_published_one(start, fol
 def test_views_are_told_of_a_check_that_changes_what_they_show(workspace) -> None:
     told, atlas = [], Atlas.published()
     workspace.atlas.use(atlas)
-    workspace.labels.doubts_changed.connect(lambda: told.append(1))
+    workspace.labels.problems_changed.connect(lambda: told.append(1))
     mean = {code: atlas[code] for code in atlas.codes if code != "CO"}
     workspace.document.do(ImportLandmarks((LandmarkSet.from_mapping(mean, L),), Provenance(How.TYPED)))
     workspace.wait()

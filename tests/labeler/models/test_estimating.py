@@ -174,11 +174,11 @@ def test_both_methods_once_jrmpc_is_ready(editing, estimating, atlas):
 
 def test_a_verdict_is_kept_with_what_was_judged(tmp_path, editing, estimating, atlas):
     with pytest.raises(GpError, match="no estimate to judge"):
-        estimating.judge("accept")
+        estimating.record_verdict("accept")
     animal = draw_animal(atlas, rng=np.random.default_rng(2)).side("L")
     label(editing, animal, (*TRUTH, "CL", "MN"))
     touch(editing, animal, motion(np.random.default_rng(4)), PROBE)
-    estimating.judge("reject", by="CD", note="too deep")
+    estimating.record_verdict("reject", by="CD", note="too deep")
     file = editing.document.save(tmp_path / "GP-1.gpspecimen.json")
     reopened = Editing(open_specimen(file)).document
     (check,) = reopened.state.pose_checks

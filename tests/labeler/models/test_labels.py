@@ -164,7 +164,7 @@ def test_states_of_points():
     assert states["ZL"] is PointState.GHOST
     assert states["MN"] is PointState.UNSEEN
     assert [c for c, s in states.items() if s is PointState.DOUBTFUL] == ["FPP"]
-    assert editing.labels.doubts(L)["FPP"].deviation_of("FPP").distance == pytest.approx(3, abs=0.5)
+    assert editing.labels.problems(L)["FPP"].deviation_of("FPP").distance == pytest.approx(3, abs=0.5)
     editing.document.do(CheckPoint(L, "FPP"))
     assert editing.labels.point_states(L)["FPP"] is PointState.CHECKED
 
@@ -243,7 +243,7 @@ def test_the_checker_is_asked_once_for_the_same_points():
     assert editing.labels.point_states(L) == editing.labels.point_states(L)
     assert len(asked) == 1
     editing.document.do(PlacePoint(R, "ZL", (0, 0, 0), MARK))
-    editing.labels.doubts(L)
+    editing.labels.problems(L)
     assert len(asked) == 1
 
 
@@ -253,7 +253,7 @@ def test_nonsense_is_doubted_in_words_not_in_kilometres():
     heap = {code: 1e-3 * rng.normal(size=3) for code in CODES if code != "CO"}
     assert not published(LandmarkSet.from_mapping(heap, L)).deviations
     off = {code: Atlas.published()[code] for code in heap} | {"ZL": (300.0, 0, 0)}
-    doubt = published(LandmarkSet.from_mapping(off, L)).doubts["ZL"]
+    doubt = published(LandmarkSet.from_mapping(off, L)).problems["ZL"]
     assert doubt.word == "far off"
     assert "check names, side and units" in doubt.text
 
@@ -273,10 +273,10 @@ def test_doubts_do_not_blink_while_an_edit_is_judged():
 
     def doubted() -> dict[str, float]:
         states = editing.labels.point_states(L, wait=False)
-        assert set(editing.labels.near_doubts(L)) == {
+        assert set(editing.labels.known_problems(L)) == {
             c for c, s in states.items() if s is PointState.DOUBTFUL
         }
-        doubts = editing.labels.near_doubts(L)
+        doubts = editing.labels.known_problems(L)
         return {code: round(doubt.deviation_of(code).distance, 1) for code, doubt in doubts.items()}
 
     assert doubted() == {}, "nobody has looked yet"
@@ -328,8 +328,8 @@ def test_a_point_far_off_is_doubted_and_its_ghost_comes_where_it_belongs():
     points["MH"] = points["MH"] + [0, 2.5, 0]
     editing = Editing(predict=partial(shape_predict, atlas), check=partial(check_side, atlas=atlas))
     editing.document.do(ImportLandmarks((LandmarkSet.from_mapping(points, L),), MARK))
-    assert set(editing.labels.doubts(L)) == {"MH"}
-    assert np.linalg.norm(editing.labels.doubts(L)["MH"].deviation_of("MH").expected - atlas["MH"]) < 0.5
+    assert set(editing.labels.problems(L)) == {"MH"}
+    assert np.linalg.norm(editing.labels.problems(L)["MH"].deviation_of("MH").expected - atlas["MH"]) < 0.5
     editing.labels.clear(side=L, code="MH")
     ghost = editing.labels.ghosts(L)["MH"]
     assert np.linalg.norm(ghost.position - atlas["MH"]) < ghost.radius_95 < 1.0

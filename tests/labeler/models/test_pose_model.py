@@ -50,7 +50,7 @@ def test_a_skipped_feature_comes_last_and_a_chosen_one_first(workspace, animal):
     first, second = ORDER[:2]
     workspace.pose.skip()
     assert workspace.pose.target == second
-    workspace.pose.aim("ZL")
+    workspace.pose.set_target("ZL")
     workspace.pose.record(animal["ZL"], TouchHow.TYPED)
     rest = []
     while workspace.pose.target is not None:
@@ -153,7 +153,7 @@ def test_skull_features_stand_after_the_features_in_their_order(workspace, anima
     assert workspace.pose.names == ORDER
     assert workspace.pose.next_skull == "S1"
     touching.mark_skull(workspace.document, "S10", (1, 2, 3))
-    workspace.pose.aim("S1")
+    workspace.pose.set_target("S1")
     workspace.pose.record((4, 5, 6), TouchHow.TYPED)
     touching.record_touch(workspace.document, "L", "S2", (7, 8, 9))
     assert workspace.pose.names == (*ORDER, "S1", "S2", "S10")
@@ -237,6 +237,6 @@ def test_a_feature_that_is_touched_again_is_done_again(workspace, animal):
     first = ORDER[0]
     for code in ORDER[:3]:
         workspace.pose.record(animal[code], TouchHow.TYPED)
-    workspace.pose.aim(first)
+    workspace.pose.set_target(first)
     workspace.pose.record(animal[first] + 0.1, TouchHow.TYPED)
     assert workspace.pose.target == ORDER[3], "it goes on with what is untouched"

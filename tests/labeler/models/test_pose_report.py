@@ -56,7 +56,7 @@ def made():
         touching.record_touch(editing.document, "L", code, animal[code] + (50, 0, 9), source="<Stylus & co>")
     touching.record_touch(editing.document, "L", "MN", animal["MN"] + (53, 0, 9))
     touching.record_touch(editing.document, "L", "S1", (1, 2, 3))
-    estimating.judge("reject", by="C&D", note="<too> deep")
+    estimating.record_verdict("reject", by="C&D", note="<too> deep")
     yield editing, estimating
     editing.document.close(discard=True)
 
@@ -99,7 +99,7 @@ def test_a_verdict_on_another_estimate_is_said_to_be_that():
     estimating = editing.pose
     for code in PROBE:
         touching.record_touch(editing.document, "L", code, Atlas.published()[code])
-    check = estimating.judge("accept")
+    check = estimating.record_verdict("accept")
     made = (editing, estimating)
     assert "Not of this estimate" not in Page(report(made).html()).text
     touching.record_touch(editing.document, "L", "RWP", Atlas.published()["RWP"] + (0.8, 0, 0))

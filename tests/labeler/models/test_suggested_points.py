@@ -51,7 +51,7 @@ def test_a_hasty_student_places_three_points_and_no_more() -> None:
         assert editing.labels.progress(L).text == f"3 placed, {n + 1} suggested"
     assert set(editing.document.landmarks(L).placed) == set(OPENING)
     assert "CO" not in editing.document.landmarks(L)
-    assert not editing.labels.doubts(L)
+    assert not editing.labels.problems(L)
     assert not editing.labels.ghosts(R)  # the other side, mirrored, is expected from facts alone
     assert {s for c, s in editing.labels.point_states(L).items() if c not in (*OPENING, "CO")} == {
         PointState.SUGGESTED

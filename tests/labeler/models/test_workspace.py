@@ -375,7 +375,7 @@ def test_a_single_point_off_the_bone_is_doubted_by_the_scan(on_ball) -> None:
     out = np.array([0.0, 0.0, 1.0])
     on_ball.labels.place(MIDDLE + (BALL_MM + 1.0) * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    doubt = on_ball.labels.near_doubts(Side.LEFT)["IN"]
+    doubt = on_ball.labels.known_problems(Side.LEFT)["IN"]
     assert doubt.kind == "off bone"
     distance = float(doubt.text.split()[2])
     assert distance == pytest.approx(1.0, abs=VOXEL_MM)
@@ -383,17 +383,17 @@ def test_a_single_point_off_the_bone_is_doubted_by_the_scan(on_ball) -> None:
     assert "from bone" in content_of(on_ball.labels, has_scan=True).status
     on_ball.labels.place(MIDDLE + BALL_MM * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    assert not on_ball.labels.near_doubts(Side.LEFT)
+    assert not on_ball.labels.known_problems(Side.LEFT)
     on_ball.labels.place(MIDDLE + (BALL_MM - 2.0) * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    assert not on_ball.labels.near_doubts(Side.LEFT), "within bone it is not off it"
+    assert not on_ball.labels.known_problems(Side.LEFT), "within bone it is not off it"
 
 
 def test_the_scan_is_asked_again_when_its_threshold_changes(on_ball) -> None:
     on_ball.atlas.use(Atlas.published())
     on_ball.labels.place(MIDDLE + np.array([0, 0, BALL_MM]), side=Side.LEFT, code="IN")
     on_ball.wait()
-    assert not on_ball.labels.near_doubts(Side.LEFT)
+    assert not on_ball.labels.known_problems(Side.LEFT)
     on_ball.scan.set_threshold(float(on_ball.scan.volume.array.max()) + 1)
     on_ball.wait()
-    assert on_ball.labels.near_doubts(Side.LEFT)["IN"].text == "IN is far from bone"
+    assert on_ball.labels.known_problems(Side.LEFT)["IN"].text == "IN is far from bone"

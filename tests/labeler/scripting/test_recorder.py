@@ -295,7 +295,7 @@ def test_touches_and_verdicts_are_done_again(recording) -> None:
     document.undo()
     document.redo()
     pose.choose(probe_noise=0.3)
-    pose.judge("reject", by="AB", note="tilted")
+    pose.record_verdict("reject", by="AB", note="tilted")
     steps = recording.check()
     assert steps[-3:-1] == ["estimate", "verdict"]
 
@@ -313,7 +313,7 @@ def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
     assert run("pose.overlay") == ["overlay"]
     assert run("pose.along_axis") == ["action"]
     assert run("tool.place") == ["action"]
-    workspace.pose.judge("accept", by="AB")
+    workspace.pose.record_verdict("accept", by="AB")
     assert recording.recorder.tables[-1]["do"] == "verdict"
     recording.window.ui.prompts.files = [recording.folder / "first" / "pose.json"]
     assert run("pose.export")[-1] == "estimate"

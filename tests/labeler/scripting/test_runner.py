@@ -181,7 +181,7 @@ IMPOSSIBLE = (
 def test_what_cannot_be_done_says_why(tmp_path) -> None:
     driver = WindowDriver(tmp_path / "out", tmp_path)
     driver.workspace.scan.begin(ball_volume())
-    driver.settle()
+    driver.wait_until_idle()
     try:
         for number, (table, text) in enumerate(IMPOSSIBLE, start=1):
             (step,) = make_script([table]).steps

@@ -40,7 +40,7 @@ def connected(workspace, simulator, **fields):
 
 def recorded(workspace, name):
     """Press until the touch is in the specimen: a busy machine may hold messages up."""
-    workspace.pose.aim(name)
+    workspace.pose.set_target(name)
     seen = []
     workspace.tracker.touched.connect(seen.append)
     workspace.tracker.refused.connect(lambda _: workspace.tracker.press())
@@ -135,7 +135,7 @@ def test_the_pose_is_sent_back_while_it_holds(workspace):
     for name in (*PROBE, "IN"):
         workspace.pose.record(atlas[name], TouchHow.TYPED, name=name)
     assert "nobody has accepted it" in workspace.tracker.sending
-    workspace.pose.judge("accept")
+    workspace.pose.record_verdict("accept")
     client = pyigtl.OpenIGTLinkClient("127.0.0.1", port)
     try:
         message = client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE)
@@ -159,10 +159,10 @@ def test_a_pose_that_looks_wrong_is_held_back(workspace, trouble):
             source = {"MN": "OS", "OS": "MN"}.get(name, name) if trouble == "names" else name
             position = atlas[source] * (right if trouble == "side" else 1.0)
             workspace.pose.record(position, TouchHow.TYPED, name=name)
-        workspace.pose.judge("accept")
+        workspace.pose.record_verdict("accept")
         if trouble == "rejected":
             assert client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE) is not None
-            workspace.pose.judge("reject")
+            workspace.pose.record_verdict("reject")
         why = {"names": "look exchanged", "side": "look like those of the", "rejected": "it was rejected"}[
             trouble
         ]
@@ -175,7 +175,7 @@ def test_a_pose_that_looks_wrong_is_held_back(workspace, trouble):
             workspace.pose.change_side()
         if trouble != "rejected":
             assert "nobody has accepted it" in words[-1], "the touches have changed since"
-        workspace.pose.judge("accept")
+        workspace.pose.record_verdict("accept")
         assert "Held back" not in words[-1]
         message = client.wait_for_message("T_tracker_cochlea", timeout=DEADLINE)
         np.testing.assert_allclose(message.matrix, workspace.pose.estimate.pose.transform, atol=1e-4)
@@ -189,7 +189,7 @@ def test_a_press_for_one_feature_is_never_recorded_as_another(workspace, simulat
     simulator.do("go RWA 0.2")
     refusals = []
     workspace.tracker.refused.connect(refusals.append)
-    workspace.pose.aim("RWA")
+    workspace.pose.set_target("RWA")
     workspace.tracker.press()
     workspace.tracker.poll()
     if change == "skip":

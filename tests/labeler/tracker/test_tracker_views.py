@@ -179,7 +179,7 @@ def test_guided_touching_by_a_foot_pedal(qtbot, workspace, top, simulator):
     connected(qtbot, workspace, simulator)
     names = list(POINTS)
     simulator.do(f"go {names[0]} 0.2")
-    workspace.pose.aim(names[0])
+    workspace.pose.set_target(names[0])
     assert guide.code.text() == names[0]
 
     def press_until_touched(key):
@@ -270,7 +270,7 @@ def test_redo_goes_back_through_what_was_touched_before_the_guide_was_opened(qtb
         assert guide.picture.isVisible()
     qtbot.keyClick(guide, Qt.Key.Key_S)
     assert workspace.pose.target is None
-    workspace.pose.aim(ORDER[0])
+    workspace.pose.set_target(ORDER[0])
     assert not guide.redo.isEnabled()
     touch(workspace, ORDER[0])
     assert guide.redo.text() == f"Redo {ORDER[0]}", "what was touched here comes before the order"

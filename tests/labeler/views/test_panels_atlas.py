@@ -127,6 +127,7 @@ def test_an_atlas_is_fitted_and_tried_out(workspace, panel, ui, folder, qtbot) -
     assert words == ["3 animals, 6 sides were read.", "Skipped torn_L.mrk.json"]
     assert panel.trial.run.isEnabled()
     workspace.atlas.try_out()
+    QApplication.processEvents()  # commands are refreshed once a turn
     assert not panel.trial.run.isEnabled()
     deliver(workspace)
     assert [row[0] for row in panel.trial.figures] == ["Robust", "JRMPC"]

@@ -141,7 +141,7 @@ def test_every_state_has_its_word(workspace, panel):
     assert word(table, "FPA", LEFT) == "ghost"
     assert word(table, "FPA", RIGHT) == "to do"
     assert word(table, "CO", RIGHT) == "by itself", "nobody places it"
-    distance = workspace.labels.doubts(LEFT)["OI"].deviation_of("OI").distance
+    distance = workspace.labels.problems(LEFT)["OI"].deviation_of("OI").distance
     assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
 
 
@@ -284,6 +284,7 @@ def test_everything_done_offers_the_export(workspace, panel, ui, qtbot):
             if not row.computed:
                 workspace.labels.mark_unseen(side=side, code=row.code)
     assert panel.card.content.name == "Everything is labelled"
+    qtbot.waitUntil(panel.card.primary.isEnabled)
     qtbot.mouseClick(panel.card.primary, CLICK)
     assert ui.calls == ["ask_export"]
 
@@ -407,5 +408,5 @@ def test_names_that_look_exchanged_are_exchanged_by_the_card(panel, workspace, q
     qtbot.waitUntil(lambda: card.primary.text().startswith("Exchange CA and CB"))
     qtbot.mouseClick(card.primary, CLICK)
     deliver(workspace)
-    assert not workspace.labels.near_doubts(LEFT)
+    assert not workspace.labels.known_problems(LEFT)
     np.testing.assert_allclose(workspace.document.landmarks(LEFT)["CA"], in_scan("CA"))

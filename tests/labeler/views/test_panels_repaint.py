@@ -148,7 +148,7 @@ def test_a_change_of_the_active_point_draws_two_rows(workspace, panel):
 def test_what_changes_nothing_draws_nothing(workspace, panel):
     painted = Painted(panel.table.view.viewport())
     painted.taken()
-    workspace.labels.doubts_changed.emit()
+    workspace.labels.problems_changed.emit()
     workspace.labels.ghosts_changed.emit()
     assert painted.taken().isEmpty()
 
@@ -156,7 +156,7 @@ def test_what_changes_nothing_draws_nothing(workspace, panel):
 def test_doubts_are_told_where_there_are_any_and_judging_is_always(workspace):
     told: list[str] = []
     workspace.labels.checked.connect(lambda: told.append("judged"))
-    workspace.labels.doubts_changed.connect(lambda: told.append("doubts"))
+    workspace.labels.problems_changed.connect(lambda: told.append("doubts"))
     place(workspace, "CA", "RWP", "OS", "RWA", "FPP", "MH")
     deliver(workspace)
     assert set(told) == {"judged"}

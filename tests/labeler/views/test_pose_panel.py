@@ -507,7 +507,7 @@ def test_probe_noise_is_given_and_found_again(workspace, panel, qtbot):
 def test_the_point_that_gains_most_is_aimed_at_with_a_click(workspace, panel, qtbot):
     touch(workspace, *PROBE)
     best = workspace.pose.gains()[0].code
-    workspace.pose.aim("OI")
+    workspace.pose.set_target("OI")
     qtbot.mouseClick(panel.result.next, CLICK)
     assert workspace.pose.target == best
 

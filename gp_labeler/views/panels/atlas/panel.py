@@ -309,7 +309,7 @@ class LabelsCard(Card):
         for signal in (
             workspace.atlas.changed,
             workspace.labels.checked,
-            workspace.labels.doubts_changed,
+            workspace.labels.problems_changed,
             workspace.document.landmarks_changed,
             workspace.document.reset,
         ):

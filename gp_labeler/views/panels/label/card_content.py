@@ -131,7 +131,7 @@ _ACTIONS = {
 
 def _next_action(labels: LabelsModel, side: Side, code: str, state: PointState) -> tuple[str, str]:
     """Return id and words of the one next action: for a doubt that has a remedy, that remedy."""
-    doubt = labels.near_doubts(side).get(code) if state is PointState.DOUBTFUL else None
+    doubt = labels.known_problems(side).get(code) if state is PointState.DOUBTFUL else None
     if doubt is not None and doubt.kind == "other side":
         return "swap_sides", "Exchange left and right"
     if doubt is not None and doubt.kind == "exchanged":
@@ -149,7 +149,7 @@ def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tu
         said = suggestion_text(labels.document.landmarks(side).suggested[code])
         source = f" ({said})" if said else ""
         return f"Not confirmed{source}. It counts once you confirm or correct it.", "ghost"
-    doubt = labels.near_doubts(side).get(code)
+    doubt = labels.known_problems(side).get(code)
     if state is PointState.DOUBTFUL and doubt is not None:
         words = doubt.text
         return f"{words[:1].upper()}{words[1:]}.", "danger"
@@ -221,7 +221,7 @@ def _between(labels: LabelsModel) -> CardContent:
         point_text(side, row.code)
         for side in Side
         for row in FEATURES
-        if not row.computed and not labels.document.state.landmark(side, row.code).settled
+        if not row.computed and not labels.document.state.landmark(side, row.code).decided
     ]
     totals = " · ".join(f"{side.word} {labels.progress(side).text}" for side in Side)
     if to_do:

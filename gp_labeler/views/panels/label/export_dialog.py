@@ -74,7 +74,7 @@ class ExportDialog(QDialog):
         self.setModal(True)
         self._make_widgets(str(folder))
         self._lay_out()
-        follow(self, workspace.labels.doubts_changed, self.refresh)
+        follow(self, workspace.labels.problems_changed, self.refresh)
         self.refresh()
         open_at(self, 560, 520)
 
@@ -194,7 +194,7 @@ class ExportDialog(QDialog):
         states = labels.point_states(side, wait=False)
         doubts = {
             code: doubt
-            for code, doubt in labels.near_doubts(side).items()
+            for code, doubt in labels.known_problems(side).items()
             if states[code] is PointState.DOUBTFUL
         }
         far = [code for code, doubt in doubts.items() if doubt.kind == "far"]

@@ -53,7 +53,7 @@ class FeatureCard(QWidget):
     Parameters
     ----------
     workspace : Workspace
-        Whose session it shows and edits.
+        What it shows and edits.
     actions : mapping of str to QAction
         What its buttons do.
     """
@@ -175,7 +175,7 @@ class FeatureCard(QWidget):
             workspace.labels.active_changed,
             workspace.document.landmarks_changed,
             workspace.labels.ghosts_changed,
-            workspace.labels.doubts_changed,
+            workspace.labels.problems_changed,
             workspace.scan.opened,
         ):
             follow(self, signal, self.refresh)
@@ -245,7 +245,7 @@ def _swap_names(workspace: Workspace) -> None:
     """Exchange the active point with the one that seems to have its name."""
     labels = workspace.labels
     side, code = labels.active.side, labels.active.code
-    doubt = labels.near_doubts(side).get(code or "")
+    doubt = labels.known_problems(side).get(code or "")
     if doubt is not None and doubt.kind == "exchanged":
         workspace.labels.swap(side, *doubt.landmarks)
 

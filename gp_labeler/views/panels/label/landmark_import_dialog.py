@@ -40,7 +40,7 @@ class LandmarkImportDialog(QDialog):
     Parameters
     ----------
     workspace : Workspace
-        Whose session takes the points.
+        Whose document takes the points.
     files : sequence of path
         The files.
     near_bone : callable, optional

@@ -59,12 +59,12 @@ def _add_edits(add: Callable[..., None], workspace: Workspace, side: Side, code:
     )
     unseen = MarkUnseen(side, code, document.provenance(How.UNSEEN))
     add("Cannot be seen", lambda: document.do(unseen), enabled=free and not mark.unseen)
-    add("Clear", lambda: document.do(ClearPoint(side, code)), enabled=free and (mark.settled or suggested))
+    add("Clear", lambda: document.do(ClearPoint(side, code)), enabled=free and (mark.decided or suggested))
     locked = mark.locked
     add(
         "Unlock" if locked else "Lock",
         lambda: labels.lock(not locked, side=side, code=code),
-        enabled=mark.settled,
+        enabled=mark.decided,
     )
 
 
@@ -81,7 +81,7 @@ def _add_swaps(add: Callable[..., None], menu: QMenu, workspace: Workspace, side
         if row.computed or row.shared != feature(code).shared or row.code == code:
             continue
         other = document.state.landmark(side, row.code)
-        if other.settled and not other.locked:
+        if other.decided and not other.locked:
             swap = partial(workspace.labels.swap, side, code, row.code)
             add(f"{row.code}  {row.name}", swap, to=others)
     others.setEnabled(not others.isEmpty() and not document.state.landmark(side, code).locked)

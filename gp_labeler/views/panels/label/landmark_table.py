@@ -51,7 +51,7 @@ class LandmarkTable(QWidget):
     Parameters
     ----------
     workspace : Workspace
-        Whose session it shows and edits.
+        What it shows and edits.
     """
 
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:

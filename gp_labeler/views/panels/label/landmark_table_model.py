@@ -42,7 +42,7 @@ class LandmarkTableModel(QAbstractTableModel):
     Parameters
     ----------
     workspace : Workspace
-        Whose session it shows.
+        What it shows.
     """
 
     headings_changed = Signal()
@@ -57,14 +57,14 @@ class LandmarkTableModel(QAbstractTableModel):
             workspace.document.reset,
             workspace.document.landmarks_changed,
             workspace.labels.ghosts_changed,
-            workspace.labels.doubts_changed,
+            workspace.labels.problems_changed,
             workspace.labels.active_changed,
         ):
             follow(self, signal, self.refresh)
         self.refresh()
 
     def refresh(self, *_: object) -> None:
-        """Ask the session anew, and tell of what changed."""
+        """Read the models again, and announce the cells that changed."""
         cells, headings, labels = self._cells, self._headings, self._workspace.labels
         self._cells = {
             (index_of(code), column): self._cell(code, side, state)
@@ -137,7 +137,7 @@ class LandmarkTableModel(QAbstractTableModel):
     def _word(self, code: str, side: Side, state: PointState, is_active: bool) -> str:
         if is_active and state in (PointState.TO_DO, PointState.GHOST):
             return "place"
-        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.near_doubts(side).get(code)):
+        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.known_problems(side).get(code)):
             return doubt.word
         if feature(code).computed and state is PointState.TO_DO:
             return "by itself"
@@ -147,7 +147,7 @@ class LandmarkTableModel(QAbstractTableModel):
         text = f"{code} {side.word}: {state.value}"
         if feature(code).computed and state is PointState.TO_DO:
             return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
-        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.near_doubts(side).get(code)):
+        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.known_problems(side).get(code)):
             text += f", {doubt.text}"
         if state is PointState.SUGGESTED:
             said = suggestion_text(self._workspace.document.landmarks(side).suggested[code])

@@ -24,7 +24,7 @@ class LabelPanel(QWidget):
     Parameters
     ----------
     workspace : Workspace
-        Whose session they show and edit.
+        What they show and edit.
     actions : mapping of str to QAction
         What its buttons do.
     """

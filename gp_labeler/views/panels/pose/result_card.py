@@ -116,7 +116,7 @@ class ResultCard(Card):
     def _aim(self) -> None:
         gains = self._workspace.pose.gains()
         if gains:
-            self._workspace.pose.aim(gains[0].code)
+            self._workspace.pose.set_target(gains[0].code)
 
 
 class _OnePose(QWidget):

@@ -148,7 +148,7 @@ class TouchesCard(Card):
         )
         self.clear.clicked.connect(lambda: self._do(lambda: self._clear(None)))
         self.more.clicked.connect(self._toggle_skull)
-        self.skull.clicked.connect(lambda: pose.aim(pose.next_skull))
+        self.skull.clicked.connect(lambda: pose.set_target(pose.next_skull))
         table.clear_asked.connect(lambda name: self._do(lambda: self._clear(name)))
         table.use_asked.connect(self._toggle_use)
         table.chosen.connect(self._on_chosen)
@@ -182,7 +182,7 @@ class TouchesCard(Card):
     def _on_chosen(self, name: str) -> None:
         """Aim at what is not touched yet; show what is."""
         if self._touch(name) is None:
-            self._workspace.pose.aim(name)
+            self._workspace.pose.set_target(name)
         else:
             self._do(lambda: self._workspace.pose.show(name))
 
@@ -209,12 +209,12 @@ class TouchesCard(Card):
     def _clear(self, name: str | None) -> None:
         touching.clear_touches(self._workspace.document, self._workspace.pose.side, name)
         if name is not None:
-            self._workspace.pose.aim(name)
+            self._workspace.pose.set_target(name)
 
     def _open_menu(self, name: str, where: QPoint) -> None:
         pose, touch, menu = self._workspace.pose, self._touch(name), QMenu(self)
         menu.setAttribute(_DELETE)
-        menu.addAction("Touch next" if touch is None else "Touch again", lambda: pose.aim(name))
+        menu.addAction("Touch next" if touch is None else "Touch again", lambda: pose.set_target(name))
         menu.addAction("Type position…", lambda: self.table.edit_position(name))
         if touch is not None:
             word = "Take in again" if touch.left_out else "Leave out"

@@ -80,7 +80,9 @@ class VerdictCard(Card):
     def judge(self, verdict: str) -> bool:
         """Keep a verdict with the initials and the note that stand here."""
         by, note = self.initials.text().strip(), self.note.text().strip()
-        done = attempt(self._workspace, lambda: self._workspace.pose.judge(verdict, by=by, note=note))
+        done = attempt(
+            self._workspace, lambda: self._workspace.pose.record_verdict(verdict, by=by, note=note)
+        )
         if done:
             self.note.clear()
             self._workspace.say(f"{_WORDS[verdict][1]}; it is kept in the specimen")
