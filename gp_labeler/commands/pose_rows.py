@@ -85,7 +85,7 @@ def pose_rows() -> Iterator[Action]:
               checked=lambda w: w.interaction.tool == "touch", group="touches",
               hint="A dry run: a click on bone or a slice touches the feature asked for")
     yield row("skip", "Skip this feature", ("Shift+N",), lambda w, ui: w.pose.skip(), _has_target,
-              hint="It is asked for w after the others", group="touches", icon="skip")
+              hint="It is asked for again after the others", group="touches", icon="skip")
     yield row("clear", "Clear touches", (),
               lambda w, ui: touching.clear_touches(w.document, w.pose.side), _is_touched,
               hint="Of this side; undo brings them back", group="touches")
@@ -101,7 +101,7 @@ def pose_rows() -> Iterator[Action]:
     yield row("overlay", "Estimate over bone and slices", ("Y",), _toggle_overlay,
               checked=lambda w: w.pose.overlay.visible, group="look", icon="eye")
     yield row("along_axis", "Look along the axis", ("A",), lambda w, ui: ui.look_along_axis(), _in_scan,
-              hint="From without the apex, the round window up", group="look")
+              hint="Looking at the apex from outside, round window up", group="look")
     yield row("through_window", "Look through the round window", ("Shift+A",),
               lambda w, ui: ui.look_through_window(), _in_scan, group="look")
     yield row("tracker", "Tracked probe…", (), lambda w, ui: ui.show_tracker(), group="tracker",

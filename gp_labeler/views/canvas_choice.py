@@ -42,7 +42,7 @@ class CanvasTiming:
     Parameters
     ----------
     renderer : str
-        Of OpenGL, at that time: another one must be measured anew.
+        Of OpenGL, at that time: another one must be measured again.
     painted_ms, native_ms : float
         For a whole frame, turned and shown.
     """

@@ -26,7 +26,7 @@ __all__ = ["pose_scene"]
 
 
 def pose_scene(workspace: Workspace, *, tip: DrawnTip | None = None) -> PoseScene:
-    """Return what is drawn of the current estimate; nothing of it where it cannot be laid into the scan.
+    """Return what is drawn of the current estimate; nothing of it where it cannot be registered to the scan.
 
     Parameters
     ----------

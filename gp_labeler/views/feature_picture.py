@@ -132,7 +132,7 @@ class FeaturePicture(QWidget):
         ratio, theme = self.devicePixelRatioF(), theme_of(self)
         scale = text_scale(self)
         key = (self._shown, self.size(), theme.name, ratio, scale, family())
-        if key != self._drawn_for:  # it is drawn anew only where it changes: that takes some 10 ms
+        if key != self._drawn_for:  # it is drawn again only where it changes: that takes some 10 ms
             self._drawn_for = key
             self._drawn = feature_picture(*self._shown, self.size(), theme, ratio=ratio, scale=scale)
         painter = QPainter(self)

@@ -25,7 +25,7 @@ class NativeCanvas:
     """Draws into a widget of OpenGL, which shows it without reading it back.
 
     Contexts should be shared among windows (`canvas_choice.share_contexts`): else everything must be drawn
-    anew when the view comes into another window.
+    again when the view comes into another window.
 
     Parameters
     ----------

@@ -124,7 +124,7 @@ class PoseUi(UiPart):
         guide.showFullScreen()
 
     def show_physical(self) -> None:
-        """Hold touches against the scan of the same skull."""
+        """Compare touches with the labelled scan of the same skull."""
         PhysicalDialog(self._workspace, self.prompts, self._window).open()
 
     def look_along_axis(self) -> None:

@@ -66,7 +66,7 @@ def report_pictures(window: MainWindow) -> dict[str, bytes]:
     view.update(**_BARE)
     found = {**_bone_pictures(window, poses[0]), **_slice_pictures(window, poses[0])}
     view.update(**before)
-    scene_view.scene.camera.restore(looked)  # last: a crosshair that goes out of sight takes the camera along
+    scene_view.scene.camera.restore(looked)  # last: a crosshair that leaves the view takes the camera along
     scene_view.redraw()
     return found
 

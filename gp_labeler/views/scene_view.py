@@ -1,7 +1,7 @@
 """The 3D view as a widget: the scene on a canvas, painted or native (`views.canvas`).
 
 What follows the pointer (the ring where a click would land, a dragged point, the crosshair) is painted over
-the last frame; points are drawn over a kept picture of the bone. While the bone is drawn anew, a little at a
+the last frame; points are drawn over a kept picture of the bone. While the bone is drawn again, a little at a
 time, a coarse preview mesh is shown. A picture of the widget (`grab`) always shows the finished frame.
 """
 
@@ -363,7 +363,7 @@ class SceneView(QWidget):
             self._point_at(*self._pointer)
 
     def forget(self) -> None:
-        """Draw everything anew: what was kept on the graphics card is lost."""
+        """Draw everything again: what was kept on the graphics card is lost."""
         self.scene.forget()
         self._stale = True
 

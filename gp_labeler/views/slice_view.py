@@ -90,7 +90,7 @@ class SliceView(QWidget):
             self._take(self._whole.at(self._position()))
 
     def go_to(self, position: FloatArray) -> None:
-        """Bring a (3,) scan position into sight."""
+        """Bring a (3,) scan position into view."""
         if self.shown is not None:
             self._take(self.shown.showing(position, 0.2))
 

@@ -8,7 +8,7 @@ from gp_labeler.scene.window_level import WindowLevel
 __all__ = ["drag_window_level", "window_level_of"]
 
 _DRAG_FOR_RANGE = 400.0
-"""Logical pixels of a drag that change window or level by as much as the whole range of greys."""
+"""Logical pixels of a drag that change window or level by as much as the whole range of grey values."""
 
 
 def window_level_of(workspace: Workspace) -> WindowLevel:

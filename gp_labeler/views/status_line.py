@@ -126,12 +126,11 @@ class StatusLine(QWidget):
             self._show(f"The next click moves {point} there · Esc leaves it where it is", "next")
         elif workspace.interaction.tool == "touch":
             target = workspace.pose.target
-            where = (
-                f"where {point_text(workspace.pose.side, target)} is"
-                if target
-                else "in vain: all are touched"
-            )
-            self._show(f"Click on bone or a slice {where}", "next")
+            if target:
+                where = point_text(workspace.pose.side, target)
+                self._show(f"Click on bone or a slice where {where} is", "next")
+            else:
+                self._show("All features are touched", "next")
         elif workspace.interaction.tool == "look":
             self._show("Drag over a slice to move the crosshair", "hint")
         elif workspace.interaction.tool == "grey":
@@ -151,7 +150,7 @@ class StatusLine(QWidget):
             "danger": theme.danger,
         }
         look = f"color: {colours[role]}"
-        if self.next_click.styleSheet() != look:  # Qt polishes the label anew even for the same one
+        if self.next_click.styleSheet() != look:  # Qt polishes the label again even for the same one
             self.next_click.setStyleSheet(look)
         self._role = role
         self._make_room()

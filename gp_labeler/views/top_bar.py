@@ -161,7 +161,7 @@ class TopBar(QWidget):
     def _make_room(self) -> None:
         """Leave out what the scan is like where there is no room for it, and then the words of the buttons.
 
-        Nothing is hidden to measure it: that would lay out the bar anew at every edit.
+        Nothing is hidden to measure it: that would lay out the bar again at every edit.
         """
         shown = [button for button, _ in self._icons if not button.isHidden()]
         about = self.about.sizeHint().width() + _GAP

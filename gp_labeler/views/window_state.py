@@ -14,7 +14,7 @@ __all__ = ["WindowState"]
 
 
 class WindowState:
-    """A few values in a small file; damaged it counts as empty, and where it cannot be written it is let be.
+    """A few values in a small file; a damaged one counts as empty, and one that cannot be written is ignored.
 
     Parameters
     ----------

@@ -64,7 +64,7 @@ class WindowUi(AtlasUi, PoseUi):
     # Files
 
     def open_path(self, path: Path) -> None:
-        """Open a scan or specimen, once unsaved edits are settled; an atlas at once."""
+        """Open a scan or specimen, once unsaved edits are saved or given up; an atlas at once."""
         goes_on = is_atlas_file(path) or (
             self._workspace.document.lacks_scan and not path.name.endswith(SUFFIX)
         )
@@ -84,7 +84,7 @@ class WindowUi(AtlasUi, PoseUi):
             self._workspace.say(str(error), "error")
 
     def begin(self) -> None:
-        """Begin a new specimen without a scan, once unsaved edits are settled."""
+        """Begin a new specimen without a scan, once unsaved edits are saved or given up."""
         if self.resolve_unsaved():
             self._workspace.document.begin()
             self._window.set_step("pose")
@@ -106,7 +106,7 @@ class WindowUi(AtlasUi, PoseUi):
             self._workspace.scan.find(path)
 
     def open_demo(self) -> None:
-        """Open the phantom, once unsaved edits are settled."""
+        """Open the phantom, once unsaved edits are saved or given up."""
         if self.resolve_unsaved():
             self._workspace.scan.open_demo()
 
@@ -131,7 +131,7 @@ class WindowUi(AtlasUi, PoseUi):
         return True
 
     def resolve_unsaved(self) -> bool:
-        """Settle what is not saved before something else is opened; return whether to go on."""
+        """Ask what becomes of unsaved edits before something else is opened; return whether to go on."""
         document = self._workspace.document
         if not document.dirty:
             return True

@@ -98,7 +98,7 @@ class SlicePainter:
         self.forget_points()
 
     def forget_points(self) -> None:
-        """Ask for points, ghosts and lines anew when they are painted next."""
+        """Ask for points, ghosts and lines again when they are painted next."""
         self._points = None
 
     def paint(self, painter: QPainter) -> None:

@@ -72,7 +72,7 @@ class Segments(QWidget):
 
 
 class Notices(QWidget):
-    """Findings, one below the other; they are made anew only when they change."""
+    """Findings, one below the other; they are made again only when they change."""
 
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)

@@ -37,7 +37,7 @@ STEPS = (
         "atlas",
         "Atlas",
         "atlas",
-        "What labels are held against: the published atlas, or one fitted to your animals",
+        "What labels are compared with: the published atlas, or one fitted to your animals",
     ),
     Step("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )

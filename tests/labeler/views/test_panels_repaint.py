@@ -26,7 +26,7 @@ from gp_labeler.views import feature_picture as pictures
 from gp_labeler.views.feature_picture import FeaturePicture, feature_picture
 from gp_labeler.views.panels.label.landmark_table_model import LandmarkTableModel
 from gp_labeler.views.panels.label.panel import LabelPanel
-from gp_labeler.views.panels.pose.touch_table_model import MISFIT, TouchTableModel
+from gp_labeler.views.panels.pose.touch_table_model import RESIDUAL, TouchTableModel
 from gp_labeler.views.theme import DARK, LIGHT, Theme, apply_theme, theme_of
 
 pytestmark = pytest.mark.usefixtures("qapp")  # without one, Qt aborts at the first picture
@@ -245,7 +245,7 @@ def test_a_ground_has_the_colours_of_its_theme(theme):
         np.testing.assert_allclose(shown, (wanted.blue(), wanted.green(), wanted.red()), atol=8)
 
 
-def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
+def test_a_touch_repaints_its_row_and_the_residuals_that_changed() -> None:
     animal = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
     workspace = Workspace(None, QueueDispatcher(), atlas=ATLAS)
     for code in (*PROBE, "ZL"):
@@ -265,10 +265,10 @@ def test_a_touch_repaints_its_row_and_the_misfits_that_changed() -> None:
         for n, (new, old) in enumerate(zip(model.rows, before, strict=True)):
             if new.name == "ZL":
                 assert {(n, column) for column in range(model.columnCount())} <= painted
-            if new.misfit != old.misfit or (model.largest != largest and new.misfit is not None):
-                assert (n, MISFIT) in painted
-            if replace(new, misfit=old.misfit) == old:
-                assert not {(n, column) for column in range(model.columnCount())} & painted - {(n, MISFIT)}
+            if new.residual != old.residual or (model.largest != largest and new.residual is not None):
+                assert (n, RESIDUAL) in painted
+            if replace(new, residual=old.residual) == old:
+                assert not {(n, column) for column in range(model.columnCount())} & painted - {(n, RESIDUAL)}
         assert far != 6.0 or model.largest != largest
     workspace.close(discard=True)
 

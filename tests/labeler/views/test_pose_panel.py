@@ -126,9 +126,9 @@ def test_a_dropped_probe_file_gives_the_numbers_of_the_library(workspace, panel,
     shown_origin = panel.result.one.origin.text().replace("\N{MINUS SIGN}", "-").removesuffix("mm").split()
     np.testing.assert_allclose([float(x) for x in shown_origin], alone.origin, atol=0.005)
     assert f"{alone.radius_95:.2f} mm" in panel.result.one.region.text()
-    for code, misfit in alone.residuals.items():
+    for code, residual in alone.residuals.items():
         row = panel.touches.model.rows[panel.touches.model.row_of(code)]
-        assert row.misfit == misfit
+        assert row.residual == residual
         assert row.suspect is (code in alone.suspects)
 
 
@@ -193,7 +193,7 @@ def test_what_is_being_typed_outlives_a_touch_from_elsewhere(workspace, panel, q
     panel.touches.table.edit_position("OS")
     editor(panel).selectAll()
     qtbot.keyClicks(editor(panel), "1 2")
-    touch(workspace, "RWA", "MN", seed=2)  # the misfit of OS changes, and so does its row
+    touch(workspace, "RWA", "MN", seed=2)  # the residual of OS changes, and so does its row
     assert editor(panel).text() == "1 2"
     qtbot.keyClicks(editor(panel), " 3")
     qtbot.keyClick(editor(panel), Qt.Key.Key_Return)
@@ -307,7 +307,7 @@ def test_a_click_leaves_a_point_out_and_takes_it_in_again(workspace, panel, qtbo
     assert "MN" not in workspace.pose.estimate.pose.residuals
     assert "1 left out" in panel.touches.heading.text()
     row = panel.touches.model.rows[panel.touches.model.row_of("MN")]
-    assert (row.state, row.misfit) == ("unseen", None)
+    assert (row.state, row.residual) == ("unseen", None)
     click(qtbot, panel, "MN", USE)
     assert workspace.pose.estimate.pose.as_dict() == before.as_dict()
 
@@ -526,7 +526,7 @@ def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
     mm, deg = estimate.errors()
     assert facts["From the labels"].text() == f"CO {mm:.2f} mm, axis {deg:.1f}°"
     assert facts["FRE"].text() == f"{estimate.registered.fre_mm:.2f} mm"
-    assert facts["Laid in"].text() == "by labelled features, 6 of 6"
+    assert facts["Registered by"].text() == "by labelled features, 6 of 6"
     qtbot.mouseClick(panel.in_scan.way.buttons["skull"], CLICK)
     assert workspace.pose.estimate.registered is None
     assert "at least 3 points" in " ".join(panel.in_scan.notices.shown[0])

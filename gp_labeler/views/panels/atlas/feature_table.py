@@ -63,7 +63,7 @@ class FeatureTableModel(QAbstractTableModel):
         self.refresh_atlas()
 
     def refresh_atlas(self) -> None:
-        """Ask for the atlas anew."""
+        """Ask for the atlas again."""
         atlas = self._workspace.atlas.current
         self.beginResetModel()
         self.codes = () if atlas is None else atlas.codes
@@ -80,7 +80,7 @@ class FeatureTableModel(QAbstractTableModel):
 
     @property
     def n_judged(self) -> int:
-        """Labels of both sides that were held against the atlas."""
+        """Labels of both sides that were compared with the atlas."""
         return sum(len(away) for away in self._away.values())
 
     @property

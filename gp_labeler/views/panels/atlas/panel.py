@@ -158,7 +158,7 @@ class AtlasCard(Card):
             facts["File"] = workspace.atlas.file.name
         if workspace.atlas.is_held_out:
             facts["Here"] = (
-                f"{workspace.document.state.specimen} is one of them, and is held against the others"
+                f"{workspace.document.state.specimen} is one of them, and is compared with the others"
             )
         self.facts.show_facts(facts)
 

@@ -62,7 +62,7 @@ class LandmarkImportDialog(QDialog):
         self._prompts = prompts or Prompts(self)
         self._table: dict[str, str] = {}
         self._files = [Path(file) for file in files]
-        self._misfit = ""
+        self._objection = ""
         self._memory = LabNamesMemory(workspace.directory)
         self.setWindowTitle("Import landmarks")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -132,7 +132,7 @@ class LandmarkImportDialog(QDialog):
 
     def _look(self, *_: object) -> None:
         """Read the files, and say what is in them."""
-        self._misfit = ""
+        self._objection = ""
         self.anyway.setChecked(False)
         unknown = self._unknown()
         self.names.show_names(unknown)
@@ -192,8 +192,8 @@ class LandmarkImportDialog(QDialog):
         self._refresh()
 
     def _refresh(self, *_: object) -> None:
-        self.anyway.setVisible(bool(self._misfit))
-        self.take.setEnabled(not self._n_wrong and (not self._misfit or self.anyway.isChecked()))
+        self.anyway.setVisible(bool(self._objection))
+        self.take.setEnabled(not self._n_wrong and (not self._objection or self.anyway.isChecked()))
 
     def _show_references(self) -> None:
         """Leave the specimen as it is, and only show where their points are."""
@@ -217,7 +217,7 @@ class LandmarkImportDialog(QDialog):
                 replace_placed=not self.keep.isChecked(),
             )
         except MisfitError as error:
-            self._misfit = error.problem
+            self._objection = error.problem
             self._show([("warning", _sentence(error.problem) + " " + (error.remedy or ""))])
         except GpError as error:
             self._show([("error", str(error))])
@@ -232,7 +232,7 @@ class LandmarkImportDialog(QDialog):
             self._workspace.say(f"Imported landmarks: {done}")
             self.accept()
             return
-        self._misfit = ""
+        self._objection = ""
         self._title.set_words("Imported, but look at this")
         self._choices.hide()
         self.show_only.hide()

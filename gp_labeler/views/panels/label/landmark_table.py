@@ -167,7 +167,7 @@ class _TableView(QTableView):
         return line_height(self)
 
     def _on_headings(self) -> None:
-        """Show other counts; only where one takes more room than its column has are columns fitted anew."""
+        """Show other counts; only where one takes more room than its column has are columns fitted again."""
         widths = [self.columnWidth(column) for column in (1, 2)]
         if widths != self._state_widths():
             self._fit()
@@ -203,7 +203,7 @@ class _TableView(QTableView):
             super().keyPressEvent(event)
 
     def repaint_row(self, row: int) -> None:
-        """Draw one row anew, where there is such a row."""
+        """Draw one row again, where there is such a row."""
         for column in range(self.model().columnCount()):
             self.update(self.model().index(row, column))
 

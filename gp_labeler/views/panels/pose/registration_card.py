@@ -23,7 +23,8 @@ __all__ = ["RegistrationCard"]
 
 _WAYS = {"auto": "Automatic", "features": "Features", "skull": "Skull"}
 _NO_SCAN = "No scan is open: the pose stays in the frame of the touches."
-_NO_ESTIMATE = "Once there is an estimate, it is laid into the scan."
+_FACTS = ("Registered by", "CO", "FRE", "TRE at CO", "From the labels")
+_NO_ESTIMATE = "Once there is an estimate, it is registered to the scan."
 _HINTS = {
     "auto": "By the skull's features where three of them are touched and on the scan, else by the labels",
     "features": "By the features that are both touched and labelled",
@@ -52,7 +53,7 @@ class RegistrationCard(Card):
         super().__init__("In the scan", parent)
         self._workspace = workspace
         self.way = Segments(_WAYS, _HINTS)
-        self.facts = {name: numbers() for name in ("Laid in", "CO", "FRE", "TRE at CO", "From the labels")}
+        self.facts = {name: numbers() for name in _FACTS}
         styled(self.facts["From the labels"], HEADING, bold=True)
         self.notices, self.waiting = Notices(), text_label("", "hint", wrap=True)
         self.skull = text_label("", "hint", wrap=True)
@@ -148,7 +149,7 @@ _CAPTIONS = {
 def _facts(estimate: Estimate | None) -> dict[str, str]:
     registered = None if estimate is None else estimate.registered
     if estimate is None or registered is None:
-        return dict.fromkeys(("Laid in", "CO", "FRE", "TRE at CO", "From the labels"), NONE)
+        return dict.fromkeys(_FACTS, NONE)
     placed, fiducials = estimate.in_scan(), registered.fiducials
     tre = NONE
     if placed is not None and fiducials is not None:
@@ -156,7 +157,7 @@ def _facts(estimate: Estimate | None) -> dict[str, str]:
         tre = f"{fine_mm(registered.tre_mm(placed.origin))}  (95 %: {fine_mm(bound)})"
     n = "" if fiducials is None else f", {len(fiducials.fiducials)} of {len(fiducials.names)}"
     return {
-        "Laid in": _FOUND[registered.way] + n,
+        "Registered by": _FOUND[registered.way] + n,
         "CO": NONE,
         "FRE": fine_mm(registered.fre_mm),
         "TRE at CO": tre,

@@ -13,14 +13,14 @@ from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import heading_width, pixels, text_width
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.painting.strokes import round_pen
-from gp_labeler.views.panels.pose.touch_table_model import CLEAR, MISFIT, NAME, USE, XYZ, TouchRow
+from gp_labeler.views.panels.pose.touch_table_model import CLEAR, NAME, RESIDUAL, USE, XYZ, TouchRow
 from gp_labeler.views.panels.pose.wording import name_of
 from gp_labeler.views.theme import Theme
 
 __all__ = ["column_widths", "names_width", "paint_cell", "paint_ground"]
 
 _PAD, _CHIP, _BAR, _WIDE_BAR, _GAP = 8, 12, 20, 50, 6
-_WIDEST_NUMBER, _WIDEST_MISFIT, _WIDEST_CODE = "\N{MINUS SIGN}1000.00", "10.00", "RWM"
+_WIDEST_NUMBER, _WIDEST_RESIDUAL, _WIDEST_CODE = "\N{MINUS SIGN}1000.00", "10.00", "RWM"
 _ASKED = "touch, or type x y z"
 _MIDDLE = Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | _MIDDLE
@@ -41,11 +41,11 @@ def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) ->
     """
     heads = {column: heading_width(view, words) for column, words in headings.items()}
     number = text_width(view, _WIDEST_NUMBER) + _GAP
-    misfit = _misfit_width(view) + pixels(view, _BAR) + 2 * _GAP
+    residual = _residual_width(view) + pixels(view, _BAR) + 2 * _GAP
     columns = {
         NAME: _left(view) + text_width(view, _WIDEST_CODE, bold=True) + _GAP,
         XYZ: max(3 * number, text_width(view, _ASKED) + _GAP),
-        MISFIT: misfit,
+        RESIDUAL: residual,
         USE: pixels(view, 13) + 2 * _PAD,
         CLEAR: pixels(view, 16),
     }
@@ -53,7 +53,7 @@ def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) ->
     free = width - sum(columns.values())
     beside_names = free - names_width(view)
     spare = beside_names if beside_names >= 0 else free  # where names have no room, bars may have it
-    columns[MISFIT] += min(max(spare, 0), pixels(view, _WIDE_BAR))
+    columns[RESIDUAL] += min(max(spare, 0), pixels(view, _WIDE_BAR))
     return columns
 
 
@@ -67,8 +67,8 @@ def _left(view: QWidget) -> int:
     return _PAD + pixels(view, _CHIP) + 5
 
 
-def _misfit_width(view: QWidget) -> int:
-    return text_width(view, _WIDEST_MISFIT)
+def _residual_width(view: QWidget) -> int:
+    return text_width(view, _WIDEST_RESIDUAL)
 
 
 def paint_ground(
@@ -97,8 +97,8 @@ def paint_cell(
         _paint_name(painter, view, box, row, theme)
     elif column == XYZ:
         _paint_position(painter, box, row, theme)
-    elif column == MISFIT:
-        _paint_misfit(painter, view, box, row, theme, longest)
+    elif column == RESIDUAL:
+        _paint_residual(painter, view, box, row, theme, longest)
     elif row.touch is not None and column == USE:
         _paint_use(painter, view, box, row, theme)
     elif row.touch is not None and column == CLEAR and over:
@@ -142,22 +142,22 @@ def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme)
         painter.drawText(cell, _RIGHT, f"{value:.2f}".replace("-", _MINUS))
 
 
-def _paint_misfit(
+def _paint_residual(
     painter: QPainter, view: QWidget, box: QRectF, row: TouchRow, theme: Theme, longest: float
 ) -> None:
-    if row.misfit is None:
+    if row.residual is None:
         return
     colour = QColor(theme.danger if row.suspect else theme.accent_text)
-    left = _misfit_width(view) + _GAP
+    left = _residual_width(view) + _GAP
     words = QRectF(box.left(), box.top(), left, box.height())
     painter.setPen(colour if row.suspect else QColor(theme.text))
-    painter.drawText(words, _RIGHT, f"{row.misfit:.2f}")
+    painter.drawText(words, _RIGHT, f"{row.residual:.2f}")
     full = box.width() - left - 2 * _GAP
     track = QRectF(box.left() + left + _GAP, box.center().y() - 2.5, full, 5)
     painter.setPen(Qt.PenStyle.NoPen)
     painter.setBrush(QColor(theme.border))
     painter.drawRoundedRect(track, 2.5, 2.5)
-    track.setWidth(max(full * min(row.misfit / longest, 1.0), 3.0))
+    track.setWidth(max(full * min(row.residual / longest, 1.0), 3.0))
     painter.setBrush(colour)
     painter.drawRoundedRect(track, 2.5, 2.5)
 

@@ -14,10 +14,10 @@ from gp_labeler.document.touches import Touch, TouchHow, frame_of
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.pose.wording import fine_mm, parse_position, touch_text, triple
 
-__all__ = ["CLEAR", "MISFIT", "NAME", "ROW_ROLE", "USE", "XYZ", "TouchRow", "TouchTableModel"]
+__all__ = ["CLEAR", "NAME", "RESIDUAL", "ROW_ROLE", "USE", "XYZ", "TouchRow", "TouchTableModel"]
 
-NAME, XYZ, MISFIT, USE, CLEAR = range(5)
-_HEADINGS = ("Point", "x, y, z in mm", "Misfit", "Use", "")
+NAME, XYZ, RESIDUAL, USE, CLEAR = range(5)
+_HEADINGS = ("Point", "x, y, z in mm", "Residual", "Use", "")
 ROW_ROLE = int(Qt.ItemDataRole.UserRole) + 1
 
 Index = QModelIndex | QPersistentModelIndex
@@ -33,7 +33,7 @@ class TouchRow:
     touch : Touch, optional
     state : str
         A shape, see `chips.SHAPES`.
-    misfit : float, optional
+    residual : float, optional
         Distance from where the others expect the point, mm.
     suspect, target : bool
     """
@@ -41,7 +41,7 @@ class TouchRow:
     name: str
     touch: Touch | None
     state: str
-    misfit: float | None
+    residual: float | None
     suspect: bool
     target: bool
 
@@ -52,7 +52,7 @@ class TouchRow:
 
 
 class TouchTableModel(QAbstractTableModel):
-    """Names, positions and misfits of the touches of the side in work.
+    """Names, positions and residuals of the touches of the side in work.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ class TouchTableModel(QAbstractTableModel):
         self.refresh()
 
     def refresh(self) -> None:
-        """Ask the workspace anew."""
+        """Ask the workspace again."""
         known = [self._row(name) for name in self._workspace.pose.names]
         self.n_skull = sum(row.is_skull for row in known)
         rows = tuple(row for row in known if not row.is_skull or self._is_worth_a_row(row))
@@ -86,15 +86,15 @@ class TouchTableModel(QAbstractTableModel):
         self.rows = rows
         is_rescaled = self.largest != largest
         for n, (new, old) in enumerate(zip(rows, before, strict=True)):
-            if replace(new, misfit=old.misfit) != old:
+            if replace(new, residual=old.residual) != old:
                 self.dataChanged.emit(self.index(n, 0), self.index(n, CLEAR))
-            elif is_rescaled or new.misfit != old.misfit:  # most rows, with every touch: only this is painted
-                self.dataChanged.emit(self.index(n, MISFIT), self.index(n, MISFIT))
+            elif is_rescaled or new.residual != old.residual:  # most rows, with every touch
+                self.dataChanged.emit(self.index(n, RESIDUAL), self.index(n, RESIDUAL))
 
     @property
     def largest(self) -> float:
-        """The longest misfit, mm: full length of the bars, which are of 1 mm at least."""
-        return max([1.0, *(row.misfit for row in self.rows if row.misfit is not None)])
+        """The longest residual, mm: full length of the bars, which are of 1 mm at least."""
+        return max([1.0, *(row.residual for row in self.rows if row.residual is not None)])
 
     def row_of(self, name: str | None) -> int:
         """Return the number of a row by its name; -1 where there is none."""
@@ -124,14 +124,14 @@ class TouchTableModel(QAbstractTableModel):
     def _row(self, name: str) -> TouchRow:
         pose = self._workspace.pose
         touch = self._workspace.document.state.touches.get((pose.side, name))
-        misfit, suspect = self._misfit(name)
+        residual, suspect = self._residual(name)
         target = pose.target == name
         state = "active" if target else "to do"
         if touch is not None:
             state = "unseen" if touch.left_out else "doubtful" if suspect else "placed"
-        return TouchRow(name, touch, state, misfit, suspect, target)
+        return TouchRow(name, touch, state, residual, suspect, target)
 
-    def _misfit(self, name: str) -> tuple[float | None, bool]:
+    def _residual(self, name: str) -> tuple[float | None, bool]:
         estimate = self._workspace.pose.estimate
         if estimate is None:
             return None, False
@@ -188,7 +188,7 @@ class TouchTableModel(QAbstractTableModel):
             return row.name
         if column == XYZ:
             return "" if row.touch is None else triple(row.touch.position)
-        return fine_mm(row.misfit) if column == MISFIT and row.misfit is not None else ""
+        return fine_mm(row.residual) if column == RESIDUAL and row.residual is not None else ""
 
     def _hint(self, row: TouchRow, column: int) -> str:
         if row.touch is not None and column == USE:

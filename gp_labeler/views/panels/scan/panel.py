@@ -1,4 +1,4 @@
-"""The panel of the step Scan: what was opened, how its greys are shown, where bone begins, and its mesh."""
+"""The panel of the step Scan: the scan, its window and level, where bone begins, and its mesh."""
 
 from __future__ import annotations
 

@@ -68,7 +68,7 @@ class Welcome(QWidget):
         self.refresh()
 
     def refresh(self) -> None:
-        """List the recent files anew."""
+        """List the recent files again."""
         emptied(self._recent)
         self._button_icons = [entry for entry in self._button_icons if entry[0].objectName() != "recent"]
         recent = self._workspace.recent
