@@ -18,7 +18,9 @@ from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.io import (
+    Labelling,
     import_mat,
+    load_labellings,
     load_specimens,
     read_landmarks,
     read_touches,
@@ -48,6 +50,7 @@ from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
 from gp_core.study.nested_search import NestedReport, nested_search
 from gp_core.study.physical import PhysicalReport, physical_test
+from gp_core.study.reliability import ReliabilityReport, reliability
 from gp_core.study.simulation import SimulationReport, simulate
 from gp_core.study.subset_search import SearchReport, search_features
 
@@ -81,6 +84,7 @@ __all__ = [
     "Hypothesis",
     "JrmpcResult",
     "JrmpcSettings",
+    "Labelling",
     "LandmarkSet",
     "LeaveOneOutReport",
     "NestedReport",
@@ -89,6 +93,7 @@ __all__ = [
     "PoseGate",
     "PoseQuality",
     "RegistrationResult",
+    "ReliabilityReport",
     "RigidTransform",
     "ScanEvidence",
     "SearchReport",
@@ -113,6 +118,7 @@ __all__ = [
     "import_mat",
     "jrmpc",
     "leave_one_out",
+    "load_labellings",
     "load_specimens",
     "nested_search",
     "physical_test",
@@ -124,6 +130,7 @@ __all__ = [
     "read_pose",
     "read_touches",
     "register_fiducials",
+    "reliability",
     "search_features",
     "simulate",
     "touch_conditions",

@@ -23,6 +23,7 @@ from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
 from gp_core.study.nested_search import NestedReport
 from gp_core.study.physical import PhysicalReport
+from gp_core.study.reliability import PairedDifference, ReliabilityReport
 from gp_core.study.simulation import SimulationReport
 from gp_core.study.subset_search import SearchReport
 from gp_core.validation import FloatArray
@@ -33,6 +34,7 @@ __all__ = [
     "draw_physical",
     "error_boxes",
     "error_histograms",
+    "label_agreement",
     "nested_errors",
     "save_figure",
     "search_curves",
@@ -470,3 +472,53 @@ def _compared(ax: Axes, rows: Sequence[ComparisonRow], error: str) -> None:
 
 def _tick(noise: float, mistouch: float) -> str:
     return f"one off\n{mistouch:g}" if mistouch else f"noise\n{noise:g}"
+
+
+_DIRECTIONS = ("forwards", "outwards", "upwards")
+
+
+def label_agreement(report: ReliabilityReport) -> Figure:
+    """Draw differences of repeated labels against their mean (Bland and Altman), for each direction.
+
+    Lines are the mean difference and the limits of agreement (mean +- 1.96 SD): solid between observers,
+    where there are several, dashed between the rounds of one.
+
+    References
+    ----------
+    Bland and Altman, "Statistical methods for assessing agreement", Lancet 327, 1986.
+    https://doi.org/10.1016/S0140-6736(86)90837-8
+    """
+    figure, axes = new_figure(1, 3, (10.0, 3.6))
+    kinds = (("rounds of one observer", False, RIGHT, "--"), ("two observers", True, LEFT, "-"))
+    shown = [(name, _those(report.differences, inter), c, s) for name, inter, c, s in kinds]
+    for i, (ax, letter) in enumerate(zip(axes, "ABC", strict=True)):
+        for name, rows, colour, style in shown:
+            if rows:
+                _draw_agreement(
+                    ax, np.array([(r.mean[i], r.difference[i]) for r in rows]), name, colour, style
+                )
+        label(
+            ax,
+            letter,
+            f"Mean of two labels from the atlas, mm {_DIRECTIONS[i]}",
+            f"Difference, mm {_DIRECTIONS[i]}",
+        )
+        ax.axhline(0.0, color=_FAINT, linewidth=0.8, zorder=0)
+        ax.sharey(axes[0])
+    figure.legend(
+        *axes[0].get_legend_handles_labels(), fontsize=8, frameon=False, ncols=2, loc="outside upper center"
+    )
+    return figure
+
+
+def _those(differences: Sequence[PairedDifference], inter: bool) -> list[PairedDifference]:
+    return [row for row in differences if row.is_inter is inter]
+
+
+def _draw_agreement(ax: Axes, points: FloatArray, name: str, colour: str, style: str) -> None:
+    ax.scatter(points[:, 0], points[:, 1], s=7, color=colour, alpha=0.55, linewidths=0, label=name)
+    if len(points) < 2:
+        return
+    mean, spread = points[:, 1].mean(), points[:, 1].std(ddof=1)
+    for height, width in ((mean, 1.2), (mean - 1.96 * spread, 0.8), (mean + 1.96 * spread, 0.8)):
+        ax.axhline(height, color=colour, linewidth=width, linestyle=style)
