@@ -18,7 +18,13 @@ _MOST_DISAGREEMENTS = 8
 
 
 def add(commands: Subparsers) -> None:
-    """Add the command."""
+    """Add the command to the parser.
+
+    Parameters
+    ----------
+    commands : Subparsers
+        The subparsers of ``gp-core``, to which the command is added.
+    """
     parser = add_command(
         commands,
         "reliability",
@@ -41,7 +47,18 @@ def add(commands: Subparsers) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Measure, print, and write what was asked for."""
+    """Run ``gp-core reliability``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    int
+        Exit status; see `gp_core.cli.entry.main`.
+    """
     rng = rng_of(args)
     report = reliability(load_labellings(args.specimens, names=lab_names(args)), rng=rng)
     save_json(args.json, report.as_dict())

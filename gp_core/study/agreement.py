@@ -61,7 +61,13 @@ class ErrorSummary:
     sd_mm: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return it for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {**self.__dict__, "tem_95_mm": list(self.tem_95_mm)}
 
 
@@ -135,7 +141,13 @@ class IntraclassCorrelation:
     icc3_95: tuple[float, float]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file; None stands for what cannot be computed."""
+        """Return it for a JSON file; None stands for what cannot be computed.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         numbers = {name: _or_none(value) for name, value in (("icc2", self.icc2), ("icc3", self.icc3))}
         intervals = {"icc2_95": self.icc2_95, "icc3_95": self.icc3_95}
         bounds = {name: [_or_none(bound) for bound in interval] for name, interval in intervals.items()}
@@ -152,6 +164,10 @@ def intraclass_correlation(values: FloatArray, *, independent: int | None = None
         that large coordinates count more.
     independent : int, optional
         As how many independent coordinates the m count in the intervals; by default as m.
+
+    Returns
+    -------
+    IntraclassCorrelation
 
     Raises
     ------
@@ -317,7 +333,13 @@ class AnovaRow:
     p: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return it for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return dict(self.__dict__)
 
 

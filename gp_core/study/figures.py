@@ -483,6 +483,14 @@ def label_agreement(report: ReliabilityReport) -> Figure:
     Lines are the mean difference and the limits of agreement (mean +- 1.96 SD): solid between observers,
     where there are several, dashed between the rounds of one.
 
+    Parameters
+    ----------
+    report : ReliabilityReport
+
+    Returns
+    -------
+    Figure
+
     References
     ----------
     Bland and Altman, "Statistical methods for assessing agreement", Lancet 327, 1986.

@@ -106,7 +106,13 @@ class FeatureReliability:
     n_unseen: int = 0
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return it for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         parts = {name: getattr(self, name) for name in ("intra", "inter", "icc_intra", "icc_inter")}
         found = {name: None if part is None else part.as_dict() for name, part in parts.items()}
         return {"feature": self.code, **found, "n_unseen": self.n_unseen}
@@ -142,7 +148,13 @@ class ObserverOffset:
     n_animals: int
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return it for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {**self.__dict__, "observers": list(self.observers), "offset_mm": list(self.offset_mm)}
 
 
@@ -163,7 +175,13 @@ class PoseError:
     axis_deg: dict[str, float]
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return it for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return dict(self.__dict__)
 
 
@@ -192,7 +210,13 @@ class Disagreement:
     ratio: float
 
     def as_dict(self) -> dict[str, Any]:
-        """Return it for a JSON file."""
+        """Return it for a JSON file.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         return {**self.__dict__, "side": self.side.value, "labellings": list(self.labellings)}
 
 
@@ -265,7 +289,13 @@ class ReliabilityReport:
         return (*self.features, self.overall)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the report as the JSON file holds it."""
+        """Return the report as the JSON file holds it.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm, angles in degrees.
+        """
         poses = {"intra": self.pose_intra, "inter": self.pose_inter}
         return {
             "observers": list(self.observers),
@@ -285,7 +315,13 @@ class ReliabilityReport:
         }
 
     def save_csv(self, path: str | PathLike[str]) -> None:
-        """Write one line a feature, and one for all; numbers keep every bit."""
+        """Write one line a feature, and one for all; numbers keep every bit.
+
+        Parameters
+        ----------
+        path : path
+            The file to write.
+        """
         stream = io.StringIO()
         writer = csv.writer(stream, lineterminator="\n")
         errors = ("n_pairs", "mean_mm", "median_mm", "max_mm", "dahlberg_mm", "tem_mm", "sd_mm")
