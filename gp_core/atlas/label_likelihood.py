@@ -337,9 +337,7 @@ def best_hypothesis(model: LabelModel, points: FloatArray, *, below: float = np.
     fit = model.fit(points)
     hypothesis = replace(hypothesis, cost=float(fit.deviances[0]))
     for _ in range(len(points) // 2):
-        if (
-            model.prior_cost(hypothesis) + float(fit.log_det[0]) > below
-        ):  # and the squared residuals are not negative
+        if model.prior_cost(hypothesis) + float(fit.log_det[0]) > below:  # squared residuals only add to it
             break
         exchanges, outliers = _candidates(model, hypothesis, fit)
         costs = np.concatenate([model.costs(exchanges), model.costs(outliers)])

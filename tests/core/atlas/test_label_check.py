@@ -94,7 +94,7 @@ def test_a_finding_says_what_how_sure_and_what_to_do(published: Atlas) -> None:
     np.testing.assert_allclose(finding.deviation_of(a).expected, ear[a], atol=1.0)
 
 
-def test_several_mistakes_are_told_apart(published: Atlas) -> None:
+def test_several_mistakes_are_distinguished(published: Atlas) -> None:
     (ear,) = _ears(published, 19, 1, seed=4)
     wrong = _swapped(_swapped(ear, "CA", "CB"), "RWA", "RWP").with_point("OS", ear["OS"] + [0, 0, 4])
     found = {(f.kind, f.landmarks) for f in check_side(_renamed(wrong), published).findings if f.is_problem}

@@ -156,7 +156,7 @@ def test_writing_onto_a_folder_is_said_plainly(
         ("touches.dat", "1,5\t2,5\t-3,5e1\n" * 6),
     ],
 )
-def test_decimal_commas_are_told_from_columns(
+def test_decimal_commas_are_distinguished_from_columns(
     name: str, text: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / name).write_text(text)

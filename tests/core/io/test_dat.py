@@ -48,7 +48,7 @@ def test_rows_by_their_number(file, separator):
     assert [sixteen.extra[name].tolist() for name in skull_feature_names()] == ROWS[8:]
 
 
-def test_numbers_in_an_unused_row_are_told(file, caplog):
+def test_numbers_in_an_unused_row_are_reported(file, caplog):
     read_touches(write(file, ROWS), "L")
     assert "line 4" in caplog.text
     assert "line 8" in caplog.text

@@ -97,7 +97,7 @@ def test_wrong_content_is_named(file, content, message):
         read_landmarks(file)
 
 
-def test_sixteen_columns_are_written_and_points_not_placed_are_told_apart(file):
+def test_sixteen_columns_are_written_and_states_are_distinguished(file):
     landmarks = some_landmarks("R", n_placed=9).with_unseen("ZL")
     write_fcsv(file, landmarks)
     rows = [line.split(",") for line in file.read_text().splitlines() if not line.startswith("#")]

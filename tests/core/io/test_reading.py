@@ -36,7 +36,7 @@ def test_a_file_without_a_side_needs_the_argument(tmp_path, stem):
     assert read_landmarks(file, side="R").side.value == "R"
 
 
-def test_a_specimen_file_is_told_from_a_landmark_file(tmp_path):
+def test_a_specimen_file_is_distinguished_from_a_landmark_file(tmp_path):
     file = tmp_path / "GP01.gpspecimen.json"
     file.write_text('{"format": "gp-labeler specimen", "version": 3}')
     with pytest.raises(FileFormatError, match=r"gp-labeler export GP01\.gpspecimen\.json -o labelled"):

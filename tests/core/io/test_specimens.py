@@ -152,7 +152,7 @@ def test_an_animal_that_was_labelled_three_times_is_one_animal(tmp_path, caplog)
         load_specimens(tmp_path, observer="EF")
 
 
-def test_one_observer_who_has_two_files_of_one_round_is_told_how_to_name_them(tmp_path):
+def test_two_files_of_one_round_give_a_remedy_for_their_names(tmp_path):
     _labelled(tmp_path, "AB", 1)
     _labelled(tmp_path / "other", "AB", 1, shift=0.2)
     with pytest.raises(FeatureError, match=r"too.*GP1_AB_r2_L\.mrk\.json"):

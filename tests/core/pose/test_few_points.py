@@ -22,7 +22,7 @@ def _said(pose: CochleaPose) -> list[str]:
 
 
 @pytest.mark.parametrize("n", [3, 4])
-def test_up_to_four_points_a_mistouch_cannot_be_told(n: int) -> None:
+def test_up_to_four_points_a_mistouch_cannot_be_detected(n: int) -> None:
     assert _said(_pose(n)) == [f"only {n} points: a mistouch cannot be distinguished from an unusual animal"]
 
 

@@ -56,7 +56,7 @@ def test_the_region_of_every_exchange_reaches_the_truth() -> None:
     assert (np.mean(held, axis=0) >= 0.9).all()
 
 
-def test_the_heaviest_other_reading_is_the_true_one() -> None:
+def test_the_likeliest_other_hypothesis_is_the_true_one() -> None:
     animal, touches = _touches(1, 0.1)
     exchanged = {**touches, "CL": touches["OS"], "OS": touches["CL"]}
     pose = estimate_pose(exchanged, "L", ATLAS)

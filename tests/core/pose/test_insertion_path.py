@@ -123,7 +123,7 @@ def test_units_must_be_said(tmp_path: Path) -> None:
         read_path(file, units="inch")
 
 
-def test_axes_are_turned_but_never_mirrored(tmp_path: Path) -> None:
+def test_axes_are_rotated_but_never_mirrored(tmp_path: Path) -> None:
     path = _spiral()
     theirs = np.column_stack([path[:, 2], -path[:, 1], path[:, 0]])
     file = _write(tmp_path / "path.csv", theirs)

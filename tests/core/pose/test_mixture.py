@@ -16,7 +16,7 @@ def _covariance(scale: float) -> np.ndarray:
     return root @ root.T
 
 
-def test_of_one_reading_it_is_the_plain_radius() -> None:
+def test_of_one_hypothesis_it_is_the_plain_radius() -> None:
     covariance = np.zeros((6, 6))
     covariance[:3, :3] = _covariance(0.2)
     part = origin_part(1.0, np.ones(3), np.ones(3), covariance)
@@ -24,7 +24,7 @@ def test_of_one_reading_it_is_the_plain_radius() -> None:
 
 
 @pytest.mark.parametrize("share", [0.004, 0.02, 0.3, 0.7, 0.999])
-def test_it_holds_95_percent_of_the_mixture_and_of_every_reading_not_ruled_out(share: float) -> None:
+def test_it_covers_95_percent_of_the_mixture_and_of_every_hypothesis_not_ruled_out(share: float) -> None:
     parts = [
         MixturePart(1 - share, np.zeros(3), _covariance(0.2)),
         MixturePart(share, np.array([2.0, 1, 0]), _covariance(0.3)),
@@ -43,7 +43,7 @@ def test_it_holds_95_percent_of_the_mixture_and_of_every_reading_not_ruled_out(s
         assert held[1] < 0.1
 
 
-def test_a_reading_of_no_weight_changes_nothing() -> None:
+def test_a_hypothesis_of_no_weight_changes_nothing() -> None:
     parts = [
         MixturePart(1.0, np.zeros(3), _covariance(0.2)),
         MixturePart(0.0, np.full(3, 9.0), _covariance(0.2)),

@@ -20,7 +20,7 @@ def test_six_touches_that_agree_are_good():
     assert (found.level, found.word) == ("good", "Good")
 
 
-def test_a_wrong_side_and_swapped_names_are_told_first():
+def test_a_wrong_side_and_swapped_names_are_reported_first():
     wrong = estimate_pose(ANIMAL, "R", ATLAS)
     swapped = estimate_pose({**ANIMAL, "MN": ANIMAL["OS"], "OS": ANIMAL["MN"]}, "L", ATLAS)
     assert (pose_quality(wrong).level, pose_quality(swapped).level) == ("danger", "danger")

@@ -58,7 +58,7 @@ def test_it_moves_nothing_and_widens_the_region() -> None:
         assert np.linalg.eigvalsh(grown).min() > -1e-12
 
 
-def test_an_offset_common_to_all_touches_is_held_where_it_is_told() -> None:
+def test_an_offset_common_to_all_touches_is_covered_where_it_is_given() -> None:
     held = []
     for seed in range(60):
         rng = np.random.default_rng(seed)
@@ -120,7 +120,7 @@ def test_the_next_touch_is_weighed_with_the_same_shared_error() -> None:
         assert gains(touches, ATLAS, shared_error=mm)[0].radius_95_now == pytest.approx(pose.plain_radius_95)
 
 
-def test_a_drift_is_told_where_touches_carry_times() -> None:
+def test_a_drift_is_estimated_where_touches_carry_times() -> None:
     rng = np.random.default_rng(3)
     animal = draw_side(ATLAS, rng)
     codes = tuple(rng.permutation(EXTERNAL))

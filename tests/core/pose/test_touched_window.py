@@ -77,7 +77,7 @@ def test_an_edge_under_another_name_is_no_window(a: str, b: str, wanted: str) ->
     assert pose.round_window == wanted
 
 
-def test_the_turn_is_at_least_as_sure_as_it_says() -> None:
+def test_the_covariance_of_the_rotation_is_conservative() -> None:
     squared = []
     for seed in range(120):
         animal = _animal(seed, side := Side.LEFT if seed % 2 else Side.RIGHT)

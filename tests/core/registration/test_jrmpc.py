@@ -123,7 +123,7 @@ def test_stopping_at_rest_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> No
     assert_same(early, full)
 
 
-def test_too_few_iterations_are_told() -> None:
+def test_too_few_iterations_are_reported() -> None:
     assert not jrmpc(animals(1), max_iterations=3).converged
 
 
@@ -150,7 +150,7 @@ def test_shift_of_one_set_changes_its_translation_only() -> None:
     np.testing.assert_allclose(shifted.translations[1:], still.translations[1:], atol=1e-9)
 
 
-def test_turn_of_one_set_is_undone() -> None:
+def test_rotation_of_one_set_is_undone() -> None:
     rng = np.random.default_rng(3)
     shape = rng.normal(size=(30, 3)) * [4.0, 3.0, 2.0]
     centres = shape + 0.2 * rng.normal(size=shape.shape)

@@ -29,7 +29,7 @@ def random_orthogonal(rng: np.random.Generator) -> FloatArray:
     return np.linalg.qr(rng.normal(size=(3, 3)))[0]
 
 
-def test_the_turn_is_that_of_the_singular_value_decomposition() -> None:
+def test_the_rotation_is_that_of_the_singular_value_decomposition() -> None:
     """Nearly singular, mirrored, tiny and huge matrices too; the error grows as the rotation gets open."""
     rng = np.random.default_rng(0)
     for _ in range(3000):
@@ -42,10 +42,10 @@ def test_the_turn_is_that_of_the_singular_value_decomposition() -> None:
 
 
 @pytest.mark.parametrize("h", [np.zeros((3, 3)), np.diag([1.0, 0, 0]), np.diag([1.0, 1.0, -1.0])])
-def test_open_turn_is_the_least(h: FloatArray) -> None:
+def test_an_under_determined_rotation_is_the_minimal_one(h: FloatArray) -> None:
     np.testing.assert_allclose(rotation_of(h), np.eye(3), atol=1e-12)
 
 
-def test_opposite_of_no_turn_is_still_a_rotation() -> None:
+def test_opposite_of_the_identity_is_still_a_rotation() -> None:
     rotation = rotation_of(np.diag([-1.0, -1.0, 1.0]))
     np.testing.assert_allclose(rotation, np.diag([-1.0, -1.0, 1.0]), atol=1e-12)

@@ -121,7 +121,7 @@ def test_matrices_that_are_not_rigid_are_left_out() -> None:
     assert np.linalg.norm(found.tip_offset - TIP) < 0.2
 
 
-def test_more_turning_shows_in_spread_and_error() -> None:
+def test_more_rotation_shows_in_spread_and_error() -> None:
     wide, narrow = (calibrate_pivot(recorded(100, noise=0.2, tilt=tilt, spin=5)) for tilt in (40.0, 15.0))
     assert wide.spread_deg > 1.5 * narrow.spread_deg
     assert wide.standard_error_mm < narrow.standard_error_mm

@@ -105,7 +105,7 @@ CROSS = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0.0]])
         (np.full((4, 3), 150.1), "one line"),
     ],
 )
-def test_points_that_leave_a_turn_open_are_named(source: FloatArray, words: str) -> None:
+def test_points_that_do_not_determine_a_rotation_are_named(source: FloatArray, words: str) -> None:
     names = ("RWA", "RWP", "LLI", "MN")[: len(source)]
     with pytest.raises(GeometryError, match=words):
         weighted_procrustes(source, source, names=names)
@@ -122,7 +122,7 @@ def test_line_in_the_target_is_refused() -> None:
         weighted_procrustes(CROSS, LINE)
 
 
-def test_ambiguous_turn_is_refused() -> None:
+def test_ambiguous_rotation_is_refused() -> None:
     tetrahedron = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
     with pytest.raises(GeometryError, match="do not determine"):
         weighted_procrustes(tetrahedron, mirror_x(tetrahedron))

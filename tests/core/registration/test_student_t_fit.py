@@ -75,7 +75,7 @@ def test_they_agree_on_real_touches_of_either_side(name: str, shared_data: Path)
         _assert_same(_model(PROBE), points)
 
 
-def test_the_turn_is_the_best_of_all_rotations() -> None:
+def test_the_rotation_is_the_optimal_one() -> None:
     rng = np.random.default_rng(0)
     for trial in range(300):
         h = rng.normal(size=(3, 3)) @ np.diag([1, 10.0 ** -rng.integers(0, 4), 10.0 ** -rng.integers(0, 8)])
@@ -89,7 +89,7 @@ def test_the_turn_is_the_best_of_all_rotations() -> None:
         assert np.trace(matrix.T @ h) == pytest.approx(best, rel=1e-12)
 
 
-def test_an_open_turn_is_not_a_number() -> None:
+def test_an_under_determined_rotation_is_not_a_number() -> None:
     half = (1.0, 0, 0, 0, 0, 0, 0, 0, 0)
     assert np.isnan(rotation.optimal_rotation(half, (1.0, 0, 0, 0))).all()
 

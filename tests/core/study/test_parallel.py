@@ -37,7 +37,7 @@ def test_results_are_in_order() -> None:
     assert run_map(square, []) == []
 
 
-def test_results_are_told_as_they_come() -> None:
+def test_results_are_reported_as_they_come() -> None:
     told: list[tuple[int, int]] = []
     with ThreadPoolExecutor(3) as threads:
         run_map(square, [3, 4, 5], threads, done=lambda i, result: told.append((i, result)))
