@@ -63,11 +63,17 @@ def follow(owner: QObject, signal: Any, slot: Callable[..., object]) -> None:
     method = weakref.WeakMethod(slot)  # a strong one would keep a widget alive that nobody holds
 
     def let_go() -> None:
+        _let_go.discard(let_go)
         living = method()
         if living is not None:
             signal.disconnect(living, missing_ok=True)
 
+    _let_go.add(let_go)
     owner.destroyed.connect(let_go)
+
+
+_let_go: set[Callable[[], None]] = set()
+"""Keeps these functions out of the garbage: PyQt would call one that the collector has cleared already."""
 
 
 def attempt(teller: Teller, action: Callable[[], object]) -> bool:

@@ -26,8 +26,12 @@ class CanvasView(Protocol):
         """Draw the scene as it is now."""
         ...
 
-    def paint_over(self, painter: QPainter) -> None:
-        """Paint what lies over the frame."""
+    def paint_overlay(self, painter: QPainter) -> None:
+        """Paint what lies over the frame and changes only with it."""
+        ...
+
+    def paint_pointer(self, painter: QPainter) -> None:
+        """Paint what follows the pointer and the crosshair."""
         ...
 
     def forget(self) -> None:
@@ -136,12 +140,15 @@ class PaintedCanvas:
         return nullcontext()
 
     def take(self) -> None:
-        """Read the pixels."""
+        """Read the pixels, and paint over them: where only the pointer moves, none of it is done again."""
         pixels = self.target.pixels()
         height, width, _ = pixels.shape
         frame = QImage(pixels.data, width, height, 3 * width, QImage.Format.Format_RGB888)
         frame = frame.convertToFormat(QImage.Format.Format_RGB32)  # as the screen has it: painted at once
         frame.setDevicePixelRatio(self._view.devicePixelRatioF())
+        painter = QPainter(frame)
+        self._contents.paint_overlay(painter)
+        painter.end()
         self._frame = frame
 
     def paint(self, painter: QPainter) -> None:
@@ -149,7 +156,7 @@ class PaintedCanvas:
         if self._frame is not None:
             painter.drawImage(QPointF(0, 0), self._frame)
             self._painted = self._frame
-        self._contents.paint_over(painter)
+        self._contents.paint_pointer(painter)
 
     def resize(self) -> None:
         """Do nothing: the next picture has the view's size."""

@@ -160,5 +160,6 @@ class _Over(QWidget):
 
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: N802
         painter = QPainter(self)
-        self._contents.paint_over(painter)
+        self._contents.paint_overlay(painter)
+        self._contents.paint_pointer(painter)
         painter.end()

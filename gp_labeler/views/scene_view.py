@@ -319,12 +319,15 @@ class SceneView(QWidget):
         self.canvas.paint(painter)
         painter.end()
 
-    def paint_over(self, painter: QPainter) -> None:
-        """Paint what lies over the frame."""
+    def paint_overlay(self, painter: QPainter) -> None:
+        """Paint what lies over the frame and changes only with it."""
         painter.save()
         painter.scale(1 / self.scene.scale, 1 / self.scene.scale)
         self.overlay.paint(painter)
         painter.restore()
+
+    def paint_pointer(self, painter: QPainter) -> None:
+        """Paint what follows the pointer and the crosshair."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._workspace.scan.volume is not None:
             paint_crosshair(painter, self, self.scene, self._workspace.view.crosshair)
