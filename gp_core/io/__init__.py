@@ -18,7 +18,7 @@ from gp_core.io.reading import (
     specimen_of,
     unknown_labels,
 )
-from gp_core.io.specimens import Labelling, landmark_files, load_labellings, load_specimens
+from gp_core.io.specimens import Labelling, landmark_files, load_labellings, load_specimens, mean_labels
 from gp_core.io.table import write_csv
 
 __all__ = [
@@ -33,6 +33,7 @@ __all__ = [
     "landmarks_of",
     "load_labellings",
     "load_specimens",
+    "mean_labels",
     "natural_key",
     "read_authors_mat",
     "read_lab_names",

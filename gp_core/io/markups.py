@@ -258,7 +258,14 @@ def write_suggestions(
     """
     if not landmarks.suggested:
         raise GpError(f"nothing is suggested on the {landmarks.side.word} side", specimen=specimen)
-    header = FileHeader(specimen=specimen, side=landmarks.side, frame=landmarks.frame, volume=volume)
+    header = FileHeader(
+        specimen=specimen,
+        side=landmarks.side,
+        frame=landmarks.frame,
+        volume=volume,
+        observer=landmarks.observer or None,
+        round=landmarks.round,
+    )
     write_point_lists(path, {"Fiducial": suggestions_of(landmarks)}, header)
 
 

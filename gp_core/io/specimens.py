@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from os import PathLike, fspath
 from pathlib import Path
@@ -20,7 +20,7 @@ from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 
-__all__ = ["Labelling", "landmark_files", "load_labellings", "load_specimens"]
+__all__ = ["Labelling", "landmark_files", "load_labellings", "load_specimens", "mean_labels"]
 
 _log = logging.getLogger(__name__)
 
@@ -137,7 +137,7 @@ def load_labellings(
         check_plausible_size(landmarks, file)
         key = _Key(name, landmarks.observer, landmarks.round)
         only_suggested = bool(landmarks.suggested) and not landmarks.placed
-        if only_suggested:
+        if only_suggested and key not in sides:
             key = next((k for k in sides if k.name == name and landmarks.side in sides[k]), key)
         earlier, labels = sources.setdefault((key, landmarks.side, only_suggested), (file, landmarks))
         if earlier is not file:
@@ -227,20 +227,39 @@ def _mean_of(labellings: list[Labelling]) -> Specimen:
     for side in Side:
         of_side = [each.specimen.sides[side] for each in labellings if side in each.specimen.sides]
         if of_side:
-            sides[side] = _mean_side(of_side, first.name)
+            sides[side] = mean_labels(of_side, first.name)
     told = "; ".join(each.who for each in labellings)
     _log.warning("%s: labelled %d times, the mean is taken (%s)", first.name, len(labellings), told)
     return Specimen(first.name, sides)
 
 
-def _mean_side(labelled: list[LandmarkSet], name: str) -> LandmarkSet:
+def mean_labels(labelled: Sequence[LandmarkSet], specimen: str) -> LandmarkSet:
+    """Return the mean of several labellings of one side.
+
+    Parameters
+    ----------
+    labelled : sequence of LandmarkSet
+        Of one side, in one frame.
+    specimen : str
+        Whose they are, for messages.
+
+    Returns
+    -------
+    LandmarkSet
+        Each feature is the mean of the labellings that have it; of one labelling, that itself.
+
+    Raises
+    ------
+    FeatureError
+        They are in different frames.
+    """
     if len(labelled) == 1:
         return labelled[0]
     first = labelled[0]
     if other := next((each for each in labelled if each.frame != first.frame), None):
         raise FeatureError(
             f"its labels are in the frames {first.frame} and {other.frame}",
-            specimen=name,
+            specimen=specimen,
             remedy="Export them all in the frame of the scan.",
         )
     points = {

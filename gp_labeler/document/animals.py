@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 
@@ -12,7 +12,7 @@ import numpy as np
 from gp_core.atlas.label_check import Finding
 from gp_core.atlas.screening import Screened, screen_labels
 from gp_core.errors import GpError
-from gp_core.io import load_specimens
+from gp_core.io import load_specimens, mean_labels
 from gp_core.io.file_names import natural_key
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import LandmarkSet, Specimen
@@ -122,10 +122,11 @@ def read_animals(
     for n, file in enumerate(files):
         tell(0.3 * n / max(len(files), 1))
         reading.read(file)
-    specimens = [Specimen(name, reading.sides[name]) for name in sorted(reading.sides, key=natural_key)]
+    specimens = [reading.specimen(name) for name in sorted(reading.sides, key=natural_key)]
     screened = screen_labels(
         specimens, confirmed=reading.confirmed, tell=lambda fraction: tell(0.3 + 0.7 * fraction)
     )
+    screened = replace(screened, notes=(*reading.notes, *screened.notes))
     exchanged = {(f.specimen, f.side): f for f in screened.findings if f.kind == "other side"}
     skipped = [Skipped(f"{name} {side.word}", f.text) for (name, side), f in exchanged.items()]
     usable = [_without_sides(specimen, exchanged) for specimen in specimens]
@@ -151,6 +152,23 @@ class _Reading:
         self.sources: dict[tuple[str, Side], Path] = {}
         self.skipped: list[Skipped] = []
         self.confirmed: set[tuple[str, Side, str]] = set()
+        self._repeats: dict[tuple[str, Side], list[LandmarkSet]] = {}
+
+    @property
+    def notes(self) -> list[str]:
+        """Which sides have the mean of several labellings."""
+        return [
+            f"{name} {side.word}: the mean of {1 + len(repeats)} labellings is taken."
+            for (name, side), repeats in self._repeats.items()
+        ]
+
+    def specimen(self, name: str) -> Specimen:
+        """Return an animal, with the mean of the labels of a side that was labelled several times."""
+        sides = {
+            side: mean_labels([first, *self._repeats.get((name, side), ())], name)
+            for side, first in self.sides[name].items()
+        }
+        return Specimen(name, sides)
 
     def read(self, file: Path) -> None:
         """Take in the sides that a file holds."""
@@ -188,9 +206,19 @@ class _Reading:
         elif side not in self.sides.get(name, {}):
             self.sides.setdefault(name, {})[side] = landmarks
             self.sources[name, side] = file
-        elif not _are_same(self.sides[name][side], landmarks):
+        elif _are_same(self.sides[name][side], landmarks):
+            return
+        elif self._is_another_labelling(name, landmarks):
+            self._repeats.setdefault((name, side), []).append(landmarks)
+        else:
             earlier = self.sources[name, side].name
             self.skipped.append(Skipped(what, f"this side is in {earlier} too, with other labels"))
+
+    def _is_another_labelling(self, name: str, landmarks: LandmarkSet) -> bool:
+        """Whether it is by another observer, or of another round, in the same frame."""
+        known = [self.sides[name][landmarks.side], *self._repeats.get((name, landmarks.side), ())]
+        sittings = {(each.observer, each.round) for each in known}
+        return (landmarks.observer, landmarks.round) not in sittings and landmarks.frame == known[0].frame
 
 
 def _has_own_labels(landmarks: LandmarkSet) -> bool:

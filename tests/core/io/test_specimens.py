@@ -16,10 +16,12 @@ from gp_core.io import (
     write_csv,
     write_fcsv,
     write_markups,
+    write_suggestions,
 )
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
+from gp_core.landmarks.suggestion import Suggestion
 
 
 def write(folder, specimen, side, *, seed=0, name=None):
@@ -198,3 +200,17 @@ def test_the_shared_point_in_one_of_two_files_counts_for_both(tmp_path):
     write_markups(tmp_path / "GP1_R.mrk.json", right, specimen="GP1")
     (animal,) = load_specimens(tmp_path)
     np.testing.assert_array_equal(animal.side("L")["IN"], right["IN"])
+
+
+def test_suggestions_stay_with_the_round_that_they_were_made_in(tmp_path):
+    for round_ in (1, 2):
+        marks = _labelled(tmp_path, "AB", round_, shift=0.1 * round_)
+        if round_ == 2:
+            marks = marks.with_point("MN", None).with_suggestions({"MN": Suggestion((1.0, 2.0, 3.0))})
+            for suggested, write in ((False, write_markups), (True, write_suggestions)):
+                name = landmark_file_name("GP1", marks.side, suggested=suggested, observer="AB", round_=2)
+                write(tmp_path / name, marks, specimen="GP1")
+    first, second = (each.specimen.side("L") for each in load_labellings(tmp_path))
+    assert (set(first.suggested), set(second.suggested)) == (set(), {"MN"})
+    assert "MN" in first
+    assert "MN" not in second

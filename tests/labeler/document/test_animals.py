@@ -7,6 +7,7 @@ import pytest
 from animal_cases import drawn_animals, write_animals, write_side
 
 from gp_core.errors import GpError
+from gp_core.io import landmark_file_name, write_markups
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.animals import read_animals
@@ -62,6 +63,20 @@ def test_what_cannot_be_used_is_skipped_with_its_reason(tmp_path) -> None:
     assert "torn.mrk.json" in reasons
     assert "in GP03_R.mrk.json too, with other labels" in reasons["GP03 right (GP03_R.mrk.json)"]
     assert len(reasons) == 4
+
+
+def test_an_animal_of_two_observers_is_one_with_the_mean_of_its_labels(tmp_path) -> None:
+    (animal,) = drawn_animals(1)
+    truth = animal.side(L)
+    for observer, shift in (("AB", 0.0), ("CD", 0.2)):
+        marks = LandmarkSet(truth.points + shift, L, observer=observer)
+        file = tmp_path / landmark_file_name("GP01", L, observer=observer, round_=1)
+        write_markups(file, marks, specimen="GP01")
+    animals = read_animals([tmp_path])
+    assert (animals.text, animals.skipped) == ("1 animal, 1 side", ())
+    np.testing.assert_allclose(animals.specimens[0].side(L)["CA"], truth["CA"] + 0.1, atol=1e-9)
+    assert animals.screened is not None
+    assert animals.screened.notes == ("GP01 left: the mean of 2 labellings is taken.",)
 
 
 def test_a_label_far_off_is_read_and_named(tmp_path) -> None:
