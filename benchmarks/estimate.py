@@ -17,7 +17,7 @@ _ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [
     str(_ROOT),
     str(_ROOT / "tests" / "core" / "registration"),
-    str(_ROOT / "tests" / "core" / "atlas"),
+    str(_ROOT / "tests" / "core"),
 ]
 
 from atlas_cases import draw_side, draw_specimens  # noqa: E402

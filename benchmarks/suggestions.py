@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 _ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(_ROOT), str(_ROOT / "tests" / "labeler" / "models")]
+sys.path[:0] = [str(_ROOT), *(str(_ROOT / "tests" / "labeler" / room) for room in ("", "models"))]
 
 from suggestion_users import Coverage, measured, mirrored  # noqa: E402
 

@@ -93,3 +93,12 @@ def test_no_real_data_is_shipped() -> None:
     listed = subprocess.run(["git", "ls-files"], capture_output=True, text=True, check=False, cwd=_ROOT)
     odd = [f for f in listed.stdout.split() if f.endswith((".mat", ".dat", ".nii", ".gz", ".nrrd", ".dcm"))]
     assert odd == []
+
+
+@pytest.mark.parametrize("path", sorted((_ROOT / "benchmarks").glob("*.py")), ids=lambda p: p.name)
+def test_every_benchmark_finds_what_it_imports(path: Path) -> None:
+    code = f"import runpy; runpy.run_path({str(path)!r}, run_name='imported')"
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=_ROOT
+    )
+    assert done.returncode == 0, done.stderr[-500:]
