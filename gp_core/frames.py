@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import FrameError
 from gp_core.validation import FloatArray, as_points
 
@@ -48,6 +49,7 @@ class RigidTransform:
     src: str
 
     def __post_init__(self) -> None:
+        check_fields(self)
         matrix = np.array(self.matrix, dtype=np.float64)
         if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
             raise FrameError(f"a rigid transform must be a finite (4, 4) matrix, got shape {matrix.shape}")
@@ -84,8 +86,11 @@ class RigidTransform:
             The matrix is not a rotation.
         """
         matrix = np.eye(4)
-        matrix[:3, :3] = rotation
-        matrix[:3, 3] = translation
+        try:
+            matrix[:3, :3] = rotation
+            matrix[:3, 3] = translation
+        except (TypeError, ValueError, OverflowError):
+            raise FrameError("a rigid transform is of (3, 3) and (3,) numbers") from None
         return cls(matrix, dst, src)
 
     @classmethod
@@ -160,6 +165,7 @@ class RigidTransform:
             turned_back, -turned_back @ self.translation, dst=self.src, src=self.dst
         )
 
+    @checks_arguments
     def __matmul__(self, other: RigidTransform) -> RigidTransform:
         """Compose ``T_a_b @ T_b_c``.
 

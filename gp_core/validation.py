@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import fields
 from difflib import get_close_matches
 from typing import Any
 
@@ -11,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GpError
 
-__all__ = ["FloatArray", "as_points", "check_option", "near_matches"]
+__all__ = ["FloatArray", "as_points", "check_option", "freeze_arrays", "near_matches"]
 
 FloatArray = NDArray[np.float64]
 
@@ -40,7 +41,7 @@ def as_points(value: ArrayLike, name: str, *, missing_allowed: bool = False) -> 
     """
     try:
         points = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise GpError(f"{name} must be numbers in (N, 3), got {type(value).__name__}") from None
     if points.ndim != 2 or points.shape[1] != 3:
         raise GpError(f"{name} must have the shape (N, 3), got {points.shape}")
@@ -49,6 +50,21 @@ def as_points(value: ArrayLike, name: str, *, missing_allowed: bool = False) -> 
         row = int(np.flatnonzero(bad.any(axis=1))[0])
         raise GpError(f"{name} must be finite, got {points[row].tolist()} in row {row}")
     return points
+
+
+def freeze_arrays(instance: Any) -> None:
+    """Give a frozen dataclass arrays of its own that cannot be written to; call it in ``__post_init__``.
+
+    Parameters
+    ----------
+    instance : dataclass
+    """
+    for one in fields(instance):
+        value = getattr(instance, one.name)
+        if isinstance(value, np.ndarray):
+            own = value.copy()
+            own.setflags(write=False)
+            object.__setattr__(instance, one.name, own)
 
 
 def check_option(value: Any, name: str, allowed: Iterable[Any]) -> None:
@@ -69,7 +85,7 @@ def check_option(value: Any, name: str, allowed: Iterable[Any]) -> None:
         It is none of them; the message suggests similar values.
     """
     options = list(allowed)
-    if value not in options:
+    if not isinstance(value, str | int | float) or value not in options:
         shown = ", ".join(str(o) for o in options)
         raise GpError(f"{name} must be one of {shown}, got {value!r}{near_matches(str(value), options)}")
 

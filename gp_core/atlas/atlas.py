@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.atlas.published import published_shape
 from gp_core.constants import DEFINING_FEATURES
 from gp_core.disk import read_head, read_json, write_text
@@ -74,6 +75,7 @@ class Atlas:
     specimens: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
+        check_fields(self, leaving_out=("codes", "specimens"))
         codes = check_codes(self.codes, "the atlas", allowed=PLACED)
         if list(codes) != sorted(codes, key=index_of):
             raise FeatureError(f"the features of atlas {self.name!r} are out of order: {' '.join(codes)}")
@@ -123,6 +125,7 @@ class Atlas:
             return _published()
 
     @classmethod
+    @checks_arguments
     def load(cls, path: str | PathLike[str]) -> Atlas:
         """Read an atlas file.
 
@@ -178,6 +181,7 @@ class Atlas:
                 "is a damaged atlas: numbers or names are not where they should be", file=path, remedy=remedy
             ) from None
 
+    @checks_arguments
     def save(self, path: str | PathLike[str]) -> None:
         """Write the atlas as JSON, with full precision.
 
@@ -204,6 +208,7 @@ class Atlas:
         }
         write_text(path, json.dumps(content, indent=1) + "\n")
 
+    @checks_arguments
     def __getitem__(self, code: str) -> FloatArray:
         """Return the mean position (3,) of a feature, of CO too, in mm."""
         if code == "CO":
@@ -216,6 +221,7 @@ class Atlas:
         """(3,) mean position of CO, mm: the origin of the atlas frame, up to rounding."""
         return cochlea_origin(*(self.mean[self._row(code)] for code in DEFINING_FEATURES))
 
+    @checks_arguments
     def rows(self, codes: Iterable[str]) -> FloatArray:
         """Return the mean positions of features.
 
@@ -236,6 +242,7 @@ class Atlas:
         """
         return self.mean[[self._row(code) for code in codes]]
 
+    @checks_arguments
     def variances(self, codes: Iterable[str]) -> FloatArray:
         """Return the variance of features between animals, averaged over the three coordinates.
 
@@ -253,6 +260,7 @@ class Atlas:
         mean: FloatArray = diagonal.reshape(-1, 3).mean(axis=1)
         return mean
 
+    @checks_arguments
     def cross_covariance(self, codes: Iterable[str], others: Iterable[str]) -> FloatArray:
         """Return the covariance between the coordinates of two lists of features.
 
@@ -268,6 +276,7 @@ class Atlas:
         """
         return self.covariance[np.ix_(self.coordinates(codes), self.coordinates(others))]
 
+    @checks_arguments
     def coordinates(self, codes: Iterable[str]) -> list[int]:
         """Return the rows of `covariance` that belong to features.
 

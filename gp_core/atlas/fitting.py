@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas, fit_weighted_atlas
 from gp_core.atlas.screening import Screened, screen_labels
@@ -12,6 +13,7 @@ from gp_core.landmarks.sets import Specimen
 __all__ = ["fit_atlas", "fit_screened_atlas"]
 
 
+@checks_arguments
 def fit_atlas(
     specimens: Sequence[Specimen],
     *,

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_likelihood import (
     LABELLING_NOISE_MM,
@@ -28,7 +29,7 @@ from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = [
     "OUTLIER_SD",
@@ -96,6 +97,9 @@ class Deviation:
     expected: FloatArray
     covariance: FloatArray
     n_sd: float
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def is_outlier(self) -> bool:
@@ -262,6 +266,7 @@ class SideCheck:
         return found
 
 
+@checks_arguments
 def check_specimen(
     specimen: Specimen, atlas: Atlas, *, scan: Mapping[Side, ScanEvidence] | None = None
 ) -> list[Finding]:
@@ -306,6 +311,7 @@ def check_landmarks(landmarks: LandmarkSet, atlas: Atlas) -> list[Finding]:
     return list(check_side(landmarks, atlas).findings)
 
 
+@checks_arguments
 def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | None = None) -> SideCheck:
     """Check the labels of one side.
 

@@ -254,7 +254,7 @@ class LabelFit:
         rotations, points = _procrustes(labels, model.mean, 1 / variances)
         for _ in range(_NEWTON_STEPS):
             step = (gain @ (points - model.mean).reshape(len(points), -1, 1))[..., 0]
-            rotation = _rotations(-step[:, 3:])
+            rotation = _rotations(np.asarray(-step[:, 3:], dtype=np.float64))
             points = (points - step[:, None, :3]) @ np.swapaxes(rotation, 1, 2)
             rotations = rotation @ rotations
         residual = (points - model.mean).reshape(len(points), -1)

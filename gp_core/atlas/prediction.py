@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
 from gp_core.constants import DEFINING_FEATURES
@@ -20,6 +21,7 @@ UNKNOWN_ANGLE_SD = np.pi / np.sqrt(3)
 """Standard deviation of a uniformly distributed angle, rad."""
 
 
+@checks_arguments
 def predict(atlas: Atlas, landmarks: LandmarkSet) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Predict every feature that is not placed from those that are.
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import FileFormatError, GpError
 from gp_core.io.file_names import landmark_file_name
 from gp_core.io.markups import write_markups
@@ -51,6 +52,7 @@ def read_authors_mat(path_left: str | PathLike[str], path_right: str | PathLike[
     return [Specimen(f"GP{i:02d}", {Side.LEFT: a, Side.RIGHT: b}) for i, (a, b) in pairs]
 
 
+@checks_arguments
 def import_mat(
     path_left: str | PathLike[str],
     path_right: str | PathLike[str],

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
 from gp_core.io.header import FileHeader
@@ -182,6 +183,7 @@ def _point(row: dict[str, Any], flip_xy: bool, file: str | PathLike[str]) -> Lab
     )
 
 
+@checks_arguments
 def write_markups(
     path: str | PathLike[str],
     landmarks: LandmarkSet,
@@ -230,6 +232,7 @@ def write_markups(
     write_point_lists(path, {"Fiducial": points_of(landmarks)}, header)
 
 
+@checks_arguments
 def write_suggestions(
     path: str | PathLike[str],
     landmarks: LandmarkSet,

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.constants import METHODS
 from gp_core.errors import FileFormatError, GpError
 from gp_core.frames import FRAMES, RigidTransform
@@ -25,6 +26,7 @@ _AGREE = 1e-6
 _REMEDY = "Estimate the pose again."
 
 
+@checks_arguments
 def read_pose(path: str | PathLike[str]) -> CochleaPose:
     """Read a pose that `CochleaPose.save` or ``gp-core estimate --json`` wrote, to the last bit.
 

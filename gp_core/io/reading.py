@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import FeatureError, FileFormatError, GeometryError, GpError
 from gp_core.io.dat import is_sentinel, read_dat
 from gp_core.io.fcsv import read_fcsv
@@ -117,6 +118,7 @@ def _with_name(point: LabelledPoint, names: LabelNames, file: str | PathLike[str
     return point._replace(label=name, side=side or point.side)
 
 
+@checks_arguments
 def read_landmarks(
     path: str | PathLike[str],
     *,
@@ -215,6 +217,7 @@ def sides_of(points: PointList, *, unknown: Unknown = "error") -> tuple[Landmark
     return tuple(landmarks_of(points, side=side, unknown=unknown) for side in Side)
 
 
+@checks_arguments
 def read_touches(
     path: str | PathLike[str],
     side: Side | str,

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import FeatureError, FileFormatError
 from gp_core.io.file_names import landmark_file_name, natural_key
 from gp_core.io.reading import read_points, sides_of, specimen_of
@@ -56,6 +57,7 @@ class Labelling:
         return f"{self.observer or 'unnamed'}, round {self.round}"
 
 
+@checks_arguments
 def load_specimens(
     paths: str | PathLike[str] | Iterable[str | PathLike[str]],
     *,

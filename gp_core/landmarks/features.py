@@ -187,6 +187,8 @@ def index_of(code: str) -> int:
     FeatureError
         No such feature; the message suggests similar codes.
     """
+    if not isinstance(code, str):
+        raise FeatureError(f"a feature is named by its code, such as RWA, got {type(code).__name__}")
     key = code.strip().upper()
     if key not in _INDEX:
         raise FeatureError(
@@ -223,6 +225,8 @@ def check_codes(
     FeatureError
         Unknown, named twice, not allowed here, or too few.
     """
+    if isinstance(codes, str | bytes) or not isinstance(codes, Iterable):
+        raise FeatureError(f"{name} must be a list of features, got {codes!r}")
     found = tuple(feature(code).code for code in codes)
     permitted = tuple(CODES if allowed is None else allowed)
     for code in found:

@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
-from gp_core.landmarks.features import CODES, Side, feature, index_of
+from gp_core.landmarks.features import CODES, Side, check_codes, feature, index_of
 from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
@@ -89,6 +90,7 @@ class LandmarkSet:
     round: int = 1
 
     def __post_init__(self) -> None:
+        check_fields(self, leaving_out=("points", "side", "unseen", "extra"))
         points = as_points(self.points, "points", missing_allowed=True).copy()
         if len(points) != len(CODES):
             raise GpError(f"a landmark set has {len(CODES)} rows, got {len(points)}")
@@ -96,7 +98,9 @@ class LandmarkSet:
         points.setflags(write=False)
         object.__setattr__(self, "points", points)
         object.__setattr__(self, "side", Side.parse(self.side))
-        object.__setattr__(self, "unseen", frozenset(feature(c).code for c in self.unseen) - set(self.placed))
+        unseen = check_codes(self.unseen, "unseen", at_least=0)
+        object.__setattr__(self, "unseen", frozenset(unseen) - set(self.placed))
+        self._freeze_extra()
         object.__setattr__(self, "suggested", self._undecided(self.suggested))
         if self.scan_evidence is not None:
             object.__setattr__(self, "scan_evidence", self.scan_evidence.of(self.as_mapping()))
@@ -107,6 +111,13 @@ class LandmarkSet:
             object.__setattr__(self, "provenance", MappingProxyType(kept))
         if not isinstance(self.round, int) or self.round < 1:
             raise GpError(f"a round is a whole number from 1, got {self.round!r:.40}")
+
+    def _freeze_extra(self) -> None:
+        if not isinstance(self.extra, Mapping):
+            raise GpError(f"extra must be a mapping of names to positions, got {type(self.extra).__name__}")
+        if self.extra:
+            extra = {name: _position(point, name) for name, point in self.extra.items()}
+            object.__setattr__(self, "extra", MappingProxyType(extra))
 
     def _undecided(self, suggested: Mapping[str, Suggestion]) -> Mapping[str, Suggestion]:
         """Return the suggestions of the features that are to do."""
@@ -137,6 +148,7 @@ class LandmarkSet:
         return cls(np.full((len(CODES), 3), np.nan), Side.parse(side), frame)
 
     @classmethod
+    @checks_arguments
     def from_mapping(
         cls, points: Mapping[str, ArrayLike], side: Side | str, *, frame: str = "scan"
     ) -> LandmarkSet:
@@ -165,7 +177,12 @@ class LandmarkSet:
         """
         rows = np.full((len(CODES), 3), np.nan)
         for code, position in points.items():
-            rows[index_of(code)] = _position(position, code)
+            row = index_of(code)
+            if not np.isnan(rows[row, 0]):
+                raise FeatureError(
+                    f"{CODES[row]} is given twice", landmark=CODES[row], remedy="Keep one of them."
+                )
+            rows[row] = _position(position, code)
         return cls(rows, Side.parse(side), frame)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -174,6 +191,7 @@ class LandmarkSet:
         about = (self.scan_evidence, dict(self.provenance), self.observer, self.round)
         return LandmarkSet, (self.points, self.side, self.frame, self.unseen, *mappings, *about)
 
+    @checks_arguments
     def __getitem__(self, code: str) -> FloatArray:
         """Return the (3,) position of a feature, NaN where it is not placed."""
         point: FloatArray = self.points[index_of(code)]
@@ -203,6 +221,7 @@ class LandmarkSet:
         missing = np.isnan(self.points[:, 0]).tolist()
         return tuple(code for code, absent in zip(CODES, missing, strict=True) if not absent)
 
+    @checks_arguments
     def status(self, code: str) -> Status:
         """Return the state of a feature.
 
@@ -223,6 +242,7 @@ class LandmarkSet:
             return Status.UNSEEN
         return Status.SUGGESTED if code in self.suggested else Status.TO_DO
 
+    @checks_arguments
     def as_mapping(self, codes: Iterable[str] | None = None) -> dict[str, FloatArray]:
         """Return the placed positions by code.
 
@@ -239,6 +259,7 @@ class LandmarkSet:
         wanted = self.placed if codes is None else tuple(codes)
         return {code: self[code] for code in wanted if code in self}
 
+    @checks_arguments
     def array(self, codes: Iterable[str]) -> FloatArray:
         """Return the positions of features, in the requested order.
 
@@ -270,6 +291,7 @@ class LandmarkSet:
                 )
         return self.points[rows]
 
+    @checks_arguments
     def with_point(self, code: str, position: ArrayLike | None) -> LandmarkSet:
         """Return a copy with one feature placed or cleared; its suggestion is dropped.
 
@@ -292,6 +314,7 @@ class LandmarkSet:
         about = {key: value for key, value in self.provenance.items() if key != code}
         return replace(self, points=points, unseen=self.unseen - {code}, suggested=others, provenance=about)
 
+    @checks_arguments
     def with_unseen(self, code: str) -> LandmarkSet:
         """Return a copy with one feature marked as not visible.
 
@@ -333,6 +356,7 @@ class LandmarkSet:
         """Features that a person has reviewed and confirmed, and by whom (empty: unnamed)."""
         return {code: about.checked_by for code, about in self.provenance.items() if about.checked}
 
+    @checks_arguments
     def with_suggestions(self, suggestions: Mapping[str, Suggestion]) -> LandmarkSet:
         """Return a copy with suggestions for features that are not labelled yet.
 
@@ -353,6 +377,7 @@ class LandmarkSet:
         """
         return replace(self, suggested={**self.suggested, **suggestions})
 
+    @checks_arguments
     def confirmed(self, codes: Iterable[str]) -> LandmarkSet:
         """Return a copy in which suggestions have become observations, since a person has confirmed them.
 
@@ -380,6 +405,7 @@ class LandmarkSet:
             landmarks = landmarks.with_point(code, self.suggested[code].position)
         return landmarks
 
+    @checks_arguments
     def moved(self, T_dst_src: RigidTransform) -> LandmarkSet:
         """Return the set in another frame.
 
@@ -422,7 +448,7 @@ def _placeable(code: str) -> str:
 def _position(position: ArrayLike, code: str) -> FloatArray:
     try:
         xyz = np.asarray(position, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         xyz = np.empty(0)
     if xyz.shape != (3,) or not np.isfinite(xyz).all():
         raise GpError(
@@ -449,6 +475,7 @@ class Specimen:
     sides: Mapping[Side, LandmarkSet]
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for side, landmarks in self.sides.items():
             if landmarks.side is not side:
                 raise GpError(
@@ -460,6 +487,7 @@ class Specimen:
         """Let pickle carry the animal to other processes, though it cannot carry a read-only mapping."""
         return Specimen, (self.name, dict(self.sides))
 
+    @checks_arguments
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side.
 

@@ -11,14 +11,16 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.disk import write_text
+from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.io.pose_export import write_csv, write_landmarks
 from gp_core.io.tfm import write_tfm
 from gp_core.landmarks.features import Side
 from gp_core.pose.covariance import cone_95, radius_95
 from gp_core.pose.mixture import UNDECIDED, Hypothesis, axis_part, mixture_radius_95, origin_part
-from gp_core.validation import FloatArray, check_option
+from gp_core.validation import FloatArray, check_option, freeze_arrays
 
 __all__ = ["HYPOTHESIS_STATES", "ROUND_WINDOWS", "CochleaPose"]
 
@@ -91,6 +93,9 @@ class CochleaPose:
     hypotheses: tuple[Hypothesis, ...] = ()
 
     def __post_init__(self) -> None:
+        if not isinstance(self.covariance, np.ndarray) or self.covariance.shape != (6, 6):
+            raise GpError(f"the covariance of a pose must be a (6, 6) array, got {np.shape(self.covariance)}")
+        freeze_arrays(self)
         check_option(self.side_state, "state of the side", HYPOTHESIS_STATES)
         check_option(self.names_state, "state of the names", HYPOTHESIS_STATES)
 
@@ -199,6 +204,7 @@ class CochleaPose:
             else self.T_touches_atlas.matrix.tolist(),
         }
 
+    @checks_arguments
     def save(self, path: str | PathLike[str]) -> None:
         """Write the pose as JSON.
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.constants import METHODS
@@ -25,6 +26,7 @@ from gp_core.validation import check_option
 __all__ = ["estimate_pose"]
 
 
+@checks_arguments
 def estimate_pose(
     touches: Mapping[str, ArrayLike] | LandmarkSet,
     side: Side | str,

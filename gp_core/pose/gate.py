@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.pose.cochlea_pose import CochleaPose
@@ -72,6 +73,7 @@ class PoseGate:
     max_age_s: float = 1.0
 
     def __post_init__(self) -> None:
+        check_fields(self)
         for name, value, unit in (
             ("radius", self.max_radius_mm, "mm"),
             ("cone", self.max_cone_deg, "degrees"),
@@ -82,6 +84,7 @@ class PoseGate:
                     f"the largest {name} of a pose that is sent must be above 0 {unit}, got {value!r}"
                 )
 
+    @checks_arguments
     def reasons(
         self, pose: CochleaPose | None, *, accepted: bool, reference_age_s: float | None = None
     ) -> tuple[GateReason, ...]:

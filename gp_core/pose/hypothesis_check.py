@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import FeatureError
 from gp_core.landmarks.features import feature
 from gp_core.landmarks.sets import LandmarkSet
@@ -100,6 +101,7 @@ def hypothesis_warnings(pose: CochleaPose) -> Iterator[str]:
         )
 
 
+@checks_arguments
 def read_as(touches: LandmarkSet, hypothesis: Hypothesis) -> LandmarkSet:
     """Return touches as a hypothesis takes them: of the other ear, or with two names exchanged.
 

@@ -9,6 +9,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import checks_arguments
 from gp_core.disk import write_text
 from gp_core.errors import FileFormatError, GpError
 from gp_core.io.table import read_rows
@@ -42,6 +43,7 @@ _CLEARLY = 1.25
 _MIRROR_Z = np.array([1.0, 1.0, -1.0])
 
 
+@checks_arguments
 def read_path(
     path: str | PathLike[str], *, units: str, axes: str = "x,y,z", rows: int | None = None
 ) -> FloatArray:
@@ -86,6 +88,7 @@ def read_path(
     return points
 
 
+@checks_arguments
 def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> FloatArray:
     """Move a path to the cochlea of a pose.
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = ["UNDECIDED", "Hypothesis", "MixturePart", "axis_part", "mixture_radius_95", "origin_part"]
 
@@ -45,6 +45,9 @@ class Hypothesis:
     probability: float
     transform_to_touches: RigidTransform
     covariance: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def origin(self) -> FloatArray:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.constants import MM_PER_DEGREE
 from gp_core.landmarks.anatomy import mirror_right
@@ -48,6 +49,7 @@ class TouchGain:
         return self.radius_95_now - self.radius_95 + MM_PER_DEGREE * turn
 
 
+@checks_arguments
 def gains(
     touches: LandmarkSet,
     atlas: Atlas,

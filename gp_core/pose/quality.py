@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.pose.cochlea_pose import CochleaPose
 
 __all__ = ["PoseQuality", "pose_quality"]
@@ -36,6 +37,7 @@ class PoseQuality:
     reason: str
 
 
+@checks_arguments
 def pose_quality(pose: CochleaPose) -> PoseQuality:
     """Rate a pose by its side and names, its 95 % region and its warnings.
 

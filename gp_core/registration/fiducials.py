@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import GeometryError, GpError
 from gp_core.landmarks.features import feature
 from gp_core.landmarks.sets import LandmarkSet
@@ -25,6 +26,7 @@ _OUTLIER_RMS_RATIO = 0.5
 _EXACT_MM = 1e-6
 
 
+@checks_arguments
 def register_fiducials(
     touches: Mapping[str, ArrayLike],
     scan: Mapping[str, ArrayLike],

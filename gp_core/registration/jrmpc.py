@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import GeometryError, GpError
 from gp_core.processors import n_cores
-from gp_core.validation import FloatArray, as_points
+from gp_core.validation import FloatArray, as_points, freeze_arrays
 
 __all__ = ["DEFAULTS", "ESTIMATION", "JrmpcBatch", "JrmpcResult", "JrmpcSettings", "jrmpc", "jrmpc_batch"]
 
@@ -109,6 +110,9 @@ class JrmpcResult:
     n_iterations: int
     converged: bool
 
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
     def moved(self, point_sets: Sequence[ArrayLike]) -> list[FloatArray]:
         """Return the points of each set in the common frame.
 
@@ -159,6 +163,7 @@ class JrmpcBatch:
     converged: NDArray[np.bool_]
 
 
+@checks_arguments
 def jrmpc(
     point_sets: Sequence[ArrayLike],
     centres: ArrayLike | None = None,

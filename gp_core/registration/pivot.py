@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import GeometryError, GpError
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = ["PivotCalibration", "calibrate_pivot"]
 
@@ -70,6 +71,9 @@ class PivotCalibration:
     left_out: tuple[int, ...]
     unseen: tuple[int, ...]
 
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
     @property
     def standard_error_mm(self) -> float:
         """Standard error of the tip offset as a length, mm."""
@@ -111,6 +115,7 @@ class PivotCalibration:
         }
 
 
+@checks_arguments
 def calibrate_pivot(T_tracker_marker: ArrayLike) -> PivotCalibration:
     """Find the tip of a probe that was rotated about its resting tip.
 
@@ -212,7 +217,7 @@ def _tip_covariance(rotations: FloatArray, rms: float) -> FloatArray:
 def _as_poses(value: ArrayLike) -> FloatArray:
     try:
         poses = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise GpError("marker poses must be numbers in (N, 4, 4)") from None
     if poses.ndim != 3 or poses.shape[1:] != (4, 4):
         raise GpError(f"marker poses must have the shape (N, 4, 4), got {poses.shape}")

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.frames import RigidTransform
 from gp_core.stats import NORMAL_95, chi_square_share
-from gp_core.validation import FloatArray, as_points
+from gp_core.validation import FloatArray, as_points, freeze_arrays
 
 __all__ = ["RegistrationResult"]
 
@@ -46,6 +46,9 @@ class RegistrationResult:
     suspects: tuple[str, ...] = ()
     fiducials: FloatArray = field(default_factory=lambda: np.empty((0, 3)), repr=False)
     method: str = "names"
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def fle_mm(self) -> float:

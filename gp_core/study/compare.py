@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
 from gp_core.constants import METHODS
@@ -164,6 +165,7 @@ def _summary(values: FloatArray) -> dict[str, float]:
     }
 
 
+@checks_arguments
 def compare(
     specimens: Sequence[Specimen] | None = None,
     *,

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal, perturbed_atlas
 from gp_core.errors import GeometryError, GpError
@@ -40,7 +41,7 @@ from gp_core.study.sessions import (
     wrong_side,
 )
 from gp_core.study.subsets import check_labels
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = ["GROUPS", "ConditionRow", "ConditionsReport", "TouchCondition", "conditions", "touch_conditions"]
 
@@ -88,6 +89,7 @@ class TouchCondition:
         return self.n_random or len(self.codes)
 
 
+@checks_arguments
 def touch_conditions(groups: Sequence[str] = GROUPS) -> tuple[TouchCondition, ...]:
     """Return all conditions of some groups, in the order of the table.
 
@@ -172,6 +174,9 @@ class ConditionRow:
     animals: NDArray[np.int64]
     values: dict[str, FloatArray]
     states: NDArray[np.str_]
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def held(self, region: str) -> FloatArray:
         """Return which estimates have the truth within a region.
@@ -265,6 +270,7 @@ class ConditionsReport:
         return {"animals": self.animals, "rows": [row.as_dict() for row in self.rows]}
 
 
+@checks_arguments
 def conditions(
     specimens: Sequence[Specimen] | None = None,
     *,

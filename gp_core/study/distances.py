@@ -10,11 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.argument_types import checks_arguments
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
 from gp_core.landmarks.sets import Specimen
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = ["DistanceTable", "distances"]
 
@@ -38,6 +39,9 @@ class DistanceTable:
     sd: FloatArray
     counts: NDArray[np.int64]
     n_sides: int
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     def pairs(self) -> list[dict[str, Any]]:
         """Return one row for each pair of features.
@@ -100,6 +104,7 @@ class DistanceTable:
         write_text(path, "\n".join(lines) + "\n")
 
 
+@checks_arguments
 def distances(specimens: Sequence[Specimen]) -> DistanceTable:
     """Measure the distances of all pairs of features over both sides of all animals.
 

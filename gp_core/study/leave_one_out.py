@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.constants import METHODS
@@ -149,6 +150,7 @@ def _summary(values: FloatArray) -> dict[str, float]:
     }
 
 
+@checks_arguments
 def leave_one_out(
     specimens: Sequence[Specimen],
     *,

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
 from gp_core.landmarks.sets import Specimen
@@ -97,6 +98,7 @@ class NestedReport:
         }
 
 
+@checks_arguments
 def nested_search(
     specimens: Sequence[Specimen],
     *,

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
 from gp_core.constants import DEFINING_FEATURES, METHODS
@@ -103,6 +104,7 @@ def _as_dict(registration: RegistrationResult) -> dict[str, Any]:
     }
 
 
+@checks_arguments
 def physical_test(
     touches: LandmarkSet,
     ct: LandmarkSet,

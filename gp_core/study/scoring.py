@@ -14,7 +14,7 @@ from gp_core.landmarks.features import index_of
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.robust import locate_robust
 from gp_core.registration.jrmpc import JrmpcSettings, jrmpc_batch
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = ["PoseErrors", "angle_between_deg", "jrmpc_errors", "robust_errors", "touched"]
 
@@ -35,6 +35,9 @@ class PoseErrors:
 
     e_co_mm: FloatArray
     e_ma_deg: FloatArray
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def e_t(self) -> float:

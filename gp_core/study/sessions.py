@@ -15,7 +15,7 @@ import numpy as np
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = [
     "Disturbance",
@@ -66,6 +66,9 @@ class Session:
     points: FloatArray
     noise: FloatArray
     timed: bool = False
+
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
 
     @property
     def outward(self) -> FloatArray:

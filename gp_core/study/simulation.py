@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.constants import METHODS
@@ -108,6 +109,7 @@ def _box(values: FloatArray) -> dict[str, float]:
     }
 
 
+@checks_arguments
 def simulate(
     specimens: Sequence[Specimen],
     *,

@@ -8,6 +8,7 @@ from dataclasses import asdict, dataclass
 from os import PathLike
 from typing import Any
 
+from gp_core.argument_types import checks_arguments
 from gp_core.constants import METHODS
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.features import CODES, check_codes
@@ -151,6 +152,7 @@ class RobustProblem:
         return lambda probe: robust_errors(atlases, [touched(truth, probe) for truth in truths], truths).e_t
 
 
+@checks_arguments
 def search_features(
     specimens: Sequence[Specimen],
     *,

@@ -1,0 +1,198 @@
+"""Arguments held against the annotations of a public function, so that a wrong type is a `GpError`.
+
+Only what an annotation says is looked at; whether a value makes sense is for the function to say.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import numbers
+import types
+import typing
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import fields
+from typing import Any, ParamSpec, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.errors import GpError
+
+__all__ = ["check_fields", "checks_arguments"]
+
+_P = ParamSpec("_P")
+_R = TypeVar("_R")
+
+_MANY = 1000
+"""Elements of a sequence that are looked at."""
+
+_WORDS = {
+    float: "a number",
+    int: "a whole number",
+    bool: "true or false",
+    str: "a text",
+    type(None): "None",
+    np.ndarray: "an array of numbers",
+}
+
+
+def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
+    """Return a function that raises `GpError` where an argument is not of the type that is annotated.
+
+    Examples
+    --------
+    >>> @checks_arguments
+    ... def double(length: float) -> float:
+    ...     return 2 * length
+    >>> double("x")
+    Traceback (most recent call last):
+        ...
+    gp_core.errors.GpError: length must be a number, got 'x'
+    """
+    signature = inspect.signature(function)
+    hints: dict[str, Any] = {}
+
+    @functools.wraps(function)
+    def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:
+        if not hints:
+            hints.update(typing.get_type_hints(function))
+        try:
+            bound = signature.bind(*args, **kwargs)
+        except TypeError as error:
+            raise GpError(f"{function.__name__}: {error}") from None
+        for name, value in bound.arguments.items():
+            if name in hints and signature.parameters[name].default is not value:
+                _check(value, hints[name], name)
+        return function(*args, **kwargs)
+
+    return checked
+
+
+def check_fields(instance: Any, *, leaving_out: Collection[str] = ()) -> None:
+    """Raise `GpError` unless the fields of a dataclass are of the types that are annotated.
+
+    Parameters
+    ----------
+    instance : dataclass
+    leaving_out : collection of str
+        Fields that take more than they are annotated with, and say so themselves.
+    """
+    hints = _hints_of(instance.__class__)
+    for one in fields(instance):
+        if one.name not in leaving_out:
+            _check(getattr(instance, one.name), hints[one.name], one.name)
+
+
+@functools.cache
+def _hints_of(cls: Any) -> dict[str, Any]:
+    return typing.get_type_hints(cls)
+
+
+def _check(value: Any, hint: Any, name: str) -> None:
+    if not _fits(value, hint):
+        shown = repr(value)
+        if len(shown) > 60 or "\n" in shown:
+            shown = type(value).__name__
+        raise GpError(f"{name} must be {_words(hint)}, got {shown}")
+
+
+def _fits(value: Any, hint: Any) -> bool:
+    """Whether a value is of an annotated type; what is not understood fits."""
+    anything, origin, arguments = _parts(hint)
+    if anything:
+        return True
+    if origin in (typing.Union, types.UnionType):
+        return any(_fits(value, one) for one in arguments)
+    if origin is None:
+        return _fits_class(value, hint)
+    if origin is np.ndarray:
+        return _is_numeric(value)
+    if origin is tuple and arguments[-1] is not Ellipsis:
+        return (
+            isinstance(value, Sequence) and len(value) == len(arguments) and all(map(_fits, value, arguments))
+        )
+    if isinstance(origin, type) and issubclass(origin, Mapping):
+        keys, values = arguments
+        return isinstance(value, Mapping) and all(
+            _fits(key, keys) and (_fits(one, values)) for key, one in value.items()
+        )
+    if isinstance(origin, type) and issubclass(origin, Iterable) and arguments:
+        return _fits_iterable(value, origin, arguments[0])
+    return not isinstance(origin, type) or isinstance(value, origin)
+
+
+@functools.cache
+def _parts(hint: Any) -> tuple[bool, Any, tuple[Any, ...]]:
+    """Return whether anything fits, and what an annotation is made of."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    # ArrayLike is a union, which a union with anything else takes in
+    anything = hint is Any or all(one in arguments for one in typing.get_args(ArrayLike))
+    return anything, origin, arguments
+
+
+def _fits_class(value: Any, hint: Any) -> bool:
+    if not isinstance(hint, type):
+        return True
+    if hint is float:
+        return _is_number(value, numbers.Real)
+    if hint is int:
+        return _is_number(value, numbers.Integral)
+    if hint is bool:
+        return isinstance(value, bool | np.bool_)
+    return isinstance(value, hint)
+
+
+def _fits_iterable(value: Any, origin: type, element: Any) -> bool:
+    """Whether it may be gone through, and holds what it should; a text is no list of letters."""
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+        return False
+    if issubclass(origin, Sequence) and not isinstance(value, Sequence):
+        return False
+    if isinstance(value, Collection):
+        return all(_fits(one, element) for _, one in zip(range(_MANY), value, strict=False))
+    return True  # a generator, which can be gone through but once
+
+
+def _is_number(value: Any, kind: type) -> bool:
+    if isinstance(value, bool | np.bool_) or not isinstance(value, kind):
+        return False
+    number: Any = value
+    try:
+        float(number)
+    except OverflowError:
+        return False
+    return True
+
+
+def _is_numeric(value: Any) -> bool:
+    try:
+        np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        return False
+    return not isinstance(value, str | bytes)
+
+
+def _words(hint: Any) -> str:
+    """Say an annotation in words."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if hint == ArrayLike:
+        return "numbers"
+    if origin in (typing.Union, types.UnionType):
+        words = list(dict.fromkeys(_words(one) for one in arguments if one is not type(None)))
+        words += ["None"] if type(None) in arguments else []
+        return " or ".join(words)
+    if isinstance(origin, type):
+        if issubclass(origin, Mapping):
+            return f"a mapping of {_word(arguments[0])} to {_word(arguments[1])}"
+        if origin is not np.ndarray and issubclass(origin, Iterable) and arguments:
+            return f"a list of {_word(arguments[0])}"
+        return _WORDS.get(origin, "a path" if origin.__name__ == "PathLike" else f"a {origin.__name__}")
+    name = getattr(hint, "__name__", str(hint))
+    return _WORDS.get(hint, f"{'an' if name[0] in 'AEIO' else 'a'} {name}")
+
+
+def _word(hint: Any) -> str:
+    """Say an annotation as what a list is of."""
+    words = _words(hint)
+    return words.removeprefix("a ").removeprefix("an ") if hint is not ArrayLike else words
