@@ -22,12 +22,12 @@ from qtpy.QtWidgets import QWidget
 
 from gp_core.landmarks.features import CODES, Side
 from gp_core.validation import FloatArray
-from gp_labeler.scene.schematic import FAR, Schematic, schematic_of
 from gp_labeler.views.fonts import CAPTION, HEADING, base_font, family, text_scale
 from gp_labeler.views.painting.strokes import beside, round_pen, smooth
+from gp_labeler.views.schematic import FAR, Schematic, schematic_of
 from gp_labeler.views.theme import Theme, theme_of
 
-__all__ = ["FeaturePicture", "feature_picture"]
+__all__ = ["FeaturePicture", "feature_picture", "ground_picture"]
 
 _MARGIN = 18.0
 _ROOMY = 180
@@ -70,7 +70,7 @@ def feature_picture(
         How much larger than normal text is.
     """
     side, frame = Side.parse(side), QRectF(0, 0, size.width(), size.height())
-    ground = _ground(_like(code, side), side, size.width(), size.height(), theme, ratio)
+    ground = ground_picture(_like(code, side), side, size.width(), size.height(), theme, ratio)
     pixmap = QPixmap.fromImage(ground)
     painter = QPainter(pixmap)
     painter.setRenderHint(QPainter.RenderHint.Antialiasing)
@@ -92,7 +92,7 @@ def _like(code: str, side: Side) -> str:
 
 
 @lru_cache(_GROUNDS)
-def _ground(code: str, side: Side, width: int, height: int, theme: Theme, ratio: float) -> QImage:
+def ground_picture(code: str, side: Side, width: int, height: int, theme: Theme, ratio: float) -> QImage:
     """Draw the ear, and the head where it is shown, without any feature."""
     image = QImage(round(width * ratio), round(height * ratio), QImage.Format.Format_ARGB32_Premultiplied)
     image.setDevicePixelRatio(ratio)

@@ -101,7 +101,7 @@ def test_what_is_drawn_is_what_is_hit(scene: Scene3D, ball: Surface) -> None:
     scene.bone.show([ball])
     scene.target.resize(80, 60)
     scene.camera.focus_on(BALL + np.array([0.3, 0.2, 0.4]), across_mm=8)
-    scene.bone._look.LightingOff()  # the side in the shade is dim against the background
+    scene.set_colours(LIGHT)  # against a bright background, bone is seen in the shade as well
     drawn = _unlike_background(scene.image())
     hit = np.array([[scene.pick(x, y) is not None for x in range(80)] for y in range(60)])
     assert hit.sum() > 1000

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from fontTools.ttLib import TTFont
 from qtpy.QtGui import QFont, QFontDatabase, QFontInfo
-from qtpy.QtWidgets import QApplication, QLabel
+from qtpy.QtWidgets import QAbstractButton, QApplication, QLabel
 from window_cases import ball_volume, settle
 
 from gp_core.landmarks.features import Side
@@ -112,7 +112,7 @@ def test_nothing_in_the_bar_moves_with_what_can_be_undone(qtbot, window) -> None
 
     def places() -> list[tuple[int, int]]:
         QApplication.processEvents()
-        return [(button.x(), button.width()) for button, _ in bar._icons if button.isVisible()]
+        return [(b.x(), b.width()) for b in bar.findChildren(QAbstractButton) if b.isVisible()]
 
     labels.place([10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
     one = places()

@@ -194,7 +194,7 @@ def test_a_picture_on_a_ground_that_was_kept_is_the_same(code):
     ]
     for kind in kinds:  # letters of a size differ a little the first time
         picture_of(code, *kind)
-    pictures._ground.cache_clear()
+    pictures.ground_picture.cache_clear()
     first = [picture_of(code, *kind) for kind in kinds]
     again = [picture_of(code, *kind) for kind in reversed(kinds)]
     assert all(is_same(a, b) for a, b in zip(first, again[::-1], strict=True))

@@ -14,6 +14,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
 from gp_labeler.models.view import CUTS
 from gp_labeler.scene.planes import Plane
+from gp_labeler.views.panels.scan.mesh_card import MeshCard
 
 LEFT_BUTTON, NO_KEYS = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 
@@ -121,7 +122,7 @@ def test_what_a_cut_lays_open_is_seen_no_more_through_bone(window) -> None:
 
 
 def test_the_mesh_card_cuts_and_shows_the_cut(window) -> None:
-    card = window._scan.mesh
+    card = window.findChild(MeshCard)
     assert not any(button.isChecked() for button in card.cut.planes.values())
     card.cut.planes["axial"].click()
     assert window.workspace.view.state.cut.plane == "axial"

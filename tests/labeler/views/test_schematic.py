@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gp_core.landmarks.features import CODES, Side
-from gp_labeler.scene.schematic import FAR, schematic_of
+from gp_labeler.views.schematic import FAR, schematic_of
 
 LEFT, RIGHT = Side.LEFT, Side.RIGHT
 
