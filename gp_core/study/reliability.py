@@ -315,7 +315,7 @@ class ReliabilityReport:
         }
 
     def save_csv(self, path: str | PathLike[str]) -> None:
-        """Write one line a feature, and one for all; numbers keep every bit.
+        """Write one line for each feature, and one for all; with full precision.
 
         Parameters
         ----------
