@@ -1,6 +1,6 @@
-"""Arguments held against the annotations of a public function, so that a wrong type is a `GpError`.
+"""Type checks of the arguments of public functions, by their annotations: a wrong type is a `GpError`.
 
-Only what an annotation says is looked at; whether a value makes sense is for the function to say.
+Only the annotated types are checked; whether a value makes sense is left to the function.
 """
 
 from __future__ import annotations
@@ -38,7 +38,22 @@ _WORDS = {
 
 
 def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
-    """Return a function that raises `GpError` where an argument is not of the type that is annotated.
+    """Return a function that checks the types of its arguments.
+
+    Parameters
+    ----------
+    function : callable
+        With annotations.
+
+    Returns
+    -------
+    callable
+        The same function, with the check.
+
+    Raises
+    ------
+    GpError
+        When it is called: an argument has another type than annotated, or does not exist.
 
     Examples
     --------
