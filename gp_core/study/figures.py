@@ -499,23 +499,17 @@ def label_agreement(report: ReliabilityReport) -> Figure:
     figure, axes = new_figure(1, 3, (10.0, 3.6))
     kinds = (("rounds of one observer", False, RIGHT, "--"), ("two observers", True, LEFT, "-"))
     shown = [(name, _those(report.differences, inter), c, s) for name, inter, c, s in kinds]
+    largest = max((abs(x) for row in report.differences for x in row.difference), default=0.0) or 1.0
     for i, (ax, letter) in enumerate(zip(axes, "ABC", strict=True)):
         for name, rows, colour, style in shown:
             if rows:
-                _draw_agreement(
-                    ax, np.array([(r.mean[i], r.difference[i]) for r in rows]), name, colour, style
-                )
-        label(
-            ax,
-            letter,
-            f"Mean of two labels from the atlas, mm {_DIRECTIONS[i]}",
-            f"Difference, mm {_DIRECTIONS[i]}",
-        )
+                points = np.array([(row.mean[i], row.difference[i]) for row in rows])
+                _draw_agreement(ax, points, name, colour, style)
+        label(ax, letter, f"Mean, mm {_DIRECTIONS[i]} of the atlas", f"Difference, mm {_DIRECTIONS[i]}")
         ax.axhline(0.0, color=_FAINT, linewidth=0.8, zorder=0)
-        ax.sharey(axes[0])
-    figure.legend(
-        *axes[0].get_legend_handles_labels(), fontsize=8, frameon=False, ncols=2, loc="outside upper center"
-    )
+        ax.set_ylim(-1.08 * largest, 1.08 * largest)
+    named = axes[0].get_legend_handles_labels()
+    figure.legend(*named, fontsize=8, frameon=False, ncols=2, loc="outside upper center")
     return figure
 
 

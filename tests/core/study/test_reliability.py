@@ -211,6 +211,21 @@ def test_what_cannot_be_compared_is_refused() -> None:
         reliability(sets)
 
 
+def test_a_single_point_or_none_in_common_is_enough_to_say_so(tmp_path: Path) -> None:
+    def of_points(observer: str, **points: list[float]) -> Labelling:
+        marks = LandmarkSet.from_mapping(points, "L")
+        return Labelling(Specimen("GP1", {Side.LEFT: marks}), observer)
+
+    one = reliability([of_points("AB", CA=[0, 0, 0]), of_points("CD", CA=[0, 0, 0.3])])
+    assert one.overall.inter is not None
+    assert one.overall.inter.mean_mm == pytest.approx(0.3)
+    assert (one.anova, one.offsets, one.overall.icc_inter, one.differences) == ((), (), None, ())
+    save_figure(label_agreement(one), tmp_path / "empty.svg")
+    none = reliability([of_points("AB", CA=[0, 0, 0]), of_points("CD", CB=[0, 0, 0.3])])
+    assert (none.features, none.overall.inter) == ((), None)
+    json.dumps(none.as_dict(), allow_nan=False)
+
+
 def test_the_command_prints_and_writes_all_of_it(tmp_path: Path, capsys) -> None:
     folder = tmp_path / "labelled"
     folder.mkdir()
@@ -245,6 +260,8 @@ def test_the_figure_has_a_panel_for_each_direction(report: ReliabilityReport, tm
     assert [ax.get_ylabel() for ax in figure.axes] == [
         f"Difference, mm {way}" for way in ("forwards", "outwards", "upwards")
     ]
-    drawn = sum(len(c.get_offsets()) for c in figure.axes[0].collections)
-    assert drawn == len(report.differences)
+    largest = max(abs(x) for row in report.differences for x in row.difference)
+    for ax in figure.axes:
+        assert sum(len(c.get_offsets()) for c in ax.collections) == len(report.differences)
+        assert ax.get_ylim()[1] > largest, "every point is in the picture"
     save_figure(figure, tmp_path / "agreement.svg")
