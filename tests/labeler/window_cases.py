@@ -118,6 +118,7 @@ def settle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
 
 
 def image_bytes(image: QImage) -> np.ndarray:
-    """Return the bytes of a picture, whichever binding Qt has."""
+    """Return a copy of a picture's bytes, whichever binding Qt has: the picture may be gone before them."""
     bits = image.constBits()
-    return np.frombuffer(bits.asarray(image.sizeInBytes()) if hasattr(bits, "asarray") else bits, np.uint8)
+    raw = bits.asarray(image.sizeInBytes()) if hasattr(bits, "asarray") else bits
+    return np.frombuffer(raw, np.uint8).copy()
