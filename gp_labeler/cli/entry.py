@@ -15,6 +15,7 @@ from gp_core.terminal import leave_output, plain_terminal
 from gp_labeler.cli.export import run_export
 from gp_labeler.cli.mesh import run_mesh
 from gp_labeler.cli.phantom import run_phantom
+from gp_labeler.cli.straighten import run_straighten
 from gp_labeler.system.installation import explain_import
 from gp_labeler.system.plain_numbers import use_plain_numbers
 
@@ -27,6 +28,7 @@ _EXAMPLE = """examples:
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
   gp-labeler phantom -o head.nrrd            a synthetic head with its truth; see gp-labeler phantom --help
+  gp-labeler straighten head.nrrd            how the head lies in its scan; see gp-labeler straighten --help
   gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
   gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
   gp-labeler doctor                   what this machine has, and what it lacks
@@ -82,6 +84,8 @@ def _run(arguments: Sequence[str] | None) -> int:
             return run_mesh(given[1:])
         if given[:1] == ["phantom"]:
             return run_phantom(given[1:])
+        if given[:1] == ["straighten"]:
+            return run_straighten(given[1:])
         if given[:1] == ["export"]:
             return run_export(given[1:])
         if given[:1] == ["simulate-tracker"]:

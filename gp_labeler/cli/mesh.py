@@ -12,7 +12,7 @@ from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
 
-__all__ = ["make_mesh_parser", "run_mesh"]
+__all__ = ["add_import_options", "import_options", "make_mesh_parser", "run_mesh"]
 
 _EXAMPLE = """examples:
   gp-labeler mesh head.nrrd -o head.ply
@@ -36,7 +36,7 @@ def make_mesh_parser() -> argparse.ArgumentParser:
     formats = ".ply, .stl, .vtp, .obj, .glb or .gltf"
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MESH", help=formats)
     _add_surface(parser.add_argument_group("the surface"))
-    _add_import(parser.add_argument_group("how the scan is read"))
+    add_import_options(parser.add_argument_group("how the scan is read"))
     return parser
 
 
@@ -56,7 +56,8 @@ def _add_surface(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--largest", type=int, metavar="N", help="keep only so many parts, the largest")
 
 
-def _add_import(group: argparse._ArgumentGroup) -> None:
+def add_import_options(group: argparse._ArgumentGroup) -> None:
+    """Add the options that say how a scan is read."""
     group.add_argument(
         "--spacing", type=float, nargs="+", metavar="MM", help="voxel size: one number, or x y z"
     )
@@ -97,7 +98,7 @@ def run_mesh(arguments: Sequence[str]) -> int:
         The scan cannot be read like this, has no surface at this threshold, or the file cannot be written.
     """
     args = make_mesh_parser().parse_args(arguments)
-    options = _import_options(args)
+    options = import_options(args)
     surface_options = {
         name: value
         for name, value in (("smallest_mm", args.smallest), ("largest", args.largest))
@@ -125,7 +126,8 @@ def run_mesh(arguments: Sequence[str]) -> int:
     return 0
 
 
-def _import_options(args: argparse.Namespace) -> dict[str, Any]:
+def import_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Return what these options say, for `read_volume`."""
     options: dict[str, Any] = {"accept": args.accept, "reverse": args.reverse, "stride": args.stride}
     if args.spacing is not None:
         if len(args.spacing) not in (1, 3):

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
 from gp_labeler.phantom.variation import SWITCHES, USUAL, HeadVariation
 
@@ -28,7 +29,7 @@ _MOST = 1000
 
 def make_phantom_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler phantom``."""
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="gp-labeler phantom",
         description="Make synthetic scans of guinea-pig heads, with the truth about each.",
         epilog=_EXAMPLE,

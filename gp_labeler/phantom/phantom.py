@@ -184,7 +184,7 @@ def _placed(
     canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int
 ) -> tuple[Canvas, Placement | None]:
     """Return the voxels of the scan, and how the head got there."""
-    placement = placement_of(head, variation, seed)
+    placement = placement_of(canvas, head, variation, seed)
     moved = canvas if placement is None else placement.canvas(canvas)
     return (cropped(moved, variation.crop) if variation.crop[0] else moved), placement
 

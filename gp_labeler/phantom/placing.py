@@ -16,7 +16,7 @@ from gp_labeler.phantom.variation import HeadVariation, generator_of
 
 __all__ = ["Placement", "cropped", "placement_of"]
 
-_BETWEEN_MM, _WIDTH_MM = 12.0, 9.0
+_BETWEEN_MM, _WIDTH_MM = 8.0, 6.0
 """Distance of the random displacements from each other, and the reach of each (standard deviation)."""
 
 _COARSE_MM = 1.5
@@ -25,7 +25,7 @@ _REGION = ((-16.0, 16.0), (-14.0, 52.0), (-20.0, 16.0))
 
 _AIR_MM = 1.5
 _SLAB = 2_000_000
-_HALF_BONE = 22_000.0
+_HALF_BONE, _N_PLACES = 22_000.0, 5000
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,19 +106,19 @@ class Placement:
         return np.stack([places.min(axis=0) - _AIR_MM, places.max(axis=0) + _AIR_MM])
 
 
-def placement_of(head: HeadLayout, variation: HeadVariation, seed: int) -> Placement | None:
+def placement_of(canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int) -> Placement | None:
     """Return how a variation moves a head; None where it leaves it as it was painted."""
     from scipy.spatial.transform import Rotation
 
     if not variation.asymmetry and not any(variation.turn):
         return None
-    displacement = _displacement(head, variation.asymmetry, seed) if variation.asymmetry else None
+    displacement = _displacement(canvas, head, variation.asymmetry, seed) if variation.asymmetry else None
     rotation = Rotation.from_rotvec(variation.turn, degrees=True).as_matrix()
     return Placement(rotation, head.roughly(np.array([[0.0, -15.0, 0.0]]))[0], displacement)
 
 
-def _displacement(head: HeadLayout, rms: float, seed: int) -> Displacement:
-    """Draw a displacement of random bumps that neither moves nor turns the head as a whole."""
+def _displacement(canvas: Canvas, head: HeadLayout, rms: float, seed: int) -> Displacement:
+    """Draw a displacement of random bumps that neither moves nor turns the bone as a whole."""
     rng = generator_of(seed, "asymmetry")
     knots = head.roughly(_region(_BETWEEN_MM))
     weights = rng.standard_normal(knots.shape)
@@ -126,13 +126,20 @@ def _displacement(head: HeadLayout, rms: float, seed: int) -> Displacement:
     axes = [np.arange(a, b + _COARSE_MM, _COARSE_MM) for a, b in zip(low, high, strict=True)]
     z, y, x = np.meshgrid(axes[2], axes[1], axes[0], indexing="ij")
     places = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    where = head.roughly(_region(_BETWEEN_MM / 3))
+    where = _bone_of(canvas)
     bumps = _bumps(where, knots, weights)
     rigid = _rigid_part(where, bumps)
     off = np.linalg.norm(bumps - _motion(where, rigid), axis=1)
     factor = rms / float(np.sqrt(np.mean(off**2)))
     field: FloatArray = factor * (_bumps(places, knots, weights) - _motion(places, rigid))
     return Displacement(low, field.T.reshape(3, *x.shape))
+
+
+def _bone_of(canvas: Canvas) -> FloatArray:
+    """Return places (N, 3) all over the painted bone."""
+    voxels = np.argwhere(canvas.grey > _HALF_BONE)[:, ::-1]
+    chosen = voxels[:: max(1, len(voxels) // _N_PLACES)]
+    return canvas.origin + canvas.spacing * chosen
 
 
 def _region(step: float) -> FloatArray:

@@ -1,0 +1,270 @@
+"""A scan made coarse, and the surface of its bone as points: what a head's pose is found from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from gp_core.errors import GpError
+from gp_core.validation import FloatArray
+from gp_labeler.imaging.coarse import means_of_cubes
+from gp_labeler.imaging.volume import Volume
+
+__all__ = ["COARSER", "Bone", "CoarseScan", "bone_of", "coarse_scan", "finest_step", "threshold_candidates"]
+
+_Values = NDArray[np.float32]
+_Mask = NDArray[np.bool_]
+
+_VOXELS_ACROSS = 110
+"""Of the finer copy, along its middle edge: 0.4 mm in a guinea pig's head."""
+
+COARSER = 1.5
+"""Cubes of the search over those of the refinement."""
+
+_N_POINTS = 4000
+_SMALLEST_ISLAND = 0.05
+_FEWEST_VOXELS = 500
+_TAILS_PERCENT = (0.5, 99.9)
+_SAMPLES = 500_000
+_APART = 1.25
+"""How much farther from the dark end a second candidate of the threshold must be to be worth a try."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoarseScan:
+    """A scan of cubes of voxels.
+
+    Parameters
+    ----------
+    grid : (nz, ny, nx) float32 array
+        Grey values.
+    T_scan_index : (4, 4) array
+        From an index (i, j, k) to LPS mm; an index names the centre of its cube.
+    measured : (nz, ny, nx) bool array, optional
+        Where the scanner measured; None: everywhere.
+    """
+
+    grid: _Values
+    T_scan_index: FloatArray
+    measured: _Mask | None = None
+
+    @cached_property
+    def T_index_scan(self) -> FloatArray:  # noqa: N802 - a transform keeps its name
+        """(4, 4) from LPS mm to index."""
+        return np.asarray(np.linalg.inv(self.T_scan_index), dtype=np.float64)
+
+    @property
+    def spacing(self) -> FloatArray:
+        """(3,) mm along i, j, k."""
+        lengths: FloatArray = np.linalg.norm(self.T_scan_index[:3, :3], axis=0)
+        return lengths
+
+    @property
+    def extent(self) -> FloatArray:
+        """(3,) mm: how long the scan is along i, j, k."""
+        return self.spacing * self.grid.shape[::-1]
+
+    def indices(self, points: FloatArray) -> FloatArray:
+        """Return the indices (N, 3), fractions, of points (N, 3), LPS mm."""
+        found: FloatArray = points @ self.T_index_scan[:3, :3].T + self.T_index_scan[:3, 3]
+        return found
+
+    def places(self, mask: _Mask) -> FloatArray:
+        """Return the centres (N, 3) of the voxels of a mask, LPS mm."""
+        index = np.argwhere(mask)[:, ::-1]
+        return np.asarray(index @ self.T_scan_index[:3, :3].T + self.T_scan_index[:3, 3])
+
+    def inside(self, points: FloatArray) -> _Mask:
+        """Return which points (N, 3) lie where the scanner measured."""
+        index = np.rint(self.indices(points)).astype(np.intp)
+        size = np.array(self.grid.shape[::-1])
+        there = np.all((index >= 0) & (index < size), axis=1)
+        if self.measured is not None:
+            i, j, k = np.clip(index, 0, size - 1).T
+            there &= self.measured[k, j, i]
+        return np.asarray(there)
+
+    def sampled(self, values: _Values, points: FloatArray) -> FloatArray:
+        """Return values of the grid at points (N, 3), interpolated."""
+        from scipy.ndimage import map_coordinates
+
+        index = self.indices(points)[:, ::-1].T
+        found: FloatArray = map_coordinates(values, index, order=1, mode="nearest", output=np.float64)
+        return found
+
+
+def finest_step(volume: Volume) -> float:
+    """Return the edge of the cubes, mm, that are fine enough for the pose of a head that fills the scan."""
+    extent = np.sort(np.array(volume.size) * volume.spacing)
+    return max(float(extent[1]) / _VOXELS_ACROSS, max(volume.spacing))
+
+
+def coarse_scan(volume: Volume, step: float, box: ArrayLike | None = None) -> CoarseScan:
+    """Return a scan, or the part of it in a box, in cubes of about `step` mm.
+
+    Parameters
+    ----------
+    volume : Volume
+    step : float
+        mm; never finer than the voxels.
+    box : (2, 3) array_like, LPS mm, optional
+
+    Raises
+    ------
+    GpError
+        The box holds none of the scan.
+    """
+    first, last = _index_range(volume, box)
+    part = volume.array[first[2] : last[2], first[1] : last[1], first[0] : last[0]]
+    whole = np.floor(step / np.array(volume.spacing) + 1e-6).astype(int)
+    factors = np.clip(whole, 1, last - first)
+    to_volume = np.eye(4)
+    to_volume[:3, :3] = np.diag(factors)
+    to_volume[:3, 3] = first + (factors - 1) / 2
+    measured = None if volume.fill is None else _block_means(part != volume.fill, factors) > 0.5
+    return CoarseScan(_block_means(part, factors), volume.T_scan_voxel @ to_volume, measured)
+
+
+def _index_range(volume: Volume, box: ArrayLike | None) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Return the first voxel (3,) of a box, and the one after the last."""
+    size = np.array(volume.size, dtype=np.intp)
+    if box is None:
+        return np.zeros(3, dtype=np.intp), size
+    low, high = np.asarray(box, dtype=np.float64).reshape(2, 3)
+    corners = low + np.array(list(np.ndindex(2, 2, 2))) * (high - low)
+    index = volume.scan_to_voxel(corners)
+    first = np.clip(np.ceil(index.min(axis=0)), 0, size).astype(np.intp)
+    last = np.clip(np.floor(index.max(axis=0)) + 1, 0, size).astype(np.intp)
+    if np.any(last - first < 2):
+        raise GpError("the box holds none of the scan", file=volume.path, remedy="Draw it around the head.")
+    return first, last
+
+
+def _block_means(values: NDArray[Any], factors: NDArray[np.intp]) -> _Values:
+    """Return the means of blocks of (fx, fy, fz) voxels of a (z, y, x) array, without what is left over."""
+    if len(set(factors.tolist())) == 1:
+        array = values.view(np.uint8) if values.dtype == bool else values
+        return means_of_cubes(array, int(factors[0]))
+    fx, fy, fz = (int(f) for f in factors)
+    nz, ny, nx = (n // f for n, f in zip(values.shape, (fz, fy, fx), strict=True))
+    out = np.empty((nz, ny, nx), np.float32)
+    for k in range(nz):
+        slab = values[k * fz : (k + 1) * fz, : ny * fy, : nx * fx].mean(axis=0, dtype=np.float32)
+        out[k] = slab.reshape(ny, fy, nx, fx).mean(axis=(1, 3))
+    return out
+
+
+def threshold_candidates(scan: CoarseScan) -> tuple[float, ...]:
+    """Return the grey values at which bone may begin, the likeliest first.
+
+    The upper cut of three classes of the square root of the grey values, and the third of four where that is
+    clearly higher: bone among tissue that is bright itself.
+
+    Raises
+    ------
+    GpError
+        All voxels have the same value.
+    """
+    from skimage.filters import threshold_multiotsu
+
+    values = scan.grid.ravel() if scan.measured is None else scan.grid[scan.measured]
+    values = values[:: max(1, values.size // _SAMPLES)]
+    low, high = np.percentile(values, _TAILS_PERCENT) if values.size else (0.0, 0.0)
+    if not low < high:
+        raise GpError("the scan has no contrast", remedy="Check that the right series or folder was opened.")
+    roots = np.sqrt(np.clip(values, low, high) - low)
+    if len(np.unique(roots)) < 4:
+        return (float(low + high) / 2,)
+    three = float(threshold_multiotsu(roots, classes=3, nbins=128)[1] ** 2)  # type: ignore[no-untyped-call]
+    four = float(threshold_multiotsu(roots, classes=4, nbins=128)[2] ** 2)  # type: ignore[no-untyped-call]
+    return (three + low, four + low) if four > _APART * three else (three + low,)
+
+
+@dataclass(frozen=True, eq=False)
+class Bone:
+    """Bone in a coarse scan.
+
+    Parameters
+    ----------
+    scan : CoarseScan
+    threshold : float
+        Grey value at which bone begins.
+    mask : (nz, ny, nx) bool array
+        Its voxels.
+    """
+
+    scan: CoarseScan
+    threshold: float
+    mask: _Mask = field(repr=False)
+
+    @classmethod
+    def islands(cls, scan: CoarseScan, threshold: float) -> list[Bone]:
+        """Return the bone of all large islands together, and where there are several, of each alone.
+
+        Raises
+        ------
+        GpError
+            There is hardly any bone.
+        """
+        from scipy.ndimage import label
+
+        above = scan.grid > threshold
+        numbers, n = label(above, structure=np.ones((3, 3, 3)))
+        sizes = np.bincount(numbers.ravel(), minlength=n + 1)
+        sizes[0] = 0
+        large = np.argsort(-sizes)[: np.count_nonzero(sizes >= _SMALLEST_ISLAND * max(int(sizes.max()), 1))]
+        if sizes[large].sum() < _FEWEST_VOXELS:
+            raise GpError(f"there is hardly any bone above {threshold:g}", remedy="Move the threshold.")
+        together = cls(scan, threshold, np.isin(numbers, large))
+        rivals = [i for i in large[:3] if sizes[i] >= 0.2 * sizes[large[0]]]
+        return [together, *(cls(scan, threshold, numbers == i) for i in rivals if len(large) > 1)]
+
+    @cached_property
+    def surface(self) -> _Mask:
+        """Its outermost voxels."""
+        from scipy.ndimage import binary_erosion
+
+        return np.asarray(self.mask & ~binary_erosion(self.mask))
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """(N, 3) LPS mm: some of the surface, in random order, the same each time."""
+        places = self.scan.places(self.surface)
+        order = np.random.default_rng(0).permutation(len(places))[:_N_POINTS]
+        return places[order]
+
+    @cached_property
+    def tree(self) -> Any:
+        """A search tree of the surface points."""
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.points)
+
+    @cached_property
+    def centre(self) -> FloatArray:
+        """(3,) LPS mm: the centroid."""
+        centroid: FloatArray = self.scan.places(self.mask).mean(axis=0)
+        return centroid
+
+    @cached_property
+    def radius(self) -> float:
+        """Root mean square distance from the centroid, mm."""
+        offsets = self.scan.places(self.mask) - self.centre
+        return float(np.sqrt((offsets**2).sum(axis=1).mean()))
+
+
+def bone_of(volume: Volume, threshold: float | None = None) -> tuple[Bone, Bone]:
+    """Return all bone of a scan, in its finer and its coarser copy.
+
+    Raises
+    ------
+    GpError
+        There is no contrast, or hardly any bone.
+    """
+    fine, coarse = (coarse_scan(volume, factor * finest_step(volume)) for factor in (1.0, COARSER))
+    level = threshold_candidates(coarse)[0] if threshold is None else threshold
+    return Bone.islands(fine, level)[0], Bone.islands(coarse, level)[0]

@@ -1,0 +1,97 @@
+"""The mid-plane to a fraction of a voxel: grey values near bone are laid onto their mirror image."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gp_core.validation import FloatArray
+from gp_labeler.head_pose.bone import Bone
+from gp_labeler.head_pose.mid_plane import MidPlane
+
+__all__ = ["refined_by_greys"]
+
+_N_POINTS = 12_000
+_BLUR_VOXELS = 1.0
+_LOSS_WIDTHS = (0.18, 0.105)
+"""Difference, bone being 1 and soft tissue 0, at which a point begins to count less, in two fits."""
+
+_MOST_STEPS = 25
+
+
+class GreyValues:
+    """Clipped grey values of a scan, and points near the surface of its bone; made once for several planes.
+
+    Parameters
+    ----------
+    bone : Bone
+        In the finer copy of the scan.
+    """
+
+    def __init__(self, bone: Bone) -> None:
+        from scipy.ndimage import binary_dilation, binary_erosion, gaussian_filter
+
+        grid, threshold = bone.scan.grid, bone.threshold
+        sample = grid[::2, ::2, ::2]
+        below, above = sample[sample < threshold], sample[sample > threshold]
+        soft, bright = (float(np.median(v)) if v.size else threshold for v in (below, above))
+        low = max(threshold - (bright - soft) / 2, soft)
+        high = max(bright, 2 * threshold - low)
+        self.bone = bone
+        self.greys = gaussian_filter(np.clip((grid - low) / max(high - low, 1e-6), 0, 1), _BLUR_VOXELS)
+        shell = binary_dilation(bone.mask) & ~binary_erosion(bone.mask)
+        places = np.argwhere(shell)
+        chosen = places[np.random.default_rng(0).permutation(len(places))[:_N_POINTS]]
+        self.own = self.greys[tuple(chosen.T)].astype(np.float64)
+        T = bone.scan.T_scan_index
+        self.points: FloatArray = chosen[:, ::-1] @ T[:3, :3].T + T[:3, 3]
+
+    def differences(self, plane: MidPlane) -> FloatArray:
+        """Return how much brighter each point's mirror image is; 0 beyond the scan."""
+        mirrored = plane.mirrored(self.points)
+        found: FloatArray = self.bone.scan.sampled(self.greys, mirrored) - self.own
+        found[~self.bone.scan.inside(mirrored)] = 0.0
+        return found
+
+
+def refined_by_greys(values: GreyValues, plane: MidPlane) -> MidPlane:
+    """Return the plane whose mirror image agrees best, near a first one: two angles and an offset.
+
+    Parameters
+    ----------
+    values : GreyValues
+    plane : MidPlane
+        Within some six degrees; farther off it may not be pulled in.
+    """
+    from scipy.optimize import least_squares
+
+    bone = values.bone
+    step = float(bone.scan.spacing.mean())
+    across = np.linalg.svd(plane.normal[None])[2][1:]
+    centre = plane.nearest(bone.centre)
+
+    def moved(p: FloatArray) -> MidPlane:
+        normal = plane.normal + (p[:2] / bone.radius) @ across
+        return MidPlane.through(centre + p[2] * plane.normal, normal)
+
+    def residuals(p: FloatArray) -> FloatArray:
+        return values.differences(moved(p))
+
+    def slopes(p: FloatArray) -> FloatArray:
+        h = 0.5 * step
+        columns = [(residuals(p + d) - residuals(p - d)) / (2 * h) for d in h * np.eye(3)]
+        return np.stack(columns, axis=1)
+
+    found = np.zeros(3)
+    for width in _LOSS_WIDTHS:
+        found = least_squares(
+            residuals,
+            found,
+            jac=slopes,
+            loss="cauchy",
+            f_scale=width,
+            x_scale=step,
+            xtol=1e-4,
+            ftol=1e-5,
+            max_nfev=_MOST_STEPS,
+        ).x
+    return moved(found)

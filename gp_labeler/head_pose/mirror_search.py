@@ -1,0 +1,165 @@
+"""The mid-sagittal plane from bone alone: mirror images of its surface are laid onto the surface.
+
+All normals and offsets on a grid are scored on a clipped distance field, the best are refined by ICP onto the
+mirror image, and the best of those by grey values. After Combès et al., "Automatic symmetry plane estimation
+of bilateral objects in point clouds", CVPR 2008, doi:10.1109/CVPR.2008.4587757, with a field of view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.validation import FloatArray
+from gp_labeler.head_pose.bone import Bone
+from gp_labeler.head_pose.mid_plane import MidPlane
+from gp_labeler.imaging.progress import Report
+
+__all__ = ["Agreement", "agreement_of", "clipped_distances", "refined_by_points", "search_planes"]
+
+_N_NORMALS, _N_POINTS = 320, 1200
+_REACH, _STEP = 0.6, 0.45
+"""How far from the centroid planes are tried (in radii), and how densely (in clipping distances)."""
+
+_CLIP, _OUTSIDE = 6.0, -0.3
+"""Distances are clipped at radius / 6; a point beyond the scan scores neither well nor badly."""
+
+_APART_DEG = 12.0
+_KEPT, _FINER = 14, 6
+_NEAR = 18.0
+"""A mirrored point meets bone within radius / 18."""
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """How well the two halves of the bone agree.
+
+    Parameters
+    ----------
+    share : float
+        Of the mirrored surface points that lie in the scan, how many meet bone, 0 to 1.
+    overlap : float
+        How many of the mirrored surface points lie in the scan, 0 to 1.
+    """
+
+    share: float
+    overlap: float
+
+
+def agreement_of(bone: Bone, plane: MidPlane) -> Agreement:
+    """Return how well a bone agrees with its mirror image in a plane."""
+    mirrored = plane.mirrored(bone.points)
+    inside = bone.scan.inside(mirrored)
+    if not inside.any():
+        return Agreement(0.0, 0.0)
+    distance = bone.tree.query(mirrored[inside], distance_upper_bound=bone.radius / _NEAR)[0]
+    return Agreement(float(np.isfinite(distance).mean()), float(inside.mean()))
+
+
+def search_planes(bone: Bone, report: Report) -> list[MidPlane]:
+    """Return distinct planes in which a bone may be symmetric, the best first."""
+    starts = _scored_on_grid(bone, report.part(0.0, 0.6))
+    clip = bone.radius / _CLIP
+    found = []
+    for n, start in enumerate(starts):
+        report(0.6 + 0.3 * n / len(starts))
+        plane = refined_by_points(bone, start, (1.2 * clip, 0.35 * clip), 10, every=3)
+        found.append((_misfit(bone, plane, clip / 2, every=2), plane))
+    found.sort(key=lambda pair: pair[0])
+    finer = [refined_by_points(bone, plane, (0.5 * clip, 0.12 * clip), 14) for _, plane in found[:_FINER]]
+    finer.sort(key=lambda plane: _misfit(bone, plane, clip / 2))
+    report(1.0)
+    return distinct(finer, 3.0)
+
+
+def distinct(planes: list[MidPlane], apart_deg: float) -> list[MidPlane]:
+    """Return the planes, without those that are near an earlier one."""
+    kept: list[MidPlane] = []
+    for plane in planes:
+        if all(plane.angle_to_deg(other) >= apart_deg for other in kept):
+            kept.append(plane)
+    return kept
+
+
+def clipped_distances(bone: Bone, clip: float) -> tuple[NDArray[np.float32], NDArray[np.intp]]:
+    """Return distances to the surface, less `clip`, at most 0: a flat padded grid, and its size (x, y, z)."""
+    from scipy.ndimage import distance_transform_edt
+
+    distance = distance_transform_edt(~bone.surface, sampling=bone.scan.spacing[::-1])
+    below: NDArray[np.float32] = np.minimum(distance - clip, 0.0).astype(np.float32)
+    if bone.scan.measured is not None:
+        below[~bone.scan.measured] = _OUTSIDE * clip
+    padded = np.pad(below, 1, constant_values=_OUTSIDE * clip)
+    return padded.ravel(), np.array(padded.shape[::-1], dtype=np.intp)
+
+
+def _scored_on_grid(bone: Bone, report: Report) -> list[MidPlane]:
+    clip = bone.radius / _CLIP
+    field, size = clipped_distances(bone, clip)
+    points = bone.points[:_N_POINTS]
+    index = bone.scan.indices(points) + 1.0
+    offsets = np.arange(-_REACH * bone.radius, _REACH * bone.radius + 1e-9, _STEP * clip)
+    scored = []
+    normals = _hemisphere(_N_NORMALS)
+    for n, normal in enumerate(normals):
+        if n % 32 == 0:
+            report(n / len(normals))
+        heights = (points - bone.centre) @ normal
+        step = bone.scan.T_index_scan[:3, :3] @ normal
+        at = np.rint(index - 2 * (heights - offsets[:, None])[..., None] * step).astype(np.intp)
+        i, j, k = np.moveaxis(np.clip(at, 0, size - 1), -1, 0)
+        score = field[(k * size[1] + j) * size[0] + i].mean(axis=1)
+        best = int(score.argmin())
+        scored.append((float(score[best]), MidPlane.through(bone.centre + offsets[best] * normal, normal)))
+    scored.sort(key=lambda pair: pair[0])
+    return distinct([plane for _, plane in scored], _APART_DEG)[:_KEPT]
+
+
+def _hemisphere(n: int) -> FloatArray:
+    """Return n unit vectors (n, 3), evenly spread over half a sphere."""
+    i = np.arange(n) + 0.5
+    z = i / n
+    turn = np.pi * (1 + np.sqrt(5)) * i
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(turn), r * np.sin(turn), z], axis=1)
+
+
+def refined_by_points(
+    bone: Bone, plane: MidPlane, widths: tuple[float, float], steps: int, *, every: int = 1
+) -> MidPlane:
+    """Return the plane that best lays the mirrored surface onto the surface, near a first one.
+
+    Parameters
+    ----------
+    bone : Bone
+    plane : MidPlane
+    widths : (float, float)
+        Distance, mm, at which a pair of points counts a quarter: in the first and the last step.
+    steps : int
+    every : int
+        Use every n-th point only.
+    """
+    points = bone.points[::every]
+    for width in np.geomspace(*widths, steps):
+        mirrored = plane.mirrored(points)
+        distance, nearest = bone.tree.query(mirrored)
+        partners = bone.points[nearest]
+        weights = bone.scan.inside(mirrored) / (1 + (distance / width) ** 2) ** 2
+        if weights.sum() < 20:
+            break
+        weights /= weights.sum()
+        centre = weights @ (points + partners) / 2
+        cross = ((points - centre) * weights[:, None]).T @ (partners - centre)
+        normal = np.linalg.eigh(cross + cross.T)[1][:, 0]
+        plane = MidPlane.through(centre, normal * (np.sign(normal @ plane.normal) or 1.0))
+    return plane
+
+
+def _misfit(bone: Bone, plane: MidPlane, clip: float, *, every: int = 1) -> float:
+    """Return the mean clipped distance between mirrored and unmirrored surface, 0 to 1."""
+    mirrored = plane.mirrored(bone.points[::every])
+    distance = np.minimum(bone.tree.query(mirrored, distance_upper_bound=clip)[0], clip)
+    distance[~bone.scan.inside(mirrored)] = clip / 2
+    return float(distance.mean() / clip)

@@ -1,0 +1,104 @@
+"""The pose of a head in its scan, and why none was found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_labeler.head_pose.mid_plane import MidPlane
+
+__all__ = ["Confidence", "HeadPose", "HeadPoseError"]
+
+_REMEDY = "Place IN and a pair such as OI, and straighten by landmarks; or give a box around the head."
+
+
+class HeadPoseError(GpError):
+    """No pose of the head was found that can be trusted; says why, and what to do instead."""
+
+    def __init__(self, reason: str, *, file: Any = None, remedy: str = _REMEDY) -> None:
+        super().__init__(reason, file=file, remedy=remedy)
+
+
+@dataclass(frozen=True)
+class Confidence:
+    """What speaks for a mid-plane.
+
+    Parameters
+    ----------
+    agreement : float
+        Share of the mirrored surface that meets bone, 0 to 1.
+    overlap : float
+        Share of the surface whose mirror image lies in the scan, 0 to 1.
+    margin : float
+        Lead in agreement over the best other plane.
+    """
+
+    agreement: float
+    overlap: float
+    margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class HeadPose:
+    """How a head lies in its scan.
+
+    Parameters
+    ----------
+    T_head_scan : RigidTransform
+        From the scan (LPS, mm) to the head: x left, y posterior, z superior; x = 0 is the mid-sagittal plane.
+    found_by : str
+        ``symmetry``, ``points`` or ``landmarks``.
+    confidence : Confidence, optional
+        What speaks for the mid-plane; None where the bone was not asked.
+    pitch : str
+        What the pitch was taken from, in words. It is a proposal unless it comes from points.
+    left : str
+        What left was taken from, in words: nothing in the scan can prove it.
+    warnings : tuple of str
+        What a person should look at.
+    """
+
+    T_head_scan: RigidTransform
+    found_by: str
+    confidence: Confidence | None
+    pitch: str
+    left: str
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def mid_plane(self) -> MidPlane:
+        """The mid-sagittal plane in the scan; its normal points left."""
+        return MidPlane(self.T_head_scan.rotation[0], -float(self.T_head_scan.translation[0]))
+
+    @property
+    def tilt_deg(self) -> float:
+        """By how much the head is turned from straight in the scan, degrees."""
+        cosine = (float(np.trace(self.T_head_scan.rotation)) - 1) / 2
+        return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the pose as JSON values."""
+        confidence = self.confidence
+        return {
+            "T_head_scan": self.T_head_scan.matrix.tolist(),
+            "midPlane": {
+                "normal": self.mid_plane.normal.tolist(),
+                "offset": self.mid_plane.offset,
+            },
+            "tiltDegrees": self.tilt_deg,
+            "foundBy": self.found_by,
+            "confidence": None
+            if confidence is None
+            else {
+                "agreement": confidence.agreement,
+                "overlap": confidence.overlap,
+                "margin": confidence.margin,
+            },
+            "pitch": self.pitch,
+            "left": self.left,
+            "warnings": list(self.warnings),
+        }

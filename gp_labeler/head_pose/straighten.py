@@ -1,0 +1,206 @@
+"""The pose of a head found by itself, from the symmetry of its bone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_core.validation import FloatArray
+from gp_labeler.head_pose.bone import (
+    COARSER,
+    Bone,
+    CoarseScan,
+    coarse_scan,
+    finest_step,
+    threshold_candidates,
+)
+from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_greys
+from gp_labeler.head_pose.mid_plane import MidPlane
+from gp_labeler.head_pose.mirror_search import Agreement, agreement_of, search_planes
+from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError
+from gp_labeler.head_pose.template import HeadTemplate, InPlane, front_and_up, phantom_template
+from gp_labeler.imaging.progress import Progress, Report
+from gp_labeler.imaging.volume import Volume
+
+__all__ = ["left_of_file", "pose_in_plane", "straighten"]
+
+_REFINED = 4
+_RIVAL_DEG = 8.0
+_LEAST_OVERLAP = 0.25
+_WHOLE = (0.65, 0.7, 0.12)
+"""Least agreement, overlap and margin of a head that lies in the scan as a whole."""
+
+_PART = (0.82, 0.25, 0.05)
+"""The same where much of the head is missing: agreement must be higher."""
+
+_THIN_MARGIN = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class _Found:
+    plane: MidPlane
+    confidence: Confidence
+    bone: Bone
+
+    @property
+    def accepted(self) -> bool:
+        c = self.confidence
+        return any(
+            c.agreement >= agreement and c.overlap >= overlap and c.margin >= margin
+            for agreement, overlap, margin in (_WHOLE, _PART)
+        )
+
+
+def straighten(
+    volume: Volume,
+    *,
+    threshold: float | None = None,
+    box: ArrayLike | None = None,
+    template: HeadTemplate | None = None,
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> HeadPose:
+    """Find how a head lies in its scan, from the symmetry of its bone.
+
+    Parameters
+    ----------
+    volume : Volume
+    threshold : float, optional
+        Grey value at which bone begins; by default two candidates are tried.
+    box : (2, 3) array_like, LPS mm, optional
+        Look at this part of the scan only: without a holder, a second head.
+    template : HeadTemplate, optional
+        A known head that says which way is front and up, and the pitch; by default the synthetic guinea pig.
+    progress, cancel : callable, optional
+        Told the fraction done; asked whether to stop.
+
+    Returns
+    -------
+    HeadPose
+
+    Raises
+    ------
+    HeadPoseError
+        No plane was found that can be trusted; the message says why and asks for points.
+    GpError
+        There is no bone, no contrast, or nothing in the box.
+    Cancelled
+        `cancel` said so.
+    """
+    report = Report(progress, cancel)
+    report(0.0)
+    step = finest_step(volume)
+    fine = coarse_scan(volume, step, box)
+    coarse = coarse_scan(volume, COARSER * step, box)
+    found = _mid_plane(fine, coarse, threshold, volume, report.part(0.05, 0.7))
+    return pose_in_plane(
+        volume,
+        found.bone,
+        found.plane,
+        found.confidence,
+        template or phantom_template(),
+        report.part(0.7, 1.0),
+    )
+
+
+def _mid_plane(
+    fine: CoarseScan, coarse: CoarseScan, threshold: float | None, volume: Volume, report: Report
+) -> _Found:
+    """Return the first plane that can be trusted, over thresholds and islands of bone."""
+    levels = threshold_candidates(coarse) if threshold is None else (threshold,)
+    tried: list[_Found] = []
+    problem: GpError | None = None
+    for level in levels:
+        try:
+            coarse_bones, fine_bones = Bone.islands(coarse, level), Bone.islands(fine, level)
+        except GpError as error:
+            problem = error
+            continue
+        for bone in coarse_bones:
+            found = _best_plane(bone, _counterpart(bone, fine_bones), report)
+            tried.append(found)
+            if found.accepted:
+                return found
+    if not tried:
+        raise problem or GpError("there is no bone", file=volume.path)
+    raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
+
+
+def _counterpart(bone: Bone, others: list[Bone]) -> Bone:
+    """Return the bone of the finer copy that is the same island."""
+    return min(
+        others,
+        key=lambda other: float(np.linalg.norm(other.centre - bone.centre)) + abs(other.radius - bone.radius),
+    )
+
+
+def _best_plane(bone: Bone, fine: Bone, report: Report) -> _Found:
+    """Return the plane in which the two halves agree best, and its lead over the others."""
+    starts = search_planes(bone, report.part(0.0, 0.6))[:_REFINED]
+    values = GreyValues(fine)
+    judged: list[tuple[Agreement, MidPlane]] = []
+    for n, start in enumerate(starts):
+        report(0.6 + 0.4 * n / len(starts))
+        plane = refined_by_greys(values, start)
+        judged.append((agreement_of(bone, plane), plane))
+    seen = [pair for pair in judged if pair[0].overlap >= _LEAST_OVERLAP] or judged
+    best, plane = max(seen, key=lambda pair: pair[0].share)
+    rivals = [a.share for a, other in seen if other.angle_to_deg(plane) > _RIVAL_DEG]
+    margin = best.share - max([*rivals, 0.0])
+    return _Found(plane, Confidence(best.share, best.overlap, margin), bone)
+
+
+def _why(found: _Found) -> str:
+    c = found.confidence
+    if c.overlap < _WHOLE[1]:
+        reason = f"only {100 * c.overlap:.0f} % of the bone has its mirror image in the scan"
+    elif c.agreement < _WHOLE[0]:
+        reason = f"only {100 * c.agreement:.0f} % of the bone meets its mirror image"
+    else:
+        reason = "it is nearly as symmetric in another plane"
+    return f"the head could not be straightened by its symmetry: {reason}"
+
+
+def pose_in_plane(
+    volume: Volume,
+    bone: Bone,
+    plane: MidPlane,
+    confidence: Confidence | None,
+    template: HeadTemplate,
+    report: Report,
+    *,
+    found_by: str = "symmetry",
+) -> HeadPose:
+    """Return the pose of a head whose mid-plane is known; front, up and pitch are the template's."""
+    lying = front_and_up(bone, plane, template, report)
+    warnings = []
+    if lying.margin < _THIN_MARGIN or not _dense_in_front(bone, lying):
+        warnings.append("front and up are uncertain: check that the nose points forward and the teeth down")
+    return HeadPose(
+        RigidTransform.from_parts(lying.axes, lying.origin, dst="scan", src="head").inverse(),
+        found_by,
+        confidence,
+        f"proposed from {template.name}",
+        left_of_file(volume),
+        tuple(warnings),
+    )
+
+
+def _dense_in_front(bone: Bone, lying: InPlane) -> bool:
+    """Whether the densest bone, the teeth, lies in front of the middle of all bone."""
+    values = bone.scan.grid[bone.mask]
+    places = bone.scan.places(bone.mask)
+    densest = places[values >= np.quantile(values, 0.985)]
+    forward: FloatArray = -lying.axes[:, 1]
+    return float((densest.mean(axis=0) - places.mean(axis=0)) @ forward) > 0
+
+
+def left_of_file(volume: Volume) -> str:
+    """Return what left and right are taken from, in words."""
+    grid = "a left-handed grid" if volume.is_mirrored else "a right-handed grid"
+    return f"the file's orientation ({grid}); nothing in the scan can prove it"

@@ -1,0 +1,327 @@
+"""A head is straightened by its bone or by points, and what cannot be trusted is refused."""
+
+import json
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from gp_core.errors import GpError
+from gp_core.io.markups import write_markups
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.cli.entry import main
+from gp_labeler.head_pose import (
+    HeadPoseError,
+    HeadTemplate,
+    MidPlane,
+    straighten,
+    straighten_by_landmarks,
+    straighten_by_points,
+)
+from gp_labeler.head_pose.bone import coarse_scan
+from gp_labeler.imaging.progress import Cancelled
+from gp_labeler.imaging.readers import read_volume
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.phantom import USUAL, HeadVariation, make_phantom, save_phantom
+
+MICE = Path(__file__).resolve().parents[4] / "shared" / "data" / "mouse_ct"
+TURN = (40.0, -100.0, 60.0)
+
+
+@cache
+def head(seed=21, names=(), turn=TURN, **given):
+    variation = HeadVariation.drawn(seed, names).having({"turn": turn, **given})
+    return make_phantom(seed, spacing=0.5, variation=variation)
+
+
+def true_plane(phantom):
+    T = phantom.T_head_scan
+    return MidPlane(T.rotation[0], -T.translation[0])
+
+
+def errors(pose, phantom):
+    """Return by how many degrees and mm the mid-plane is off, and by how many degrees the whole head."""
+    truth = true_plane(phantom)
+    middle = phantom.volume.extent.mean(axis=0)[None]
+    turn = pose.T_head_scan.rotation.T @ phantom.T_head_scan.rotation
+    whole = np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1)))
+    off = abs(pose.mid_plane.heights(middle)[0] - truth.heights(middle)[0])
+    return pose.mid_plane.angle_to_deg(truth), float(off), float(whole)
+
+
+@cache
+def found():
+    return straighten(head(names=USUAL).volume)
+
+
+def test_a_head_is_straightened_by_the_symmetry_of_its_bone():
+    deg, mm, whole = errors(found(), head(names=USUAL))
+    assert deg < 0.4
+    assert mm < 0.15
+    assert whole < 3.0  # with the pitch: the template is of the same species
+    assert found().confidence.agreement > 0.65
+    assert found().confidence.overlap > 0.95
+    assert found().warnings == ()
+    assert "file's orientation" in found().left
+    assert "proposed" in found().pitch
+
+
+def test_the_head_frame_is_left_posterior_superior():
+    pose, specimen = found(), head(names=USUAL).specimen
+    left, right = (pose.T_head_scan.apply(specimen.side(s).array(["ZL", "OI", "IN"])) for s in Side)
+    assert (left[:2, 0] > 4).all()
+    assert (right[:2, 0] < -4).all()
+    assert left[2, 1] < left[1, 1] - 30  # the nose in front
+    assert np.linalg.det(pose.T_head_scan.rotation) == pytest.approx(1.0)
+    assert abs(left[2, 0]) < 1.0
+
+
+def test_a_silent_mirror_is_the_head_that_the_scan_shows():
+    phantom = head(mirrored="silent")
+    deg, _, whole = errors(straighten(phantom.volume), phantom)
+    assert deg < 0.4
+    assert whole < 3.0
+
+
+def test_the_order_of_the_axes_of_the_grid_does_not_matter():
+    volume = head(names=USUAL).volume
+    swapped = np.ascontiguousarray(volume.array.transpose(1, 2, 0)[::-1])
+    T = volume.T_scan_voxel[:, [2, 0, 1, 3]].copy()  # new i, j, k are old k, i, j
+    T[:3, 3] += (swapped.shape[0] - 1) * T[:3, 2]
+    T[:3, 2] *= -1
+    other = Volume(swapped, T)
+    corner = volume.voxel_to_scan([[3, 5, 7]])
+    assert other.value_at(corner[0]) == volume.value_at(corner[0])
+    pose = straighten(other)
+    assert pose.mid_plane.angle_to_deg(found().mid_plane) < 0.2
+    np.testing.assert_allclose(pose.T_head_scan.rotation, found().T_head_scan.rotation, atol=0.02)
+
+
+def test_a_cropped_head_in_a_scanners_circle_is_straightened():
+    phantom = head(22, turn=(10.0, 5.0, 0.0), crop=(0.25, "P"), circle=1.0)
+    deg, mm, _ = errors(straighten(phantom.volume), phantom)
+    assert deg < 1.5
+    assert mm < 0.3
+
+
+@pytest.mark.parametrize("holder", ["tube", "rod"])
+def test_a_holder_as_bright_as_bone_never_gives_a_wrong_plane(holder):
+    phantom = head(23, holder=holder)
+    try:
+        pose = straighten(phantom.volume)
+    except HeadPoseError:
+        return
+    assert errors(pose, phantom)[0] < 3.0
+
+
+def test_half_a_head_is_refused_and_points_are_asked_for():
+    phantom = head(24, turn=(0.0, 0.0, 0.0), crop=(0.65, "L"))
+    with pytest.raises(HeadPoseError, match=r"could not be straightened by its symmetry.*IN and a pair"):
+        straighten(phantom.volume)
+
+
+def test_a_box_leaves_out_what_is_not_the_head():
+    phantom = head(23, turn=(0.0, 0.0, 0.0), holder="tube")
+    low, high = (phantom.T_head_scan.inverse().apply([p])[0] for p in ((-19, -54, -20), (19, 14, 16)))
+    pose = straighten(phantom.volume, box=[low, high])
+    assert errors(pose, phantom)[0] < 0.6
+    with pytest.raises(GpError, match="box holds none of the scan"):
+        straighten(phantom.volume, box=[[900, 900, 900], [950, 950, 950]])
+
+
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        (np.full((20, 20, 20), 7, np.uint8), "no contrast"),
+        (np.random.default_rng(0).normal(100, 10, (40, 40, 40)).astype(np.float32), ""),
+    ],
+)
+def test_a_scan_without_a_head_is_refused(values, said):
+    with pytest.raises(GpError, match=said):
+        straighten(Volume(values, np.diag([0.5, 0.5, 0.5, 1.0])))
+
+
+def test_a_sphere_is_symmetric_in_every_plane_and_refused():
+    z, y, x = np.indices((50, 50, 50)) - 25.0
+    ball = np.where(abs(np.sqrt(x**2 + y**2 + z**2) - 18) < 2, 30_000, 9_000)
+    noisy = ball + np.random.default_rng(0).normal(0, 300, ball.shape)
+    with pytest.raises(HeadPoseError, match="nearly as symmetric in another plane"):
+        straighten(Volume(noisy.astype(np.float32), np.diag([0.5, 0.5, 0.5, 1.0])))
+
+
+def test_it_stops_when_asked_and_tells_how_far_it_is():
+    told = []
+    with pytest.raises(Cancelled):
+        straighten(head(names=USUAL).volume, progress=told.append, cancel=lambda: len(told) > 5)
+    assert told == sorted(told)
+
+
+def some(phantom, codes, noise=0.3, sides="LR", seed=0):
+    rng = np.random.default_rng(seed)
+    return {
+        Side(s): LandmarkSet.from_mapping(
+            {c: phantom.specimen.side(s)[c] + rng.normal(0, noise, 3) for c in codes}, s
+        )
+        for s in sides
+    }
+
+
+def test_in_and_a_pair_give_the_pose_and_the_bone_refines_it():
+    phantom = head(names=USUAL)
+    clicked = some(phantom, ["IN", "OI"])
+    rough = straighten_by_landmarks(phantom.volume, clicked, refine=False)
+    fine = straighten_by_landmarks(phantom.volume, clicked)
+    assert errors(rough, phantom)[2] < 6.0
+    assert errors(fine, phantom)[0] < 0.5
+    assert errors(fine, phantom)[1] < 0.15
+    assert fine.found_by == "landmarks"
+    assert fine.warnings == ()
+    assert rough.confidence is None
+
+
+def test_exchanged_sides_are_noticed():
+    phantom = head(names=USUAL)
+    clicked = some(phantom, ["IN", "OI"])
+    exchanged = {
+        side: LandmarkSet(clicked[Side.RIGHT if side is Side.LEFT else Side.LEFT].points, side)
+        for side in Side
+    }
+    assert "left and right exchanged" in straighten_by_landmarks(phantom.volume, exchanged).warnings[0]
+
+
+@pytest.mark.parametrize(("codes", "sides"), [(["OI", "MN", "OS", "IN"], "L"), (["OI"], "LR"), ([], "LR")])
+def test_too_few_landmarks_are_refused(codes, sides):
+    phantom = head(names=USUAL)
+    with pytest.raises(HeadPoseError, match="IN, and one feature such as OI or MN on both sides"):
+        straighten_by_landmarks(phantom.volume, some(phantom, codes, sides=sides))
+
+
+def test_landmarks_help_where_symmetry_is_refused():
+    phantom = head(24, turn=(0.0, 0.0, 0.0), crop=(0.65, "P"))
+    left, right = (phantom.specimen.side(side) for side in Side)
+    pair = [c for c in ("ZL", "IN") if c in left and c in right]
+    assert pair == ["ZL", "IN"]
+    pose = straighten_by_landmarks(phantom.volume, some(phantom, pair, noise=0.1))
+    assert errors(pose, phantom)[0] < 2.5
+
+
+def test_three_free_points_are_enough():
+    phantom = head(names=USUAL)
+    left, right = (phantom.specimen.side(side) for side in Side)
+    shift = np.array([0.4, -0.3, 0.5])
+    pose = straighten_by_points(
+        phantom.volume, midline=left["IN"] - shift, left=left["MN"] + shift, right=right["MN"] - shift
+    )
+    deg, mm, whole = errors(pose, phantom)
+    assert (deg < 0.5, mm < 0.15, whole < 3.0) == (True, True, True)
+    other = straighten_by_points(phantom.volume, midline=left["IN"], left=right["MN"], right=left["MN"])
+    assert "calls right" in other.warnings[-1]
+    with pytest.raises(HeadPoseError, match="too near"):
+        straighten_by_points(phantom.volume, midline=left["IN"], left=left["MN"], right=left["MN"])
+
+
+def test_a_labelled_head_serves_as_a_template():
+    known, other = head(names=USUAL), head(25, turn=(0.0, 90.0, 0.0))
+    template = HeadTemplate.of(known.volume, known.T_head_scan)
+    pose = straighten(other.volume, template=template)
+    assert errors(pose, other)[2] < 4.0
+    assert known.volume.name in pose.pitch
+
+
+def test_a_mirrored_point_lies_as_far_behind_the_plane():
+    plane = MidPlane([0.0, 3.0, 4.0], 10.0)
+    points = np.random.default_rng(1).normal(0, 10, (20, 3))
+    image = plane.mirrored(points)
+    np.testing.assert_allclose(plane.heights(image), -plane.heights(points))
+    np.testing.assert_allclose(plane.mirrored(image), points)
+    np.testing.assert_allclose(plane.heights(np.array([plane.nearest(points[0])])), 0, atol=1e-12)
+    assert np.linalg.norm(plane.normal) == pytest.approx(1.0)
+    assert plane.angle_to_deg(MidPlane([0.0, -3.0, -4.0], 0.0)) == pytest.approx(0.0, abs=1e-5)
+
+
+def test_cubes_of_a_long_voxel_are_means_at_the_right_place():
+    values = np.arange(4 * 6 * 9, dtype=np.float32).reshape(4, 6, 9)
+    volume = Volume.from_parts(values, [0.1, 0.2, 0.4], [5.0, 6.0, 7.0])
+    scan = coarse_scan(volume, 0.4)
+    assert scan.grid.shape == (4, 3, 2)
+    np.testing.assert_allclose(scan.grid[1, 2, 1], values[1, 4:6, 4:8].mean())
+    at = scan.places(np.ones(scan.grid.shape, bool))[0]
+    np.testing.assert_allclose(at, volume.voxel_to_scan([[1.5, 0.5, 0.0]])[0])
+    np.testing.assert_allclose(scan.sampled(scan.grid, at[None]), scan.grid[0, 0, 0])
+
+
+@pytest.mark.skipif(not MICE.is_dir(), reason="the shared mice are not here")
+def test_a_real_mouse_is_straightened():
+    rows = json.loads((MICE / "A_J_.mrk.json").read_text())["markups"][0]["controlPoints"]
+    points = {row["label"]: np.array(row["position"]) for row in rows}
+    pose = straighten(read_volume(MICE / "A_J_.nii.gz"))
+    pairs = [
+        pair.split("-")
+        for pair in ["2-3", "4-5", "10-11", "17-15", "20-18", "24-27", "36-37", "40-41", "46-47"]
+    ]
+    across = np.array([points[a] - points[b] for a, b in pairs])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    assert np.median(np.abs(across @ pose.mid_plane.normal)) > np.cos(np.radians(3.0))
+    middles = np.array([(points[a] + points[b]) / 2 for a, b in pairs])
+    assert np.abs(pose.mid_plane.heights(middles)).max() < 0.3
+
+
+def test_the_command_says_the_pose_and_writes_it(tmp_path, capsys):
+    phantom = head(names=USUAL)
+    scan, truth = save_phantom(phantom, tmp_path / "head.nrrd")
+    assert main(["straighten", str(scan), "--json", str(tmp_path / "pose.json")]) == 0
+    said = capsys.readouterr().out
+    assert "mid-sagittal plane" in said
+    assert "file's orientation" in said
+    pose = json.loads((tmp_path / "pose.json").read_text())
+    known = np.array(json.loads(truth.read_text())["T_head_scan"])
+    assert np.abs(np.array(pose["T_head_scan"])[0, :3] @ known[0, :3]) > np.cos(np.radians(0.4))
+    assert pose["foundBy"] == "symmetry"
+    assert set(pose["confidence"]) == {"agreement", "overlap", "margin"}
+
+
+def test_the_command_takes_landmarks(tmp_path, capsys):
+    phantom = head(names=USUAL)
+    scan, _ = save_phantom(phantom, tmp_path / "head.nrrd")
+    files = []
+    for side, landmarks in some(phantom, ["IN", "OI"]).items():
+        files.append(str(tmp_path / f"GP_{side.value}.mrk.json"))
+        write_markups(files[-1], landmarks, specimen="GP")
+    assert main(["straighten", str(scan), "--landmarks", *files]) == 0
+    assert "pitch: from OI, IN" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--left", "1", "2", "3"], "belong together"),
+        (["--threshold", "nan"], "--threshold must be a number"),
+        (
+            [
+                "--landmarks",
+                "a",
+                "--midline",
+                "0",
+                "0",
+                "0",
+                "--left",
+                "1",
+                "0",
+                "0",
+                "--right",
+                "2",
+                "0",
+                "0",
+            ],
+            "not both",
+        ),
+        ([], "does not exist"),
+    ],
+)
+def test_the_command_refuses_in_one_line(options, said, tmp_path, capsys):
+    assert main(["straighten", str(tmp_path / "none.nrrd"), *options]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert said in error
