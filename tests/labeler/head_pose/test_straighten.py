@@ -14,7 +14,6 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.cli.entry import main
 from gp_labeler.head_pose import (
     HeadPoseError,
-    HeadTemplate,
     MidPlane,
     straighten,
     straighten_by_landmarks,
@@ -135,7 +134,7 @@ def test_a_box_leaves_out_what_is_not_the_head():
     ("values", "said"),
     [
         (np.full((20, 20, 20), 7, np.uint8), "no contrast"),
-        (np.random.default_rng(0).normal(100, 10, (40, 40, 40)).astype(np.float32), ""),
+        (np.random.default_rng(0).normal(100, 10, (40, 40, 40)).astype(np.float32), "bone|straightened"),
     ],
 )
 def test_a_scan_without_a_head_is_refused(values, said):
@@ -198,8 +197,8 @@ def test_too_few_landmarks_are_refused(codes, sides):
         straighten_by_landmarks(phantom.volume, some(phantom, codes, sides=sides))
 
 
-def test_landmarks_help_where_symmetry_is_refused():
-    phantom = head(24, turn=(0.0, 0.0, 0.0), crop=(0.65, "P"))
+def test_landmarks_and_the_bone_straighten_a_front_half():
+    phantom = head(24, turn=(0.0, 0.0, 0.0), crop=(0.3, "P"))
     left, right = (phantom.specimen.side(side) for side in Side)
     pair = [c for c in ("ZL", "IN") if c in left and c in right]
     assert pair == ["ZL", "IN"]
@@ -220,14 +219,6 @@ def test_three_free_points_are_enough():
     assert "calls right" in other.warnings[-1]
     with pytest.raises(HeadPoseError, match="too near"):
         straighten_by_points(phantom.volume, midline=left["IN"], left=left["MN"], right=left["MN"])
-
-
-def test_a_labelled_head_serves_as_a_template():
-    known, other = head(names=USUAL), head(25, turn=(0.0, 90.0, 0.0))
-    template = HeadTemplate.of(known.volume, known.T_head_scan)
-    pose = straighten(other.volume, template=template)
-    assert errors(pose, other)[2] < 4.0
-    assert known.volume.name in pose.pitch
 
 
 def test_a_mirrored_point_lies_as_far_behind_the_plane():
@@ -317,7 +308,7 @@ def test_the_command_takes_landmarks(tmp_path, capsys):
             ],
             "not both",
         ),
-        ([], "does not exist"),
+        ([], "there is no such file"),
     ],
 )
 def test_the_command_refuses_in_one_line(options, said, tmp_path, capsys):
