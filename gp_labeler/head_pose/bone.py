@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.coarse import means_of_cubes
+from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["COARSER", "Bone", "CoarseScan", "bone_of", "coarse_scan", "finest_step", "threshold_candidates"]
@@ -266,5 +267,5 @@ def bone_of(volume: Volume, threshold: float | None = None) -> tuple[Bone, Bone]
         There is no contrast, or hardly any bone.
     """
     fine, coarse = (coarse_scan(volume, factor * finest_step(volume)) for factor in (1.0, COARSER))
-    level = threshold_candidates(coarse)[0] if threshold is None else threshold
+    level = propose_threshold(volume) if threshold is None else threshold
     return Bone.islands(fine, level)[0], Bone.islands(coarse, level)[0]

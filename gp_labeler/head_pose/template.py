@@ -10,7 +10,7 @@ import numpy as np
 
 from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
-from gp_labeler.head_pose.bone import Bone, coarse_scan, finest_step, threshold_candidates
+from gp_labeler.head_pose.bone import Bone, bone_of
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import clipped_distances
 from gp_labeler.imaging.progress import Report
@@ -50,9 +50,7 @@ class HeadTemplate:
         cls, volume: Volume, T_head_scan: RigidTransform, *, threshold: float | None = None
     ) -> HeadTemplate:
         """Make a template of a scan whose head pose is known."""
-        scan = coarse_scan(volume, finest_step(volume))
-        level = threshold_candidates(scan)[0] if threshold is None else threshold
-        bone = Bone.islands(scan, level)[0]
+        bone = bone_of(volume, threshold)[0]
         points = T_head_scan.apply(bone.points)
         both = np.concatenate([points, points * (-1.0, 1.0, 1.0)])
         order = np.random.default_rng(0).permutation(len(both))[:_N_POINTS]

@@ -14,6 +14,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.cli.entry import main
 from gp_labeler.head_pose import (
     HeadPoseError,
+    HeadTemplate,
     MidPlane,
     straighten,
     straighten_by_landmarks,
@@ -219,6 +220,14 @@ def test_three_free_points_are_enough():
     assert "calls right" in other.warnings[-1]
     with pytest.raises(HeadPoseError, match="too near"):
         straighten_by_points(phantom.volume, midline=left["IN"], left=left["MN"], right=left["MN"])
+
+
+def test_a_labelled_head_serves_as_a_template():
+    known, other = head(names=USUAL), head(25, turn=(0.0, 90.0, 0.0))
+    template = HeadTemplate.of(known.volume, known.T_head_scan)
+    pose = straighten(other.volume, template=template)
+    assert errors(pose, other)[2] < 4.0
+    assert known.volume.name in pose.pitch
 
 
 def test_a_mirrored_point_lies_as_far_behind_the_plane():
