@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
@@ -18,6 +18,7 @@ from gp_core.frames import RigidTransform
 from gp_core.io.pose_export import write_csv, write_landmarks
 from gp_core.io.tfm import write_tfm
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.repeats import RepeatedTouches
 from gp_core.pose.covariance import cone_95, radius_95
 from gp_core.pose.mixture import UNDECIDED, Hypothesis, axis_part, mixture_radius_95, origin_part
 from gp_core.validation import FloatArray, check_option, freeze_arrays
@@ -72,6 +73,8 @@ class CochleaPose:
         Of the touches as they are named, among all hypotheses.
     hypotheses : tuple of Hypothesis
         Other hypotheses that are not ruled out, the likeliest first.
+    repeats : mapping of str to RepeatedTouches
+        The touches of each feature that was touched more than once.
     """
 
     side: Side
@@ -91,6 +94,7 @@ class CochleaPose:
     shared_error: float | None = None
     probability: float = 1.0
     hypotheses: tuple[Hypothesis, ...] = ()
+    repeats: Mapping[str, RepeatedTouches] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not isinstance(self.covariance, np.ndarray) or self.covariance.shape != (6, 6):
@@ -173,7 +177,7 @@ class CochleaPose:
         dict
             Plain values for JSON; lengths in mm, angles in degrees.
         """
-        return {
+        content = {
             "gpPose": 1,
             "method": self.method,
             "side": self.side.value,
@@ -203,6 +207,9 @@ class CochleaPose:
             if self.T_touches_atlas is None
             else self.T_touches_atlas.matrix.tolist(),
         }
+        if self.repeats:
+            content["repeated_touches"] = {code: one.as_dict() for code, one in self.repeats.items()}
+        return content
 
     @checks_arguments
     def save(self, path: str | PathLike[str]) -> None:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.argument_types import checks_arguments
@@ -14,6 +15,7 @@ from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.plausible_size import check_plausible_size
+from gp_core.landmarks.repeats import RepeatedTouches, combine_repeats
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.hypothesis_check import hypothesis_warnings
@@ -43,8 +45,10 @@ def estimate_pose(
 
     Parameters
     ----------
-    touches : mapping of str to (3,) array_like, or LandmarkSet
-        Position of each touched feature in the tracker's frame, mm; three or more, not collinear.
+    touches : mapping of str to (3,) or (n, 3) array_like, or LandmarkSet
+        Position of each touched feature in the tracker's frame, mm; three or more, not collinear. A feature
+        that was touched n times may have all its touches: their mean is used, without outliers, and counts as
+        one touch does.
     side : {"L", "R"}
         Side of the head.
     atlas : Atlas, optional
@@ -88,7 +92,8 @@ def estimate_pose(
     """
     check_option(method, "method", METHODS)
     check_option(round_window, "round window", ROUND_WINDOWS)
-    landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
+    repeats = {} if isinstance(touches, LandmarkSet) else combine_repeats(touches)
+    landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side, repeats)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
     check_plausible_size(landmarks, strict=True)
@@ -102,18 +107,33 @@ def estimate_pose(
             shared_error=shared_error,
             times=times,
         )
+    if repeats:
+        pose = replace(pose, repeats=repeats, warnings=(*pose.warnings, *_repeat_warnings(repeats)))
     if round_window == "expected":
         return pose
     return towards_touched_window(pose, landmarks)
 
 
-def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:
+def _repeat_warnings(repeats: Mapping[str, RepeatedTouches]) -> Iterator[str]:
+    for code, one in repeats.items():
+        for number in one.outliers:
+            off = float(np.linalg.norm(one.points[number - 1] - one.mean))
+            yield (
+                f"touch {number} of {len(one.points)} of {code} lies {off:.1f} mm from the others and is "
+                "left out: check that they are of the same place"
+            )
+
+
+def _as_landmarks(
+    touches: Mapping[str, ArrayLike], side: Side | str, repeats: Mapping[str, RepeatedTouches]
+) -> LandmarkSet:
     if not isinstance(touches, Mapping):
         raise GpError(
             f"touches must be a mapping of names to points, or a LandmarkSet, got {type(touches).__name__}",
             remedy="Read a file of touches with read_touches.",
         )
-    return LandmarkSet.from_mapping(touches, side, frame="tracker")
+    means = {code: one.mean for code, one in repeats.items()}
+    return LandmarkSet.from_mapping({**touches, **means}, side, frame="tracker")
 
 
 def _with_hypotheses(
