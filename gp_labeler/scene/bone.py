@@ -64,7 +64,7 @@ class BoneActor:
         """
         self._drop()
         self._surfaces = tuple(surfaces)
-        self._fine = [piece for surface in surfaces for piece in chunks_of(surface)]
+        self._fine = [chunk for surface in surfaces for chunk in chunks_of(surface)]
         self._quick = [MeshChunk(surface, 0, surface.n_triangles) for surface in quick if surface.n_triangles]
         self.version += 1
 
@@ -132,23 +132,23 @@ class BoneActor:
         Parameters
         ----------
         direction : (3,) float array
-            Into the scene. Nearer pieces of solid bone come first, as they hide others; of transparent bone,
+            Into the scene. Nearer chunks of solid bone come first, as they hide others; of transparent bone,
             they come last, as they lie over others.
         quick : bool
             The preview mesh, where there is one.
         at_once : bool
-            All pieces in one group.
+            All chunks in one group.
         """
         if not self._visible or self._opacity == 0:
             return []
-        pieces = self._quick if quick and self._quick else self._fine
+        chunks = self._quick if quick and self._quick else self._fine
         order = 1.0 if self._opacity == 1 else -1.0
-        pieces = sorted(pieces, key=lambda piece: order * float(piece.middle @ direction))
-        return [pieces] if at_once or quick else [[piece] for piece in pieces]
+        chunks = sorted(chunks, key=lambda chunk: order * float(chunk.middle @ direction))
+        return [chunks] if at_once or quick else [[chunk] for chunk in chunks]
 
-    def actors(self, pieces: Sequence[MeshChunk]) -> list[vtkActor]:
-        """Return what draws pieces, invisible yet."""
-        made = [piece.actor(self._layers.bone, self._look, self._plane) for piece in pieces]
+    def actors(self, chunks: Sequence[MeshChunk]) -> list[vtkActor]:
+        """Return what draws chunks, invisible yet."""
+        made = [chunk.actor(self._layers.bone, self._look, self._plane) for chunk in chunks]
         solid = self._cut is not None and self._opacity == 1
         for actor in made:
             actor.SetBackfaceProperty(cast(Any, self._inside if solid else None))
@@ -204,8 +204,8 @@ class BoneActor:
         self._inside.SetSpecular(0.0)
 
     def _drop(self) -> None:
-        for piece in (*self._fine, *self._quick):
-            piece.close(self._layers.bone)
+        for chunk in (*self._fine, *self._quick):
+            chunk.close(self._layers.bone)
         self._fine, self._quick = [], []
 
 

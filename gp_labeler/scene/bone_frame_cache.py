@@ -1,7 +1,7 @@
 """The bone as it is seen now, kept as a picture with depths, over which points are drawn again and again.
 
 Without a graphics card a large mesh takes a second to draw. So it is drawn when the camera or the bone itself
-changes, never for a point; and it is drawn in pieces, between which the window answers.
+changes, never for a point; and it is drawn in chunks, between which the window answers.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class BoneFrameCache:
         self._coarseness = 1
         self._warm = -1
         self.n_drawn = 0
-        """How often bone has been drawn, a frame in pieces once."""
+        """How often bone has been drawn, a frame in chunks once."""
 
     def is_fine(self, key: RenderKey) -> bool:
         """Whether the picture that is kept shows just that, finely."""
@@ -128,7 +128,7 @@ class BoneFrameCache:
         direction : (3,) float array
             Into the scene.
         seconds : float
-            After which to stop, at the end of a piece.
+            After which to stop, at the end of a chunk.
         """
         if self.is_fine(key):
             return True
@@ -164,7 +164,7 @@ class BoneFrameCache:
         self._smoother.RemoveAllViewProps()
 
     def _steps(self, key: RenderKey, direction: FloatArray) -> Iterator[None]:
-        """Draw a fine picture, stopping after each piece and each strip."""
+        """Draw a fine picture, stopping after each chunk and each strip."""
         if self._bone.has_quick and self._warm != key.mesh:
             self._draw_preview((1, 1), key.size, direction)  # so that the first turn does not wait for it
             self._warm = key.mesh

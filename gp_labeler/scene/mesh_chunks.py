@@ -1,4 +1,4 @@
-"""A large mesh in pieces, each of which is drawn in a moment."""
+"""A large mesh in chunks, each of which is drawn in a moment."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ from gp_labeler.scene.render_layers import release
 __all__ = ["CHUNK_TRIANGLES", "MeshChunk", "chunks_of"]
 
 CHUNK_TRIANGLES = 16_000
-"""About 10 ms without a graphics card: input waits for one piece at most."""
+"""About 10 ms without a graphics card: input waits for one chunk at most."""
 
 _SAMPLES = 200
 _SPREAD = 4
-"""A piece whose corners are spread over more of the table of points, in times its size, gets its own."""
+"""A chunk whose corners are spread over more of the table of points, in times its size, gets its own."""
 
 
 class MeshChunk:
@@ -84,7 +84,7 @@ class MeshChunk:
 
 
 def chunks_of(surface: Surface, n_triangles: int = CHUNK_TRIANGLES) -> list[MeshChunk]:
-    """Return a surface in pieces of about so many triangles, neighbours in the mesh together."""
+    """Return a surface in chunks of about so many triangles, neighbours in the mesh together."""
     n = surface.n_triangles
     edges = np.linspace(0, n, max(1, round(n / n_triangles)) + 1).astype(int).tolist()
     return [MeshChunk(surface, first, last) for first, last in pairwise(edges) if last > first]

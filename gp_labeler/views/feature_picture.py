@@ -162,6 +162,8 @@ class _Picture:
 
     def draw_feature(self) -> None:
         self._painter.setClipRect(self._frame)
+        high = QFontMetricsF(self._font(CAPTION)).height() + 3
+        self._taken.append(self._frame.adjusted(0, self._frame.height() - high, 0, 0))  # words stand there
         self._points()
         self._words()
 

@@ -393,7 +393,7 @@ def test_a_point_more_is_drawn_without_drawing_the_bone_again(scene: Scene3D, ba
 
 
 @pytest.mark.parametrize("opacity", [1.0, 0.5])
-def test_bone_drawn_in_pieces_is_the_same_bone(
+def test_bone_drawn_in_chunks_is_the_same_bone(
     scene: Scene3D, ball: Surface, opacity: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scene.bone.opacity = opacity
