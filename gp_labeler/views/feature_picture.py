@@ -162,8 +162,7 @@ class _Picture:
 
     def draw_feature(self) -> None:
         self._painter.setClipRect(self._frame)
-        high = QFontMetricsF(self._font(CAPTION)).height() + 3
-        self._taken.append(self._frame.adjusted(0, self._frame.height() - high, 0, 0))  # words stand there
+        self._taken += self._edges()
         self._points()
         self._words()
 
@@ -307,6 +306,17 @@ class _Picture:
         self._painter.setPen(Qt.PenStyle.NoPen)
         self._painter.setBrush(colour)
         self._painter.drawPath(path)
+
+    def _edges(self) -> list[QRectF]:
+        """Return the boxes of the directions and of the words at the lower edge."""
+        frame, high = self._frame, QFontMetricsF(self._font(CAPTION, bold=True)).height() + 3
+        middle = frame.center()
+        return [
+            QRectF(frame.left(), frame.bottom() - high, frame.width(), high),
+            QRectF(frame.left(), middle.y() - high / 2, high, high),
+            QRectF(frame.right() - high, middle.y() - high / 2, high, high),
+            QRectF(middle.x() - high / 2, frame.top(), high, high),
+        ]
 
     def _words(self) -> None:
         """Write the directions at the edges, and from where it is seen."""
