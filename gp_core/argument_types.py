@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.errors import GpError
 
-__all__ = ["check_fields", "checks_arguments"]
+__all__ = ["check_fields", "checks_arguments", "checks_arguments_but"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -35,6 +35,21 @@ _WORDS = {
     type(None): "None",
     np.ndarray: "an array of numbers",
 }
+
+
+def checks_arguments_but(*leaving_out: str) -> Callable[[Callable[_P, _R]], Callable[_P, _R]]:
+    """Return `checks_arguments` that leaves out arguments of which the function says more itself.
+
+    Parameters
+    ----------
+    *leaving_out : str
+        Their names.
+    """
+
+    def decorate(function: Callable[_P, _R]) -> Callable[_P, _R]:
+        return _checking(function, leaving_out)
+
+    return decorate
 
 
 def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
@@ -65,6 +80,10 @@ def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
         ...
     gp_core.errors.GpError: length must be a number, got 'x'
     """
+    return _checking(function, ())
+
+
+def _checking(function: Callable[_P, _R], leaving_out: Collection[str]) -> Callable[_P, _R]:
     signature = inspect.signature(function)
     hints: dict[str, Any] = {}
 
@@ -72,16 +91,22 @@ def checks_arguments(function: Callable[_P, _R]) -> Callable[_P, _R]:
     def checked(*args: _P.args, **kwargs: _P.kwargs) -> _R:
         if not hints:
             hints.update(typing.get_type_hints(function))
-        try:
-            bound = signature.bind(*args, **kwargs)
-        except TypeError as error:
-            raise GpError(f"{function.__name__}: {error}") from None
-        for name, value in bound.arguments.items():
-            if name in hints and signature.parameters[name].default is not value:
+        for name, value in _named(signature, args, kwargs).items():
+            if name in hints and name not in leaving_out and signature.parameters[name].default is not value:
                 _check(value, hints[name], name)
         return function(*args, **kwargs)
 
     return checked
+
+
+def _named(
+    signature: inspect.Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    """Return arguments by name; none where they do not match, which the call itself then says."""
+    try:
+        return signature.bind(*args, **kwargs).arguments
+    except TypeError:
+        return {}
 
 
 def check_fields(instance: Any, *, leaving_out: Collection[str] = ()) -> None:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.argument_types import checks_arguments
+from gp_core.argument_types import checks_arguments_but
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.constants import METHODS
@@ -28,7 +28,7 @@ from gp_core.validation import check_option
 __all__ = ["estimate_pose"]
 
 
-@checks_arguments
+@checks_arguments_but("touches")
 def estimate_pose(
     touches: Mapping[str, ArrayLike] | LandmarkSet,
     side: Side | str,
@@ -92,7 +92,7 @@ def estimate_pose(
     """
     check_option(method, "method", METHODS)
     check_option(round_window, "round window", ROUND_WINDOWS)
-    repeats = {} if isinstance(touches, LandmarkSet) else combine_repeats(touches)
+    repeats = combine_repeats(touches) if isinstance(touches, Mapping) else {}
     landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side, repeats)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
