@@ -44,6 +44,11 @@ def checks_arguments_but(*leaving_out: str) -> Callable[[Callable[_P, _R]], Call
     ----------
     *leaving_out : str
         Their names.
+
+    Returns
+    -------
+    callable
+        The decorator.
     """
 
     def decorate(function: Callable[_P, _R]) -> Callable[_P, _R]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -163,4 +164,17 @@ def _atlas_of_names(specimens: Sequence[Specimen] | None) -> Atlas:
 
 
 def _default_atlas(specimens: Sequence[Specimen] | None) -> Atlas:
-    return fit_atlas(specimens) if specimens else Atlas.published()
+    return _fitted(tuple(specimens)) if specimens else Atlas.published()
+
+
+def _fitted(specimens: tuple[Specimen, ...]) -> Atlas:
+    """Fit an atlas once to the same animals, in a row: each touch of a session asks for it again."""
+    for animals, atlas in _LAST_FITTED:
+        if len(animals) == len(specimens) and all(map(operator.is_, animals, specimens)):
+            return atlas
+    atlas = fit_atlas(specimens)
+    _LAST_FITTED[:] = [(specimens, atlas)]
+    return atlas
+
+
+_LAST_FITTED: list[tuple[tuple[Specimen, ...], Atlas]] = []
