@@ -9,7 +9,7 @@ from pathlib import Path
 from gp_core.disk import write_bytes
 from gp_core.errors import GpError
 
-__all__ = ["stand_in_directory", "write_problem"]
+__all__ = ["fallback_directory", "write_problem"]
 
 _NEEDED_BYTES = 200_000  # some journals
 _PROBE = "can-be-written"
@@ -29,7 +29,7 @@ def write_problem(directory: Path) -> str:
     return ""
 
 
-def stand_in_directory() -> Path | None:
+def fallback_directory() -> Path | None:
     """Return a folder of this user for temporary files that can be written; None where there is none."""
     user = os.getuid() if hasattr(os, "getuid") else "user"
     folder = Path(tempfile.gettempdir(), f"gp-labeler-{user}")

@@ -106,11 +106,11 @@ class Cochlea:
         turns = np.interp(steps / self.length, RISE, TURNS).astype(np.float32)
         bulge = (_BULGE * np.clip(steps, 0, 1) * np.clip(self.length - steps, 0, 1)).astype(np.float32)
         cc = self.ear["CC"]
-        misfit = float(self._beyond(_as_grid(cc), steps, radii, turns, bulge)[0, 0, 0])
+        excess = float(self._beyond(_as_grid(cc), steps, radii, turns, bulge)[0, 0, 0])
 
         def value(grid: Grid) -> Values:
             near_cc = np.exp(squared_length(moved(grid, cc)) / np.float32(-2 * _DENT_MM**2))
-            fitted: Values = self._beyond(grid, steps, radii, turns, bulge) - np.float32(misfit) * near_cc
+            fitted: Values = self._beyond(grid, steps, radii, turns, bulge) - np.float32(excess) * near_cc
             return fitted
 
         ends = np.stack([self.ear["CB"] - 1.5 * self.axis, self.ear["CA"] + CAP_MM * self.axis])

@@ -165,7 +165,7 @@ def _check_range(value: float, name: str, low: float, high: float) -> None:
 
 
 def generator_of(seed: int, name: str) -> np.random.Generator:
-    """Return a source of chance that depends on a seed and a name, and on nothing else."""
+    """Return a source of random numbers that depends on a seed and a name, and on nothing else."""
     return np.random.default_rng([seed, *name.encode()])
 
 

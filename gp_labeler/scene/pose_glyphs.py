@@ -20,7 +20,7 @@ __all__ = ["SolidActor"]
 class SolidActor:
     """Draws solids: full where they are seen, fainter where bone hides them.
 
-    They are laid out anew as one mesh whenever they change. The glyph filter of VTK and pyvista scales a
+    They are laid out again as one mesh whenever they change. The glyph filter of VTK and pyvista scales a
     glyph by one number, while a rod that grows longer keeps its thickness.
 
     Parameters

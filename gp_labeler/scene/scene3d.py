@@ -182,12 +182,12 @@ class Scene3D:
         return self._bone_frames.n_drawn
 
     def render(self, *, quick: bool = False) -> None:
-        """Draw one frame; the bone anew only where it or the camera has changed.
+        """Draw one frame; the bone again only where it or the camera has changed.
 
         Parameters
         ----------
         quick : bool
-            Where the bone must be drawn anew, draw its coarser preview mesh, if there is one; `advance` then
+            Where the bone must be drawn again, draw its coarser preview mesh, if there is one; `advance` then
             draws it finely.
         """
         self._set_clipping()
@@ -224,7 +224,7 @@ class Scene3D:
         return RenderKey(matrix.tobytes(), self.target.size, look, self.bone.version)
 
     def forget(self) -> None:
-        """Draw everything anew: the context of OpenGL in which pictures were kept is gone."""
+        """Draw everything again: the context of OpenGL in which pictures were kept is gone."""
         self.target.forget()
         self._bone_frames.forget()
 
@@ -324,7 +324,7 @@ class Scene3D:
 class _Room:
     """Near and far plane of the camera: moved with it, else only for what lies outside them.
 
-    A point more must not change the projection, or the bone would be drawn anew for it.
+    A point more must not change the projection, or the bone would be drawn again for it.
     """
 
     def __init__(self, renderer: vtkRenderer) -> None:

@@ -1,4 +1,4 @@
-"""The clock of a tracker against that of this computer: which messages are late, and when it was set anew."""
+"""The clock of a tracker against that of this computer: which messages are late, when it was set."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ _AHEAD_S = 0.5
 """A message that seems to have taken that much less than the quickest has a time stamp that is wrong."""
 
 _ADOPT_S = 1.5
-"""How long time stamps must agree with each other before they are taken for a clock that was set anew."""
+"""How long time stamps must agree with each other before they are taken for a clock that was set again."""
 
 _AGREE_S = 0.05
 
@@ -53,7 +53,7 @@ class DeviceClock:
     def __init__(self, late_s: float) -> None:
         self.late_s = late_s
         self.changes = 0
-        """How often a clock that was set anew has been adopted."""
+        """How often a clock that was set again has been adopted."""
         self._quickest = np.inf
         self._time = -np.inf
         self._received = -np.inf
@@ -88,7 +88,7 @@ class DeviceClock:
         return Fault.NONE, ""
 
     def _adopted(self, time: float, received: float) -> bool:
-        """Whether the clock was set anew: its new time stamps have been steady for long enough."""
+        """Whether the clock was set again: its new time stamps have been steady for long enough."""
         run = self._run
         if run is None or not run.goes_on(time, received):
             self._run = _Run(time, received, time, received - time)

@@ -106,7 +106,7 @@ class FrameCheck:
         return _place(position) not in self._segments
 
     def forget(self) -> None:
-        """Begin anew: there are no touches any more."""
+        """Begin again: there are no touches any more."""
         self.last = None
         self._segments.clear()
         self._joined.clear()

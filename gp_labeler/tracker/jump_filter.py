@@ -182,7 +182,7 @@ def _motion(before: Sample, after: Sample) -> _Motion:
     assert before.matrix is not None
     assert after.matrix is not None
     seconds = after.time - before.time
-    if seconds <= 0:  # the tracker's clock was set anew between the two
+    if seconds <= 0:  # the tracker's clock was set again between the two
         seconds = after.received - before.received
     degrees = float(turn_deg(before.matrix[:3, :3].T @ after.matrix[:3, :3]))
     return _Motion(max(seconds, 1e-6), after.matrix[:3, 3] - before.matrix[:3, 3], degrees)

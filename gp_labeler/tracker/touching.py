@@ -162,7 +162,7 @@ class TouchRecorder:
         return self.dwell and self._touched is None
 
     def press(self) -> None:
-        """Record the tip from now on; it should be still. A press during a recording begins it anew."""
+        """Record the tip from now on; it should be still. A press during a recording begins it again."""
         self._pressed_at = self._clock()
         self.progress = 0.0
 
@@ -178,7 +178,7 @@ class TouchRecorder:
         Returns
         -------
         list of RecordedTouch or RefusedTouch
-            Mostly empty. Only a press can be refused: holding still begins anew instead.
+            Mostly empty. Only a press can be refused: holding still begins again instead.
         """
         done: list[RecordedTouch | RefusedTouch] = []
         for sample in samples:

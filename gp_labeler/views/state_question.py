@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gp_labeler.document.state_directory import stand_in_directory, write_problem
+from gp_labeler.document.state_directory import fallback_directory, write_problem
 from gp_labeler.views.prompts import Prompts
 
 __all__ = ["directory_to_use"]
@@ -29,7 +29,7 @@ def directory_to_use(wanted: Path, prompts: Prompts) -> Path | None:
     """
     directory = wanted
     while problem := write_problem(directory):
-        other = stand_in_directory()
+        other = fallback_directory()
         answers = [] if other is None else [f"Use {other}"]
         answer = prompts.choose(
             "Unsaved edits cannot be kept safe",

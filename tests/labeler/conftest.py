@@ -11,7 +11,7 @@ import pytest
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from pytestqt.qtbot import QtBot
-from window_cases import PATIENCE_MS, Answers, ball_volume, close, settle
+from window_cases import PATIENCE_MS, Answers, ball_volume, close, wait_until_idle
 
 from gp_labeler.imaging.volume import Volume
 
@@ -70,7 +70,7 @@ def make_window(qtbot, tmp_path) -> Iterator[Callable[..., object]]:
 
 @pytest.fixture(scope="module")
 def one_window(qapp) -> Iterator[object]:
-    """One window for all tests of a file: to open a scan anew is quicker than to make a window."""
+    """One window for all tests of a file: to open a scan again is quicker than to make a window."""
     from gp_labeler.views.application import make_window as make
 
     made = make(None, atlas=False)
@@ -86,5 +86,5 @@ def window(qtbot, make_window, ball):
     """A window with the ball open and meshed."""
     window = make_window()
     window.workspace.scan.begin(ball)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     return window

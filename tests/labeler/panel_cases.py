@@ -29,7 +29,7 @@ def grey_volume(seed: int = 0) -> Volume:
     return Volume.from_parts(array.clip(0, 255).astype(np.uint8), (1.5,) * 3, (-20, -40, -30), name="GP-014")
 
 
-def desk_with_scan(**options) -> Workspace:
+def workspace_with_scan(**options) -> Workspace:
     """Make a workspace on that scan, with the atlas, whose jobs wait to be delivered."""
     workspace = Workspace(None, QueueDispatcher(), atlas=ATLAS, author="tester", **options)
     volume = grey_volume()

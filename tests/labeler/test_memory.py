@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from window_cases import MIDDLE, ball_volume, settle, write_ball
+from window_cases import MIDDLE, ball_volume, wait_until_idle, write_ball
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -152,7 +152,7 @@ def test_the_window_frees_the_scan_before(layout: str, qtbot, make_window, no_co
     from scipy.spatial.transform import Rotation
 
     window = make_window()
-    workspace, wait = window.workspace, lambda: settle(qtbot, window)
+    workspace, wait = window.workspace, lambda: wait_until_idle(qtbot, window)
     oblique = Rotation.from_euler("xyz", [10, 20, 5], degrees=True).as_matrix()
     workspace.scan.begin(_new_ball(1))
     first = _work_on(workspace, wait)

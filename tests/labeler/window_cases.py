@@ -108,7 +108,7 @@ def close(window) -> None:
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 
 
-def settle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
+def wait_until_idle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
     """Wait until all work is done, and all is drawn."""
     workspace = window.workspace
     qtbot.waitUntil(lambda: not workspace.jobs.running, timeout=int(1000 * seconds))

@@ -188,7 +188,7 @@ def _shrunk(log: SkyScanLog, mm: float, shape: tuple[int, int], step: int) -> Sp
 def _sections_apart(log: SkyScanLog, numbers: Sequence[int], step: int, n_slices: int) -> tuple[int, str]:
     """Return how many sections lie from one slice to the next, and why that is a guess, if it is.
 
-    NRecon names slices by their sections. Other programs number them anew, from 0 or 1.
+    NRecon names slices by their sections. Other programs number them again, from 0 or 1.
     """
     there = f"there are {n_slices}, numbered {min(numbers)} to {max(numbers)}"
     said = f"{log.path.name} speaks of every {log.step}. section from {log.first} to {log.last}; {there}"

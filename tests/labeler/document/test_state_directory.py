@@ -16,7 +16,7 @@ from gp_labeler.document.opening import new_specimen, recover_specimen
 from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import SetNotes
-from gp_labeler.document.state_directory import stand_in_directory, write_problem
+from gp_labeler.document.state_directory import fallback_directory, write_problem
 from gp_labeler.views.state_question import directory_to_use
 
 
@@ -114,10 +114,10 @@ class Answers:
 
 def test_a_folder_stands_in_as_the_user_says(shut: Path, tmp_path: Path, monkeypatch) -> None:
     monkeypatch.setattr(state_directory.tempfile, "gettempdir", lambda: str(tmp_path / "temporary"))
-    stand_in = stand_in_directory()
+    fallback = fallback_directory()
     for answer, expected in (
-        ("Use", stand_in),
-        ("", stand_in),
+        ("Use", fallback),
+        ("", fallback),
         ("Work", None),
         ("Choose", tmp_path / "mine"),
     ):
@@ -125,7 +125,7 @@ def test_a_folder_stands_in_as_the_user_says(shut: Path, tmp_path: Path, monkeyp
         assert directory_to_use(shut, prompts) == expected
         ((text, answers),) = prompts.asked
         assert str(shut) in text
-        assert answers == [f"Use {stand_in}", "Choose a folder…", "Work without"]
+        assert answers == [f"Use {fallback}", "Choose a folder…", "Work without"]
 
 
 def test_nobody_is_asked_where_all_is_well(tmp_path: Path) -> None:

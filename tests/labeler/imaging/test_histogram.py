@@ -17,7 +17,7 @@ def volume_of(array: np.ndarray, **rest) -> Volume:
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.int16, np.uint16, np.float32])
-def test_two_greys_stand_where_they_are(dtype):
+def test_two_grey_values_stand_where_they_are(dtype):
     array = np.full((20, 20, 20), 30, dtype)
     array[5:10] = 200
     array[0, 0, 0], array[0, 0, 1] = 0, 230

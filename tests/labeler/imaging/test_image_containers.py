@@ -482,7 +482,7 @@ LOGS = {
     "all sections": (said(0, 33), 0, 1, 0.25),
     "numbers from elsewhere": (said(100, 133), 100, 1, 0.25),
     "every second, by section": (said(0, 66, 2), 0, 2, 0.5),
-    "every second, numbered anew": (said(10, 76, 2), 0, 1, 0.5),
+    "every second, numbered again": (said(10, 76, 2), 0, 1, 0.5),
     "every second kept": (said(0, 66), 0, 2, 0.5),
     "micro sign": (said(0, 33, pixel="Pixel Size (µm)=250"), 0, 1, 0.25),
     "millimetres": (said(0, 33, pixel="Pixel Size (mm)=0.25"), 0, 1, 0.25),
@@ -500,7 +500,7 @@ def test_a_skyscan_log_gives_the_voxel_size(name: str, tmp_path: Path) -> None:
 
 LOGS_ASKED = {
     "made smaller": (said(0, 33, width=2 * SIZE[0]), 0, 1, "92 x 80 pixels.*--spacing 0.5"),
-    "some were kept, numbered anew": (said(0, 66), 0, 1, "every 1. section from 0 to 66.*0.25 0.25 0.5"),
+    "some were kept, numbered again": (said(0, 66), 0, 1, "every 1. section from 0 to 66.*0.25 0.25 0.5"),
     "step against numbers": (said(0, 99, 3), 5, 2, "every 3. section from 0 to 99; there are 34.*--spacing"),
     "size of the projections": (
         said(0, 33, pixel="x=0") + "[Acquisition]\nImage Pixel Size (um)=30\n[Reconstruction]\n",

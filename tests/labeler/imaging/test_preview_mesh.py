@@ -19,7 +19,7 @@ def shell() -> Volume:
     return Volume.from_parts((100 * np.clip(wall + 0.5, 0, 1)).astype(np.uint8), [0.1] * 3, [0.0, 0.0, 0.0])
 
 
-def test_a_stand_in_has_few_triangles_and_lies_where_the_surface_does(shell: Volume) -> None:
+def test_a_preview_has_few_triangles_and_lies_where_the_surface_does(shell: Volume) -> None:
     surface = extract_isosurface(shell, 50)
     middle = shell.extent.mean(axis=0)
     for n in (20_000, 5_000):

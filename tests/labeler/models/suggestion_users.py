@@ -66,7 +66,7 @@ def label(editing: Editing, side: Side, truth: LandmarkSet, rng: np.random.Gener
         else:
             editing.labels.place(seen, side=side, code=code)
         for other in editing.document.landmarks(side).suggested:
-            editing.labels.clear(side=side, code=other)  # to be accepted anew, where it is now expected
+            editing.labels.clear(side=side, code=other)  # to be accepted again, where it is now expected
 
 
 def measured(n_animals: int, seed: int = 0) -> Coverage:

@@ -179,7 +179,7 @@ def test_an_atlas_opened_at_the_start_is_not_replaced_by_the_published_one(
 
 @pytest.fixture
 def start(tmp_path):
-    """Start the program anew, once more each time, and wait until its atlas is there."""
+    """Start the program again, once more each time, and wait until its atlas is there."""
     made = []
 
     def started(directory=tmp_path / "state"):

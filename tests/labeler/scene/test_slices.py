@@ -171,7 +171,7 @@ def test_window_and_level_are_linear_for_all_types(dtype: type) -> None:
 
 
 @pytest.mark.parametrize(("dtype", "offset"), [("uint32", 2**31), ("int32", -(2**31)), ("float64", 1e12)])
-def test_greys_are_right_for_small_differences_of_large_values(dtype: str, offset: float) -> None:
+def test_grey_values_are_right_for_small_differences_of_large_values(dtype: str, offset: float) -> None:
     steps = np.arange(256).reshape(16, 16)
     values = (steps.astype(np.float64) + offset).astype(dtype)
     assert np.array_equal(WindowLevel(offset, offset + 255).grey(values), steps)

@@ -9,7 +9,7 @@ import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
 from script_cases import run, untimed
-from window_cases import settle
+from window_cases import wait_until_idle
 
 from gp_core.io import read_landmarks
 from gp_core.landmarks.features import Side, index_of
@@ -71,7 +71,7 @@ def test_events_in_the_window_leave_the_same_files(qtbot, make_window, folder) -
     window = make_window(atlas=True)
     window.resize(*SIZE)
     window.workspace.scan.open(folder / "ball.nrrd")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     window.grid.scene_view.view_from("A")
     window.grid.reset()
     views = {"3d": window.grid.scene_view, **{p.value: window.grid.slice_views[p] for p in Plane}}
@@ -80,7 +80,7 @@ def test_events_in_the_window_leave_the_same_files(qtbot, make_window, folder) -
         row = table.view.visualRect(table.model.index(index_of(code), 1 + list(Side).index(Side(side))))
         QTest.mouseClick(table.view.viewport(), Qt.MouseButton.LeftButton, pos=row.center())
         QTest.mouseClick(views[view], Qt.MouseButton.LeftButton, pos=QPoint(*pixel))
-        settle(qtbot, window)
+        wait_until_idle(qtbot, window)
     window.ui.prompts.files = [folder / "window"]
     window.commands.run("file.export")
     assert texts(folder / "window") == texts(folder / "out")

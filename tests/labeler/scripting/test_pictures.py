@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from qtpy.QtGui import QImage
-from window_cases import MIDDLE, VOXEL_MM, image_bytes, settle
+from window_cases import MIDDLE, VOXEL_MM, image_bytes, wait_until_idle
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.planes import Plane
@@ -45,7 +45,7 @@ def brightest(image: QImage) -> np.ndarray:
 def window(qtbot, make_window):
     window = make_window()
     window.workspace.scan.begin(spotted())
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     for name in ("outline_visible", "labels_visible"):
         window.workspace.view.update(**{name: False})
     window.workspace.view.update(level=1600.0, width=2400.0)
@@ -79,7 +79,7 @@ def l_shaped() -> Volume:
 def test_left_is_where_it_should_be_in_3d(qtbot, make_window, letter, sign) -> None:
     window = make_window()
     window.workspace.scan.begin(l_shaped())
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     window.grid.scene_view.view_from(letter)
     window.grid.scene_view.reset()
     image = pixels(picture(window, "3d", (500, 400))).astype(int)

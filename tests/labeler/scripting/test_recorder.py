@@ -12,7 +12,7 @@ from animal_cases import drawn_animals, write_animals
 from qtpy.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from script_cases import write_ball
-from window_cases import BALL_MM, MIDDLE, settle
+from window_cases import BALL_MM, MIDDLE, wait_until_idle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -135,7 +135,7 @@ class Recording:
         n = len(self.recorder.tables)
         self.window.ui.prompts.answers = list(answers)
         self.window.commands.run(id)
-        settle(self.qtbot, self.window)
+        wait_until_idle(self.qtbot, self.window)
         return [table["do"] for table in self.recorder.tables[n:]]
 
     def check(self, *files: str) -> list[str]:
@@ -171,7 +171,7 @@ def write_path(folder) -> Path:
 def recording(qtbot, make_window, tmp_path):
     window = make_window(atlas=True)
     window.workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     return Recording(qtbot, window, tmp_path)
 
 
@@ -221,7 +221,7 @@ def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
     workspace.labels.go_to(Side.RIGHT, "RWP")
     assert run("point.clear") == ["clear_point"]
     workspace.scan.set_threshold(1003.25)
-    settle(recording.qtbot, recording.window)
+    wait_until_idle(recording.qtbot, recording.window)
     recording.document.do(SetNotes("one"), merge=False)
     recording.document.do(SetNotes('one "two"\nthrée'), merge=True)
     steps = recording.check()
@@ -334,7 +334,7 @@ def test_an_own_atlas_and_an_insertion_path_are_taken_again(recording, when) -> 
     def take() -> None:
         prompts.files = [animals]
         recording.window.commands.run("atlas.fit_folder")
-        settle(recording.qtbot, recording.window)
+        wait_until_idle(recording.qtbot, recording.window)
         prompts.files = [write_path(recording.folder)]
         prompts.answers = ["m", "left", "z,-y,x", "The first 30"]
         recording.window.commands.run("pose.path")
@@ -366,10 +366,10 @@ def test_another_atlas_is_taken_again(recording) -> None:
     recording.workspace.atlas.current.save(file)
     recording.begin()
     recording.workspace.atlas.open(file)
-    settle(recording.qtbot, recording.window)
+    wait_until_idle(recording.qtbot, recording.window)
     assert recording.recorder.tables[-1] == {"do": "atlas", "path": str(file)}
     recording.workspace.atlas.use_published()
-    settle(recording.qtbot, recording.window)
+    wait_until_idle(recording.qtbot, recording.window)
     assert recording.recorder.tables[-1]["path"] == "published"
     place_three(recording)
     recording.check()
@@ -431,7 +431,7 @@ def test_another_scan_is_opened_without_what_was_not_saved(recording) -> None:
     other = write_ball(recording.folder / "other.nrrd")
     recording.window.ui.prompts.answers = ["Do not save"]
     recording.window.ui.open_path(other)
-    settle(recording.qtbot, recording.window)
+    wait_until_idle(recording.qtbot, recording.window)
     recording.labels.place(MIDDLE, How.MESH, side="L", code="CA")
     recording.document.do(RenameSpecimen("ball"))
     recording.check(*FILES[:2])
@@ -446,7 +446,7 @@ def test_what_was_only_touched_needs_no_scan_until_it_gets_one(qtbot, make_windo
     assert recording.run("file.new", "Do not save") == ["open", "view"]
     touching.record_touch(recording.document, "R", "OS", [4, 5, 3])
     window.workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert recording.document.state.specimen == "ball"
     recording.labels.place(MIDDLE, side="L", code="CA")
     assert recording.check(FILES[0]).count("open") == 3
@@ -457,7 +457,7 @@ def test_what_was_only_touched_needs_no_scan_until_it_gets_one(qtbot, make_windo
 def test_a_phantom_with_labels_comes_back_with_them(qtbot, make_window, tmp_path) -> None:
     window = make_window()
     window.workspace.scan.open_demo(3, 0.4)
-    settle(qtbot, window, 60)
+    wait_until_idle(qtbot, window, 60)
     recording = Recording(qtbot, window, tmp_path)
     recording.labels.place(window.workspace.scan.truth.side(Side.LEFT)["CA"], side="L", code="CA")
     recording.begin()

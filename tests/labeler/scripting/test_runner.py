@@ -41,7 +41,7 @@ def test_a_click_on_bone_places_on_it(tmp_path) -> None:
     assert mark["provenance"]["how"] == "mesh"
 
 
-def test_best_turns_the_head_to_what_is_hidden(tmp_path) -> None:
+def test_best_rotates_the_head_to_what_is_hidden(tmp_path) -> None:
     behind = on_ball(0.3, 1, 0.2)
     hidden = run(tmp_path, LOOK, place("RWA", behind))
     assert "bone hides that position" in hidden.error

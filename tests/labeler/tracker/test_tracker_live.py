@@ -68,7 +68,7 @@ def _bench(simulator: SimulatorProcess, *, dwell: bool = False, limits: Limits =
 def bench(swaying) -> Iterator[Bench]:
     bench = _bench(swaying, reference="HeadToTracker")
     bench.link.open()
-    bench.settle()
+    bench.wait_until_idle()
     yield bench
     bench.link.close()
 
@@ -77,7 +77,7 @@ def bench(swaying) -> Iterator[Bench]:
 def plain(resting) -> Iterator[Bench]:
     bench = _bench(resting)
     bench.link.open()
-    bench.settle()
+    bench.wait_until_idle()
     yield bench
     bench.link.close()
 
@@ -126,7 +126,7 @@ def test_a_covered_marker_is_said_and_records_nothing(swaying, bench) -> None:
     assert bench.samples[-1].matrix is None
     assert isinstance(bench.press(), RefusedTouch)
     swaying.do("show")
-    bench.settle()
+    bench.wait_until_idle()
 
 
 def test_a_jump_records_nothing_false(swaying, bench) -> None:
@@ -138,10 +138,10 @@ def test_a_jump_records_nothing_false(swaying, bench) -> None:
     swaying.do("jump 40")
     bench.until(lambda: bool(bench.seen(Fault.JUMP)), "a jump")
     assert "jumped by 4" in bench.seen(Fault.JUMP)[0].detail
-    bench.settle()
+    bench.wait_until_idle()
     swaying.do("jump 40 0.3")
     assert isinstance(bench.press(), RefusedTouch)
-    bench.settle()
+    bench.wait_until_idle()
     assert bench.touches == []
     assert _off(bench.touch(), "RWA") < _CLOSE
 
@@ -165,7 +165,7 @@ def test_every_bad_message_is_named(swaying, bench) -> None:
 def test_a_repeated_position_is_frozen(swaying, bench) -> None:
     swaying.do("stale 0.6")
     bench.until(lambda: bool(bench.seen(Fault.FROZEN) or bench.seen(Fault.NO_REFERENCE)), "frozen samples")
-    bench.settle()
+    bench.wait_until_idle()
 
 
 def test_the_button_presses_once(swaying, bench) -> None:
@@ -185,14 +185,14 @@ def test_the_button_presses_once(swaying, bench) -> None:
 def test_late_messages_are_named_and_record_nothing(resting) -> None:
     bench = _bench(resting, limits=Limits(late_s=0.25))
     bench.link.open()
-    bench.settle()
+    bench.wait_until_idle()
     resting.do("late 0.7")
     bench.until(lambda: bool(bench.seen(Fault.LATE)), "late messages")
     refused = bench.press()
     assert isinstance(refused, RefusedTouch)
     resting.do("late 0")
     bench.until(lambda: bool(bench.seen(Fault.BACKWARDS)), "messages overtaken by others")
-    bench.settle()
+    bench.wait_until_idle()
     bench.link.close()
 
 
@@ -217,7 +217,7 @@ def test_a_cut_connection_is_lost_and_comes_back(resting, plain) -> None:
     assert plain.link.latest is None
     assert isinstance(plain.press(), RefusedTouch)
     plain.until(lambda: plain.link.state.phase is LinkPhase.CONNECTED, "the connection")
-    plain.settle()
+    plain.wait_until_idle()
     assert _off(plain.touch(), "MN") < _CLOSE
 
 
@@ -314,7 +314,7 @@ def test_a_server_that_is_pyigtl_s_own() -> None:
         link = TrackerLink(TrackerAddress(port=port, probe="StylusToTracker"), _PATIENT)
         bench = Bench(link, TouchRecorder(Probe(), TouchSettings(max_gap_s=0.3)))
         link.open()
-        bench.settle()
+        bench.wait_until_idle()
         assert bench.touch().position == pytest.approx((7, 8, 9), abs=0.15)
         server.kill()
         bench.until(lambda: link.state.phase is LinkPhase.LOST, "the loss")

@@ -119,7 +119,7 @@ class Bench:
     def until(self, true: Callable[[], bool], what: str = "") -> None:
         until(true, self.step, what)
 
-    def settle(self) -> None:
+    def wait_until_idle(self) -> None:
         """Wait for some good samples in a row."""
         self.samples.clear()
         self.until(lambda: sum(s.usable for s in self.samples[-5:]) == 5, "good samples")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import pyvista as pv
 from qtpy.QtGui import QImage
-from window_cases import BALL_MM, MIDDLE, image_bytes, settle
+from window_cases import BALL_MM, MIDDLE, image_bytes, wait_until_idle
 
 from gp_core.errors import GpError
 from gp_labeler.imaging.surface_files import write_mesh
@@ -21,7 +21,7 @@ from gp_labeler.views.recorder import Recorder
 def window(qtbot, one_window, ball):
     one_window.workspace.view.update(layout="3d")
     one_window.workspace.scan.begin(ball)
-    settle(qtbot, one_window)
+    wait_until_idle(qtbot, one_window)
     yield one_window
     one_window.workspace.meshes.clear()
 
@@ -43,11 +43,11 @@ def test_the_menu_adds_it_and_takes_it_away(qtbot, window, file) -> None:
     assert not actions["file.remove_meshes"].isEnabled()
     window.ui.prompts.files = [file]
     assert window.commands.run("file.add_mesh")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert [mesh.name for mesh in window.workspace.meshes.meshes] == ["implant"]
     assert 500 < (_pixels(window) != before).any(axis=-1).sum() < before.size / 9
     assert window.commands.run("file.remove_meshes")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     np.testing.assert_array_equal(_pixels(window), before)
 
 
@@ -66,7 +66,7 @@ def test_python_adds_any_dataset(qtbot, window) -> None:
 def test_another_scan_takes_them_away(qtbot, window, file, ball) -> None:
     window.workspace.meshes.add(file)
     window.workspace.scan.begin(ball)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert window.workspace.meshes.meshes == ()
     assert window.grid.scene_view.scene.added.names == ()
 
@@ -77,7 +77,7 @@ def test_a_damaged_file_is_told_and_nothing_is_shown(qtbot, window, file) -> Non
     window.workspace.messages.said.connect(lambda text, kind: told.append((text, kind)))
     window.ui.prompts.files = [file]
     window.commands.run("file.add_mesh")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert [(kind, "implant.stl" in text, "cut off" in text) for text, kind in told] == [
         ("error", True, True)
     ]

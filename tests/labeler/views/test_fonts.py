@@ -10,7 +10,7 @@ import pytest
 from fontTools.ttLib import TTFont
 from qtpy.QtGui import QFont, QFontDatabase, QFontInfo
 from qtpy.QtWidgets import QAbstractButton, QApplication, QLabel
-from window_cases import ball_volume, settle
+from window_cases import ball_volume, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
@@ -96,13 +96,13 @@ def test_the_larger_text_of_the_desktop_is_followed(make_window, monkeypatch) ->
 
 def test_slices_and_3d_follow_the_text_size(qtbot, window) -> None:
     window.workspace.labels.place([10.0, -20.0, 36.0], How.MESH, side=Side.LEFT, code="CA")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     overlay = window.grid.scene_view.overlay
     assert overlay.text_size == pytest.approx(fonts.TEXT * fonts.desktop_scale())
     small, large = (word_picture("CA", size, "#FFFFFF", 1.0).box.height() for size in (13, 26))
     assert large == pytest.approx(2 * small, abs=2)
     window.set_text_size(200)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert overlay.text_size == pytest.approx(2 * fonts.TEXT * fonts.desktop_scale())
 
 
@@ -139,7 +139,7 @@ def test_words_in_the_views_are_legible_in_both_themes(colours) -> None:
 def test_the_instruction_is_always_whole(qtbot, window) -> None:
     volume = ball_volume()
     window.workspace.scan.begin(volume)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     for width in (1400, 1000, 853, 640):
         for size in (100, 150, 200):
             window.set_text_size(size)

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from animal_cases import drawn_animals, write_animals, write_side
-from panel_cases import RecordingUi, actions_of, cut_words, deliver, desk_with_scan, in_scan, place
+from panel_cases import RecordingUi, actions_of, cut_words, deliver, in_scan, place, workspace_with_scan
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from qtpy.QtGui import QDropEvent, QFontMetrics
 from qtpy.QtWidgets import QApplication, QPushButton
-from window_cases import close, settle
+from window_cases import close, wait_until_idle
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.features import Side, feature
@@ -32,7 +32,7 @@ L, R = Side.LEFT, Side.RIGHT
 
 @pytest.fixture
 def workspace() -> Iterator[Workspace]:
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     deliver(workspace)
     yield workspace
     workspace.close(discard=True)
@@ -167,36 +167,36 @@ def test_beside_no_scan_the_names_of_features_stand_in_full(panel, qtbot) -> Non
 
 def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qtbot) -> None:
     window = make_window(atlas=True)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert not window.rail.buttons["label"].isEnabled()
     qtbot.mouseClick(window.rail.buttons["atlas"], CLICK)
     assert window.panels.currentWidget().isVisible()
     assert not window.grid.isVisible()
     drop(window, folder)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     workspace = window.workspace
     assert workspace.atlas.current.n_samples == 6
     window.ui.prompts.files = [tmp_path / "own.json"]
     window.commands.run("atlas.save")
     assert Atlas.load(tmp_path / "own.json").n_samples == 6
     window.commands.run("atlas.published")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert workspace.atlas.is_published
     assert not window.commands.actions["atlas.published"].isEnabled()
     qtbot.mouseClick(window.rail.buttons["scan"], CLICK)
     assert window.welcome.isVisible()
     drop(window, tmp_path / "own.json")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert workspace.atlas.current.n_samples == 6
     assert workspace.scan.volume is None
     window.commands.run("atlas.show")
     assert window.rail.step == "atlas"
     window.ui.prompts.files = [folder]
     window.commands.run("atlas.fit_folder")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert len(workspace.atlas.specimens) == 3
     window.commands.run("atlas.try")
-    settle(qtbot, window, 180)  # compiling may be part of it
+    wait_until_idle(qtbot, window, 180)  # compiling may be part of it
     assert workspace.atlas.trial.n_sides == 6
 
 
@@ -204,33 +204,33 @@ def test_an_atlas_that_is_gone_at_the_next_start_is_told_until_another_is_chosen
     make_window, folder, tmp_path, qtbot
 ) -> None:
     window = make_window(atlas=True)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     window.workspace.atlas.fit([folder])
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     window.workspace.atlas.save(tmp_path / "own.json")
     window.workspace.atlas.open(tmp_path / "own.json")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     close(window)
     (tmp_path / "own.json").unlink()
     again = make_window(atlas=True)
-    settle(qtbot, again)
+    wait_until_idle(qtbot, again)
     again.commands.run("atlas.show")
     notice = again.findChild(AtlasCard).notices
     assert notice.isVisible()
     assert "The atlas of own.json cannot be had any more" in notice.shown[0][1]
     qtbot.mouseClick(again.findChild(AtlasCard).published, CLICK)
-    settle(qtbot, again)
+    wait_until_idle(qtbot, again)
     assert not notice.isVisible()
     assert not again.commands.actions["atlas.published"].isEnabled()
 
 
 def test_a_damaged_atlas_dropped_on_the_window_is_named(make_window, tmp_path, qtbot) -> None:
     window = make_window(atlas=True)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     file = tmp_path / "half.json"
     file.write_text('{"gpAtlas": 1,')
     drop(window, file)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert "half.json" in window.status.next_click.text()
     assert window.workspace.atlas.is_published
 
@@ -261,11 +261,11 @@ def _tick(qtbot, box) -> None:
 def test_what_is_left_out_is_listed_and_opens_where_it_is(make_window, tmp_path, qtbot) -> None:
     folder = _wrong_animals(tmp_path)
     window = make_window(atlas=True)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     workspace, own = window.workspace, window.findChild(AtlasPanel).own
     qtbot.mouseClick(window.rail.buttons["atlas"], CLICK)
     workspace.atlas.fit([folder])
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     words = [notice.words for notice in own.findings.findChildren(Notice)]
     assert words[1] == "GP02 left: CA and CB look exchanged"
     assert len(words) == 5
@@ -275,14 +275,14 @@ def test_what_is_left_out_is_listed_and_opens_where_it_is(make_window, tmp_path,
     assert list(cut_words(window.findChild(AtlasPanel))) == []
     spread = workspace.atlas.current.variances(["CA"])[0]
     _tick(qtbot, own.keep_doubtful)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert workspace.atlas.current.variances(["CA"])[0] > 10 * spread
     _tick(qtbot, own.keep_doubtful)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert workspace.atlas.current.variances(["CA"])[0] == spread
     show = next(b for b in own.findings.findChildren(QPushButton) if "GP02" in b.accessibleName())
     qtbot.mouseClick(show, CLICK)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert workspace.document.state.specimen == "GP02"
     assert (workspace.labels.active.side, workspace.labels.active.code) == (L, "CA")
 

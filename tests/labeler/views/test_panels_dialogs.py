@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
-from panel_cases import cut_words, deliver, desk_with_scan, in_scan, place
+from panel_cases import cut_words, deliver, in_scan, place, workspace_with_scan
 from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QApplication, QWidget
 
@@ -35,7 +35,7 @@ CLICK = Qt.MouseButton.LeftButton
 
 @pytest.fixture
 def workspace() -> Iterator[Workspace]:
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     yield workspace
     workspace.close(discard=True)
 

@@ -12,9 +12,9 @@ from panel_cases import (
     actions_of,
     cut_words,
     deliver,
-    desk_with_scan,
     in_scan,
     place,
+    workspace_with_scan,
 )
 from qtpy.compat import isalive
 from qtpy.QtCore import QCoreApplication, QEvent, QModelIndex, QPoint, QSize, Qt
@@ -47,7 +47,7 @@ LOWEST_PANEL = QSize(PANEL_WIDTH, 698)
 
 @pytest.fixture
 def workspace() -> Iterator[Workspace]:
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     yield workspace
     workspace.close(discard=True)
 

@@ -1,4 +1,4 @@
-"""What a change costs: only what it changes is drawn anew, and yet nothing on the screen is ever stale."""
+"""What a change costs: only what it changes is drawn again, and yet nothing on the screen is ever stale."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from panel_cases import ATLAS, PANEL_WIDTH, actions_of, deliver, desk_with_scan, in_scan, place
+from panel_cases import ATLAS, PANEL_WIDTH, actions_of, deliver, in_scan, place, workspace_with_scan
 from qtpy.QtCore import QEvent, QModelIndex, QObject, QSize
 from qtpy.QtGui import QColor, QImage, QPixmap, QRegion
 from qtpy.QtWidgets import QApplication, QDialog, QWidget
@@ -36,7 +36,7 @@ LEFT, RIGHT = Side.LEFT, Side.RIGHT
 
 @pytest.fixture
 def workspace() -> Iterator[Workspace]:
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     yield workspace
     workspace.close(discard=True)
 
@@ -49,11 +49,11 @@ def panel(workspace: Workspace, qtbot) -> LabelPanel:
     panel.resize(PANEL_WIDTH, 698)
     panel.show()
     qtbot.waitExposed(panel)
-    settle()
+    wait_until_idle()
     return panel
 
 
-def settle() -> None:
+def wait_until_idle() -> None:
     for _ in range(4):  # layouts inside layouts take a turn each
         QApplication.processEvents()
 
@@ -72,7 +72,7 @@ class Painted(QObject):
         return False
 
     def taken(self) -> QRegion:
-        settle()
+        wait_until_idle()
         region, self._region = self._region, QRegion()
         return region
 
@@ -91,7 +91,7 @@ def is_same(a: np.ndarray, b: np.ndarray) -> bool:
 
 
 def on_screen(widget: QWidget) -> np.ndarray:
-    """Return what stands on the screen, unlike `grab`, which draws all anew."""
+    """Return what stands on the screen, unlike `grab`, which draws all again."""
     return pixels(widget.screen().grabWindow(widget.winId()))
 
 
@@ -168,7 +168,7 @@ def test_doubts_are_told_where_there_are_any_and_judging_is_always(workspace):
 def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(workspace, panel):
     for what in edits(workspace):
         deliver(workspace)
-        settle()
+        wait_until_idle()
         assert is_same(on_screen(panel), pixels(panel.grab())), what
 
 
@@ -210,7 +210,7 @@ def test_the_picture_follows_feature_side_size_and_theme(qtbot):
     qtbot.waitExposed(picture)
 
     def shows(code: str, side: Side, theme: Theme) -> bool:
-        settle()
+        wait_until_idle()
         inside = (slice(8, -8), slice(8, -8))  # of the round corners
         wanted = picture_of(code, side, picture.size(), theme, picture.devicePixelRatioF())
         return is_same(on_screen(picture)[inside], wanted[inside])

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import RecordingUi, actions_of, cut_words, deliver, desk_with_scan, grey_volume, place
+from panel_cases import RecordingUi, actions_of, cut_words, deliver, grey_volume, place, workspace_with_scan
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from qtpy.QtGui import QDropEvent
 from qtpy.QtWidgets import QApplication, QPushButton
@@ -31,7 +31,7 @@ CLICK = Qt.MouseButton.LeftButton
 
 @pytest.fixture
 def workspace() -> Iterator[Workspace]:
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     workspace.document.do(SetThreshold(110.0))
     deliver(workspace)
     yield workspace
@@ -113,7 +113,7 @@ def test_undo_brings_the_slider_back(workspace, panel):
     assert panel.bone.box.value == 110.0
 
 
-def test_the_proposed_threshold_parts_the_two_greys(workspace, panel, qtbot):
+def test_the_proposed_threshold_parts_the_two_grey_values(workspace, panel, qtbot):
     qtbot.mouseClick(panel.bone.propose, CLICK)
     deliver(workspace)
     assert 60 < workspace.document.state.threshold < 170

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from panel_cases import desk_with_scan
+from panel_cases import workspace_with_scan
 from pose_cases import (
     ALL,
     DATA,
@@ -153,7 +153,7 @@ def test_a_slice_beside_the_region_does_not_cut_it() -> None:
 
 
 def test_names_stand_beside_what_is_near(qtbot) -> None:
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     view = SliceView(workspace, Plane.CORONAL)
     qtbot.addWidget(view)
     overlay = PoseLayer(view)

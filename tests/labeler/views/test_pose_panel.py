@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import PANEL_WIDTH, RecordingUi, actions_of, cut_words, deliver, desk_with_scan
+from panel_cases import PANEL_WIDTH, RecordingUi, actions_of, cut_words, deliver, workspace_with_scan
 from qtpy.QtCore import QEvent, QPoint, QSize, Qt
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QApplication, QLabel, QLineEdit
@@ -516,7 +516,7 @@ def test_the_point_that_gains_most_is_aimed_at_with_a_click(workspace, panel, qt
 
 
 def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
-    workspace = desk_with_scan()
+    workspace = workspace_with_scan()
     panel = shown(workspace, qtbot)
     shift = np.array([3.0, -12.0, 4.0])
     for code in ("CA", "CB", *PROBE):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtWidgets import QApplication
-from window_cases import BALL_MM, MIDDLE, ball_volume, close, drop_file, settle
+from window_cases import BALL_MM, MIDDLE, ball_volume, close, drop_file, wait_until_idle
 
 from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.sampling import draw_animal
@@ -103,7 +103,7 @@ def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_win
     close(bare)
     again = make_window()
     again.ui.open_path(saved)
-    settle(qtbot, again)
+    wait_until_idle(qtbot, again)
     assert again.rail.step == "pose"
     assert again.steps["pose"].isVisible()
     assert set(touched(again)) == set(PROBE)
@@ -112,7 +112,7 @@ def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_win
 def test_the_views_come_with_the_scan_and_the_step_stays(qtbot, bare):
     to_step(qtbot, bare, "pose")
     bare.workspace.scan.begin(ball_volume())
-    settle(qtbot, bare)
+    wait_until_idle(qtbot, bare)
     assert bare.rail.step == "pose"
     assert bare.grid.isVisible()
     assert bare.steps["pose"].width() < bare.grid.width()
@@ -122,12 +122,12 @@ def test_a_scan_that_is_opened_later_joins_what_was_touched(qtbot, bare, tmp_pat
     to_step(qtbot, bare, "pose")
     drop_file(bare, touch_file(tmp_path))
     bare.workspace.scan.begin(ball_volume())
-    settle(qtbot, bare)
+    wait_until_idle(qtbot, bare)
     assert set(touched(bare)) == set(PROBE)
     assert bare.workspace.scan.volume is not None
     assert bare.workspace.document.state.specimen == "ball"
     bare.workspace.scan.begin(ball_volume())
-    settle(qtbot, bare)
+    wait_until_idle(qtbot, bare)
     assert touched(bare) == {}, "the next scan is another specimen's"
 
 
@@ -246,5 +246,5 @@ def test_files_are_asked_for(qtbot, window, tmp_path):
 def test_elsewhere_a_dropped_file_is_opened_as_ever(qtbot, window, tmp_path):
     to_step(qtbot, window, "label")
     drop_file(window, touch_file(tmp_path))
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert touched(window) == {}

@@ -7,7 +7,7 @@ import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtGui import QImage
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, image_bytes, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, image_bytes, wait_until_idle
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -34,7 +34,7 @@ def window(qtbot, one_window, ball):
     one_window.workspace.view.update(layout="four-up")
     one_window.workspace.scan.begin(ball)
     one_window.activateWindow()
-    settle(qtbot, one_window)
+    wait_until_idle(qtbot, one_window)
     yield one_window
     one_window.workspace.references.clear()
 
@@ -43,7 +43,7 @@ def window(qtbot, one_window, ball):
 def shown(qtbot, window, tmp_path):
     window.ui.prompts.files = [write_list(tmp_path, Apex=ON_BONE, Umbo=INSIDE)]
     assert window.commands.run("file.show_references")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     return window
 
 
@@ -78,12 +78,12 @@ def test_they_are_drawn_on_slices_near_them_only(shown, plane) -> None:
 def test_they_are_drawn_on_bone_and_go_when_cleared(shown, qtbot) -> None:
     view = shown.grid.scene_view
     view.view_from("A")
-    settle(qtbot, shown)
+    wait_until_idle(qtbot, shown)
     before = _pixels(view)
     assert shown.commands.actions["file.clear_references"].isEnabled()
     assert shown.commands.run("file.clear_references")
     assert not shown.commands.actions["file.clear_references"].isEnabled()
-    settle(qtbot, shown)
+    wait_until_idle(qtbot, shown)
     y, x = np.argwhere((_pixels(view) != before).any(axis=-1)).T
     pixel = _pixel(view, ON_BONE)
     assert np.hypot(x - pixel.x(), y - pixel.y()).min() < 8

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from window_cases import MIDDLE, settle
+from window_cases import MIDDLE, wait_until_idle
 
 from gp_core import Atlas, Side
 from gp_labeler.document.edits import CheckPoint
@@ -91,7 +91,7 @@ def test_a_doubted_point_shows_where_it_should_be(window, qtbot, monkeypatch) ->
         _place(workspace, code)
     _place(workspace, "RWL", shift=2.0)
     workspace.labels.set_active(Active(Side.LEFT, "RWL"))
-    settle(qtbot, window)  # doubts are known a moment before the views are told of them
+    wait_until_idle(qtbot, window)  # doubts are known a moment before the views are told of them
     assert drawn_ghosts(workspace) != []
     view.grab()
     (ghost,) = view.slice_painter.points.ghosts

@@ -18,7 +18,7 @@ import pytest
 from qtpy.QtCore import Qt, QTimer
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QMenu
-from window_cases import MIDDLE, Answers, ball_volume, close, settle
+from window_cases import MIDDLE, Answers, ball_volume, close, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import ACTIONS
@@ -43,7 +43,7 @@ def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbo
     window.ui.open_demo()
     qtbot.waitUntil(status.work.bar.isVisible)
     status.work.stop.click()
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     status.say("Saved", "info")
     qtbot.waitUntil(lambda: status.where.isVisible() and status.height() == height)
 
@@ -53,7 +53,7 @@ def test_the_first_page_gives_way_to_the_scan(qtbot, make_window, ball) -> None:
     assert window.pages.currentIndex() == 0
     assert "Open" in window.status.next_click.text()
     window.workspace.scan.begin(ball)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert window.pages.currentIndex() == 1
     assert window.windowTitle().startswith("ball")
     assert window.rail.step == "label"
@@ -84,7 +84,7 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
     sitk.WriteImage(image, str(tmp_path / "ball.nrrd"))
     window = make_window()
     window.ui.open_path(tmp_path / "ball.nrrd")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     assert window.isWindowModified()
     window.ui.prompts.files = [tmp_path / "one"]
@@ -96,7 +96,7 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
     again = make_window()
     assert saved.resolve() in again.workspace.recent.all()
     again.ui.open_path(saved)
-    settle(qtbot, again)
+    wait_until_idle(qtbot, again)
     np.testing.assert_array_equal(again.workspace.document.landmarks("L")["CA"], MIDDLE)
     assert again.workspace.scan.volume.size == volume.size
     assert again.workspace.bone.surfaces
@@ -106,7 +106,7 @@ def test_a_file_that_is_no_scan_is_said_in_words(qtbot, make_window, tmp_path) -
     (tmp_path / "notes.nrrd").write_text("milk, bread")
     window = make_window()
     window.ui.open_path(tmp_path / "notes.nrrd")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert "notes.nrrd" in window.status.next_click.text()
     assert window.pages.currentIndex() == 0
 
@@ -118,7 +118,7 @@ def test_a_scan_without_a_voxel_size_is_asked_about(qtbot, make_window, tmp_path
     window = make_window()
     window.ui.prompts.answers = ["Keep the order of the slices", "Go on"]
     window.ui.open_path(tmp_path / "ball.tif")
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert window.ui.prompts.asked
     if window.workspace.scan.volume is not None:
         assert window.workspace.document.state.import_choices
@@ -143,7 +143,7 @@ def test_edits_that_are_not_wanted_are_not_offered_again(qtbot, window, tmp_path
     window.ui.open_path(tmp_path / "x.gpspecimen.json")  # no specimen: the edits are still there
     assert "CA" in window.workspace.document.landmarks("L")
     window.workspace.scan.begin(ball_volume())
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert find_recoveries(tmp_path / "state") == ()
 
 
@@ -316,9 +316,9 @@ def test_the_window_answers_while_work_goes_on(qtbot, window) -> None:
     timer.timeout.connect(answer)
     timer.start()
     task = window.workspace.jobs.submit(work)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     timer.stop()
-    assert task.result, "on the thread of the window, work would have waited for its answers in vain"
+    assert task.result, "on the thread of the window, work would have waited for its answers for ever"
 
 
 def test_work_can_be_stopped(qtbot, window) -> None:
@@ -339,7 +339,7 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
         window.ui.prompts = Answers()
         window.show()
         window.workspace.scan.begin(ball_volume())
-        settle(qtbot, window)
+        wait_until_idle(qtbot, window)
         remains += [weakref.ref(window.grid.scene_view.scene), weakref.ref(window.workspace)]
         close(window)
         del window
@@ -372,7 +372,7 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
     first, file = make_window(), tmp_path / "ball.mha"
     write_ball(file)
     first.workspace.scan.open(file, spacing=0.25)
-    settle(qtbot, first)
+    wait_until_idle(qtbot, first)
     saved = first.workspace.document.save(tmp_path / "one")
     close(first)
     window = make_window()
@@ -380,7 +380,7 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
     window.ui.open_path(saved)
     assert window.rail.step == "label"
     assert window.steps["label"].card.content.name == "Its scan is not open yet"
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert window.steps["label"].card.content.code == "CA"
 
 
@@ -393,7 +393,7 @@ def test_every_menu_fits_a_small_screen_in_one_column(window) -> None:
 def test_a_slice_looks_the_same_after_other_views_were_maximised(qtbot, window) -> None:
     long = Volume.from_parts(ball_volume().array[:, 12:52, 24:40], [0.25] * 3, [0, 0, 0], name="long")
     window.workspace.scan.begin(long)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     view = window.grid.slice_views[Plane.AXIAL]
 
     def visit(*layouts: str) -> None:
@@ -418,13 +418,13 @@ def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make
     window, file = make_window(), tmp_path / "ball.mha"
     write_ball(file)
     window.workspace.scan.open(file, spacing=0.25)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     window.workspace.labels.place(np.array([8.0, 8.0, 8.0]), side=Side.LEFT, code="CA")
     saved = window.workspace.document.save(tmp_path / "one")
     window.workspace.scan.begin(ball_volume())
     moved = file.rename(tmp_path / "elsewhere.mha")
     window.ui.open_path(saved)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     card = window.steps["label"].card
     window.set_step("label")
     assert (card.content.name, card.primary.accessibleName()) == ("Its scan is not found", "Find scan…")
@@ -432,7 +432,7 @@ def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make
     assert "Find scan" in window.status.next_click.text()
     window.ui.prompts.files = [moved]
     QTest.mouseClick(card.primary, Qt.MouseButton.LeftButton)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert window.workspace.scan.volume is not None
     assert "CA" in window.workspace.document.landmarks(Side.LEFT)
 
@@ -447,7 +447,7 @@ def test_another_volume_replaces_the_first(qtbot, window) -> None:
     window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     other = Volume.from_parts(ball_volume().array, [0.5] * 3, [0, 0, 0], name="other")
     window.workspace.scan.begin(other)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert window.workspace.document.state.specimen == "other"
     assert not window.grid.scene_view.scene.marks.marks
     for view in window.grid.slice_views.values():

@@ -8,7 +8,7 @@ from qtpy.QtCore import QPoint, QPointF, Qt
 from qtpy.QtGui import QWheelEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
@@ -23,7 +23,7 @@ LEFT_BUTTON, NO_KEYS = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
 def window(qtbot, one_window, ball):
     one_window.workspace.scan.begin(ball)
     one_window.activateWindow()
-    settle(qtbot, one_window)
+    wait_until_idle(qtbot, one_window)
     view = one_window.grid.scene_view
     view.view_from("A")
     view.reset()
@@ -107,7 +107,7 @@ def test_a_cut_is_turned_moved_and_forgotten_with_the_specimen(qtbot, window, ba
     window.commands.run("view.cut_deeper")
     assert workspace.view.state.cut.origin[1] == pytest.approx(MIDDLE[1] + 0.5)
     workspace.scan.begin(ball)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert workspace.view.state.cut is None
     assert view.scene.bone.cut is None
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from qtpy.QtCore import QPoint, Qt
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, settle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
@@ -40,7 +40,7 @@ def window(qtbot, one_window, ball):
     one_window.workspace.view.update(layout="four-up")
     one_window.workspace.scan.begin(ball)
     one_window.activateWindow()
-    settle(qtbot, one_window)
+    wait_until_idle(qtbot, one_window)
     return one_window
 
 
@@ -254,7 +254,7 @@ def test_letters_do_what_the_sheet_says(window, scene) -> None:
 
 def test_enter_suggests_the_ghost(qtbot, window) -> None:
     window.workspace.atlas.load()
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     scene, document, labels = window.grid.scene_view, window.workspace.document, window.workspace.labels
     from gp_core.atlas.atlas import Atlas
 
@@ -300,7 +300,7 @@ def test_the_wheel_scrolls_slices_that_are_linked(qtbot, window) -> None:
     assert coronal.pixel_at(window.workspace.view.crosshair)[1] < coronal.pixel_at(before)[1]
 
 
-def test_contrast_tool_changes_greys_and_places_nothing(window) -> None:
+def test_contrast_tool_changes_window_and_level_and_places_nothing(window) -> None:
     view = window.grid.slice_views[Plane.AXIAL]
     window.workspace.interaction.set_tool("grey")
     before = view.window_level()

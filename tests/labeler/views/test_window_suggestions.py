@@ -10,7 +10,7 @@ from qtpy.QtCore import QEvent, QPoint, Qt
 from qtpy.QtGui import QKeyEvent
 from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
-from window_cases import MIDDLE, settle
+from window_cases import MIDDLE, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
@@ -66,7 +66,7 @@ def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(qtbot, sug
     assert status_of(suggested, "MN") is PointState.SUGGESTED
     assert "Is MN left right here?" in suggested.status.next_click.text()
     assert axial.voxel_pixels(INSIDE, voxel) >= 2.0
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.PLACED
     assert suggested.workspace.document.state.landmark(L, "MN").provenance.how is How.CONFIRMED
@@ -81,7 +81,7 @@ def test_enters_without_a_picture_in_between_confirm_nothing(qtbot, suggested) -
     for _ in range(4):
         QTest.keyClick(axial, Qt.Key.Key_Return)
     assert {status_of(suggested, code) for code in ("MN", "ZL")} == {PointState.SUGGESTED}
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     for _ in range(4):
         QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.PLACED
@@ -93,9 +93,9 @@ def test_another_point_than_the_one_that_is_chosen_is_shown_first(qtbot, suggest
     workspace.labels.suggest(INSIDE, radius_95=0.8, source="atlas", side=L, code="ZL")
     workspace.labels.go_to(L, "MN")
     suggested.grid.bring_close(INSIDE)
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     assert not workspace.interaction.confirm(L, "ZL")  # of the menu
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     assert workspace.interaction.confirm(L, "ZL")
 
 
@@ -133,21 +133,21 @@ def test_a_slice_elsewhere_does_not_show_the_point(qtbot, suggested) -> None:
     QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
     assert not suggested.grid.can_judge(INSIDE)  # not before it is painted
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     assert suggested.grid.can_judge(INSIDE)
 
 
 def test_what_bone_hides_in_the_3d_view_is_judged_on_slices(qtbot, suggested) -> None:
     workspace, scene = suggested.workspace, suggested.grid.scene_view
     workspace.view.update(layout="3d")
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     scene.setFocus()
     for _ in range(3):
         if status_of(suggested, "MN") is PointState.PLACED:
             break
         assert workspace.view.state.layout == "3d" or suggested.grid.can_judge(INSIDE)
         QTest.keyClick(scene, Qt.Key.Key_Return)
-        settle(qtbot, suggested)
+        wait_until_idle(qtbot, suggested)
     assert workspace.view.state.layout == "four-up"
     assert status_of(suggested, "MN") is PointState.PLACED
 
@@ -159,7 +159,7 @@ def test_the_button_of_the_card_confirms_as_enter_does(qtbot, suggested) -> None
     assert "atlas, 95 % within 0.80 mm" in card.content.status
     qtbot.mouseClick(card.primary, Qt.MouseButton.LeftButton)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     qtbot.mouseClick(card.primary, Qt.MouseButton.LeftButton)
     assert status_of(suggested, "MN") is PointState.PLACED
 
@@ -190,7 +190,7 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(qtbo
     axial.zoom_to(INSIDE, 10.0)
     click(axial, INSIDE)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.PLACED
@@ -210,7 +210,7 @@ def test_from_afar_an_arrow_key_brings_a_suggestion_close_and_moves_nothing(qtbo
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
-    settle(qtbot, suggested)
+    wait_until_idle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Up)
     assert status_of(suggested, "MN") is PointState.PLACED
 
@@ -241,7 +241,7 @@ def test_the_window_says_once_that_accepted_ghosts_are_suggestions_now(qtbot, wi
     said = []
     window.workspace.messages.said.connect(lambda text, level: said.append((text, level)))
     window.workspace.open_specimen(file)
-    settle(qtbot, window)
+    wait_until_idle(qtbot, window)
     assert [text for text, level in said if "accepted ghost" in text and level == "warning"] == [
         "1 point was an accepted ghost that nobody had confirmed: it counts as a suggestion now (CA L). "
         "Confirm or correct each in the table."

@@ -74,7 +74,7 @@ def _arm_replacing(workspace: Workspace, side: Side, code: str) -> None:
 
 
 def _add_swaps(add: Callable[..., None], menu: QMenu, workspace: Workspace, side: Side, code: str) -> None:
-    """Offer to exchange with each settled feature of the same side that is not locked."""
+    """Offer to exchange with each decided feature of the same side that is not locked."""
     document = workspace.document
     others = menu.addMenu("Exchange with")
     for row in FEATURES:

@@ -46,7 +46,7 @@ class LandmarkTableModel(QAbstractTableModel):
     """
 
     headings_changed = Signal()
-    """Words of the header; for `headerDataChanged` Qt would lay out and draw the whole table anew."""
+    """Words of the header; for `headerDataChanged` Qt would lay out and draw the whole table again."""
 
     def __init__(self, workspace: Workspace, parent: QObject | None = None) -> None:
         super().__init__(parent)
