@@ -13,7 +13,8 @@ import pytest
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self").exists(), reason="processes are counted in /proc")
 
-STUDY = [sys.executable, "-m", "gp_core.cli", "compare", "--repeats", "200", "--workers", "2"]
+STUDY = ["env", "--default-signal=INT"]  # for a background shell has its programs ignore Ctrl-C
+STUDY += [sys.executable, "-m", "gp_core.cli", "compare", "--repeats", "200", "--workers", "2"]
 DEADLINE_SECONDS = 300.0
 
 
