@@ -122,9 +122,12 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
     elif count == 1:
         yield None
     else:
-        from gp_core.study.worker_processes import worker_context  # here: most commands need no processes
+        # here: most commands need no processes
+        from gp_core.study.worker_processes import interrupts_held, worker_context
 
         with ProcessPoolExecutor(count, mp_context=worker_context()) as executor:
+            with interrupts_held():
+                executor.submit(int)  # starts the workers and the thread that serves them
             yield executor
 
 

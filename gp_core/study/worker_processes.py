@@ -10,14 +10,14 @@ from contextlib import contextmanager
 from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
 
-__all__ = ["worker_context"]
+__all__ = ["interrupts_held", "worker_context"]
 
 
 class _Worker(SpawnProcess):
     """A process that ignores Ctrl-C from its start on, and does not outlive its parent."""
 
     def start(self) -> None:
-        with _interrupts_held():  # signals blocked here stay blocked in the new process
+        with _signal_is_blocked():  # and stays so in the new process
             super().start()
 
     def run(self) -> None:
@@ -51,7 +51,7 @@ def _end_with_parent() -> None:
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
+def _signal_is_blocked() -> Iterator[None]:
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
@@ -60,3 +60,27 @@ def _interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def interrupts_held() -> Iterator[None]:
+    """Let Ctrl-C wait while workers are started, which must get all that they begin with.
+
+    To block the signal is not enough: another thread may take it.
+
+    Yields
+    ------
+    None
+    """
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before is None:
+        yield
+        return
+    came: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: came.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if came:
+        signal.raise_signal(signal.SIGINT)

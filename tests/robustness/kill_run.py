@@ -129,7 +129,7 @@ def _edited(state: Path, rng: np.random.Generator, *, saved: Path | None = None)
     return confirmed + 1
 
 
-def session_killed(folder: Path, rng: np.random.Generator) -> int:
+def document_killed(folder: Path, rng: np.random.Generator) -> int:
     """A document that was never saved."""
     return _edited(folder / "state", rng)
 
@@ -333,7 +333,7 @@ def window_killed(folder: Path, rng: np.random.Generator) -> int:
 
 
 KILLS: dict[str, Callable[[Path, np.random.Generator], int]] = {
-    "document": session_killed,
+    "document": document_killed,
     "saving": saving_killed,
     "export": export_killed,
     "mesh": mesh_killed,

@@ -15,7 +15,7 @@ RUN = Path(__file__).with_name("kill_run.py")
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="the run forks, and counts processes in /proc")
 def test_killed_programs_lose_nothing() -> None:
     words = [sys.executable, str(RUN), "--n", "24", "--seed", "4", "--kinds"]
-    words += ["session", "saving", "export", "mesh", "full disk", "read only"]
+    words += ["document", "saving", "export", "mesh", "full disk", "read only"]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-1000:]
     assert "24 kills" in done.stdout
