@@ -61,7 +61,8 @@ def run_map(
     futures: dict[Future[Result], int] = {}
     found: dict[int, Result] = {}
     try:
-        futures = {executor.submit(function, item): i for i, item in enumerate(items)}
+        for i, item in enumerate(items):  # one by one: Ctrl-C finds those that are submitted
+            futures[executor.submit(function, item)] = i
         for future in as_completed(futures):
             found[futures[future]] = _told(futures[future], future.result(), done)
     except BrokenExecutor:
@@ -126,9 +127,14 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
         from gp_core.study.worker_processes import interrupts_held, worker_context
 
         with ProcessPoolExecutor(count, mp_context=worker_context()) as executor:
-            with interrupts_held():
-                executor.submit(int)  # starts the workers and the thread that serves them
-            yield executor
+            try:
+                with interrupts_held():  # each task starts a worker while none is idle
+                    for _ in range(count):
+                        executor.submit(int)
+                yield executor
+            except BaseException:
+                executor.shutdown(cancel_futures=True)  # else leaving waits for all that was submitted
+                raise
 
 
 @contextmanager

@@ -17,7 +17,7 @@ class _Worker(SpawnProcess):
     """A process that ignores Ctrl-C from its start on, and does not outlive its parent."""
 
     def start(self) -> None:
-        with _signal_is_blocked():  # and stays so in the new process
+        with interrupts_held(), _signal_is_blocked():  # it stays blocked in the new process
             super().start()
 
     def run(self) -> None:

@@ -72,10 +72,10 @@ def test_workers_end_with_the_study(number: signal.Signals, pause: float, study:
     assert out == ""
 
 
-@pytest.mark.parametrize("pause", [0.0, 0.3])
-def test_ctrl_c_is_one_line(pause: float, study: subprocess.Popen) -> None:
+@pytest.mark.parametrize(("n_processes", "pause"), [(1, 0.0), (2, 0.0), (3, 0.0), (3, 0.3)])
+def test_ctrl_c_is_one_line(n_processes: int, pause: float, study: subprocess.Popen) -> None:
     """As a terminal does it: the whole group is told, workers that begin just now too."""
-    assert wait_for(lambda: len(children(study.pid)) >= 2)
+    assert wait_for(lambda: len(children(study.pid)) >= n_processes)
     time.sleep(pause)
     os.killpg(study.pid, signal.SIGINT)
     _, err = study.communicate(timeout=DEADLINE_SECONDS)
