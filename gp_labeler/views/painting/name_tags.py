@@ -81,21 +81,22 @@ def place_names(
     font.setPixelSize(round(text * ratio))
     font.setBold(True)
     metrics = QFontMetricsF(font)
-    high, step = metrics.capHeight() + 4 * ratio, metrics.lineSpacing()
+    edge = 2 * ratio  # of the halo
+    high, step = metrics.capHeight() + 2 * edge, metrics.lineSpacing()
     lines = [lines_within(tag.text, size[0] - 8 * ratio, metrics.horizontalAdvance) for tag in tags]
     corners, shown = place_labels(
         [tag.pixel for tag in tags],
-        [(max(map(metrics.horizontalAdvance, of)), high + step * (len(of) - 1)) for of in lines],
+        [(max(map(metrics.horizontalAdvance, of)) + 2 * edge, high + step * (len(of) - 1)) for of in lines],
         size,
         gaps=[tag.gap * ratio for tag in tags],
         ranks=[tag.rank for tag in tags],
     )
-    base = metrics.capHeight() + 2 * ratio
+    base = metrics.capHeight() + edge
     return [
         PlacedWord(
             line,
             word_picture(line, text, tags[n].colour, ratio, halo=halo),
-            corners[n][0],
+            corners[n][0] + edge,
             corners[n][1] + base + row * step,
             _FAINT if tags[n].faint else 1.0,
         )

@@ -526,7 +526,7 @@ def test_errors_against_the_labels_and_the_registration_are_told(qtbot):
     mm, deg = estimate.errors()
     assert facts["From the labels"].text() == f"CO {mm:.2f} mm, axis {deg:.1f}°"
     assert facts["FRE"].text() == f"{estimate.registered.fre_mm:.2f} mm"
-    assert facts["Registered by"].text() == "by labelled features, 6 of 6"
+    assert facts["Registered"].text() == "by labelled features, 6 of 6"
     qtbot.mouseClick(panel.in_scan.way.buttons["skull"], CLICK)
     assert workspace.pose.estimate.registered is None
     assert "at least 3 points" in " ".join(panel.in_scan.notices.shown[0])

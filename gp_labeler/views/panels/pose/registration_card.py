@@ -23,7 +23,7 @@ __all__ = ["RegistrationCard"]
 
 _WAYS = {"auto": "Automatic", "features": "Features", "skull": "Skull"}
 _NO_SCAN = "No scan is open: the pose stays in the frame of the touches."
-_FACTS = ("Registered by", "CO", "FRE", "TRE at CO", "From the labels")
+_FACTS = ("Registered", "CO", "FRE", "TRE at CO", "From the labels")
 _NO_ESTIMATE = "Once there is an estimate, it is registered to the scan."
 _HINTS = {
     "auto": "By the skull's features where three of them are touched and on the scan, else by the labels",
@@ -157,7 +157,7 @@ def _facts(estimate: Estimate | None) -> dict[str, str]:
         tre = f"{fine_mm(registered.tre_mm(placed.origin))}  (95 %: {fine_mm(bound)})"
     n = "" if fiducials is None else f", {len(fiducials.fiducials)} of {len(fiducials.names)}"
     return {
-        "Registered by": _FOUND[registered.way] + n,
+        "Registered": _FOUND[registered.way] + n,
         "CO": NONE,
         "FRE": fine_mm(registered.fre_mm),
         "TRE at CO": tre,

@@ -31,7 +31,7 @@ class WindowLevelCard(Card):
     """
 
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
-        super().__init__("Greys of the slices", parent)
+        super().__init__("Window and level of the slices", parent)
         self._workspace = workspace
         row = QHBoxLayout()
         row.setSpacing(4)
