@@ -23,12 +23,15 @@ from gp_core.io import (
     load_labellings,
     load_specimens,
     read_landmarks,
+    read_measurements,
     read_touches,
     write_markups,
+    write_measurements,
     write_suggestions,
 )
 from gp_core.io.pose_json import read_pose
 from gp_core.landmarks.features import CODES, EXTERNAL, FEATURES, PROBE, RECOMMENDED, TRAINING, Feature, Side
+from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
@@ -87,6 +90,7 @@ __all__ = [
     "Labelling",
     "LandmarkSet",
     "LeaveOneOutReport",
+    "Measurement",
     "NestedReport",
     "PhysicalReport",
     "PivotCalibration",
@@ -126,6 +130,7 @@ __all__ = [
     "predict",
     "read_as",
     "read_landmarks",
+    "read_measurements",
     "read_path",
     "read_pose",
     "read_touches",
@@ -135,5 +140,6 @@ __all__ = [
     "simulate",
     "touch_conditions",
     "write_markups",
+    "write_measurements",
     "write_suggestions",
 ]

@@ -8,6 +8,7 @@ from gp_core.io.header import FileHeader
 from gp_core.io.lab_names import read_lab_names
 from gp_core.io.labelled_points import LabelledPoint, PointList
 from gp_core.io.markups import write_markups, write_suggestions
+from gp_core.io.measurement_markups import measurement_file_names, read_measurements, write_measurements
 from gp_core.io.reading import (
     label_names,
     landmarks_of,
@@ -34,10 +35,12 @@ __all__ = [
     "load_labellings",
     "load_specimens",
     "mean_labels",
+    "measurement_file_names",
     "natural_key",
     "read_authors_mat",
     "read_lab_names",
     "read_landmarks",
+    "read_measurements",
     "read_points",
     "read_touches",
     "sides_of",
@@ -47,5 +50,6 @@ __all__ = [
     "write_csv",
     "write_fcsv",
     "write_markups",
+    "write_measurements",
     "write_suggestions",
 ]

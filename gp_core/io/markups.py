@@ -30,7 +30,7 @@ from gp_core.io.text import check_count, flips_xy, shown
 from gp_core.io.text_files import read_text
 from gp_core.landmarks.sets import LandmarkSet
 
-__all__ = ["read_markups", "write_markups", "write_point_lists", "write_suggestions"]
+__all__ = ["has_point_list", "read_markups", "write_markups", "write_point_lists", "write_suggestions"]
 
 _log = logging.getLogger(__name__)
 
@@ -43,6 +43,9 @@ ACCEPTED = "accepted ghost"
 
 _LINES = ("Line",)
 """What this program writes beside point lists: through points of the lists, so that nothing is lost."""
+
+_OTHER_KINDS = frozenset({"Line", "Angle", "Curve", "ClosedCurve", "Plane", "ROI"})
+"""Kinds of markups of 3D Slicer that are not point lists."""
 
 _NUMBERS_ON_LINES = re.compile(r"\[\n\s+([-+0-9.eE,\s]+?)\n\s+\]")
 
@@ -66,12 +69,12 @@ def read_markups(path: str | PathLike[str]) -> PointList:
         Not a markups file, no point list in it, not in mm, an unknown status or system, or a position
         that is neither three finite numbers nor missing.
     """
-    content = _load(path)
+    content = load_markups(path)
     header = FileHeader.from_json(content["gpLabeler"], path) if "gpLabeler" in content else None
     lists = _point_lists(content, path, told=_LINES if header else ())
     listed = (markup.get("controlPoints") for markup in lists)
     check_count(sum(len(points) for points in listed if isinstance(points, list)), "points", path)
-    points = [point for markup in lists for point in _points(markup, path)]
+    points = [point for markup in lists for point in markup_points(markup, path)]
     if header is not None:
         points = _without_accepted_ghosts(points, header, path)
     return PointList(tuple(points), Path(path), "scan" if header is None else header.frame, header)
@@ -95,7 +98,46 @@ def _without_accepted_ghosts(
     return found
 
 
-def _load(path: str | PathLike[str]) -> dict[str, Any]:
+def has_point_list(path: str | PathLike[str]) -> bool:
+    """Tell whether a file of a folder may hold landmarks: False for lines, angles, curves and planes alone.
+
+    Parameters
+    ----------
+    path : path
+        A ``.mrk.json`` file; one that cannot be read is said to hold landmarks, so that reading it says why
+        it cannot.
+
+    Returns
+    -------
+    bool
+        Whether to read its landmarks.
+    """
+    try:
+        markups = load_markups(path)["markups"]
+    except GpError:
+        return True
+    kinds = {markup.get("type") if isinstance(markup, dict) else None for markup in markups}
+    return not kinds or not kinds <= _OTHER_KINDS
+
+
+def load_markups(path: str | PathLike[str]) -> dict[str, Any]:
+    """Read a markups file as it is.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+
+    Returns
+    -------
+    dict
+        Its content, with a list ``markups``.
+
+    Raises
+    ------
+    FileFormatError
+        It is no markups file.
+    """
     try:
         content = json.loads(read_text(path))
     except (ValueError, RecursionError) as error:  # ValueError also for numbers of many thousand digits
@@ -140,7 +182,26 @@ def _point_lists(
     return found
 
 
-def _points(markup: dict[str, Any], file: str | PathLike[str]) -> list[LabelledPoint]:
+def markup_points(markup: dict[str, Any], file: str | PathLike[str]) -> list[LabelledPoint]:
+    """Return the control points of one markup.
+
+    Parameters
+    ----------
+    markup : dict
+        As the file has it.
+    file : path
+        For messages.
+
+    Returns
+    -------
+    list of LabelledPoint
+        Positions in mm, LPS.
+
+    Raises
+    ------
+    FileFormatError
+        A point, the unit or the coordinate system is not what it should be.
+    """
     _check_units(markup.get("coordinateUnits"), file)
     flip_xy = flips_xy(markup.get("coordinateSystem"), file)
     rows = markup.get("controlPoints", [])
@@ -290,11 +351,29 @@ def write_point_lists(
     GpError
         The file cannot be written, or the header holds what JSON cannot.
     """
-    content = {
-        "@schema": _SCHEMA,
-        "markups": [_markup(points, kind) for kind, points in lists.items()],
-        "gpLabeler": header.as_json(),
-    }
+    write_content(path, [as_markup(points, kind) for kind, points in lists.items()], header)
+
+
+def write_content(
+    path: str | PathLike[str], markups: Sequence[Mapping[str, Any]], header: FileHeader
+) -> None:
+    """Write markups that are made already.
+
+    Parameters
+    ----------
+    path : path
+        A ``.mrk.json`` file.
+    markups : sequence of mapping
+        As Slicer's JSON has them; see `as_markup`.
+    header : FileHeader
+        What this program says of them.
+
+    Raises
+    ------
+    GpError
+        The file cannot be written, or the header holds what JSON cannot.
+    """
+    content = {"@schema": _SCHEMA, "markups": markups, "gpLabeler": header.as_json()}
     try:
         text = json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:
@@ -327,7 +406,21 @@ def _as_json(point: LabelledPoint, index: int, kind: str) -> dict[str, Any]:
     }
 
 
-def _markup(points: Sequence[LabelledPoint], kind: str) -> dict[str, Any]:
+def as_markup(points: Sequence[LabelledPoint], kind: str) -> dict[str, Any]:
+    """Return points as one markup of 3D Slicer.
+
+    Parameters
+    ----------
+    points : sequence of LabelledPoint
+        Its control points, mm, LPS.
+    kind : str
+        ``Fiducial``, ``Line`` or ``Angle``.
+
+    Returns
+    -------
+    dict
+        Plain values for JSON.
+    """
     return {
         "type": kind,
         "coordinateSystem": "LPS",

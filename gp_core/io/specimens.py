@@ -14,6 +14,7 @@ import numpy as np
 from gp_core.argument_types import checks_arguments
 from gp_core.errors import FeatureError, FileFormatError
 from gp_core.io.file_names import landmark_file_name, natural_key
+from gp_core.io.markups import has_point_list
 from gp_core.io.reading import read_points, sides_of, specimen_of
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side
@@ -304,6 +305,10 @@ def _files(paths: list[str | PathLike[str]]) -> list[Path]:
     )  # a file may be named along with its folder
 
 
+def _is_markups(file: Path) -> bool:
+    return file.name.lower().endswith(".mrk.json")
+
+
 def landmark_files(place: str | PathLike[str]) -> list[Path]:
     """Return the landmark files of a folder (not of its subfolders), or the given file.
 
@@ -330,6 +335,7 @@ def landmark_files(place: str | PathLike[str]) -> list[Path]:
     except (OSError, ValueError) as error:
         raise FileFormatError(f"cannot be searched ({error})", file=path, remedy="Check the name.") from None
     found = [file for file in found if not file.name.startswith(".")]  # temporary files, and those of macOS
+    found = [file for file in found if not _is_markups(file) or has_point_list(file)]  # no rulers and angles
     if not found:
         raise FileFormatError(
             f"holds no landmark files ({', '.join('*' + suffix for suffix in _IN_FOLDERS)})",

@@ -14,6 +14,7 @@ from gp_core.atlas.screening import Screened, screen_labels
 from gp_core.errors import GpError
 from gp_core.io import load_specimens, mean_labels
 from gp_core.io.file_names import natural_key
+from gp_core.io.markups import has_point_list
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.document.specimen_file import SUFFIX, read_specimen
@@ -252,5 +253,12 @@ def labelled_files(folder: Path) -> Iterator[Path]:
     """Yield the landmark and specimen files of a folder, not deeper."""
     if folder.is_dir():
         for file in sorted(folder.iterdir()):
-            if file.name.lower().endswith(_IN_FOLDERS) and not file.name.startswith("."):
+            if _may_be_read(file):
                 yield file
+
+
+def _may_be_read(file: Path) -> bool:
+    """Whether a file of a folder may hold labels: rulers and angles do not."""
+    name = file.name.lower()
+    is_named_so = name.endswith(_IN_FOLDERS) and not name.startswith(".")
+    return is_named_so and (not name.endswith(".mrk.json") or has_point_list(file))

@@ -31,6 +31,12 @@ from gp_labeler.document.edits import (
     SwapSides,
 )
 from gp_labeler.document.import_edit import ImportLandmarks
+from gp_labeler.document.measurement_edits import (
+    AddMeasurements,
+    MoveMeasurement,
+    RemoveMeasurements,
+    RenameMeasurement,
+)
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes, SetThreshold
 from gp_labeler.document.state import How, Provenance
 from gp_labeler.document.touch_edits import (
@@ -58,6 +64,7 @@ EDITS: Mapping[str, type[Any]] = MappingProxyType(
             *(PlacePoint, SuggestPoints, ConfirmPoint, ClearPoint, MarkUnseen, CheckPoint, LockPoints),
             *(SwapPoints, SwapSides, SetThreshold, SetNotes, RenameSpecimen),
             *(RecordTouch, TakeTouches, RemoveTouches, LeaveOutTouch, SwapTouches, MoveTouches, SetSkull),
+            *(AddMeasurements, MoveMeasurement, RenameMeasurement, RemoveMeasurements),
         )
     }
 )

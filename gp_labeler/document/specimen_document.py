@@ -82,6 +82,8 @@ class SpecimenDocument:
     """The points that changed, (Side, code): IN for both sides, CO where it was recomputed."""
     touches_changed = Signal()
     """What was touched with the probe, or where the skull's registration features are on the scan."""
+    measurements_changed = Signal()
+    """Rulers and angles."""
     volume_changed = Signal(object)
     """The attached volume."""
     threshold_changed = Signal(object)
@@ -291,6 +293,8 @@ class SpecimenDocument:
             self.landmarks_changed.emit(changed)
         if (new.touches, new.skull) != (old.touches, old.skull):
             self.touches_changed.emit()
+        if new.measurements != old.measurements:
+            self.measurements_changed.emit()
         if new.threshold != old.threshold:
             self.threshold_changed.emit(new.threshold)
         if _details(new) != _details(old):

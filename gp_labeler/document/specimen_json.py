@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document.frozen_json import thaw
@@ -59,6 +60,11 @@ def document_of(state: SpecimenState) -> Document:
         document["volume"] = volume_document(state.volume)
     if state.threshold is not None:
         document["threshold"] = state.threshold
+    if state.measurements:
+        document["measurements"] = [
+            {"name": each.name, "points": [list(point) for point in each.points]}
+            for each in state.measurements
+        ]
     if evidence := {
         side.value: found.as_json() for side in Side if (found := state.side(side).scan_evidence)
     }:
@@ -90,6 +96,10 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
             skull=_skull_in(_typed(document.get("skull", {}), dict, "skull")),
             scan_evidence=_scan_evidence_in(
                 _typed(document.get("bone_distance_mm", {}), dict, "bone_distance_mm")
+            ),
+            measurements=tuple(
+                _measurement_in(each, f"measurements[{i}]")
+                for i, each in enumerate(_typed(document.get("measurements", []), list, "measurements"))
             ),
         )
     except FileFormatError:
@@ -271,6 +281,15 @@ def _touch_in(document: Mapping[str, Any], where: str) -> Touch:
 
 def _skull_in(document: Mapping[str, Any]) -> dict[str, Position]:
     return {name: _triple(position, f"skull.{name}") for name, position in document.items()}
+
+
+def _measurement_in(document: Any, where: str) -> Measurement:
+    content = _typed(document, dict, where)
+    points = _typed(content.get("points"), list, f"{where}.points")
+    return Measurement(
+        _typed(content.get("name"), str, f"{where}.name"),
+        tuple(_triple(point, f"{where}.points[{i}]") for i, point in enumerate(points)),
+    )
 
 
 def _scan_evidence_in(document: Mapping[str, Any]) -> dict[Side, ScanEvidence]:

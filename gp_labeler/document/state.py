@@ -19,10 +19,11 @@ import numpy as np
 from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side, feature
+from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
-from gp_core.validation import check_option
+from gp_core.validation import check_option, near_matches
 from gp_labeler.document.frozen_json import freeze
 from gp_labeler.document.touches import Touch, TouchKey, touched_set
 from gp_labeler.document.volume_reference import VolumeReference
@@ -208,12 +209,15 @@ class SpecimenState:
         Skull features on the scan by which touches are registered to it, scan frame, mm.
     scan_evidence : mapping of Side to ScanEvidence
         How far the points were from bone when that was last measured in the scan; see `measured`.
+    measurements : tuple of Measurement
+        Rulers and angles, scan frame, mm, oldest first.
 
     Raises
     ------
     GpError
-        The name cannot stand in a file name, the threshold is not finite, CA and CB are at the same place, or
-        touches of a side are partly in the tracker's frame and partly in the scan's.
+        The name cannot stand in a file name, the threshold is not finite, CA and CB are at the same place,
+        touches of a side are partly in the tracker's frame and partly in the scan's, or two measurements have
+        the same name.
     """
 
     specimen: str = "unnamed"
@@ -226,6 +230,7 @@ class SpecimenState:
     touches: Mapping[TouchKey, Touch] = field(default_factory=dict)
     skull: Mapping[str, Position] = field(default_factory=dict)
     scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
+    measurements: tuple[Measurement, ...] = ()
     sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -249,6 +254,7 @@ class SpecimenState:
         object.__setattr__(self, "touches", MappingProxyType(dict(self.touches)))
         skull = {name: _plausible(position, name) for name, position in self.skull.items()}
         object.__setattr__(self, "skull", MappingProxyType(skull))
+        _check_measurements(self.measurements)
 
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side in the scan frame, with IN and, once determined, CO."""
@@ -261,6 +267,14 @@ class SpecimenState:
     def landmark(self, side: Side | str, code: str) -> Landmark:
         """Return what is known of one point; see `point_key` for what it raises."""
         return self.landmarks.get(point_key(side, code), TO_DO)
+
+    def measurement(self, name: str) -> Measurement:
+        """Return the ruler or angle of a name; raises `GpError` where there is none."""
+        found = {each.name: each for each in self.measurements}
+        if name not in found:
+            there = f"There are {', '.join(found)}." if found else "Nothing is measured yet."
+            raise GpError(f"no measurement is called {name!r:.80}{near_matches(name, found)}", remedy=there)
+        return found[name]
 
     def with_landmarks(self, changes: Mapping[PointKey, Landmark]) -> SpecimenState:
         """Return a copy in which these points are replaced."""
@@ -326,6 +340,16 @@ def _check_touches(touches: Mapping[TouchKey, Touch]) -> None:
                 landmark=name,
                 remedy="Clear these first: one estimate cannot mix tracker and scan positions.",
             )
+
+
+def _check_measurements(measurements: tuple[Measurement, ...]) -> None:
+    names: set[str] = set()
+    for each in measurements:
+        for point in each.points:
+            _plausible(point, each.name)
+        if each.name in names:
+            raise GpError(f"a measurement is called {each.name} already", remedy="Choose another name.")
+        names.add(each.name)
 
 
 def _plausible(position: Position, code: str) -> Position:

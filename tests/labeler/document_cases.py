@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
 from gp_core.landmarks.features import CODES, FEATURES, Side
+from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document.edits import (
@@ -28,6 +29,12 @@ from gp_labeler.document.edits import (
     SwapSides,
 )
 from gp_labeler.document.landmark_import import ImportLandmarks
+from gp_labeler.document.measurement_edits import (
+    AddMeasurements,
+    MoveMeasurement,
+    RemoveMeasurements,
+    RenameMeasurement,
+)
 from gp_labeler.document.opening import new_specimen
 from gp_labeler.document.specimen_document import SpecimenDocument, utc_now
 from gp_labeler.document.specimen_edits import RecordPoseCheck, RenameSpecimen, SetNotes, SetThreshold
@@ -147,6 +154,11 @@ def text_of(state: SpecimenState) -> str:
     return json.dumps(document_of(state), sort_keys=True)
 
 
+def are_apart(points) -> bool:
+    """Whether no point lies where the next one does."""
+    return bool((np.linalg.norm(np.diff(np.array(points), axis=0), axis=1) > 1e-6).all())
+
+
 coordinates = st.floats(-1e4, 1e4, allow_nan=False, width=64)
 positions = st.tuples(coordinates, coordinates, coordinates)
 sides = st.sampled_from(Side)
@@ -212,6 +224,9 @@ tracked = st.builds(
     Touch, positions, st.just(TouchHow.TRACKED), n_samples=st.integers(2, 99), spread_mm=st.floats(0, 1)
 )
 touched_names = st.sampled_from(("MN", "LLI", "IN", "S1"))
+measurement_names = st.sampled_from(("Ruler 1", "Angle 1", "bulla, width"))
+measured_points = st.lists(positions, min_size=2, max_size=3, unique=True).filter(are_apart).map(tuple)
+measurements = st.builds(Measurement, measurement_names, measured_points)
 
 edits = st.one_of(
     st.builds(PlacePoint, sides, few_codes, positions, provenances),
@@ -244,4 +259,8 @@ edits = st.one_of(
     st.builds(SwapTouches, sides, touched_names, touched_names),
     st.builds(MoveTouches, sides),
     st.builds(SetSkull, st.dictionaries(st.sampled_from(("S1", "S2")), positions, max_size=2)),
+    st.builds(AddMeasurements, st.lists(measurements, max_size=2).map(tuple)),
+    st.builds(MoveMeasurement, measurement_names, measured_points),
+    st.builds(RenameMeasurement, measurement_names, measurement_names),
+    st.builds(RemoveMeasurements, st.lists(measurement_names, max_size=2).map(tuple)),
 )
