@@ -1,39 +1,187 @@
-"""The wheel carries the resources; the tests' own settings do what they say."""
+"""The distributions: what the wheel holds, and that it works alone; the tests' settings do what they say."""
 
 from __future__ import annotations
 
 import ast
 import os
 import re
+import shutil
 import subprocess
 import sys
+import tarfile
 import zipfile
+from email.parser import Parser
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
+
+import gp_core
 
 _ROOT = Path(__file__).resolve().parents[1]
+_NO_NETWORK = ("No matching distribution found", "Could not find a version")
+
+
+def _run(*command: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run([str(w) for w in command], capture_output=True, text=True, check=False, cwd=cwd)
+
+
+@pytest.fixture(scope="module")
+def distributions(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the sdist, and of the wheel that is built from it."""
+    folder = tmp_path_factory.mktemp("dist")
+    done = _run(sys.executable, "-m", "build", "--outdir", folder, _ROOT)
+    if any(words in done.stdout + done.stderr for words in _NO_NETWORK):
+        pytest.skip("no network to fetch the build backend")
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def wheel(distributions: Path) -> Path:
+    """The wheel."""
+    return next(distributions.glob("*.whl"))
+
+
+@pytest.fixture(scope="module")
+def alone(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The programs of an empty environment, outside the tree, in which the wheel was installed."""
+    folder = tmp_path_factory.mktemp("alone")
+    _run(sys.executable, "-m", "venv", "--without-pip", folder)
+    programs = folder / ("Scripts" if os.name == "nt" else "bin")
+    done = _run(sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet", wheel)
+    if any(words in done.stderr for words in _NO_NETWORK):
+        pytest.skip("no network to fetch NumPy and SciPy")
+    assert done.returncode == 0, done.stderr
+    return programs
 
 
 @pytest.mark.slow
-def test_the_wheel_carries_the_resources_and_works(tmp_path: Path) -> None:
-    build = [sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "-w", str(tmp_path), str(_ROOT)]
-    done = subprocess.run(build, capture_output=True, text=True, check=False)
-    if "No matching distribution found for hatchling" in done.stderr:
-        pytest.skip("no network to fetch the build backend")
-    assert done.returncode == 0, done.stderr
-    (wheel,) = tmp_path.glob("*.whl")
+def test_the_wheel_carries_the_resources(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         names = archive.namelist()
-        archive.extractall(tmp_path / "site")
-    assert "gp_core/resources/features.json" in names
+    assert {"gp_core/resources/features.json", "gp_core/py.typed", "gp_labeler/py.typed"} <= set(names)
     assert not any(name.startswith(("tests/", "docs/")) for name in names)
-    code = "import gp_core; print(gp_core.__file__, gp_core.Atlas.published().n_samples)"
-    run = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path / "site"
+
+
+@pytest.mark.slow
+def test_the_metadata_are_complete(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = [n for n in archive.namelist() if n.endswith("METADATA")]
+        told = Parser().parsestr(archive.read(name).decode())
+    assert (told["Version"], told["License-Expression"]) == (gp_core.__version__, "MIT")
+    assert told["Author"]
+    assert len(told.get_all("Classifier", [])) > 10
+    urls = [line.partition(", ")[2] for line in told.get_all("Project-URL", [])]
+    assert len(urls) >= 5
+    assert all(url.startswith("https://") for url in urls)
+    needed = [line for line in told.get_all("Requires-Dist", []) if "extra ==" not in line]
+    assert sorted(re.split(r"\W", line)[0] for line in needed) == ["numpy", "scipy"]
+    extras = set(told.get_all("Provides-Extra", []))
+    assert {"jrmpc", "figures", "app", "cluster", "all"} <= extras
+    links = re.findall(r"\]\(([^)]+)\)", told.get_payload())  # type: ignore[arg-type]
+    assert len(links) > 10
+    assert [link for link in links if not link.startswith(("https://", "#"))] == []
+
+
+@pytest.mark.slow
+def test_the_checkers_of_distributions_find_nothing(distributions: Path, wheel: Path) -> None:
+    files = sorted(distributions.iterdir())
+    done = _run(sys.executable, "-m", "twine", "check", "--strict", *files)
+    assert done.returncode == 0, done.stdout
+    done = _run(sys.executable, "-m", "check_wheel_contents", wheel, cwd=_ROOT)
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.slow
+def test_the_sdist_holds_what_both_commands_of_the_readme_need(distributions: Path) -> None:
+    (sdist,) = distributions.glob("*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        held = {name.partition("/")[2] for name in archive.getnames()}
+    listed = _run("git", "ls-files", cwd=_ROOT)
+    if listed.returncode != 0:
+        pytest.skip("not a git checkout")
+    rooms = (
+        "gp_core",
+        "gp_labeler",
+        "resources",
+        "tests",
+        "docs",
+        "tools",
+        "benchmarks",
+        "README.md",
+        "LICENSE",
     )
-    assert str(tmp_path) in run.stdout
-    assert run.stdout.split()[-1] == "22"
+    wanted = {
+        name for name in listed.stdout.split("\n") if name.startswith(rooms) and (_ROOT / name).exists()
+    }
+    assert wanted - held == set()
+
+
+@pytest.mark.slow
+@pytest.mark.machine
+def test_the_wheel_alone_needs_numpy_and_scipy_only(alone: Path) -> None:
+    done = _run(sys.executable, "-m", "pip", "--python", alone / "python", "list", "--format=freeze")
+    assert sorted(line.partition("==")[0] for line in done.stdout.split()) == ["gp-labeler", "numpy", "scipy"]
+
+
+_COMMANDS = {
+    "estimate": "estimate touches.csv --side L --json pose.json --tfm pose.tfm",
+    "estimate jrmpc": "estimate touches.csv --side L --atlas labelled --method jrmpc",
+    "fit": "fit labelled -o atlas.json",
+    "check": "check labelled",
+    "register": "register labelled/A_L.mrk.json labelled/A_L.mrk.json --side L",
+    "pivot": "pivot poses.csv",
+    "distances": "distances labelled --csv distances.csv",
+    "leave-one-out": "leave-one-out labelled --method jrmpc",
+}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with touches, six animals drawn from the published atlas, and poses of a pivoting probe."""
+    folder, rng, atlas = tmp_path_factory.mktemp("files"), np.random.default_rng(0), gp_core.Atlas.published()
+    shutil.copy(_ROOT / "docs" / "example" / "touches.csv", folder)
+    (folder / "labelled").mkdir()
+    for name in "ABCDEF":
+        points = rng.multivariate_normal(atlas.mean.ravel(), atlas.covariance).reshape(-1, 3)
+        named = dict(zip(atlas.codes, points, strict=True))
+        landmarks = gp_core.LandmarkSet.from_mapping(named, "L", frame="scan")
+        gp_core.write_markups(folder / "labelled" / f"{name}_L.mrk.json", landmarks, specimen=name)
+    rotations = Rotation.from_rotvec(rng.normal(scale=0.3, size=(30, 3))).as_matrix()
+    poses = [np.vstack([np.column_stack([r, r @ [0, 0, -150.0]]), [0, 0, 0, 1]]) for r in rotations]
+    (folder / "poses.csv").write_text("".join(",".join(map(str, pose.ravel())) + "\n" for pose in poses))
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", _COMMANDS)
+def test_the_wheel_alone_runs(alone: Path, files: Path, command: str) -> None:
+    done = _run(alone / "gp-core", *_COMMANDS[command].split(), cwd=files)
+    assert done.returncode in ((0, 1) if command == "check" else (0,)), done.stderr
+    assert done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("command", "extra"),
+    [
+        ("gp-core distances labelled --figure figure.png", "figures"),
+        ("gp-core search labelled --scheduler tcp://127.0.0.1:9", "cluster"),
+        ("gp-labeler", "app"),
+        ("gp-labeler mesh head.nrrd -o head.ply", "app"),
+        ("gp-labeler --offscreen demo --output out", "app"),
+    ],
+)
+def test_a_missing_extra_is_one_line_that_names_it(
+    alone: Path, files: Path, command: str, extra: str
+) -> None:
+    program, *words = command.split()
+    done = _run(alone / program, *words, cwd=files)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert f'Run pip install "gp-labeler[{extra}]"' in done.stderr
 
 
 @pytest.mark.parametrize(("module", "passes"), [("gp_core.anything", False), ("numpy.linalg", True)])

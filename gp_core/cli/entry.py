@@ -28,6 +28,7 @@ from gp_core.cli import (
 from gp_core.cli.options import keeping_inputs
 from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
+from gp_core.extras import missing_package
 from gp_core.terminal import leave_output, plain_terminal
 
 __all__ = ["main", "make_parser"]
@@ -98,6 +99,12 @@ def _run(arguments: Sequence[str] | None) -> int:
         sys.stdout.flush()
     except GpError as error:
         sys.stderr.write(f"gp-core: {error}\n")
+        return 2
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package in ("", "gp_core"):
+            raise
+        sys.stderr.write(f"gp-core: {missing_package(package)}\n")
         return 2
     except BrokenPipeError:  # the reader has exited, such as `head`
         leave_output()

@@ -14,6 +14,7 @@ from typing import Any
 from gp_core.atlas.atlas import Atlas, is_atlas_file
 from gp_core.disk import is_protected, is_stream, protected_inputs, write_text
 from gp_core.errors import GpError
+from gp_core.extras import need_extra
 from gp_core.io import Labelling, landmark_files, load_labellings, load_specimens, read_lab_names
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import Specimen
@@ -221,8 +222,11 @@ def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
     Raises
     ------
     GpError
-        An output is an input, also one in a folder of landmark files, or two outputs are the same file.
+        An output is an input, also one in a folder of landmark files; two outputs are the same file; or
+        figures cannot be drawn here.
     """
+    if getattr(args, "figure", None) is not None:
+        need_extra("figures")  # before hours of work, not after them
     with protected_inputs(_files_read(args)):
         written: dict[str, str] = {}
         for name in _WRITTEN:

@@ -2,7 +2,8 @@
 
 The points of every set are taken as samples of one mixture of K isotropic Gaussians and a uniform class of
 outliers; expectation conditional maximisation finds the pose of each set, the centres and their variances.
-The inner loops are compiled (`gp_core.registration.jrmpc_kernels`) and loaded on first use.
+The inner loops are compiled (`gp_core.registration.jrmpc_kernels`) and loaded on first use; without Numba,
+`gp_core.registration.jrmpc_numpy` does the same, slower.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
@@ -466,6 +468,8 @@ def _check_sizes(size: FloatArray) -> None:
 
 
 def _kernels() -> Any:
-    from gp_core.registration import jrmpc_kernels
-
-    return jrmpc_kernels
+    """Return the compiled inner loops; where Numba is missing or cannot be used, those in plain NumPy."""
+    try:
+        return import_module("gp_core.registration.jrmpc_kernels")
+    except ImportError:
+        return import_module("gp_core.registration.jrmpc_numpy")

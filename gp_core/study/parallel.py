@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 from gp_core.errors import GpError
+from gp_core.extras import missing_package
 from gp_core.processors import n_cores
 
 __all__ = ["open_executor", "run_map"]
@@ -142,9 +143,7 @@ def _cluster(address: str) -> Iterator[Executor]:
     try:
         client_class: Any = import_module("distributed").Client
     except ImportError:
-        raise GpError(
-            "a scheduler needs Dask", remedy="Install it with: pip install 'gp-labeler[cluster]'"
-        ) from None
+        raise missing_package("distributed") from None
     try:
         client = client_class(address, timeout="10s")
     except (OSError, ValueError) as error:

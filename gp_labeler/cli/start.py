@@ -16,7 +16,7 @@ try:
 except ImportError:  # another Python
     from signal import SIGINT, signal
 
-__all__ = ["core", "labeler"]
+__all__ = ["core", "labeler", "window"]
 
 
 def core() -> int:
@@ -31,6 +31,14 @@ def labeler() -> int:
     """Run ``gp-labeler``, to be stopped at once at any time: each edit is in the journal, files are whole."""
     _stop_at_once("gp-labeler")
     return int(_main_of("gp_labeler.cli.entry", "gp-labeler")())
+
+
+def window() -> int:
+    """Run ``gp-labeler`` from a desktop, where a program may have no streams to write to."""
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115, PTH123
+    return labeler()
 
 
 def _main_of(module: str, command: str) -> Callable[[], int]:

@@ -24,7 +24,7 @@ _SHORTEST_NAME, _FRAME, _AROUND = 60, 14, 76
 
 _TOOLS = (
     ("tool.place", "label", "Place"),
-    ("tool.look", "axis", "Crosshair"),
+    ("tool.look", "pose", "Crosshair"),
     ("tool.grey", "sun", "Contrast"),
 )
 
