@@ -330,7 +330,7 @@ class SpecimenDocument:
     ) -> tuple[str, ...]:
         """Attach a loaded scan. Undo leaves it alone.
 
-        Ask for its checksum where it was read, off this thread: a large scan takes a while.
+        Its checksum counts where it is known, which takes a while; `confirm_volume` tells it later.
 
         Parameters
         ----------
@@ -355,12 +355,40 @@ class SpecimenDocument:
         reference, known = VolumeReference.of(volume), self.state.volume
         if known is not None and not accept_changes and (differences := known.differences(reference)):
             raise VolumeChangedError(differences, reference)
+        if known is not None and not (accept_changes or reference.checksum):
+            reference = replace(reference, checksum=known.checksum)
         choices = getattr(volume, "choices", {}) if import_choices is None else import_choices
         self._refer_to(reference, choices, f"open {reference.name}")
         self._volume = volume
         warning = self.store.claim_volume(reference.path)
         self.volume_changed.emit(volume)
         return () if warning is None else (warning,)
+
+    def confirm_volume(self, checksum: str) -> None:
+        """Tell the checksum of the attached scan, which was not known when it was attached.
+
+        Parameters
+        ----------
+        checksum : str
+            Of its voxels and where they lie.
+
+        Raises
+        ------
+        VolumeChangedError
+            It is not the scan that was labelled; it is detached, until it is attached with `accept_changes`.
+        """
+        self._check_thread()
+        known = self.state.volume
+        if known is None or self._volume is None:
+            return
+        reference = replace(known, checksum=checksum)
+        if differences := known.differences(reference):
+            self._volume = self.measure = None
+            self.reset.emit()
+            raise VolumeChangedError(differences, reference)
+        if self._clean.volume == known:
+            self._clean = self._clean.on_volume(reference, self._clean.import_choices)
+        self._refer_to(reference, self.state.import_choices, f"check {reference.name}")
 
     def relink(self, path: str | PathLike[str]) -> None:
         """Say where the scan is now; read it from there and `attach_volume` it.

@@ -50,11 +50,12 @@ class VolumeReference:
 
     @classmethod
     def of(cls, volume: VolumeLike) -> VolumeReference:
-        """Make the reference of a loaded volume."""
+        """Make the reference of a loaded volume; without a checksum where that is not known yet."""
         i, j, k = (int(n) for n in volume.size)
         x, y, z = (float(s) for s in volume.spacing)
         path = None if volume.path is None else fspath(volume.path)
-        return cls(str(volume.name), (i, j, k), (x, y, z), str(volume.checksum), path)
+        checksum = volume.known_checksum if hasattr(volume, "known_checksum") else volume.checksum
+        return cls(str(volume.name), (i, j, k), (x, y, z), str(checksum), path)
 
     def differences(self, other: VolumeReference) -> tuple[str, ...]:
         """Say, a clause each, in what `other` is another scan than this one; its place does not count."""

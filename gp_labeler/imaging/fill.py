@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Fill", "Replacement", "find_fill", "replace_fill", "replacement_of"]
+__all__ = ["Fill", "Replacement", "find_fill", "lowest", "replace_fill", "replacement_of"]
 
 _Array = NDArray[Any]
 _Mask = NDArray[np.bool_]
@@ -49,9 +49,22 @@ class Fill:
         here = ~np.isfinite(plane) if np.isnan(self.value) else plane == self.value
         return np.asarray(here if self.outside is None else here & self.outside)
 
+    def occurs(self, values: _Array) -> bool:
+        """Return whether some of the values, of any shape, were not measured; without a mask of them all."""
+        if values.ndim < 3 or len(values) < 2:
+            return bool(self.where(values).any())
+        return any(bool(self.where(plane).any()) for plane in values)
 
-def find_fill(array: _Array, known: float | None = None) -> tuple[Fill, ...]:
+    def part(self, j: Any, i: Any) -> Fill:
+        """Return the fill of some of the pixels, by their indices along y and x."""
+        return self if self.outside is None else Fill(self.value, self.outside[j, i])
+
+
+def find_fill(array: _Array, known: float | None = None, *, sampled: bool = False) -> tuple[Fill, ...]:
     """Find the values of a (z, y, x) scan that stand for nothing; the file may say one that does.
+
+    `sampled` looks for values that are not finite in some slices only, as for all others, so that a scan is
+    not read as a whole.
 
     A fill is one exact value. It is known by its place, the same part of every slice around a middle that has
     other values, as outside a scanner's circle; or by standing apart from all others, as the lowest or
@@ -59,9 +72,10 @@ def find_fill(array: _Array, known: float | None = None) -> tuple[Fill, ...]:
     fill: bone begins there.
     """
     found: list[Fill] = [] if known is None else [Fill(float(known))]
-    if array.dtype.kind == "f" and not all(np.isfinite(plane).all() for plane in array):
-        found.append(Fill(np.nan))
     ks, js, is_ = (_spread(n, most) for n, most in zip(array.shape, (_SLICES, _ACROSS, _ACROSS), strict=True))
+    looked_at = (array[k] for k in ks) if sampled else iter(array)
+    if array.dtype.kind == "f" and not all(np.isfinite(plane).all() for plane in looked_at):
+        found.append(Fill(np.nan))
     sample = array[np.ix_(ks, js, is_)]
     left = np.isfinite(sample) & (True if known is None else sample != known)
     for _ in range(3):
@@ -127,6 +141,12 @@ def replacement_of(array: _Array, fills: tuple[Fill, ...]) -> Replacement:
         below, room = low, False  # a few holes, not a part that lies outside
     notes = tuple(_note(fill, int(n), array.size) for fill, n in zip(fills, counts, strict=True) if n)
     return Replacement(below, room, notes)
+
+
+def lowest(array: _Array) -> float:
+    """Return the lowest finite value of some slices of a (z, y, x) scan."""
+    planes = (array[k] for k in _spread(len(array), _SLICES))
+    return min((float(p[np.isfinite(p)].min()) for p in planes if np.isfinite(p).any()), default=0.0)
 
 
 def replace_fill(array: _Array, fills: tuple[Fill, ...], replacement: Replacement) -> None:

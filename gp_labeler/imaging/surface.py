@@ -122,6 +122,8 @@ def extract_isosurface(
     if surface.n_triangles and (smallest_mm > 0 or largest is not None):
         points, triangles = surface.points, surface.triangles
         surface = surface.only(kept_triangles(points, triangles, smallest_mm=smallest_mm, largest=largest))
+    volume.check()
+    volume.check()
     if not surface.n_triangles:
         raise _no_surface(volume, threshold, box)
     report(0.8)

@@ -54,6 +54,8 @@ def propose_threshold(volume: Volume) -> float:
     Otsu 1979, doi:10.1109/TSMC.1979.4310076; Liao, Chen and Chung 2001, J. Inf. Sci. Eng. 17, 713-727.
     """
     values = _block_means(volume.voxels, volume.fill)
+    volume.check()
+    volume.check()
     values = values[np.isfinite(values)]
     low, high = np.percentile(values, _TAILS_PERCENT) if len(values) else (0.0, 0.0)
     if not low < high:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -13,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from gp_core.errors import GeometryError
+from gp_core.errors import GeometryError, GpError
 from gp_core.validation import FloatArray, as_points
+from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, Voxels
 
 if TYPE_CHECKING:
@@ -184,11 +184,8 @@ class Volume:
 
     @cached_property
     def intensity_range(self) -> tuple[float, float]:
-        """The 0.1 and 99.9 percentiles of a regular subsample: where a window may start."""
-        step = max(1, self.voxels.size // _SAMPLES)
-        while math.gcd(step, self.voxels.shape[2]) > 1:  # else the samples would walk down columns
-            step += 1
-        low, high = np.percentile(self.measured(self.voxels.every(step)), _PERCENTILES)
+        """The 0.1 and 99.9 percentiles of rows all over the scan: where a window may start."""
+        low, high = np.percentile(self.measured(self.voxels.rows(_SAMPLES)), _PERCENTILES)
         return float(low), float(high)
 
     def measured(self, values: GreyArray) -> GreyArray:
@@ -214,6 +211,30 @@ class Volume:
         image.GetPointData().SetScalars(to_vtk(vtk_ready(self.array).reshape(-1), "values", share=True))
         return image
 
+    def check(self) -> None:
+        """Raise where the file was cut or changed since it was opened: what was read may be wrong.
+
+        Raises
+        ------
+        GpError
+            With what happened.
+        """
+        if (problem := self.voxels.problem) is not None:
+            raise GpError(
+                f"it {problem}", file=self.path, remedy="Copy it again, and open it. All labels are kept."
+            )
+
+    @property
+    def known_checksum(self) -> str:
+        """The checksum, where it was asked for before; else empty."""
+        return str(self.__dict__.get("checksum", ""))
+
+    def find_checksum(self, report: Report) -> str:
+        """Return the checksum, telling how far it is; for scans in their files, which are read as a whole."""
+        if not self.known_checksum:
+            self.__dict__["checksum"] = self._digest(report)
+        return self.checksum
+
     @cached_property
     def checksum(self) -> str:
         """32 hex digits of the voxels and where they lie; the same for the same scan in another file format.
@@ -221,12 +242,20 @@ class Volume:
         Every voxel counts, through one wrapping 64-bit sum for each 64 KiB, and every 64th block of them is
         hashed as it is; so a change of any one voxel shows, and 1 GB takes well under a second. Positions
         count to 0.0001 mm.
+
+        Raises
+        ------
+        GpError
+            The file was changed meanwhile.
         """
+        return self._digest(Report())
+
+    def _digest(self, report: Report) -> str:
         digest = hashlib.blake2b(digest_size=16)
         digest.update(f"{self.voxels.shape}{self.dtype.str[1:]}".encode())
         digest.update((np.round(self.T_scan_voxel, 4) + 0.0).astype("<f8").tobytes())  # + 0.0: no minus zero
         sums, samples, n, rest = [], [], 0, np.zeros(0, np.uint8)
-        for raw in self._bytes():
+        for raw in self._bytes(report):
             raw = np.concatenate([rest, raw]) if rest.size else raw
             whole = raw.size - raw.size % (8 * _BLOCK)
             blocks, rest = raw[:whole].view("<u8").reshape(-1, _BLOCK), raw[whole:]
@@ -235,13 +264,15 @@ class Volume:
             n += len(blocks)
         for part in (*sums, *samples, rest.tobytes()):
             digest.update(part)
+        self.check()
         return digest.hexdigest()
 
-    def _bytes(self) -> Iterator[NDArray[np.uint8]]:
+    def _bytes(self, report: Report) -> Iterator[NDArray[np.uint8]]:
         """Yield the voxels as bytes, a few planes at a time."""
         nz, ny, nx = self.voxels.shape
         n = max(1, _SLAB_BYTES // (ny * nx * self.dtype.itemsize))
         for k in range(0, nz, n):
+            report(k / nz)
             slab = self.voxels.read(slice(k, k + n), slice(None), slice(None))
             yield np.ascontiguousarray(slab).reshape(-1).view(np.uint8)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from gp_core.errors import GeometryError
 from gp_labeler.imaging.fill import Fill
+from gp_labeler.imaging.mapped_file import MappedFile
 
 __all__ = ["ArrayVoxels", "GreyArray", "MappedVoxels", "Voxels"]
 
@@ -49,6 +51,19 @@ class Voxels(ABC):
         """Bytes that all of them take once they are read."""
         return self.size * self.dtype.itemsize
 
+    @property
+    def in_file(self) -> bool:
+        """Whether they stay in their file until they are read."""
+        return False
+
+    @property
+    def problem(self) -> str | None:
+        """What happened to the file that holds them, since it was opened; None where nothing did.
+
+        What was cut off reads as zeros. So whoever has read asks for the problem afterwards.
+        """
+        return None
+
     def whole(self) -> GreyArray:
         """Return all of them as one (z, y, x) array."""
         return self.read(slice(None), slice(None), slice(None))
@@ -65,13 +80,18 @@ class Voxels(ABC):
         plane: GreyArray = self.read(*kji).squeeze(axis=2 - axis)
         return plane
 
-    def every(self, step: int) -> GreyArray:
-        """Return every so many-th value in the order of the file, (N,)."""
-        kept, start = [], 0
-        for plane in self.planes():
-            kept.append(np.ravel(plane)[start::step])
-            start = (start - plane.size) % step
-        return np.concatenate(kept)
+    def rows(self, n: int) -> GreyArray:
+        """Return the values of about `n` voxels at most, (N,): whole rows, spread over planes and columns.
+
+        Single voxels would take as long: a file is read in pages, which hold rows.
+        """
+        nz, ny, nx = self.shape
+        step = max(1, -(-nz * ny * nx // n))
+        while math.gcd(step, ny) > 1 and step < nz * ny:  # else the rows would lie on few planes' same lines
+            step += 1
+        places = (divmod(row, ny) for row in range(0, nz * ny, step))
+        rows = [self.read(slice(k, k + 1), slice(j, j + 1), slice(None)).reshape(-1) for k, j in places]
+        return np.concatenate(rows)
 
     def sample(self, n: int) -> GreyArray:
         """Return a regular subsample of about `n` values at most, (z, y, x)."""
@@ -110,10 +130,6 @@ class ArrayVoxels(Voxels):
         values: GreyArray = self._array[k, j, i]
         return values
 
-    def every(self, step: int) -> GreyArray:
-        """Return every so many-th value."""
-        return self._array.reshape(-1)[::step]
-
 
 class MappedVoxels(Voxels):
     """Voxels that stay in their file, which the system reads page by page where they are asked for.
@@ -126,31 +142,43 @@ class MappedVoxels(Voxels):
         Values that stand where nothing was measured.
     below : float, optional
         What is read in their place.
+    file : MappedFile, optional
+        The file, to know what happens to it.
     """
 
-    def __init__(self, stored: GreyArray, fills: tuple[Fill, ...] = (), below: float = 0.0) -> None:
-        self._stored, self._fills, self._below = stored, fills, below
+    def __init__(
+        self,
+        stored: GreyArray,
+        fills: tuple[Fill, ...] = (),
+        below: float = 0.0,
+        file: MappedFile | None = None,
+    ) -> None:
+        self._stored, self._fills, self._below, self._file = stored, fills, below, file
         self.shape, self.dtype = stored.shape, stored.dtype.newbyteorder("=")
+
+    @property
+    def in_file(self) -> bool:
+        """They stay in their file."""
+        return True
+
+    @property
+    def problem(self) -> str | None:
+        """What happened to the file since it was opened."""
+        return None if self._file is None else self._file.problem
 
     def read(self, k: slice, j: slice, i: slice) -> GreyArray:
         """Return the values of a box: a view of the map where nothing has to be changed."""
         values = self._stored[k, j, i]
-        here = tuple(
-            Fill(fill.value, None if fill.outside is None else fill.outside[j, i]) for fill in self._fills
-        )
-        return self._converted(values, here)
+        return self._converted(values, [fill.part(j, i) for fill in self._fills])
 
     def at(self, k: _Index, j: _Index, i: _Index) -> GreyArray:
         """Return the values of single voxels."""
-        here = tuple(
-            Fill(fill.value, None if fill.outside is None else fill.outside[j, i]) for fill in self._fills
-        )
-        return self._converted(self._stored[k, j, i], here)
+        return self._converted(self._stored[k, j, i], [fill.part(j, i) for fill in self._fills])
 
-    def _converted(self, values: GreyArray, fills: tuple[Fill, ...]) -> GreyArray:
+    def _converted(self, values: GreyArray, fills: list[Fill]) -> GreyArray:
         """Bring values to native byte order, and put one value where nothing was measured."""
         native = values.astype(self.dtype, copy=False)
-        if not fills:
-            return native.view(np.ndarray)
+        if not any(fill.occurs(native) for fill in fills):
+            return native
         nothing = np.logical_or.reduce([fill.where(native) for fill in fills])
         return np.where(nothing, self.dtype.type(self._below), native)

@@ -10,13 +10,14 @@ from pathlib import Path
 from typing import Any
 
 from gp_labeler.imaging.progress import Progress as Told
+from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
-__all__ = ["Demo", "InspectScan", "MakeDemo", "ProposeThreshold", "ReadScan", "phantom_seed"]
+__all__ = ["CheckScan", "Demo", "InspectScan", "MakeDemo", "ProposeThreshold", "ReadScan", "phantom_seed"]
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,22 @@ class ReadScan:
         volume = read_volume(self.plan, progress=progress, cancel=progress.cancelled)
         _ = volume.intensity_range  # remembered by the volume: found here, it costs the window nothing
         return volume
+
+
+@dataclass(frozen=True)
+class CheckScan:
+    """Find the checksum of a scan that stays in its file, and see that nothing happens to it meanwhile."""
+
+    volume: Volume
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Checking all voxels of {self.volume.name}"
+
+    def run(self, progress: Progress) -> str:
+        """Read all of it once."""
+        return self.volume.find_checksum(Report(progress, progress.cancelled))
 
 
 @dataclass(frozen=True)

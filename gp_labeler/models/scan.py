@@ -24,12 +24,21 @@ from gp_labeler.imaging.near_bone import near_bone
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import Jobs
-from gp_labeler.jobs.scan import Demo, InspectScan, MakeDemo, ProposeThreshold, ReadScan, phantom_seed
+from gp_labeler.jobs.scan import (
+    CheckScan,
+    Demo,
+    InspectScan,
+    MakeDemo,
+    ProposeThreshold,
+    ReadScan,
+    phantom_seed,
+)
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.view import ViewModel
 
 __all__ = ["ScanModel"]
 
+_CHECKING = "check scan"
 _PROPOSING = "mesh threshold"
 """Key of the job that looks for a threshold: the first part of making a mesh."""
 
@@ -75,9 +84,15 @@ class ScanModel:
         self._document, self._view, self._jobs, self._messages = document, view, jobs, messages
         self._recent = recent
         self._proposed: float | None = None
+        self._unchecked: Volume | None = None
+        """A scan whose checksum is not known yet."""
+        self._problem_told = False
         document.reset.connect(self._on_reset)
         document.loaded.connect(self._on_loaded)
         document.threshold_changed.connect(self._on_threshold)
+        view.crosshair_changed.connect(self._on_crosshair)
+        for ended in (jobs.done, jobs.failed, jobs.cancelled):
+            ended.connect(self._on_job)
 
     # What is there
 
@@ -96,13 +111,13 @@ class ScanModel:
     @property
     def evidence(self) -> Callable[[LandmarkSet], ScanEvidence] | None:
         """Tells how far the labels of a side are from the bone of this scan; None while there is none."""
-        if self.volume is None or self.threshold is None:
+        if self.volume is None or self.threshold is None or self.volume.voxels.problem:
             return None
         return partial(scan_evidence, self.volume, self.threshold)
 
     def near_bone(self, points: FloatArray) -> NDArray[np.bool_]:
         """Return which of (N, 3) scan positions lie within three voxels of bone; all, where there is none."""
-        if self.volume is None or self.threshold is None:
+        if self.volume is None or self.threshold is None or self.volume.voxels.problem:
             return np.ones(len(points), dtype=bool)
         return near_bone(self.volume, self.threshold, points)
 
@@ -186,9 +201,9 @@ class ScanModel:
         self.truth = demo.specimen
 
     def _on_reset(self) -> None:
-        self.truth = self._proposed = None
+        self.truth = self._proposed = self._unchecked = None
         for task in self._jobs.running:
-            if task.key == _PROPOSING:
+            if task.key in (_PROPOSING, _CHECKING):
                 task.cancel()
 
     def _on_loaded(self, _: tuple[str, ...]) -> None:
@@ -227,7 +242,39 @@ class ScanModel:
             self._messages.say(text, "warning")
         self._view.set_crosshair(volume.extent.mean(axis=0))
         self._proposed = None
+        self._unchecked = None if volume.known_checksum else volume
+        self._problem_told = False
         if self._document.state.threshold is None:
             self._jobs.submit(ProposeThreshold(volume), self._take_proposal, key=_PROPOSING)
         self._measure()
         self.opened.emit(volume)
+
+    # A scan that stays in its file
+
+    def _on_job(self, _: object) -> None:
+        """Check a new scan as soon as nothing else is to be done: it is read as a whole for that."""
+        self._tell_problem()
+        if self._unchecked is not None and not self._jobs.running:
+            volume, self._unchecked = self._unchecked, None
+            self._jobs.submit(CheckScan(volume), self._take_checksum, key=_CHECKING)
+
+    def _take_checksum(self, checksum: str) -> None:
+        volume = self.volume
+        try:
+            self._document.confirm_volume(checksum)
+        except VolumeChangedError as error:
+            self.differs.emit(error, volume)
+
+    def _on_crosshair(self, _: object) -> None:
+        self._tell_problem()
+
+    def _tell_problem(self) -> None:
+        """Say once what happened to the file of the scan; what is labelled stays, and can be saved."""
+        volume = self.volume
+        if volume is None or self._problem_told or (problem := volume.voxels.problem) is None:
+            return
+        self._problem_told = True
+        self._measure()
+        self._messages.say(
+            f"The scan {volume.name} {problem}. Open it again. All labels are kept.", "warning"
+        )

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from gp_labeler.imaging.fill import find_fill, replace_fill, replacement_of
+from gp_labeler.imaging.fill import Fill, Replacement, find_fill, lowest, replace_fill, replacement_of
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
@@ -22,11 +22,12 @@ from gp_labeler.imaging.readers.grey import needs_float64
 from gp_labeler.imaging.readers.options import ImportOptions
 from gp_labeler.imaging.readers.plan import ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, quiet
-from gp_labeler.imaging.readers.source import assemble, mapped_part
+from gp_labeler.imaging.readers.source import Mapped, assemble, mapped_part
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, MappedVoxels, Voxels
+from gp_labeler.imaging.voxels import ArrayVoxels, MappedVoxels, Voxels
 
 __all__ = [
+    "MAPPED_FROM",
     "READABLE",
     "Choice",
     "ImportOptions",
@@ -38,6 +39,9 @@ __all__ = [
     "read_preview",
     "read_volume",
 ]
+
+MAPPED_FROM = 1 << 27
+"""Bytes: smaller scans are read at once in any case, and are then safe from whatever happens to the file."""
 
 PathOrPlan = str | PathLike[str] | ImportPlan
 
@@ -101,9 +105,9 @@ def read_volume(
     progress, cancel : callable, optional
         Told the fraction done; asked whether to stop.
     mapped : bool, optional
-        Leave the voxels in their file, which the system then reads where they are needed: NRRD, MetaImage and
-        NIfTI that are neither packed nor scaled. By default only scans that would take more than half of this
-        machine's memory. The file must not be changed or cut while it is open.
+        Leave the voxels in their file, which the system then reads where they are needed: NRRD, MetaImage,
+        NIfTI and TIFF that are neither packed nor scaled. By default scans from `MAPPED_FROM` bytes on. What
+        other programs do to the file meanwhile is seen: ask `Volume.check` after reading.
     **options
         Fields of `ImportOptions`: `spacing`, `series`, `channel`, `accept`, `reverse`, `stride`, `region`.
         They come with the volume as `choices`, and read the same again.
@@ -153,8 +157,8 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 
 def _load(plan: ImportPlan, report: Report, mapped: bool | None) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
-        stored = _map_of(plan, mapped)
-        voxels, fill, notes = _in_memory(plan, report) if stored is None else _in_file(plan, stored, report)
+        held = _map_of(plan, mapped)
+        voxels, fill, notes = _in_memory(plan, report) if held is None else _in_file(plan, held, report)
         volume = Volume(
             voxels,
             plan.T_scan_voxel(),
@@ -164,7 +168,9 @@ def _load(plan: ImportPlan, report: Report, mapped: bool | None) -> Volume:
             choices=plan.options.as_json(),
             fill=fill,
         )
-        volume.checksum  # noqa: B018 - computed here, off the UI thread
+        if held is None:
+            volume.checksum  # noqa: B018 - computed here, off the UI thread
+        volume.check()
     return volume
 
 
@@ -182,19 +188,23 @@ def _in_memory(plan: ImportPlan, report: Report) -> tuple[Voxels, float | None, 
     return ArrayVoxels(array), replacement.fill, notes
 
 
-def _in_file(
-    plan: ImportPlan, stored: GreyArray, report: Report
-) -> tuple[Voxels, float | None, tuple[str, ...]]:
-    """Leave the voxels in their file; what stands for nothing is replaced whenever some are read."""
-    fills = find_fill(stored, plan.fill)
+def _in_file(plan: ImportPlan, held: Mapped, report: Report) -> tuple[Voxels, float | None, tuple[str, ...]]:
+    """Leave the voxels in their file; what stands for nothing is replaced whenever some are read.
+
+    All of them are read here only where some were not measured: their value has to be below all others.
+    """
+    stored, file = held
+    fills = find_fill(stored, plan.fill, sampled=True)
     report(0.5)
     replacement = replacement_of(stored, fills)
+    if not fills and stored.dtype.kind == "f":  # there may be some all the same, in slices not looked at
+        fills, replacement = (Fill(np.nan),), Replacement(below=lowest(stored))
     report(1.0)
     notes = (*plan.all_notes(narrowed=False), *replacement.notes, "its voxels stay in the file")
-    return MappedVoxels(stored, fills, replacement.below), replacement.fill, notes
+    return MappedVoxels(stored, fills, replacement.below, file), replacement.fill, notes
 
 
-def _map_of(plan: ImportPlan, mapped: bool | None) -> GreyArray | None:
+def _map_of(plan: ImportPlan, mapped: bool | None) -> Mapped | None:
     """Return the file as it is mapped, if that is asked for, or needed and possible.
 
     Raises
@@ -202,16 +212,16 @@ def _map_of(plan: ImportPlan, mapped: bool | None) -> GreyArray | None:
     VolumeError
         It is asked for, and cannot be.
     """
-    if mapped is False or (mapped is None and plan.n_bytes <= _memory() / 2):
+    if mapped is False or (mapped is None and plan.n_bytes < MAPPED_FROM):
         return None
     is_kept = plan.stored_dtype.name == plan.dtype.name
-    stored = mapped_part(plan.source, plan.size, plan.options) if is_kept else None
-    if mapped and stored is None:
+    held = mapped_part(plan.source, plan.size, plan.options) if is_kept else None
+    if mapped and held is None:
         raise VolumeError(
             "its voxels cannot be shown as they are stored: they are packed, scaled or in several files",
             remedy="Open it without mapping, or save it as raw NRRD.",
         )
-    return stored
+    return held
 
 
 def _memory() -> float:

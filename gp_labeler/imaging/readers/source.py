@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from gp_core.errors import GpError
+from gp_labeler.imaging.mapped_file import MappedFile, can_map
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.options import ImportOptions, Region
@@ -24,6 +25,7 @@ from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as
 __all__ = [
     "Compression",
     "FileSource",
+    "Mapped",
     "RawSource",
     "SliceSource",
     "assemble",
@@ -35,6 +37,9 @@ __all__ = [
 ]
 
 Plane = NDArray[Any]
+Mapped = tuple[Plane, MappedFile]
+"""The (z, y, x) values, and the file that holds them."""
+
 _CHUNK = 1 << 18
 _DECODERS = 4
 _DEFLATE_AT_MOST = 1032
@@ -118,13 +123,14 @@ class RawSource:
         text = f"{self.path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete"
         return (Problem("short-file", text, remedy="Copy it again."),)
 
-    def mapped(self) -> Plane | None:
-        """Return the (z, y, x) file as a memory map, if its values can be shown as they are stored."""
-        as_stored = self.compression == "none" and self.plane_step is None and self.finish is to_grey
-        if not as_stored or len(self.plane_shape) != 2:
+    def mapped(self) -> Mapped | None:
+        """Return the (z, y, x) file as a map, if its values can be shown as they are stored."""
+        as_stored = self.compression == "none" and self.finish is to_grey and len(self.plane_shape) == 2
+        if not as_stored or not can_map():
             return None
+        file = MappedFile(self.path, self.bytes_needed)
         shape = (self.n_planes, *self.plane_shape)
-        return np.memmap(self.path, self.dtype, "r", self.offset + self.skip, shape)
+        return file.array(self.dtype, self.offset + self.skip, shape, self.plane_step), file
 
     def planes(self, wanted: Sequence[int]) -> Iterator[Plane]:
         """Yield the (y, x) grey planes with the numbers `wanted`, which rise; each is good until the next."""
@@ -225,15 +231,15 @@ def assemble(
     return volume
 
 
-def mapped_part(source: SliceSource, size: tuple[int, int, int], options: ImportOptions) -> Plane | None:
-    """Return the wanted part of a volume of `size` (x, y, z) as a mapped file, or None where it cannot be."""
-    whole = source.mapped() if isinstance(source, RawSource) else None
-    if whole is None:
+def mapped_part(source: SliceSource, size: tuple[int, int, int], options: ImportOptions) -> Mapped | None:
+    """Return the wanted part of a volume of `size` (x, y, z) in its mapped file; None if it cannot be."""
+    mapped = source.mapped() if isinstance(source, RawSource) else None
+    if mapped is None:
         return None
+    whole, file = mapped
     i, j, k = window(size, options)
     planes = whole[: size[2]][:: -1 if options.reverse else 1]  # a list of volumes begins with the first
-    part: Plane = planes[k.start : k.stop : k.step, j.start : j.stop : j.step, i.start : i.stop : i.step]
-    return part
+    return planes[k.start : k.stop : k.step, j.start : j.stop : j.step, i.start : i.stop : i.step], file
 
 
 def window(size: tuple[int, int, int], options: ImportOptions) -> tuple[range, range, range]:

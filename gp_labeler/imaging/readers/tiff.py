@@ -73,7 +73,7 @@ def inspect_tiff(path: Path, options: ImportOptions) -> ImportPlan:
         index, rivals = choose(choices, options, None, path)
         stack = stacks[index]
         check_page(stack.first, path)
-        source = _source(stack, path, tif, options.channel)
+        source = _source(stack, path, tif if stack.series is not None else pages, options.channel)
         size = tiff_pixel_size(tif, stack.first, stack.ome, stack.axis)
         rows, columns = page_shape(stack.first)
         return ImportPlan(
@@ -127,7 +127,8 @@ def _source(stack: PageStack, path: Path, tif: tifffile.TiffFile, channel: int |
     if stack.offset is None:
         there = [page for page in stack.pages if page is not None]
         numbers = tuple(there[n] for n in nearest_there([page is not None for page in stack.pages]))
-        return _PageSource(path, stack.series, numbers, finish)
+        slices = _PageSource(path, stack.series, numbers, finish)
+        return _evenly_placed(slices, stack.first, tif) or slices
     first = stack.first
     dtype = np.dtype(first.dtype).newbyteorder(tif.byteorder)
     page_bytes = int(np.prod(first.shape)) * dtype.itemsize
@@ -140,6 +141,36 @@ def _source(stack: PageStack, path: Path, tif: tifffile.TiffFile, channel: int |
         n_planes=len(numbers),
         plane_step=(numbers[1] - numbers[0]) * page_bytes,
         finish=finish,
+    )
+
+
+def _evenly_placed(slices: _PageSource, first: tifffile.TiffPage, tif: tifffile.TiffFile) -> RawSource | None:
+    """Return the slices as one piece of the file, where each is one, and they lie at even distances.
+
+    So they do where a program writes page after page without compression, the tags of each beside it.
+    """
+    if not first.is_contiguous or first.dtype is None:
+        return None
+    dtype = np.dtype(first.dtype).newbyteorder(tif.byteorder)
+    n_bytes = int(np.prod(first.shape)) * dtype.itemsize
+    begins = []
+    for page in slices.pages_of(tif):
+        offsets, counts = np.array(page.dataoffsets), np.array(page.databytecounts)
+        in_one_piece = len(offsets) and (offsets[1:] == (offsets + counts)[:-1]).all()
+        if not in_one_piece or counts.sum() != n_bytes or page.parent is not tif:
+            return None
+        begins.append(int(offsets[0]))
+    steps = set(np.diff(begins).tolist())
+    if len(steps) != 1 or min(steps) < n_bytes:
+        return None
+    return RawSource(
+        path=slices.path,
+        offset=begins[0],
+        dtype=dtype,
+        plane_shape=first.shape,
+        n_planes=len(begins),
+        plane_step=steps.pop(),
+        finish=slices.finish,
     )
 
 
@@ -172,6 +203,11 @@ class _PageSource:
             chosen = (self._page(tif, pages, self.numbers[number]) for number in wanted)
             one_file = self.series is None or all(page is None or page.parent is tif for page in pages)
             yield from in_threads(self._plane, chosen) if one_file else map(self._plane, chosen)
+
+    def pages_of(self, tif: tifffile.TiffFile) -> Iterator[Any]:
+        """Yield the page of each slice, of the file as it is open."""
+        pages: Any = tif.pages if self.series is None else tif.series[self.series].pages
+        yield from (pages[number] for number in self.numbers)
 
     @staticmethod
     def _page(tif: tifffile.TiffFile, pages: Any, number: int) -> Any:

@@ -137,8 +137,11 @@ def _name(value: Any) -> str:
 
 def finishing(page: tifffile.TiffPage, channel: int | None) -> Callable[[Plane], Plane]:
     """Return what makes a grey slice of the values of a page: palette, colours, inversion, orientation."""
+    finish: Callable[[Plane], Plane]
     if page.photometric == PALETTE and page.colormap is not None:
         finish = partial(_finish_palette, colours=page.colormap.T, channel=channel)
+    elif page.ndim == 2 and page.photometric != _MIN_IS_WHITE:
+        finish = to_grey  # the values themselves
     else:
         finish = partial(
             _finish,

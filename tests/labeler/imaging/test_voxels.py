@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import SimpleITK
+import tifffile
 
+from gp_core.errors import GpError
+from gp_labeler.imaging import readers
 from gp_labeler.imaging.bone_distance import bone_distances
 from gp_labeler.imaging.histogram import histogram_of
 from gp_labeler.imaging.readers import VolumeError, read_volume
@@ -122,15 +128,130 @@ def test_what_cannot_be_mapped_is_refused_in_one_sentence(name: str, tmp_path: P
     assert isinstance(read_volume(path).voxels, ArrayVoxels)
 
 
-def test_a_scan_of_more_than_half_of_the_memory_stays_in_its_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_large_scans_stay_in_their_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = written(tmp_path / "ball.nrrd", ball())
-    pages = {"SC_PHYS_PAGES": ball().nbytes, "SC_PAGE_SIZE": 1}
-    monkeypatch.setattr(os, "sysconf", lambda name: pages[name])
+    assert isinstance(read_volume(path).voxels, ArrayVoxels)
+    monkeypatch.setattr(readers, "MAPPED_FROM", ball().nbytes)
     volume = read_volume(path)
     assert isinstance(volume.voxels, MappedVoxels)
     assert "its voxels stay in the file" in volume.notes
+    assert not volume.known_checksum  # nobody has read all of it
+
+
+TIFFS = {
+    "one piece": {"metadata": None},
+    "ImageJ": {"imagej": True},
+    "strips": {"rowsperstrip": 7, "metadata": None},
+    "big endian": {"byteorder": ">", "metadata": None},
+}
+
+
+@pytest.mark.parametrize("how", [*TIFFS, "page by page"])
+def test_uncompressed_tiffs_are_mapped(how: str, tmp_path: Path) -> None:
+    path, array = tmp_path / "ball.tif", ball("uint16")
+    if how == "page by page":  # the tags of each page stand between it and the next
+        with tifffile.TiffWriter(path) as writer:
+            for plane in array:
+                writer.write(plane, contiguous=False, metadata=None)
+    else:
+        tifffile.imwrite(path, array, **TIFFS[how])
+    mapped = read_volume(path, spacing=SPACING, mapped=True)
+    assert_same_scan(mapped, read_volume(path, spacing=SPACING, mapped=False))
+
+
+@pytest.mark.parametrize("how", [{"compression": "zlib"}, {"photometric": "miniswhite"}], ids=str)
+def test_tiffs_that_hold_other_values_are_not_mapped(how: dict, tmp_path: Path) -> None:
+    tifffile.imwrite(tmp_path / "ball.tif", ball("uint16"), metadata=None, **how)
+    with pytest.raises(VolumeError, match="cannot be shown as they are stored"):
+        read_volume(tmp_path / "ball.tif", spacing=SPACING, mapped=True)
+
+
+_CUT = """
+import os, sys
+import numpy as np
+from gp_labeler.imaging.readers import read_volume
+from gp_labeler.imaging.surface import extract_isosurface
+from gp_labeler.scene.planes import Plane
+from gp_labeler.scene.slices import VolumeSlicer
+
+volume = read_volume(sys.argv[1], mapped=True)
+held = volume.voxels.read(slice(None), slice(None), slice(None))
+os.truncate(sys.argv[1], int(sys.argv[2]))
+print(held.sum(), "still runs")
+for plane in Plane:
+    VolumeSlicer(volume).image(plane, 3.0).values.sum()
+volume.value_at(volume.voxel_to_scan([[10, 10, 30]])[0])
+for work in (volume.check, lambda: extract_isosurface(volume, 500.0), lambda: volume.checksum):
+    try:
+        work()
+    except Exception as problem:
+        print(type(problem).__name__, problem)
+"""
+
+
+@pytest.mark.parametrize(("left", "options"), [(5000, ("-X", "faulthandler")), (60_000, ())], ids=str)
+def test_a_file_that_is_cut_while_mapped_ends_no_program(
+    left: int, options: tuple[str, ...], tmp_path: Path
+) -> None:
+    path = written(tmp_path / "ball.nrrd", ball())
+    command = [sys.executable, *options, "-c", _CUT, str(path), str(left)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    first, *told = done.stdout.splitlines()
+    assert "still runs" in first
+    assert len(told) == 3
+    for line in told:
+        assert line.startswith("GpError")
+        assert f"was cut while it was open: {left:,} of its" in line
+        assert "labels are kept" in line
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="files in use cannot be cut")
+def test_other_faults_are_left_to_whom_they_belong(tmp_path: Path) -> None:
+    path = written(tmp_path / "ball.nrrd", ball())
+    (tmp_path / "other").write_bytes(bytes(10_000))
+    code = (
+        "import os, sys, mmap\nfrom gp_labeler.imaging.readers import read_volume\n"
+        "volume = read_volume(sys.argv[1], mapped=True)\nother = open(sys.argv[2], 'r+b')\n"
+        "held = mmap.mmap(other.fileno(), 10_000)\nother.truncate(0)\nprint(held[9000])"
+    )
+    command = [sys.executable, "-c", code, str(path), str(tmp_path / "other")]
+    done = subprocess.run(command, capture_output=True, check=False, timeout=120)
+    assert done.returncode == -signal.SIGBUS
+
+
+def test_a_file_that_is_written_to_while_mapped_is_noticed(tmp_path: Path) -> None:
+    path = written(tmp_path / "ball.nrrd", ball())
+    volume = read_volume(path, mapped=True)
+    volume.check()
+    with path.open("r+b") as file:
+        file.seek(-2, os.SEEK_END)
+        file.write(b"\1\1")
+    os.utime(path, ns=(1, 1))  # clocks of file systems are coarse
+    with pytest.raises(GpError, match="was changed while it was open"):
+        volume.check()
+    with pytest.raises(GpError, match="was changed while it was open"):
+        _ = volume.checksum
+
+
+def test_another_file_of_the_same_name_changes_nothing(tmp_path: Path) -> None:
+    path = written(tmp_path / "ball.nrrd", ball())
+    volume = read_volume(path, mapped=True)
+    path.unlink()
+    path.write_bytes(b"another")
+    volume.check()
+    np.testing.assert_array_equal(volume.array[:, 10:25, 10:25], ball()[:, 10:25, 10:25])
+
+
+def test_values_that_are_not_finite_are_found_wherever_they_are(tmp_path: Path) -> None:
+    array = ball("float32")
+    array[array < -1000] = 0
+    array[1, 20, 20] = np.nan  # a slice that is not looked at
+    array[1, 20, 21] = np.inf
+    path = written(tmp_path / "ball.nrrd", array)
+    mapped = read_volume(path, mapped=True).array
+    assert np.isfinite(mapped).all()
+    assert mapped[1, 20, 20] <= mapped.min()
 
 
 class InParts(ArrayVoxels):
@@ -161,8 +282,19 @@ def test_slices_measures_and_surfaces_never_ask_for_the_whole_scan() -> None:
     assert extract_isosurface(volume, threshold, box=box, smallest_mm=0).n_triangles
 
 
-@pytest.mark.parametrize("step", [1, 7, 1000, 10**6])
-def test_every_so_many_th_value_is_the_same_however_it_is_read(step: int) -> None:
+@pytest.mark.parametrize("n", [1, 5000, 10**4, 10**7])
+def test_rows_are_the_same_however_they_are_read(n: int) -> None:
     array = ball()
-    for voxels in (ArrayVoxels(array), MappedVoxels(array)):
-        np.testing.assert_array_equal(voxels.every(step), array.reshape(-1)[::step])
+    one, other = ArrayVoxels(array).rows(n), MappedVoxels(array).rows(n)
+    np.testing.assert_array_equal(one, other)
+    assert len(one) <= max(n, array.shape[2])
+    if n > array.size:
+        np.testing.assert_array_equal(one, array.reshape(-1))
+
+
+def test_rows_come_from_everywhere() -> None:
+    nz, ny, nx = 33, 38, 44
+    numbers = np.broadcast_to(np.arange(nz * ny)[:, None], (nz * ny, nx)).reshape(nz, ny, nx)
+    k, j = divmod(ArrayVoxels(numbers).rows(10**4).reshape(-1, nx)[:, 0], ny)
+    assert set(k) == set(range(nz))
+    assert len(set(j)) == ny

@@ -1,0 +1,88 @@
+"""Voxels that stay in their file: mapped into memory, and watched for what other programs do to the file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import as_strided
+from numpy.typing import NDArray
+
+from gp_labeler.imaging.map_guard import GuardedMap, maps_can_be_guarded
+
+__all__ = ["MappedFile", "can_map"]
+
+
+def can_map() -> bool:
+    """Whether files can be mapped so that the program survives whatever is done to them."""
+    return maps_can_be_guarded()
+
+
+class MappedFile:
+    """A file whose bytes are read by the system, page by page, where they are asked for.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    n_bytes : int
+        Bytes that are needed, from its beginning.
+
+    Raises
+    ------
+    OSError
+        It cannot be mapped.
+    ValueError
+        It is shorter.
+    """
+
+    def __init__(self, path: Path, n_bytes: int) -> None:
+        self._n_bytes = n_bytes
+        self._file = path.open("rb")
+        self._map = GuardedMap(self._file.fileno(), n_bytes)
+        self._written = os.fstat(self._file.fileno()).st_mtime_ns
+
+    def array(
+        self, dtype: np.dtype[Any], offset: int, shape: tuple[int, ...], step: int | None = None
+    ) -> NDArray[Any]:
+        """Return values of the file as an array, which cannot be written to.
+
+        Parameters
+        ----------
+        dtype : dtype
+            Of one value.
+        offset : int
+            Byte of the first one.
+        shape : tuple of int
+            Of the array.
+        step : int, optional
+            Bytes from one index of the first axis to the next, where they do not follow each other.
+        """
+        inner = int(np.prod(shape[1:])) * dtype.itemsize
+        step = inner if step is None else step
+        values = np.asarray(self._map)[offset : offset + step * (shape[0] - 1) + inner]
+        if step == inner:
+            return values.view(dtype).reshape(shape)
+        first = values[:inner].view(dtype).reshape(shape[1:])
+        return as_strided(first, shape, (step, *first.strides), writeable=False)
+
+    @property
+    def problem(self) -> str | None:
+        """What happened to the file since it was opened; None where nothing did."""
+        try:
+            now = os.fstat(
+                self._file.fileno()
+            )  # of the file that is mapped, also where another took its name
+        except OSError as error:
+            return f"cannot be read any more ({error.strerror or error})"
+        if now.st_size < self._n_bytes:
+            return f"was cut while it was open: {now.st_size:,} of its {self._n_bytes:,} bytes are left"
+        if self._map.broken:
+            return "cannot be read any more: its disk failed, or is not connected"
+        return "was changed while it was open" if now.st_mtime_ns != self._written else None
+
+    def __del__(self) -> None:
+        if hasattr(self, "_file"):
+            self._file.close()
