@@ -19,6 +19,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.validation import near_matches
 from gp_labeler.document.edits import (
+    AnnotatePoint,
     CheckPoint,
     ClearPoint,
     ConfirmPoint,
@@ -31,6 +32,7 @@ from gp_labeler.document.edits import (
     SwapSides,
 )
 from gp_labeler.document.import_edit import ImportLandmarks
+from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
 from gp_labeler.document.measurement_edits import (
     AddMeasurements,
     MoveMeasurement,
@@ -62,6 +64,7 @@ EDITS: Mapping[str, type[Any]] = MappingProxyType(
         kind.do: kind
         for kind in (
             *(PlacePoint, SuggestPoints, ConfirmPoint, ClearPoint, MarkUnseen, CheckPoint, LockPoints),
+            *(AnnotatePoint, BeginLabelling, OpenLabelling, NameObserver),
             *(SwapPoints, SwapSides, SetThreshold, SetNotes, RenameSpecimen),
             *(RecordTouch, TakeTouches, RemoveTouches, LeaveOutTouch, SwapTouches, MoveTouches, SetSkull),
             *(AddMeasurements, MoveMeasurement, RenameMeasurement, RemoveMeasurements),
@@ -127,6 +130,8 @@ def redone(edit: Any, document: SpecimenDocument) -> Any:
     """Return an edit as whoever works on the document makes it now."""
     if isinstance(edit, CheckPoint):
         return replace(edit, by=document.author)
+    if isinstance(edit, BeginLabelling) and not edit.observer:
+        return replace(edit, observer=document.author)
     if isinstance(edit, RecordTouch):
         return replace(edit, touch=_touched_now(edit.touch, document))
     if isinstance(edit, TakeTouches):

@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.provenance import Certainty
 from gp_core.landmarks.suggestion import Suggestion
-from gp_core.validation import as_points
+from gp_core.validation import as_points, check_option
 from gp_labeler.document.state import (
     TO_DO,
     Landmark,
@@ -29,6 +30,7 @@ from gp_labeler.document.state import (
 )
 
 __all__ = [
+    "AnnotatePoint",
     "CheckPoint",
     "ClearPoint",
     "ConfirmPoint",
@@ -132,7 +134,9 @@ class PlacePoint(_OnPoint):
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the point there; raises `GpError` where it is locked."""
-        return self._replaced(state, Landmark(self.position, provenance=self.provenance))
+        old = state.landmarks.get(self.key, TO_DO)  # what was noted stays true of a point that is moved
+        mark = Landmark(self.position, provenance=self.provenance, certainty=old.certainty, note=old.note)
+        return self._replaced(state, mark)
 
 
 @dataclass(frozen=True)
@@ -230,7 +234,52 @@ class MarkUnseen(_OnPoint):
 
     def apply(self, state: SpecimenState) -> SpecimenState:
         """Return the state with the point so marked; raises `GpError` where it is locked."""
-        return self._replaced(state, Landmark(unseen=True, provenance=self.provenance))
+        note = state.landmarks.get(self.key, TO_DO).note
+        return self._replaced(state, Landmark(unseen=True, provenance=self.provenance, note=note))
+
+
+@dataclass(frozen=True)
+class AnnotatePoint(_OnPoint):
+    """Say how certain the observer is of a point, and note what was seen.
+
+    Parameters
+    ----------
+    certainty : str, optional
+        ``sure``, ``fair`` or ``guess``; empty for none, and by default it stays as it is.
+    note : str, optional
+        Such as ``broken bulla``; by default it stays as it is.
+    """
+
+    do: ClassVar[str] = "annotate_point"
+    certainty: str | None = None
+    note: str | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.certainty:
+            check_option(self.certainty, "certainty", [each.value for each in Certainty])
+
+    @property
+    def text(self) -> str:
+        """Such as ``mark FPP left as fair`` or ``note on FPP left``."""
+        if self.certainty is None:
+            return f"note on {self._point}"
+        if not self.certainty:
+            return f"unmark the certainty of {self._point}"
+        return f"mark {self._point} as {self.certainty}"
+
+    def apply(self, state: SpecimenState) -> SpecimenState:
+        """Return the state with the point so marked; raises `GpError` where it is still to do."""
+        landmark = state.landmark(self.side, self.code)
+        if not landmark.decided:
+            word, remedy = "still to do", "Place it first, or mark it as one that cannot be seen."
+            if landmark.suggestion is not None:
+                word, remedy = "only suggested", "Confirm it first."
+            problem = f"{self._point} is {word}, so its certainty and notes cannot be set"
+            raise GpError(problem, specimen=state.specimen, landmark=self.code, remedy=remedy)
+        certainty = landmark.certainty if self.certainty is None else self.certainty or None
+        note = landmark.note if self.note is None else self.note
+        return self._replaced(state, replace(landmark, certainty=certainty, note=note))  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from gp_core.errors import GpError
 from gp_core.io import landmark_file_name, write_csv, write_fcsv, write_markups, write_suggestions
-from gp_core.landmarks.features import CODES, FEATURES, Side, feature
-from gp_core.landmarks.provenance import LabelProvenance
+from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_core.validation import check_option
-from gp_labeler.document.specimen_json import provenance_document, volume_document
+from gp_labeler.document.specimen_json import volume_document
 from gp_labeler.document.state import SpecimenState
 
 __all__ = ["FORMATS", "ExportReport", "export_landmarks", "export_names"]
@@ -33,25 +33,13 @@ def _write_suggestions(path: Path, landmarks: LandmarkSet, state: SpecimenState)
 
 
 def _write_markups(path: Path, landmarks: LandmarkSet, state: SpecimenState) -> None:
-    write_markups(path, _with_provenance(landmarks, state), specimen=state.specimen, volume=_volume(state))
-
-
-def _with_provenance(landmarks: LandmarkSet, state: SpecimenState) -> LandmarkSet:
-    """Add who placed each point, when and how, and who looked at it again."""
-    known = {}
-    for code in (row.code for row in FEATURES if not row.computed):
-        mark = state.landmark(landmarks.side, code)
-        how = {} if mark.provenance is None else provenance_document(mark.provenance)
-        if how or mark.checked:
-            about = LabelProvenance.from_json(how)
-            known[code] = replace(about, checked=mark.checked, checked_by=mark.checked_by)
-    return landmarks.with_provenance(known)
+    write_markups(path, landmarks, specimen=state.specimen, volume=_volume(state))
 
 
 _WRITERS: Mapping[str, Writer] = {
     ".mrk.json": _write_markups,
-    ".fcsv": lambda path, landmarks, state: write_fcsv(path, _with_provenance(landmarks, state)),
-    ".csv": lambda path, landmarks, state: write_csv(path, _with_provenance(landmarks, state)),
+    ".fcsv": lambda path, landmarks, state: write_fcsv(path, landmarks),
+    ".csv": lambda path, landmarks, state: write_csv(path, landmarks),
 }
 FORMATS = tuple(_WRITERS)
 
@@ -118,6 +106,9 @@ def export_landmarks(
 ) -> ExportReport:
     """Write ``<specimen>_L`` and ``<specimen>_R`` into a folder, each side on which something is placed.
 
+    A specimen that was labelled several times has files for each labelling, such as
+    ``<specimen>_<observer>_r<round>_L``; the report is of the one in work.
+
     Parameters
     ----------
     state : SpecimenState
@@ -150,8 +141,8 @@ def export_landmarks(
     if not files:
         raise _nothing_placed(state)
     _make_room(folder, files, overwrite)
-    for path, (write, side) in files.items():
-        write(path, state.side(side), state)
+    for path, (write, side, labelling) in files.items():
+        write(path, labelling.described_side(side), labelling)
     sides = [side for side in Side if _is_labelled(state, side)]
     return ExportReport(
         tuple(files),
@@ -168,15 +159,31 @@ def export_names(state: SpecimenState, formats: Iterable[str], *, suggested: boo
 
 def _files(
     state: SpecimenState, suffixes: tuple[str, ...], suggested: bool
-) -> dict[str, tuple[Writer, Side]]:
+) -> dict[str, tuple[Writer, Side, SpecimenState]]:
     """Return what to write, by file name."""
-    sides = [side for side in Side if _is_labelled(state, side)]
-    files = {f"{state.specimen}_{side.value}{s}": (_WRITERS[s], side) for side in sides for s in suffixes}
-    for side in Side if suggested else ():
-        if state.side(side).suggested:  # IN, which both sides share, is in both files
-            name = landmark_file_name(state.specimen, side, suggested=True)
-            files[name] = (_write_suggestions, side)
+    files: dict[str, tuple[Writer, Side, SpecimenState]] = {}
+    labelled = [each for each in state.labellings if each.landmarks]
+    for labelling in labelled:
+        who = _file_words(labelling, files) if len(labelled) > 1 else {}
+        for side in Side:
+            if _is_labelled(labelling, side):
+                name = landmark_file_name(state.specimen, side, **who).removesuffix(".mrk.json")
+                files |= {f"{name}{suffix}": (_WRITERS[suffix], side, labelling) for suffix in suffixes}
+            if suggested and labelling.side(side).suggested:  # IN, which both sides share, is in both files
+                name = landmark_file_name(state.specimen, side, suggested=True, **who)
+                files[name] = (_write_suggestions, side, labelling)
     return files
+
+
+def _file_words(labelling: SpecimenState, taken: Iterable[str]) -> dict[str, Any]:
+    """Return observer and round for file names; observers whose names look alike in them are told apart."""
+    who: dict[str, Any] = {"observer": labelling.observer, "round_": labelling.round}
+    stems = [name.rsplit("_", 1)[0] for name in taken]
+    number = 1
+    while landmark_file_name(labelling.specimen, Side.LEFT, **who).rsplit("_", 1)[0] in stems:
+        number += 1
+        who["observer"] = f"{labelling.observer}-{number}"
+    return who
 
 
 def _nothing_placed(state: SpecimenState) -> GpError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import getpass
 import os
 import threading
 from collections.abc import Callable, Mapping
@@ -69,7 +68,7 @@ class SpecimenDocument:
     directory : Path, optional
         State directory, where journals are kept; by default that of `specimen`, if any.
     author : str, optional
-        Who labels; by default the name the user is logged in with.
+        Who labels; see `author`.
     clock : callable
         Returns the time as ISO 8601 text.
     """
@@ -88,6 +87,10 @@ class SpecimenDocument:
     """The attached volume."""
     threshold_changed = Signal(object)
     """The threshold that is set, or None; see `ScanModel.threshold` for the one in effect."""
+    labelling_changed = Signal()
+    """Another labelling of the specimen is in work, or it is by another observer; after its landmarks."""
+    author_changed = Signal(str)
+    """Who labels from now on."""
     details_changed = Signal()
     """Specimen name, notes, the reference to the scan, import choices or pose checks."""
     history_changed = Signal()
@@ -112,7 +115,7 @@ class SpecimenDocument:
     ) -> None:
         begun = _loaded(specimen) if specimen is not None else new_specimen(directory)
         self.directory = begun.store.directory if directory is None else directory
-        self.author = _user() if author is None else author
+        self._author = author or ""
         self.now = clock
         self.focus: object = None
         """What the user works on, remembered with every edit."""
@@ -169,13 +172,29 @@ class SpecimenDocument:
     def undo_text(self) -> str | None:
         """What undo would take back, such as ``place FPP left``; None where there is nothing."""
         step = self.history.to_undo
-        return None if step is None else step.text
+        return None if step is None or self._would_reveal(step.state) else step.text
+
+    def _would_reveal(self, before: SpecimenState) -> bool:
+        """Whether a state before this one shows another labelling to someone who labels blind."""
+        return self.state.blind and _labelling(before) != _labelling(self.state)
 
     @property
     def redo_text(self) -> str | None:
         """What redo would do again; None where there is nothing."""
         step = self.history.to_redo
         return None if step is None else step.text
+
+    @property
+    def author(self) -> str:
+        """Who labels, in the words of that person; empty until somebody says it."""
+        return self._author
+
+    @author.setter
+    def author(self, name: str) -> None:
+        name = " ".join(name.split())
+        if name != self._author:
+            self._author = name
+            self.author_changed.emit(name)
 
     def landmarks(self, side: Side | str) -> LandmarkSet:
         """Return one side, in the scan frame."""
@@ -277,7 +296,7 @@ class SpecimenDocument:
     def _step(self, kind: str) -> bool:
         self._check_thread()
         upcoming = self.history.to_undo if kind == "undo" else self.history.to_redo
-        if upcoming is None:
+        if upcoming is None or (kind == "undo" and self._would_reveal(upcoming.state)):
             return False
         old = self.state
         self.store.record(kind, upcoming.text, upcoming.state, time=self.now())
@@ -291,6 +310,8 @@ class SpecimenDocument:
         new = self.state
         if changed := changed_points(old, new):
             self.landmarks_changed.emit(changed)
+        if _labelling(new) != _labelling(old):
+            self.labelling_changed.emit()
         if (new.touches, new.skull) != (old.touches, old.skull):
             self.touches_changed.emit()
         if new.measurements != old.measurements:
@@ -447,6 +468,10 @@ def _loaded(specimen: SpecimenState | LoadedSpecimen) -> LoadedSpecimen:
     return LoadedSpecimen(History(specimen)) if isinstance(specimen, SpecimenState) else specimen
 
 
+def _labelling(state: SpecimenState) -> tuple[object, ...]:
+    return state.observer, state.round, state.blind, tuple((o.observer, o.round) for o in state.others)
+
+
 def _details(state: SpecimenState) -> tuple[object, ...]:
     return state.specimen, state.notes, state.volume, state.import_choices, state.pose_checks
 
@@ -457,10 +482,3 @@ def _location(file: Path, specimen: str) -> str:
     shown = shown.parent if shown.name == specimen else shown
     home = Path(os.path.expanduser("~"))  # noqa: PTH111 - which has an answer where nobody has a home
     return str("~" / shown.relative_to(home)) if shown.is_relative_to(home) else str(shown)
-
-
-def _user() -> str:
-    try:
-        return getpass.getuser()
-    except (OSError, KeyError, ImportError):
-        return ""

@@ -1,9 +1,11 @@
 """The specimen file, ``<specimen>.gpspecimen.json``: what the application saves.
 
-Layout (version 3): ``format``, ``version``, ``application``, ``specimen``, ``volume`` (name, size, spacing,
+Layout (version 4): ``format``, ``version``, ``application``, ``specimen``, ``volume`` (name, size, spacing,
 checksum, path, and path relative to the file), ``landmarks`` (by ``L``, ``R`` and ``both``, then by feature
-code: position in scan mm, LPS, or suggestion; unseen, locked, checked; provenance), ``threshold``,
-``import_choices``, ``notes`` and ``pose_checks``.
+code: position in scan mm, LPS, or suggestion; unseen, locked, checked; provenance, certainty, note),
+``observer``, ``round`` and ``blind`` of that labelling, ``other_labellings`` (each with the same entries),
+``threshold``, ``import_choices``, ``notes`` and ``pose_checks``. A file without certainties, notes, observer
+and other labellings says version 3, which earlier programs read.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ __all__ = [
 
 SUFFIX = ".gpspecimen.json"
 FORMAT = "gp-labeler specimen"
-VERSION = 3
+VERSION = 4
 
 
 def application() -> str:
@@ -54,7 +56,8 @@ def write_specimen(path: str | PathLike[str], state: SpecimenState) -> None:
         It cannot be written there; what was there before is untouched.
     """
     target = Path(path)
-    document = {"format": FORMAT, "version": VERSION, "application": application(), **document_of(state)}
+    document = document_of(state)
+    document = {"format": FORMAT, "version": _version(document), "application": application(), **document}
     document = _with_relative_path(document, target.absolute().parent)
     text = json.dumps(document, indent=1, allow_nan=False) + "\n"
     write_text(target, text)
@@ -90,6 +93,14 @@ def state_in(document: Mapping[str, Any], path: str | PathLike[str]) -> Specimen
         raise FileFormatError(
             error.problem, file=path, landmark=error.landmark, remedy=error.remedy
         ) from None
+
+
+def _version(document: Document) -> int:
+    """Return the oldest version whose programs lose nothing of a document."""
+    marks = [mark for of_side in document["landmarks"].values() for mark in of_side.values()]
+    is_new = any("certainty" in mark or "note" in mark for mark in marks)
+    is_new |= any(key in document for key in ("observer", "round", "blind", "other_labellings"))
+    return VERSION if is_new else VERSION - 1
 
 
 def _check_header(content: Any, source: Path) -> None:

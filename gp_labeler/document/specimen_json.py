@@ -13,6 +13,7 @@ from typing import Any, TypeVar
 from gp_core.errors import FileFormatError, GpError
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.measurements import Measurement
+from gp_core.landmarks.provenance import Certainty
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document.frozen_json import thaw
@@ -24,7 +25,9 @@ from gp_labeler.document.state import (
     Position,
     Provenance,
     SpecimenState,
+    StoredLabelling,
     point_key,
+    provenance_json,
 )
 from gp_labeler.document.touches import Touch, Touches, TouchHow, TouchKey, touch_name
 from gp_labeler.document.volume_reference import VolumeReference
@@ -33,7 +36,6 @@ __all__ = [
     "Document",
     "accepted_ghosts",
     "document_of",
-    "provenance_document",
     "provenance_of",
     "state_of",
     "volume_document",
@@ -69,7 +71,27 @@ def document_of(state: SpecimenState) -> Document:
         side.value: found.as_json() for side in Side if (found := state.side(side).scan_evidence)
     }:
         document["bone_distance_mm"] = evidence
-    return document
+    return document | _labelling_out(state.observer, state.round, state.blind) | _others_out(state.others)
+
+
+def _labelling_out(observer: str, number: int, blind: bool) -> Document:
+    """Return who made a labelling; without what is so of the first by nobody in particular."""
+    out: Document = {"observer": observer} if observer else {}
+    out |= {"round": number} if number != 1 else {}
+    return out | ({"blind": True} if blind else {})
+
+
+def _others_out(others: tuple[StoredLabelling, ...]) -> Document:
+    rows = []
+    for each in others:
+        evidence = {side.value: found.as_json() for side, found in each.scan_evidence.items()}
+        row = {**_labelling_out(each.observer, each.round, each.blind), **_evidence_out(evidence)}
+        rows.append({**row, "landmarks": _landmarks_out(each.landmarks)})
+    return {"other_labellings": rows} if rows else {}
+
+
+def _evidence_out(evidence: Document) -> Document:
+    return {"bone_distance_mm": evidence} if evidence else {}
 
 
 def state_of(document: Mapping[str, Any]) -> SpecimenState:
@@ -101,11 +123,40 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
                 _measurement_in(each, f"measurements[{i}]")
                 for i, each in enumerate(_typed(document.get("measurements", []), list, "measurements"))
             ),
+            **_labelling_in(document, ""),
+            others=tuple(
+                _stored_labelling_in(each, f"other_labellings[{i}]")
+                for i, each in enumerate(
+                    _typed(document.get("other_labellings", []), list, "other_labellings")
+                )
+            ),
         )
     except FileFormatError:
         raise
     except GpError as error:
         raise FileFormatError(error.problem, landmark=error.landmark, remedy=error.remedy) from None
+
+
+def _labelling_in(document: Mapping[str, Any], where: str) -> dict[str, Any]:
+    number = document.get("round", 1)
+    if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+        raise FileFormatError(f"{where}round must be a whole number from 1, got {number!r:.40}")
+    observer = _typed(document.get("observer", ""), str, f"{where}observer")
+    return {
+        "observer": observer,
+        "round": number,
+        "blind": _typed(document.get("blind", False), bool, f"{where}blind"),
+    }
+
+
+def _stored_labelling_in(document: Any, where: str) -> StoredLabelling:
+    content = _typed(document, dict, where)
+    evidence = _typed(content.get("bone_distance_mm", {}), dict, f"{where}.bone_distance_mm")
+    return StoredLabelling(
+        landmarks=_landmarks_in(_typed(content.get("landmarks", {}), dict, f"{where}.landmarks")),
+        scan_evidence=_scan_evidence_in(evidence),
+        **_labelling_in(content, f"{where}."),
+    )
 
 
 def _landmarks_out(landmarks: Mapping[PointKey, Landmark]) -> Document:
@@ -124,9 +175,11 @@ def _landmark_out(landmark: Landmark) -> Document:
     if landmark.suggestion is not None:
         out["suggestion"] = _suggestion_out(landmark.suggestion)
     if landmark.provenance is not None:
-        out["provenance"] = provenance_document(landmark.provenance)
+        out["provenance"] = provenance_json(landmark.provenance)
+    if landmark.certainty is not None:
+        out["certainty"] = landmark.certainty.value
     out |= {name: True for name in ("unseen", "locked", "checked") if getattr(landmark, name)}
-    return out | ({"checked_by": landmark.checked_by} if landmark.checked_by else {})
+    return out | {name: text for name in ("checked_by", "note") if (text := getattr(landmark, name))}
 
 
 def _suggestion_out(suggestion: Suggestion) -> Document:
@@ -134,14 +187,6 @@ def _suggestion_out(suggestion: Suggestion) -> Document:
     if suggestion.radius_95 is not None:
         out["radius_95_mm"] = suggestion.radius_95
     return out | ({"source": suggestion.source} if suggestion.source else {})
-
-
-def provenance_document(provenance: Provenance) -> Document:
-    """Return a provenance as it is saved."""
-    out: Document = {"how": provenance.how.value}
-    if provenance.voxel_mm is not None:
-        out["voxel_mm"] = list(provenance.voxel_mm)
-    return out | {name: text for name in ("time", "by", "source") if (text := getattr(provenance, name))}
 
 
 def volume_document(volume: VolumeReference) -> Document:
@@ -199,7 +244,13 @@ def _landmark_in(document: Mapping[str, Any], where: str) -> Landmark:
         provenance=provenance,
         suggestion=_suggestion_in(document, where),
         checked_by=_typed(document.get("checked_by", ""), str, f"{where}.checked_by"),
+        certainty=_certainty_in(document.get("certainty"), f"{where}.certainty"),
+        note=_typed(document.get("note", ""), str, f"{where}.note"),
     )
+
+
+def _certainty_in(value: Any, where: str) -> Certainty | None:
+    return None if value is None else _parsed(Certainty, value, where)
 
 
 def _suggestion_in(document: Mapping[str, Any], where: str) -> Suggestion | None:

@@ -7,6 +7,7 @@ change.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -20,6 +21,7 @@ from gp_core.errors import FeatureError, GpError
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.measurements import Measurement
+from gp_core.landmarks.provenance import Certainty, LabelProvenance
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
@@ -35,9 +37,11 @@ __all__ = [
     "PoseCheck",
     "Provenance",
     "SpecimenState",
+    "StoredLabelling",
     "changed_points",
     "measured",
     "point_key",
+    "provenance_json",
 ]
 
 LARGEST_MM = 1e4
@@ -94,7 +98,8 @@ class Landmark:
 
     A `position` is an observation. A point that is only suggested has none, but a `suggestion`, whose
     `provenance` says who accepted it. A position that came about by accepting a ghost, as earlier versions
-    kept it, is a suggestion.
+    kept it, is a suggestion. How certain the observer was, and a note on what was seen, belong to a point
+    that is decided.
     """
 
     position: Position | None = None
@@ -104,6 +109,8 @@ class Landmark:
     provenance: Provenance | None = None
     suggestion: Suggestion | None = None
     checked_by: str = ""
+    certainty: Certainty | None = None
+    note: str = ""
 
     def __post_init__(self) -> None:
         suggestion = self.suggestion
@@ -118,6 +125,9 @@ class Landmark:
             object.__setattr__(self, "locked", False)
         if not self.checked:
             object.__setattr__(self, "checked_by", "")
+        certainty = self.certainty if self.decided else None
+        object.__setattr__(self, "certainty", None if certainty is None else Certainty(certainty))
+        object.__setattr__(self, "note", " ".join(self.note.split()) if self.decided else "")
 
     @property
     def decided(self) -> bool:
@@ -184,6 +194,40 @@ def point_key(side: Side | str, code: str) -> PointKey:
 
 
 @dataclass(frozen=True)
+class StoredLabelling:
+    """A labelling of the specimen that is not the one in work: by another observer, or of another round.
+
+    Parameters
+    ----------
+    observer : str
+        Who labelled; empty where nobody said.
+    round : int
+        Which of the observer's labellings, from 1.
+    landmarks : mapping of PointKey to Landmark
+        What was placed, suggested or marked.
+    blind : bool
+        Whether it was begun without sight of the others.
+    scan_evidence : mapping of Side to ScanEvidence
+        Distances of its points from bone, as last measured.
+    """
+
+    observer: str
+    round: int
+    landmarks: Mapping[PointKey, Landmark]
+    blind: bool = False
+    scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "landmarks", MappingProxyType(dict(self.landmarks)))
+        _check_round(self.round)
+
+
+def _check_round(number: int) -> None:
+    if isinstance(number, bool) or not isinstance(number, int) or number < 1:
+        raise GpError(f"a round is a whole number from 1, got {number!r:.40}")
+
+
+@dataclass(frozen=True)
 class SpecimenState:
     """Everything that is saved of a specimen.
 
@@ -211,6 +255,14 @@ class SpecimenState:
         How far the points were from bone when that was last measured in the scan; see `measured`.
     measurements : tuple of Measurement
         Rulers and angles, scan frame, mm, oldest first.
+    observer : str
+        Who makes the labelling in work, where that was said; see `labeller`.
+    round : int
+        Which of the observer's labellings it is, from 1.
+    blind : bool
+        Whether it was begun without sight of the others.
+    others : tuple of StoredLabelling
+        The other labellings, which are never shown with the one in work.
 
     Raises
     ------
@@ -231,6 +283,10 @@ class SpecimenState:
     skull: Mapping[str, Position] = field(default_factory=dict)
     scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
     measurements: tuple[Measurement, ...] = ()
+    observer: str = ""
+    round: int = 1
+    blind: bool = False
+    others: tuple[StoredLabelling, ...] = ()
     sets: Mapping[Side, LandmarkSet] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -246,6 +302,8 @@ class SpecimenState:
         }
         if self.threshold is not None:
             object.__setattr__(self, "threshold", freeze(float(self.threshold), "threshold"))
+        _check_round(self.round)
+        object.__setattr__(self, "observer", " ".join(self.observer.split()))
         object.__setattr__(self, "specimen", name)
         object.__setattr__(self, "landmarks", MappingProxyType(kept))
         object.__setattr__(self, "import_choices", freeze(self.import_choices, "import choices"))
@@ -259,6 +317,42 @@ class SpecimenState:
     def side(self, side: Side | str) -> LandmarkSet:
         """Return the landmarks of one side in the scan frame, with IN and, once determined, CO."""
         return self.sets[Side.parse(side)]
+
+    @property
+    def labeller(self) -> str:
+        """Who made the labelling in work: as it says, else who placed most of its points."""
+        if self.observer:
+            return self.observer
+        by = Counter(mark.provenance.by for mark in self.landmarks.values() if mark.provenance)
+        return by.most_common(1)[0][0] if by else ""
+
+    @property
+    def labellings(self) -> tuple[SpecimenState, ...]:
+        """The specimen once for each labelling, by observer and round; the others of each are left out."""
+        here = StoredLabelling(self.labeller, self.round, self.landmarks, self.blind, self.scan_evidence)
+        every = sorted((here, *self.others), key=lambda each: (each.observer.casefold(), each.round))
+        return tuple(self.with_labelling(each, ()) for each in every)
+
+    def with_labelling(self, stored: StoredLabelling, others: tuple[StoredLabelling, ...]) -> SpecimenState:
+        """Return a copy with another labelling in work."""
+        return replace(
+            self,
+            landmarks=stored.landmarks,
+            observer=stored.observer,
+            round=stored.round,
+            blind=stored.blind,
+            scan_evidence=stored.scan_evidence,
+            others=others,
+        )
+
+    def described_side(self, side: Side | str) -> LandmarkSet:
+        """Return one side with observer, round, and what is known of each label; as it is exported."""
+        landmarks, known = self.side(side), {}
+        for code in (row.code for row in FEATURES if not row.computed):
+            about = _about(self.landmark(landmarks.side, code))
+            if about is not None:
+                known[code] = about
+        return replace(landmarks, observer=self.labeller, round=self.round).with_provenance(known)
 
     def touched(self, side: Side | str) -> LandmarkSet:
         """Return the touches of one side that count, in their own frame; skull features in `extra`."""
@@ -282,7 +376,8 @@ class SpecimenState:
 
     def on_volume(self, volume: VolumeReference | None, import_choices: Mapping[str, Any]) -> SpecimenState:
         """Return a copy that belongs to another volume, or to the same one elsewhere."""
-        return replace(self, volume=volume, import_choices=import_choices, scan_evidence={})
+        others = tuple(replace(each, scan_evidence={}) for each in self.others)
+        return replace(self, volume=volume, import_choices=import_choices, scan_evidence={}, others=others)
 
 
 def measured(state: SpecimenState, measure: Callable[[LandmarkSet], ScanEvidence] | None) -> SpecimenState:
@@ -296,7 +391,40 @@ def measured(state: SpecimenState, measure: Callable[[LandmarkSet], ScanEvidence
     """
     if measure is None:
         return state
-    return replace(state, scan_evidence={side: measure(state.side(side)) for side in Side})
+    others = tuple(_measured_labelling(each, measure) for each in state.others)
+    found = {side: measure(state.side(side)) for side in Side}
+    return replace(state, scan_evidence=found, others=others)
+
+
+def _measured_labelling(
+    stored: StoredLabelling, measure: Callable[[LandmarkSet], ScanEvidence]
+) -> StoredLabelling:
+    if stored.scan_evidence:
+        return stored
+    found = {side: measure(_landmark_set(stored.landmarks, side)) for side in Side}
+    return replace(stored, scan_evidence=found)
+
+
+def provenance_json(provenance: Provenance) -> dict[str, Any]:
+    """Return a provenance as plain JSON values, as specimen and landmark files have it."""
+    out: dict[str, Any] = {"how": provenance.how.value}
+    if provenance.voxel_mm is not None:
+        out["voxel_mm"] = list(provenance.voxel_mm)
+    return out | {name: text for name in ("time", "by", "source") if (text := getattr(provenance, name))}
+
+
+def _about(mark: Landmark) -> LabelProvenance | None:
+    """Return what is known of a label beside its position; None for nothing."""
+    if mark.provenance is None and not (mark.checked or mark.certainty or mark.note):
+        return None
+    about = LabelProvenance.from_json({} if mark.provenance is None else provenance_json(mark.provenance))
+    return replace(
+        about,
+        checked=mark.checked,
+        checked_by=mark.checked_by,
+        certainty=mark.certainty,
+        note=mark.note,
+    )
 
 
 def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Side, str]]:

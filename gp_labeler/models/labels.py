@@ -15,6 +15,7 @@ from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import (
+    AnnotatePoint,
     ClearPoint,
     ConfirmPoint,
     LockPoints,
@@ -94,9 +95,11 @@ class LabelsModel:
         self._jobs, self._messages = jobs, messages
         self._expectations, self._checks = Expectations(atlas.predict), LabelChecks(atlas.check)
         self._active = Active(Side.LEFT)
+        self._last: Active | None = None
         self._begin()
         document.reset.connect(self._on_reset)
         document.landmarks_changed.connect(self._on_landmarks)
+        document.labelling_changed.connect(self._on_labelling)
         document.focus_restored.connect(self._on_focus)
         atlas.expectations_changed.connect(self._on_expectations)
         for signal in (scan.opened, scan.threshold_changed):
@@ -200,6 +203,7 @@ class LabelsModel:
             side, code, where, self.document.provenance(how), verb="place" if is_new else "move"
         )
         changed = self.document.do(edit)
+        self._last = Active(side, code)
         if is_new:
             self._go_on(side, code)
         return changed
@@ -264,6 +268,7 @@ class LabelsModel:
         changed = self.document.do(
             ConfirmPoint(side, code, self.document.provenance(How.CONFIRMED, source=source))
         )
+        self._last = Active(side, code)
         self._go_on(side, code)
         return changed
 
@@ -296,8 +301,35 @@ class LabelsModel:
         """Say that a feature cannot be seen, and go on to the next."""
         side, code = self._target(side, code)
         changed = self.document.do(MarkUnseen(side, code, self.document.provenance(How.UNSEEN)))
+        self._last = Active(side, code)
         self._go_on(side, code)
         return changed
+
+    @property
+    def annotated(self) -> Active | None:
+        """The point that `annotate` takes: the active one, or while that is to do the one placed last."""
+        state = self.document.state
+        for point in (self._active, self._last):
+            if point is not None and point.code and state.landmark(point.side, point.code).decided:
+                return point
+        return None
+
+    def annotate(
+        self,
+        certainty: str | None = None,
+        note: str | None = None,
+        *,
+        side: Side | str | None = None,
+        code: str | None = None,
+    ) -> bool:
+        """Say how certain a point is, or note what was seen; None leaves it, empty text removes it.
+
+        Without `code`, it is the point of `annotated`.
+        """
+        if code is None and (point := self.annotated) is not None:
+            side, code = point.side, point.code
+        side, code = self._target(side, code)
+        return self.document.do(AnnotatePoint(side, code, certainty, note))
 
     def skip(self) -> None:
         """Leave the active point for later; it comes again after the others."""
@@ -384,8 +416,17 @@ class LabelsModel:
         self.document.focus = self._active
 
     def _on_reset(self) -> None:
+        self._last = None
         self.release()
         self._begin()
+        self._check_again()
+
+    def _on_labelling(self) -> None:
+        """Begin at the first feature, and forget what was doubted of the labelling before."""
+        self._checks = LabelChecks(self._checks.check, self._checks.measure)
+        self._last = None
+        self._begin()
+        self.active_changed.emit(self._active)
         self._check_again()
 
     def _on_expectations(self) -> None:

@@ -139,6 +139,9 @@ class ViewModel:
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into sight, mm."""
 
+    reset_asked = Signal()
+    """Every view shall show everything again."""
+
     def __init__(self, document: SpecimenDocument) -> None:
         self.state = ViewState()
         self._crosshair = _read_only([0.0, 0.0, 0.0])

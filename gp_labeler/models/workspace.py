@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.errors import GpError
 from gp_labeler.document.atlas_memory import AtlasMemory
+from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
+from gp_labeler.document.observer_memory import ObserverMemory
 from gp_labeler.document.recent_files import RecentFiles
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_file import SUFFIX
@@ -43,7 +46,7 @@ class Workspace:
     atlas : Atlas, optional
         Behind ghosts, doubts and poses; by default the one chosen last, loaded as a job by `atlas.load`.
     author : str, optional
-        Who labels.
+        Who labels; by default who said so before, as the state directory remembers it.
     """
 
     def __init__(
@@ -57,6 +60,9 @@ class Workspace:
         self.directory = directory
         self.recent = RecentFiles(directory) if directory else None
         self.jobs, self.messages = Jobs(dispatcher), Messages()
+        self._observers = ObserverMemory(directory) if directory else None
+        if author is None and self._observers is not None:
+            author = self._observers.recall()
         self.document = document = SpecimenDocument(directory=directory, author=author)
         document.loaded.connect(self._on_loaded)
         self.jobs.failed.connect(self._on_failed)
@@ -89,6 +95,47 @@ class Workspace:
         self.document.open(path, unsaved=unsaved, as_copy=as_copy)
         if self.recent is not None:
             self.recent.add(path)
+
+    def set_observer(self, name: str) -> None:
+        """Take down who labels, from now on and at the next start; raises `GpError` for an empty name.
+
+        A labelling that has no observer yet is theirs.
+        """
+        if not name.strip():
+            raise GpError("the observer needs a name or initials", remedy="Such as AB.")
+        self.document.author = name
+        if self._observers is not None:
+            self._observers.remember(self.document.author)
+        if self.document.state.landmarks and not self.document.state.labeller:
+            self.document.do(NameObserver(self.document.author))
+
+    def label_again(self, observer: str = "", *, blind: bool = True) -> None:
+        """Begin another labelling of the specimen, with the views as they are for a new one.
+
+        Parameters
+        ----------
+        observer : str
+            Who labels; by default the one who labels now.
+        blind : bool
+            Whether the observer shall not go back to the other labellings by undo.
+        """
+        who = observer or self.document.author
+        if observer and observer != self.document.author:
+            self.set_observer(observer)
+        if self.document.do(BeginLabelling(who, blind=blind)):
+            self._forget_where()
+
+    def open_labelling(self, observer: str, number: int) -> None:
+        """Take up a labelling of the specimen that was made before."""
+        self.document.do(OpenLabelling(observer, number))
+
+    def _forget_where(self) -> None:
+        """Put the crosshair into the middle of the scan: where it was tells where a point was."""
+        self.references.clear()
+        volume = self.scan.volume
+        if volume is not None:
+            self.view.set_crosshair(volume.extent.mean(axis=0))
+        self.view.reset_asked.emit()
 
     def begin_labelling(self) -> None:
         """Let a click place points; who labels shall not see where an estimate wants the cochlea."""

@@ -246,6 +246,7 @@ class ViewGrid(QWidget):
         for plane, view in self.slice_views.items():
             view.moved.connect(lambda mm, p=plane: self._say_where(p, mm))
         follow(self, self._workspace.view.changed, self._on_view_changed)
+        follow(self, self._workspace.view.reset_asked, self.reset)
         follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
         follow(self, self._workspace.document.reset, self._on_reset)
 

@@ -18,6 +18,7 @@ from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document.edits import (
+    AnnotatePoint,
     CheckPoint,
     ClearPoint,
     ConfirmPoint,
@@ -28,6 +29,7 @@ from gp_labeler.document.edits import (
     SwapPoints,
     SwapSides,
 )
+from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.measurement_edits import (
     AddMeasurements,
@@ -228,6 +230,9 @@ measurement_names = st.sampled_from(("Ruler 1", "Angle 1", "bulla, width"))
 measured_points = st.lists(positions, min_size=2, max_size=3, unique=True).filter(are_apart).map(tuple)
 measurements = st.builds(Measurement, measurement_names, measured_points)
 
+observers = st.sampled_from(("AB", "CD"))
+certainties = st.none() | st.sampled_from(("sure", "fair", "guess", ""))
+
 edits = st.one_of(
     st.builds(PlacePoint, sides, few_codes, positions, provenances),
     st.builds(PlacePoint, sides, few_codes, positions, provenances, st.just("nudge")),
@@ -248,6 +253,10 @@ edits = st.one_of(
         st.none(),
         st.booleans(),
     ),
+    st.builds(AnnotatePoint, sides, few_codes, certainties, st.none() | st.text(max_size=9)),
+    st.builds(BeginLabelling, observers, st.none() | st.integers(1, 3), st.just(False)),
+    st.builds(OpenLabelling, observers, st.integers(1, 2)),
+    st.builds(NameObserver, observers),
     st.builds(SetThreshold, st.floats(-1e5, 1e5)),
     st.builds(SetNotes, st.text(max_size=20)),
     st.builds(RenameSpecimen, names),

@@ -12,7 +12,13 @@ from hypothesis import strategies as st
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.document import edits as edits_module
-from gp_labeler.document import import_edit, measurement_edits, specimen_edits, touch_edits
+from gp_labeler.document import (
+    import_edit,
+    labelling_edits,
+    measurement_edits,
+    specimen_edits,
+    touch_edits,
+)
 from gp_labeler.document.edit_tables import EDITS, edit_of, edit_table, redone, script_table
 from gp_labeler.document.edits import CheckPoint, PlacePoint
 from gp_labeler.document.journal import read_journal
@@ -40,7 +46,10 @@ def test_a_table_says_all_of_an_edit_to_the_last_bit(edit):
 def test_every_kind_of_edit_has_a_name_of_its_own():
     kinds = {
         kind
-        for module in (edits_module, specimen_edits, touch_edits, import_edit, measurement_edits)
+        for module in (
+            *(edits_module, labelling_edits, specimen_edits),
+            *(touch_edits, import_edit, measurement_edits),
+        )
         for kind in vars(module).values()
         if isinstance(kind, type) and kind.__module__ == module.__name__ and "do" in vars(kind)
     }

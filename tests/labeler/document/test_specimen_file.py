@@ -66,7 +66,7 @@ def damaged(**changes):
         ("[" * 100_000, "is not JSON"),
         ([], "is not a specimen file"),
         ({"format": "other"}, "is not a specimen file"),
-        (damaged(version=4), "saved by a newer program .version 4, this one reads up to 3.. Update"),
+        (damaged(version=5), "saved by a newer program .version 5, this one reads up to 4.. Update"),
         (damaged(version="1"), "version must be a whole number from 1, got '1'"),
         (damaged(specimen=3), "specimen must be text, got 3"),
         (damaged(specimen=""), "must do as a file name"),
