@@ -115,10 +115,8 @@ class NameObserver:
 
 def _others(state: SpecimenState) -> tuple[StoredLabelling, ...]:
     """Return all labellings, with the one in work unless nothing is in it."""
-    if not state.landmarks:
-        return state.others
-    here = StoredLabelling(state.labeller, state.round, state.landmarks, state.blind, state.scan_evidence)
-    return (*state.others, here)
+    is_empty = not (state.landmarks or state.measurements)
+    return state.others if is_empty else (*state.others, state.stored)
 
 
 def _is_by(stored: StoredLabelling, observer: str) -> bool:

@@ -62,11 +62,7 @@ def document_of(state: SpecimenState) -> Document:
         document["volume"] = volume_document(state.volume)
     if state.threshold is not None:
         document["threshold"] = state.threshold
-    if state.measurements:
-        document["measurements"] = [
-            {"name": each.name, "points": [list(point) for point in each.points]}
-            for each in state.measurements
-        ]
+    document |= _measurements_out(state.measurements)
     if evidence := {
         side.value: found.as_json() for side in Side if (found := state.side(side).scan_evidence)
     }:
@@ -86,8 +82,14 @@ def _others_out(others: tuple[StoredLabelling, ...]) -> Document:
     for each in others:
         evidence = {side.value: found.as_json() for side, found in each.scan_evidence.items()}
         row = {**_labelling_out(each.observer, each.round, each.blind), **_evidence_out(evidence)}
+        row |= _measurements_out(each.measurements)
         rows.append({**row, "landmarks": _landmarks_out(each.landmarks)})
     return {"other_labellings": rows} if rows else {}
+
+
+def _measurements_out(measurements: tuple[Measurement, ...]) -> Document:
+    rows = [{"name": each.name, "points": [list(point) for point in each.points]} for each in measurements]
+    return {"measurements": rows} if rows else {}
 
 
 def _evidence_out(evidence: Document) -> Document:
@@ -119,10 +121,7 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
             scan_evidence=_scan_evidence_in(
                 _typed(document.get("bone_distance_mm", {}), dict, "bone_distance_mm")
             ),
-            measurements=tuple(
-                _measurement_in(each, f"measurements[{i}]")
-                for i, each in enumerate(_typed(document.get("measurements", []), list, "measurements"))
-            ),
+            measurements=_measurements_in(document, ""),
             **_labelling_in(document, ""),
             others=tuple(
                 _stored_labelling_in(each, f"other_labellings[{i}]")
@@ -155,6 +154,7 @@ def _stored_labelling_in(document: Any, where: str) -> StoredLabelling:
     return StoredLabelling(
         landmarks=_landmarks_in(_typed(content.get("landmarks", {}), dict, f"{where}.landmarks")),
         scan_evidence=_scan_evidence_in(evidence),
+        measurements=_measurements_in(content, f"{where}."),
         **_labelling_in(content, f"{where}."),
     )
 
@@ -332,6 +332,12 @@ def _touch_in(document: Mapping[str, Any], where: str) -> Touch:
 
 def _skull_in(document: Mapping[str, Any]) -> dict[str, Position]:
     return {name: _triple(position, f"skull.{name}") for name, position in document.items()}
+
+
+def _measurements_in(document: Mapping[str, Any], where: str) -> tuple[Measurement, ...]:
+    name = f"{where}measurements"
+    rows = _typed(document.get("measurements", []), list, name)
+    return tuple(_measurement_in(each, f"{name}[{i}]") for i, each in enumerate(rows))
 
 
 def _measurement_in(document: Any, where: str) -> Measurement:

@@ -209,6 +209,8 @@ class StoredLabelling:
         Whether it was begun without sight of the others.
     scan_evidence : mapping of Side to ScanEvidence
         Distances of its points from bone, as last measured.
+    measurements : tuple of Measurement
+        Rulers and angles of that observer, which would show where points are.
     """
 
     observer: str
@@ -216,6 +218,7 @@ class StoredLabelling:
     landmarks: Mapping[PointKey, Landmark]
     blind: bool = False
     scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
+    measurements: tuple[Measurement, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "landmarks", MappingProxyType(dict(self.landmarks)))
@@ -327,10 +330,16 @@ class SpecimenState:
         return by.most_common(1)[0][0] if by else ""
 
     @property
+    def stored(self) -> StoredLabelling:
+        """The labelling in work, as it is kept while another one is."""
+        return StoredLabelling(
+            self.labeller, self.round, self.landmarks, self.blind, self.scan_evidence, self.measurements
+        )
+
+    @property
     def labellings(self) -> tuple[SpecimenState, ...]:
         """The specimen once for each labelling, by observer and round; the others of each are left out."""
-        here = StoredLabelling(self.labeller, self.round, self.landmarks, self.blind, self.scan_evidence)
-        every = sorted((here, *self.others), key=lambda each: (each.observer.casefold(), each.round))
+        every = sorted((self.stored, *self.others), key=lambda each: (each.observer.casefold(), each.round))
         return tuple(self.with_labelling(each, ()) for each in every)
 
     def with_labelling(self, stored: StoredLabelling, others: tuple[StoredLabelling, ...]) -> SpecimenState:
@@ -342,6 +351,7 @@ class SpecimenState:
             round=stored.round,
             blind=stored.blind,
             scan_evidence=stored.scan_evidence,
+            measurements=stored.measurements,
             others=others,
         )
 

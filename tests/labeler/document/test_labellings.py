@@ -11,11 +11,13 @@ from document_cases import MARK, Editing, FakeVolume, shape
 from gp_core.errors import GpError
 from gp_core.io import load_labellings, read_landmarks
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.measurements import Measurement
 from gp_labeler.document.edit_tables import edit_of, edit_table, script_table
 from gp_labeler.document.edits import AnnotatePoint, CheckPoint, LockPoints
 from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
 from gp_labeler.document.landmark_export import FORMATS, export_landmarks
 from gp_labeler.document.landmark_import import ImportLandmarks, import_landmarks
+from gp_labeler.document.measurement_edits import AddMeasurements
 from gp_labeler.document.observer_memory import ObserverMemory
 from gp_labeler.document.opening import open_specimen
 from gp_labeler.document.recovery import find_recoveries
@@ -107,6 +109,7 @@ def test_notes_of_a_file_reach_points_that_stay(editing, tmp_path):
 
 
 def test_labelling_again_hides_all_of_the_first(editing):
+    editing.document.do(AddMeasurements((Measurement("Ruler 1", ((1, 2, 3), (4, 5, 6))),)))
     first = editing.document.state
     editing.labels.go_to(L, "ZL")
     seen = []
@@ -115,6 +118,8 @@ def test_labelling_again_hides_all_of_the_first(editing):
     state = editing.document.state
     assert seen
     assert not state.landmarks
+    assert not state.measurements  # which would show where the points were
+    assert state_of(json.loads(json.dumps(document_of(state)))) == state
     assert (state.observer, state.round, state.blind) == ("CD", 1, True)
     assert editing.document.undo_text is None
     assert not editing.document.undo()
@@ -125,6 +130,7 @@ def test_labelling_again_hides_all_of_the_first(editing):
     editing.labels.place([1, 2, 3], side=L, code="CA")
     editing.document.do(OpenLabelling("ab", 1))
     assert editing.document.state.landmarks == first.landmarks
+    assert editing.document.state.measurements == first.measurements
     assert editing.document.state.others[0].landmarks == {(L, "CA"): state_mark(editing, "CD")}
 
 
