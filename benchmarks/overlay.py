@@ -86,7 +86,7 @@ def main() -> None:
     scene3d = Scene3D(RenderTarget.offscreen(*_SIZE))
     scene3d.camera.focus_on(np.zeros(3), across_mm=16.0)
     page = QImage(*_SIZE, QImage.Format.Format_RGB32)
-    views = [SliceViewport(plane, 0.1, np.zeros(2), 0.02, _SIZE) for plane in Plane]
+    views = [SliceViewport(plane.in_scan, 0.1, np.zeros(2), 0.02, _SIZE) for plane in Plane]
 
     overlay = SceneOverlay()
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,8 @@ from gp_core.errors import GpError
 from gp_core.validation import FloatArray, check_option
 from gp_labeler.document.edits import as_position
 from gp_labeler.document.specimen_document import SpecimenDocument
+from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame
+from gp_labeler.imaging.slice_plane import SlicePlane
 
 __all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "ViewModel", "ViewState"]
 
@@ -124,7 +128,7 @@ _OF_ONE_SPECIMEN = ("level", "width", "cut", "camera")
 
 
 class ViewModel:
-    """The `ViewState`, and the crosshair that all views share.
+    """The `ViewState`, the planes of the slice views, and the crosshair that all views share.
 
     Parameters
     ----------
@@ -136,6 +140,8 @@ class ViewModel:
     """Names of the fields of `state` that changed."""
     crosshair_changed = Signal(object)
     """The crosshair, (3,) mm in the scan frame."""
+    planes_changed = Signal()
+    """The slice views show other planes, or name directions in another frame."""
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into sight, mm."""
 
@@ -144,6 +150,7 @@ class ViewModel:
 
     def __init__(self, document: SpecimenDocument) -> None:
         self.state = ViewState()
+        self._frame, self._planes = SCAN_FRAME, MappingProxyType(SCAN_FRAME.planes())
         self._crosshair = _read_only([0.0, 0.0, 0.0])
         document.reset.connect(self._on_reset)
 
@@ -175,6 +182,54 @@ class ViewModel:
             self._crosshair = crosshair
             self.crosshair_changed.emit(crosshair)
 
+    @property
+    def frame(self) -> AnatomicalFrame:
+        """The frame in which letters and views are named; positions are the scan's in any."""
+        return self._frame
+
+    @property
+    def planes(self) -> Mapping[str, SlicePlane]:
+        """What the ``axial``, ``sagittal`` and ``coronal`` views show; the crosshair lies on all three."""
+        return self._planes
+
+    @property
+    def planes_are_turned(self) -> bool:
+        """Whether a view shows another plane than the one of its name in the frame."""
+        return not all(self._planes[name].same_as(plane) for name, plane in self._frame.planes().items())
+
+    def set_frame(self, frame: AnatomicalFrame) -> None:
+        """Name directions in a frame, and show its planes."""
+        self._frame = frame
+        self.set_planes(frame.planes())
+
+    def set_planes(self, planes: Mapping[str, SlicePlane]) -> None:
+        """Show other planes in some of the slice views.
+
+        Raises
+        ------
+        GpError
+            There is no view of such a name.
+        """
+        for name in planes:
+            check_option(name, "view", tuple(self._planes))
+        self._planes = MappingProxyType({**self._planes, **planes})
+        self.planes_changed.emit()
+
+    def rotate_planes(self, about: str, angle: float) -> None:
+        """Rotate the planes of the two other views about the normal of one, through the crosshair.
+
+        Parameters
+        ----------
+        about : str
+            The view that stays: ``axial``, ``sagittal`` or ``coronal``.
+        angle : float
+            From right to down on its screen, rad.
+        """
+        check_option(about, "view", tuple(self._planes))
+        axis = -self._planes[about].towards_viewer
+        others = {name: plane for name, plane in self._planes.items() if name != about}
+        self.set_planes({n: plane.rotated(axis, angle, self._crosshair) for n, plane in others.items()})
+
     def show_point(self, position: ArrayLike) -> None:
         """Move the crosshair to a (3,) position, and bring it into sight in every view; mm, scan frame."""
         self.set_crosshair(position)
@@ -183,6 +238,7 @@ class ViewModel:
     def _on_reset(self) -> None:
         """Keep how the user likes to look at things; whoever listens to `reset` reads the rest again."""
         self.state = replace(self.state, **{name: getattr(ViewState, name) for name in _OF_ONE_SPECIMEN})
+        self._frame, self._planes = SCAN_FRAME, MappingProxyType(SCAN_FRAME.planes())
         self._crosshair = _read_only([0.0, 0.0, 0.0])
 
 

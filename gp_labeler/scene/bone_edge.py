@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.validation import FloatArray
-from gp_labeler.scene.planes import Plane
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.scene.slices import VolumeSlicer
 
 __all__ = ["BoneEdge", "nearest_on_segments"]
@@ -19,13 +19,13 @@ class BoneEdge:
     ----------
     source : VolumeSlicer
         The scan.
-    plane : Plane
+    plane : SlicePlane
         Which way it is cut.
     threshold : float
         Where bone begins.
     """
 
-    def __init__(self, source: VolumeSlicer, plane: Plane, threshold: float) -> None:
+    def __init__(self, source: VolumeSlicer, plane: SlicePlane, threshold: float) -> None:
         self.source, self.plane, self.threshold = source, plane, threshold
         self._position = self._snapped = float("nan")
         self._segments = np.empty((0, 2, 2))
@@ -36,7 +36,7 @@ class BoneEdge:
         None where there is none within so many mm.
         """
         scan = np.asarray(point, dtype=np.float64).reshape(1, 3)
-        self._cut(float(self.plane.depth(scan)[0]))
+        self._cut(self.plane.position_of(scan))
         flat = self.plane.flat(scan)[0]
         found = nearest_on_segments(flat, self._segments)
         if found is None or np.linalg.norm(found - flat) > within_mm:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.scene.pose_data import DrawnPose
 
 if TYPE_CHECKING:
@@ -16,8 +17,8 @@ if TYPE_CHECKING:
 __all__ = ["section"]
 
 
-def section(tube: pv.PolyData, pose: DrawnPose, axis: int, position: float) -> list[FloatArray]:
-    """Cut a tube where it lies in the scan by a plane across a scan axis.
+def section(tube: pv.PolyData, pose: DrawnPose, plane: SlicePlane, position: float) -> list[FloatArray]:
+    """Cut a tube where it lies in the scan by a slice.
 
     Parameters
     ----------
@@ -25,10 +26,10 @@ def section(tube: pv.PolyData, pose: DrawnPose, axis: int, position: float) -> l
         A closed surface of triangles in the cochlea frame, mm.
     pose : DrawnPose
         Where it lies.
-    axis : int
-        Scan axis across the plane: 0, 1 or 2.
+    plane : SlicePlane
+        Which plane.
     position : float
-        Of the plane along it, mm.
+        Of the slice along its normal, mm.
 
     Returns
     -------
@@ -36,7 +37,7 @@ def section(tube: pv.PolyData, pose: DrawnPose, axis: int, position: float) -> l
         Closed outlines in the scan, mm; none where the plane misses the tube.
     """
     matrix, points, corners = pose.T_scan_cochlea, tube.points.astype(np.float64), tube.regular_faces
-    depth = points @ matrix[axis, :3] + (matrix[axis, 3] - position)
+    depth = points @ (plane.normal @ matrix[:3, :3]) + (plane.position_of(matrix[:3, 3]) - position)
     ahead = depth > 0
     cut = corners[ahead[corners].any(axis=1) & ~ahead[corners].all(axis=1)]
     if not len(cut):

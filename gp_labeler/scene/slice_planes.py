@@ -34,11 +34,11 @@ class SlicePlaneActor:
         self._actors: list[vtkActor] = []
         self._images: tuple[SliceImage, ...] = ()
 
-    def show(self, images: Sequence[SliceImage], window: WindowLevel) -> None:
-        """Draw these slices in place of those before."""
+    def show(self, images: Sequence[SliceImage], window: WindowLevel, colours: Sequence[str]) -> None:
+        """Draw these slices in place of those before, each framed in its colour."""
         self.close()
         self._images = tuple(images)
-        for image in images:
+        for image, colour in zip(images, colours, strict=True):
             plane = _rectangle(image)
             picture = solid_actor(plane.GetOutput(), "#FFFFFF")
             picture.SetTexture(_texture(image, window))
@@ -46,7 +46,7 @@ class SlicePlaneActor:
             edges = vtkFeatureEdges()
             edges.SetInputData(plane.GetOutput())
             edges.Update()
-            frame = solid_actor(edges.GetOutput(), image.plane.colour)
+            frame = solid_actor(edges.GetOutput(), colour)
             frame.GetProperty().LightingOff()
             frame.GetProperty().SetLineWidth(1.5 * self._layers.scale)
             for actor in (picture, frame):
@@ -81,10 +81,10 @@ class SlicePlaneActor:
 
 def _crossing(image: SliceImage, start: FloatArray, along: FloatArray) -> float | None:
     """Return where a ray meets a picture, in lengths of its direction, or None where it passes by."""
-    axis = image.plane.axis
-    if not along[axis]:
+    across = float(along @ image.plane.normal)
+    if not across:
         return None
-    there = float((image.position - start[axis]) / along[axis])
+    there = (image.position - image.plane.position_of(start)) / across
     low, high = image.edges
     at = image.plane.flat((start + there * along)[None])[0]
     return there if there >= 0 and bool(((at >= low) & (at <= high)).all()) else None

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.validation import FloatArray
-from gp_labeler.scene.planes import Plane
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.scene.slices import SliceImage, VolumeSlicer
 
 __all__ = ["SliceViewport", "scale_bar_length"]
@@ -29,10 +29,10 @@ class SliceViewport:
 
     Parameters
     ----------
-    plane : Plane
-        Which plane.
+    plane : SlicePlane
+        Which plane: along the axes of the scan or not.
     position : float
-        Where the slice is along the plane's axis, mm.
+        Where the slice is along the plane's normal, mm.
     centre : (2,) float array
         Coordinates right and down, mm, at the middle of the view.
     mm_per_pixel : float
@@ -41,21 +41,20 @@ class SliceViewport:
         Width and height, pixels.
     """
 
-    plane: Plane
+    plane: SlicePlane
     position: float
     centre: FloatArray
     mm_per_pixel: float
     size: tuple[int, int]
 
     @classmethod
-    def fitted(cls, source: VolumeSlicer, plane: Plane, size: tuple[int, int]) -> SliceViewport:
+    def fitted(cls, source: VolumeSlicer, plane: SlicePlane, size: tuple[int, int]) -> SliceViewport:
         """Make the view that shows a whole volume, at its middle slice."""
-        extent = source.volume.extent
-        corners = plane.flat(extent)
-        span = np.abs(corners[1] - corners[0])
-        middle = extent.mean(axis=0)
-        zoom = float((span / np.maximum(size, 1)).max()) * _MARGIN
-        return cls(plane, source.snap(plane, middle[plane.axis]), corners.mean(axis=0), zoom, size)
+        corners = plane.flat(source.corners)
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        zoom = float(((high - low) / np.maximum(size, 1)).max()) * _MARGIN
+        position = source.snap(plane, plane.position_of(source.corners.mean(axis=0)))
+        return cls(plane, position, (low + high) / 2, zoom, size)
 
     def scan_to_pixel(self, points: ArrayLike) -> FloatArray:
         """Return the (N, 2) pixels over which (N, 3) scan positions lie, on the slice or off it."""
@@ -75,6 +74,13 @@ class SliceViewport:
     def off_slice(self, points: ArrayLike) -> FloatArray:
         """Return how far (N, 3) scan positions lie from the slice, mm, signed."""
         return self.plane.depth(points) - self.position
+
+    def line_of(self, other: SlicePlane) -> FloatArray:
+        """Return the (2,) unit direction, right and down, of the line in which a plane meets this one."""
+        line = np.cross(self.plane.normal, other.normal)
+        flat = np.array([line @ self.plane.right, line @ self.plane.down])
+        length = float(np.linalg.norm(flat))
+        return flat / length if length else np.array([1.0, 0.0])
 
     def image_corners(self, image: SliceImage) -> FloatArray:
         """Return the (2, 2) painter's coordinates (corners of pixels) between which an image is stretched."""
@@ -106,12 +112,12 @@ class SliceViewport:
     def centred(self, point: ArrayLike) -> SliceViewport:
         """Return the view with a (3,) scan position on its slice and in its middle."""
         scan = np.asarray(point, dtype=np.float64).reshape(1, 3)
-        return replace(self, centre=self.plane.flat(scan)[0], position=float(self.plane.depth(scan)[0]))
+        return replace(self, centre=self.plane.flat(scan)[0], position=self.plane.position_of(scan))
 
     def showing(self, point: ArrayLike, margin: float = 0.1) -> SliceViewport:
         """Return the view of the slice through a (3,) scan position, shifted only if that lies outside."""
         scan = np.asarray(point, dtype=np.float64).reshape(1, 3)
-        there = self.at(float(self.plane.depth(scan)[0]))
+        there = self.at(self.plane.position_of(scan))
         pixel, size = there.scan_to_pixel(scan)[0], np.array(self.size)
         inside = ((pixel >= margin * size) & (pixel <= (1 - margin) * size)).all()
         return there if inside else there.centred(point)

@@ -1,4 +1,4 @@
-"""Slices of a scan in its physical axes: grey values, where pixels lie, and the edge of bone on them."""
+"""Slices of a scan in any plane: grey values, where pixels lie, and the edge of bone on them."""
 
 from __future__ import annotations
 
@@ -7,23 +7,26 @@ from typing import Any
 
 import numpy as np
 from contourpy import LineType, contour_generator
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
 from vtkmodules.vtkImagingCore import vtkImageReslice
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.voxels import ArrayVoxels
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
-from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.window_level import WindowLevel
 
 __all__ = ["SliceImage", "VolumeSlicer", "level_segments"]
 
 _STRAIGHT = 1e-4
-"""Off-axis part of a direction below which voxel rows run along the scan's axes: 0.1 voxel in a thousand."""
+"""Off-axis part of a direction below which voxel rows run along a plane: 0.1 voxel in a thousand."""
+
+_EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1])
+"""The 12 edges of a box, as pairs of its 8 corners."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +37,10 @@ class SliceImage:
     ----------
     values : (h, w) array
         Values as the volume has them (a view of it where the volume lies straight).
-    plane : Plane
+    plane : SlicePlane
         Which way it is cut.
     position : float
-        Where along the plane's axis it really lies, mm.
+        Where along the plane's normal it really lies, mm.
     origin : (2,) float array
         Coordinates right and down, mm, of the centre of pixel [0, 0].
     step : (2,) float array
@@ -45,7 +48,7 @@ class SliceImage:
     """
 
     values: NDArray[Any]
-    plane: Plane
+    plane: SlicePlane
     position: float
     origin: FloatArray
     step: FloatArray
@@ -102,7 +105,7 @@ def level_segments(values: NDArray[Any], level: float) -> FloatArray:
 
 
 class VolumeSlicer:
-    """Cuts slices out of one volume: its voxels where they lie along the scan's axes, resampled where not.
+    """Cuts slices out of one volume: its voxels where a plane lies along its grid, resampled where not.
 
     Parameters
     ----------
@@ -112,47 +115,63 @@ class VolumeSlicer:
 
     def __init__(self, volume: Volume) -> None:
         self.volume = volume
-        self._axis_of = np.abs(volume.direction).argmax(axis=1)
-        off_axis = np.abs(volume.direction).copy()
-        off_axis[np.arange(3), self._axis_of] = 0.0
-        self.oblique = bool(off_axis.max() > _STRAIGHT)
-        in_memory = isinstance(volume.voxels, ArrayVoxels)
-        self._reslice = _reslice(volume) if self.oblique and in_memory else None
+        nx, ny, nz = volume.size
+        box = np.array([(i, j, k) for i in (0, nx) for j in (0, ny) for k in (0, nz)], dtype=np.float64) - 0.5
+        self.corners = volume.voxel_to_scan(box)
+        self._reslice: vtkImageReslice | None = None
 
     def close(self) -> None:
         """Let go of the voxels."""
         self._reslice = None
 
-    def step(self, plane: Plane) -> float:
+    def is_oblique(self, plane: SlicePlane) -> bool:
+        """Whether slices of a plane are resampled, because it does not lie along the grid of voxels."""
+        return self._grid_axes(plane) is None
+
+    def step(self, plane: SlicePlane) -> float:
         """Return the distance from one slice to the next, mm."""
-        if self.oblique:
-            return min(self.volume.spacing)
-        return self.volume.spacing[self._axis_of[plane.axis]]
+        return self.step_along(plane.normal)
 
-    def limits(self, plane: Plane) -> tuple[float, float]:
+    def step_along(self, direction: ArrayLike) -> float:
+        """Return how long a step of one voxel is in a (3,) unit direction, mm."""
+        in_voxels = self.volume.direction.T @ np.asarray(direction) / self.volume.spacing
+        return 1.0 / float(np.linalg.norm(in_voxels))
+
+    def limits(self, plane: SlicePlane) -> tuple[float, float]:
         """Return the first and last position of slices, mm."""
-        low, high = self.volume.extent[:, plane.axis]
+        depths = plane.depth(self.corners)
         half = 0.5 * self.step(plane)
-        return float(low + half), float(high - half)
+        return float(depths.min() + half), float(depths.max() - half)
 
-    def snap(self, plane: Plane, position: float) -> float:
-        """Return the position of the slice that is shown for `position`: the nearest that there is, mm."""
+    def snap(self, plane: SlicePlane, position: float) -> float:
+        """Return the position of the slice that is shown for `position`, mm.
+
+        It is the nearest layer of voxels; an oblique plane is cut exactly where it is asked for.
+        """
         low, high = self.limits(plane)
-        step = self.step(plane)
-        return float(np.clip(low + round((position - low) / step) * step, low, high))
+        if not self.is_oblique(plane):
+            step = self.step(plane)
+            position = low + round((position - low) / step) * step
+        return float(np.clip(position, low, high))
 
-    def image(self, plane: Plane, position: float) -> SliceImage:
-        """Return the slice nearest to a position along the plane's axis, mm."""
-        snapped = self.snap(plane, position)
-        return self._resampled(plane, snapped) if self.oblique else self._voxels(plane, snapped)
-
-    def _voxels(self, plane: Plane, position: float) -> SliceImage:
-        """Take the voxels as they are, turned and flipped for the screen."""
-        volume = self.volume
-        across, right, down = (
-            int(self._axis_of[np.abs(d).argmax()]) for d in (plane.normal, plane.right, plane.down)
+    def image(self, plane: SlicePlane, position: float) -> SliceImage:
+        """Return the slice nearest to a position along the plane's normal, mm."""
+        snapped, grid_axes = self.snap(plane, position), self._grid_axes(plane)
+        return (
+            self._resampled(plane, snapped) if grid_axes is None else self._voxels(plane, snapped, grid_axes)
         )
-        index = volume.scan_to_voxel(plane.scan(np.zeros((1, 2)), position))
+
+    def _grid_axes(self, plane: SlicePlane) -> tuple[int, int, int] | None:
+        """Return which voxel axes run across, right and down; None where none runs along the plane."""
+        along = np.abs(self.volume.direction.T @ plane.axes)
+        right, down, across = (int(n) for n in along.argmax(axis=0))
+        along[[right, down, across], [0, 1, 2]] = 0.0
+        return None if along.max() > _STRAIGHT else (across, right, down)
+
+    def _voxels(self, plane: SlicePlane, position: float, grid_axes: tuple[int, int, int]) -> SliceImage:
+        """Take the voxels as they are, turned and flipped for the screen."""
+        volume, (across, right, down) = self.volume, grid_axes
+        index = volume.scan_to_voxel(plane.moved_to(self.corners.mean(axis=0), position)[None])
         index[0, across] = np.rint(index[0, across])
         flips = []
         for axis, direction in ((down, plane.down), (right, plane.right)):
@@ -163,25 +182,23 @@ class VolumeSlicer:
         values = (cut if down > right else cut.T)[:: flips[0], :: flips[1]]  # its axes are z, y, x
         corner = volume.voxel_to_scan(index)
         step = np.array([volume.spacing[right], volume.spacing[down]])
-        return SliceImage(values, plane, float(corner[0, plane.axis]), plane.flat(corner)[0], step)
+        return SliceImage(values, plane, plane.position_of(corner), plane.flat(corner)[0], step)
 
-    def _resampled(self, plane: Plane, position: float) -> SliceImage:
-        """Interpolate on a straight grid that covers the whole volume."""
-        step = self.step(plane)
-        corners = plane.flat(self.volume.extent)
-        low, high = corners.min(axis=0) + step / 2, corners.max(axis=0) - step / 2
-        width, height = (int(n) for n in np.maximum(np.ceil((high - low) / step - 1e-6), 0) + 1)
+    def _resampled(self, plane: SlicePlane, position: float) -> SliceImage:
+        """Interpolate on a square grid over the part of the plane that lies in the volume."""
+        step = min(self.volume.spacing)
+        section = self._section(plane, position)
+        first = np.floor(section.min(axis=0) / step + 0.5)  # the same grid for all slices: nothing trembles
+        width, height = (int(n) for n in np.maximum(np.ceil(section.max(axis=0) / step - 0.5) - first + 1, 1))
+        low = first * step
         origin = plane.scan(low[None], position)[0]
-        if self._reslice is None:
+        if not isinstance(self.volume.voxels, ArrayVoxels):
             values = _interpolated(self.volume, origin, plane, step, (height, width))
             return SliceImage(values, plane, position, low, np.array([step, step]))
+        if self._reslice is None:
+            self._reslice = _reslice(self.volume)
         T_scan_screen = np.eye(4)
-        T_scan_screen[:3, 0], T_scan_screen[:3, 1], T_scan_screen[:3, 2] = (
-            plane.right,
-            plane.down,
-            plane.normal,
-        )
-        T_scan_screen[:3, 3] = origin
+        T_scan_screen[:3, :3], T_scan_screen[:3, 3] = plane.axes, origin
         to_voxel = vtkMatrixToLinearTransform()
         to_voxel.SetInput(matrix_of(self.volume.T_voxel_scan @ T_scan_screen))
         self._reslice.SetResliceTransform(to_voxel)
@@ -192,9 +209,18 @@ class VolumeSlicer:
         values = to_numpy(scalars).reshape(height, width).copy()
         return SliceImage(values, plane, position, low, np.array([step, step]))
 
+    def _section(self, plane: SlicePlane, position: float) -> FloatArray:
+        """Return the (N, 2) coordinates right and down of where a plane meets the edges of the volume, mm."""
+        start, end = self.corners[_EDGES[:, 0]], self.corners[_EDGES[:, 1]]
+        before, after = plane.depth(start) - position, plane.depth(end) - position
+        crossed = (before <= 0) != (after <= 0)
+        share = (before[crossed] / (before[crossed] - after[crossed]))[:, None]
+        met = start[crossed] + share * (end[crossed] - start[crossed])
+        return plane.flat(met if len(met) else self.corners.mean(axis=0)[None])
+
 
 def _interpolated(
-    volume: Volume, origin: FloatArray, plane: Plane, step: float, shape: tuple[int, int]
+    volume: Volume, origin: FloatArray, plane: SlicePlane, step: float, shape: tuple[int, int]
 ) -> NDArray[Any]:
     """Interpolate linearly between voxels that stay in their file, as `vtkImageReslice` does in memory."""
     down, right = np.indices(shape).reshape(2, -1)

@@ -75,10 +75,11 @@ def aim_at_bone(driver: WindowDriver, aim: FloatArray, *, turn: bool) -> bool:
 
 def _slices_to(driver: WindowDriver, plane: Plane, aim: FloatArray) -> int:
     """Return how many slices lie between the one shown and the one nearest to the aim."""
-    source = driver.window.grid.slice_views[plane].source
+    view = driver.window.grid.slice_views[plane]
+    source, shown = view.source, view.slice_plane
     assert source is not None
-    here, there = (source.snap(plane, p[plane.axis]) for p in (driver.workspace.view.crosshair, aim))
-    return round((there - here) / source.step(plane))
+    here, there = (source.snap(shown, shown.position_of(p)) for p in (driver.workspace.view.crosshair, aim))
+    return round((there - here) / source.step(shown))
 
 
 def _notches(mm_per_pixel: float, driver: WindowDriver) -> int:
@@ -88,9 +89,8 @@ def _notches(mm_per_pixel: float, driver: WindowDriver) -> int:
 
 def _on_slice(driver: WindowDriver, plane: Plane, aim: FloatArray) -> FloatArray:
     """Return the position over `aim` on the slice that is shown: panning does not scroll."""
-    there = np.array(aim)
-    there[plane.axis] = driver.workspace.view.crosshair[plane.axis]
-    return there
+    shown = driver.window.grid.slice_views[plane].slice_plane
+    return shown.moved_to(aim, shown.position_of(driver.workspace.view.crosshair))
 
 
 def _miss(driver: WindowDriver, aim: FloatArray) -> float:

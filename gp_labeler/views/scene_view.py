@@ -163,7 +163,7 @@ class SceneView(QWidget):
         """Cut the bone open through the crosshair, by one of `models.view.CUTS`; the nearer side goes."""
         normal = into = self.scene.camera.direction
         if plane != "view":
-            axis = Plane(plane).normal
+            axis = self._workspace.view.planes[plane].normal
             normal = axis if axis @ into >= 0 else -axis
         x, y, z = normal.tolist()
         cut = Cut(plane, (0.0, 0.0, 0.0), (x, y, z)).through(self._workspace.view.crosshair)
@@ -213,6 +213,7 @@ class SceneView(QWidget):
             follow(self, signal, self._show_points)
         follow(self, workspace.meshes.changed, self.redraw)
         follow(self, workspace.view.crosshair_changed, self._on_crosshair)
+        follow(self, workspace.view.planes_changed, self._show_slices)
         follow(self, workspace.view.point_shown, self.go_to)
         follow(self, workspace.interaction.dragged, self._on_dragged)
         follow(self, workspace.view.changed, self._on_view_changed)
@@ -233,8 +234,10 @@ class SceneView(QWidget):
         elif self._source is None or self._source.volume is not volume:
             self._source = VolumeSlicer(volume)
         source, middle = self._source, self._workspace.view.crosshair
-        images = [source.image(plane, float(middle[plane.axis])) for plane in Plane] if source else []
-        self.scene.slices.show(images, window_level_of(self._workspace))
+        planes = self._workspace.view.planes.values() if source else ()
+        images = [source.image(plane, plane.position_of(middle)) for plane in planes] if source else []
+        colours = [Plane(name).colour for name in self._workspace.view.planes] if source else []
+        self.scene.slices.show(images, window_level_of(self._workspace), colours)
 
     def _on_crosshair(self, position: FloatArray) -> None:
         self._show_slices()
@@ -330,8 +333,9 @@ class SceneView(QWidget):
         """Paint what follows the pointer and the crosshair."""
         painter.setRenderHint(QPainter.RenderHint.Antialiasing)
         if self._workspace.scan.volume is not None:
-            paint_crosshair(painter, self, self.scene, self._workspace.view.crosshair)
-        paint_cut(painter, self, self._workspace.view.state.cut)
+            view = self._workspace.view
+            paint_crosshair(painter, self, self.scene, view.crosshair, view.planes)
+        paint_cut(painter, self, self._workspace.view)
         drag = self._workspace.interaction.drag
         paint_pointer(
             painter, self, self.scene, self._hover if drag is None else drag.position, drag is not None

@@ -41,12 +41,12 @@ class SliceSlider(QSlider):
         self.setVisible(has_room and self._view.source is not None)
 
     def _on_value(self, n: int) -> None:
-        source, plane = self._view.source, self._view.plane
+        source, plane = self._view.source, self._view.slice_plane
         if source is not None:
             self._view.move_to(source.limits(plane)[0] + n * source.step(plane))
 
     def _on_moved(self, position: float) -> None:
-        source, plane = self._view.source, self._view.plane
+        source, plane = self._view.source, self._view.slice_plane
         if source is None:
             return
         low, high = source.limits(plane)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from qtpy.QtCore import QEvent, Qt, Signal
 from qtpy.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
@@ -10,6 +12,7 @@ from qtpy.QtWidgets import QWidget
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import How
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.bone_edge import BoneEdge
@@ -49,7 +52,7 @@ class SliceView(QWidget):
     workspace : Workspace
         What is shown.
     plane : Plane
-        Which way it is cut.
+        Which of the three; `slice_plane` is the plane that it shows now.
     parent : QWidget, optional
         Qt's parent.
     """
@@ -57,7 +60,7 @@ class SliceView(QWidget):
     hovered = Signal(object)
     """(3,) scan position under the pointer, or None."""
     moved = Signal(float)
-    """The position of the slice along its axis, mm."""
+    """The position of the slice along the normal of its plane, mm."""
     maximise_asked = Signal()
 
     def __init__(self, workspace: Workspace, plane: Plane, parent: QWidget | None = None) -> None:
@@ -83,10 +86,15 @@ class SliceView(QWidget):
 
     # What is shown
 
+    @property
+    def slice_plane(self) -> SlicePlane:
+        """The plane that it shows."""
+        return self._workspace.view.planes[self.plane.value]
+
     def reset(self) -> None:
         """Show the whole slice."""
         if self.source is not None:
-            self._whole = SliceViewport.fitted(self.source, self.plane, self._size())
+            self._whole = SliceViewport.fitted(self.source, self.slice_plane, self._size())
             self._take(self._whole.at(self._position()))
 
     def go_to(self, position: FloatArray) -> None:
@@ -103,7 +111,7 @@ class SliceView(QWidget):
     def step(self, n: int) -> None:
         """Go so many slices on."""
         if self.source is not None:
-            self.move_to(self._position() + n * self.source.step(self.plane))
+            self.move_to(self._position() + n * self.source.step(self.slice_plane))
 
     def voxel_pixels(self, position: FloatArray, voxel_mm: float) -> float:
         """Return how many logical pixels a voxel is wide at a (3,) scan position; 0 where it is not seen."""
@@ -112,7 +120,7 @@ class SliceView(QWidget):
         x, y = self.pixel_at(position)
         off = float(np.abs(self.shown.off_slice(np.reshape(position, (1, 3))))[0])
         in_view = 0 <= x < self.width() and 0 <= y < self.height()
-        if not in_view or off > 0.75 * self.source.step(self.plane):
+        if not in_view or off > 0.75 * self.source.step(self.slice_plane):
             return 0.0
         return voxel_mm / (self.shown.mm_per_pixel * self.devicePixelRatioF())
 
@@ -138,6 +146,7 @@ class SliceView(QWidget):
         follow(self, workspace.scan.opened, self._on_volume)
         follow(self, workspace.document.reset, self._on_reset)
         follow(self, workspace.view.crosshair_changed, self._on_crosshair)
+        follow(self, workspace.view.planes_changed, self._on_planes)
         follow(self, workspace.view.point_shown, self.go_to)
         for signal in (
             workspace.interaction.replacing_changed,
@@ -185,25 +194,40 @@ class SliceView(QWidget):
 
     def _on_crosshair(self, position: FloatArray) -> None:
         if self.shown is not None:
-            there = self.shown.at(float(position[self.plane.axis]))
+            there = self.shown.at(self._position())
             self._take(there.showing(position, 0.02) if self._is_inside(position) else there)
             self.moved.emit(there.position)
 
+    def _on_planes(self) -> None:
+        """Show the new plane at the same zoom, with the crosshair where it is on the screen."""
+        shown = self.shown
+        if self.source is None or shown is None or shown.plane is self.slice_plane:
+            self.update()
+            return
+        if self._whole is not None and shown.looks_like(self._whole):
+            self.reset()
+        else:
+            on_screen = shown.plane.flat(self._workspace.view.crosshair[None])[0] - shown.centre
+            centre = self.slice_plane.flat(self._workspace.view.crosshair[None])[0] - on_screen
+            self._take(replace(shown, plane=self.slice_plane, position=self._position(), centre=centre))
+        self.moved.emit(self._position())
+
     def _position(self) -> float:
-        return float(self._workspace.view.crosshair[self.plane.axis])
+        return self.slice_plane.position_of(self._workspace.view.crosshair)
 
     def move_to(self, position: float) -> None:
-        """Show the slice nearest to a position along the plane's axis, mm; the crosshair goes with it."""
+        """Show the slice nearest to a position along the plane's normal, mm; the crosshair goes with it."""
         if self.source is not None:
-            crosshair = np.array(self._workspace.view.crosshair)
-            crosshair[self.plane.axis] = self.source.snap(self.plane, position)
-            self._workspace.view.set_crosshair(crosshair)
+            there = self.source.snap(self.slice_plane, position)
+            self._workspace.view.set_crosshair(
+                self.slice_plane.moved_to(self._workspace.view.crosshair, there)
+            )
 
     def _resized(self, shown: SliceViewport) -> SliceViewport:
         """Return the view at the widget's size: the whole slice if it was whole, else the same, larger."""
         whole = self._whole
         if self.source is not None and whole is not None and shown.looks_like(whole):
-            self._whole = SliceViewport.fitted(self.source, self.plane, self._size())
+            self._whole = SliceViewport.fitted(self.source, self.slice_plane, self._size())
             return self._whole.at(shown.position)
         return shown.resized(*self._size()).zoomed(min(self._size()) / min(shown.size))
 
@@ -289,7 +313,7 @@ class SliceView(QWidget):
         if self.shown is None or self.source is None:
             return
         x, y = pixel_of(self, event.position())
-        held, step = modifiers_of(event), self.source.step(self.plane)
+        held, step = modifiers_of(event), self.source.step(self.slice_plane)
         view = self._control.wheel(self.shown, notches_of(event), x, y, held, step)
         if Modifier.CTRL in held:
             self._take(view)
@@ -328,8 +352,8 @@ class SliceView(QWidget):
     def _nudge(self, right: float, down: float) -> None:
         """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""
         assert self.source is not None
-        step = np.array([self.source.step(plane) for plane in sorted(Plane, key=lambda p: p.axis)])
-        nudge(self._workspace, step * (right * self.plane.right + down * self.plane.down))
+        direction = right * self.slice_plane.right + down * self.slice_plane.down
+        nudge(self._workspace, self.source.step_along(direction) * direction)
 
     def _edge_for(self, mark: str) -> BoneEdge | None:
         """Return the edge of bone, on which a point stays that was placed on bone; None for other points."""
@@ -338,12 +362,14 @@ class SliceView(QWidget):
         threshold = self._workspace.scan.threshold
         if not on_bone or self.source is None or threshold is None:
             return None
-        return BoneEdge(self.source, self.plane, threshold)
+        return BoneEdge(self.source, self.slice_plane, threshold)
 
     def _drag_to(self, here: FloatArray, *, free: bool) -> None:
         drag, to = self._workspace.interaction.drag, here + self._grip
         if drag is not None:
-            to[self.plane.axis] = drag.position[self.plane.axis]  # the slice follows it: depth stays its own
+            to = self.slice_plane.moved_to(
+                to, self.slice_plane.position_of(drag.position)
+            )  # the slice follows it
         if self._edge is not None and self.shown is not None and not free:
             within = _NEAR_EDGE_PIXELS * self.devicePixelRatioF() * self.shown.mm_per_pixel
             edge = self._edge.nearest(to, within)
@@ -380,7 +406,7 @@ class SliceView(QWidget):
             return None
         positions = np.array([mark.position for mark in marks])
         away = np.linalg.norm(self.shown.scan_to_pixel(positions) - [x, y], axis=1)
-        away[np.abs(self.shown.off_slice(positions)) > reach_of(self.source, self.plane)] = np.inf
+        away[np.abs(self.shown.off_slice(positions)) > reach_of(self.source, self.slice_plane)] = np.inf
         nearest = int(away.argmin())
         return marks[nearest].key if away[nearest] <= 8.0 * self.devicePixelRatioF() else None
 

@@ -11,9 +11,9 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QProgressBar, QSizePolicy, QTool
 
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import point_text
+from gp_labeler.imaging.anatomical_frame import LETTERS
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.scene.planes import LETTERS
 from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon

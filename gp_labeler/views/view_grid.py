@@ -8,7 +8,7 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolBut
 
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.scene.planes import Plane, position_text
+from gp_labeler.scene.planes import Plane
 from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
 from gp_labeler.views.icons import icon
@@ -291,7 +291,9 @@ class ViewGrid(QWidget):
             row.setVisible(not set(names).isdisjoint(shown))
 
     def _say_where(self, plane: Plane, position: float) -> None:
-        self.frames[plane.value].header.say_where(position_text(plane, position))
+        view = self._workspace.view
+        words = view.frame.position_text(view.planes[plane.value], position)
+        self.frames[plane.value].header.say_where(words)
 
     def _say_threshold(self, threshold: float | None) -> None:
         self.frames["3d"].header.say_where("" if threshold is None else f"bone from {value_text(threshold)}")

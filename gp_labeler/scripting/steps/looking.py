@@ -10,7 +10,6 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import action
-from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.events import leave, press_keys
 from gp_labeler.scripting.step import Pair, Step, Triple
 from gp_labeler.scripting.window_driver import WindowDriver
@@ -162,10 +161,10 @@ class Look(Step):
         elif self.go_to is not None:
             driver.bring(np.array(self.go_to))
         crosshair = np.array(driver.workspace.view.crosshair)
-        for plane in Plane:
-            position = getattr(self, plane.value)
+        for name, plane in driver.workspace.view.planes.items():
+            position = getattr(self, name)
             if position is not None:
-                crosshair[plane.axis] = position
+                crosshair = plane.moved_to(crosshair, position)
         driver.workspace.view.set_crosshair(crosshair)
 
     def _magnify(self, driver: WindowDriver, factor: float) -> None:

@@ -105,7 +105,7 @@ class SlicePen:
             return
         self._fade(1.0)
         for tube, alpha, width in zip(cochlea_tubes(pose.side), (60, 40), (1.0, 0.0), strict=True):
-            loops = section(tube, pose, self._shown.plane.axis, self._shown.position)
+            loops = section(tube, pose, self._shown.plane, self._shown.position)
             outlines = [self._shown.scan_to_pixel(loop) + 0.5 for loop in loops]
             area(self._painter, outlines, colour_of(pose.role), alpha, width * self._ratio)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -11,11 +11,12 @@ from qtpy.QtGui import QColor, QFontMetricsF, QPainter, QPen, QPolygonF
 from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
-from gp_labeler.models.view import Cut
+from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame
+from gp_labeler.imaging.slice_plane import SlicePlane
+from gp_labeler.models.view import Cut, ViewModel
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.colours import DARK, SceneColours
 from gp_labeler.scene.ghosts import GhostEllipsoid, outline_in
-from gp_labeler.scene.planes import Plane, letter_of, position_text
 from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.pose_names import written_in
 from gp_labeler.scene.pose_outlines import outlines_of
@@ -31,6 +32,7 @@ from gp_labeler.views.theme import theme_of
 __all__ = ["SceneOverlay", "cut_text", "paint_crosshair", "paint_cut", "paint_pointer"]
 
 _GAP_MM, _ARM_MM = 0.8, 4.0
+_ALONG = float(np.cos(np.radians(1.0)))
 _CHIP_ROOM = 26
 """Beside words on a card: a chip before them, and some air, logical pixels."""
 
@@ -156,32 +158,40 @@ def _upper_right(ring: FloatArray) -> FloatArray:
     return corner
 
 
-def paint_crosshair(painter: QPainter, view: QWidget, scene: Scene3D, middle: FloatArray) -> None:
+def paint_crosshair(
+    painter: QPainter, view: QWidget, scene: Scene3D, middle: FloatArray, planes: Mapping[str, SlicePlane]
+) -> None:
     """Paint a cross with an open centre, each arm in the colour of the plane that it stands upon."""
-    ends = [middle + sign * r * p.normal for p in Plane for sign in (-1, 1) for r in (_GAP_MM, _ARM_MM)]
+    normals = [plane.normal for plane in planes.values()]
+    ends = [middle + sign * r * normal for normal in normals for sign in (-1, 1) for r in (_GAP_MM, _ARM_MM)]
     pixels, colours = scene.display_of(np.array(ends)), theme_of(view).views
-    for n, plane in enumerate(plane for plane in Plane for _ in range(2)):
-        painter.setPen(QPen(QColor(colours[plane.value]), 1.4))
+    for n, name in enumerate(name for name in planes for _ in range(2)):
+        painter.setPen(QPen(QColor(colours[name]), 1.4))
         near, far = (painted(view, *pixels[2 * n + k]) for k in range(2))
         painter.drawLine(near, far)
 
 
-def cut_text(cut: Cut) -> str:
+def cut_text(cut: Cut, frame: AnatomicalFrame = SCAN_FRAME) -> str:
     """Say where bone is cut open, such as ``Cut axial at S 12.4 mm, inferior side stays``."""
     if cut.plane == "view":
         return "Cut across the view"
-    plane = Plane(cut.plane)
-    kept = letter_of(cut.normal)
-    return f"Cut {cut.plane} at {position_text(plane, cut.origin[plane.axis])}, {_WORDS[kept]} side stays"
+    plane, kept = frame.plane(cut.plane), _WORDS[frame.letter(cut.normal)]
+    if (
+        abs(plane.normal @ np.asarray(cut.normal)) < _ALONG
+    ):  # it was cut in an oblique plane, or in another frame
+        return f"Cut oblique, {kept} side stays"
+    where = frame.position_text(plane, plane.position_of(cut.origin))
+    return f"Cut {cut.plane} at {where}, {kept} side stays"
 
 
-def paint_cut(painter: QPainter, view: QWidget, cut: Cut | None) -> None:
+def paint_cut(painter: QPainter, view: QWidget, model: ViewModel) -> None:
     """Say in the upper left corner that bone is cut open, and where."""
+    cut = model.state.cut
     if cut is None:
         return
     theme, font = theme_of(view), font_of(view)
     painter.setFont(font)
-    text = cut_text(cut)
+    text = cut_text(cut, model.frame)
     room = QRectF(0, 0, max(view.width() - 20 - _CHIP_ROOM, 1), view.height())
     words = QFontMetricsF(font).boundingRect(room, Qt.TextFlag.TextWordWrap, text)
     box = QRectF(10, 10, words.width() + _CHIP_ROOM, words.height() + 8)

@@ -9,6 +9,7 @@ from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.ghosts import GhostEllipsoid, ellipse
@@ -41,7 +42,7 @@ _BAR_PIXELS, _BAR_SHARE = 90.0, 0.3
 """Of the width of a small view: there the scale bar leaves the letter at the lower edge alone."""
 
 
-def reach_of(source: VolumeSlicer, plane: Plane) -> float:
+def reach_of(source: VolumeSlicer, plane: SlicePlane) -> float:
     """Return how far off a slice points are still drawn on it, mm."""
     return max(_REACH_MM, 1.5 * source.step(plane))
 
@@ -77,7 +78,7 @@ class SlicePainter:
         self._workspace, self._view = workspace, view
         self._preview: float | None = None
         self._slice: SliceImage | None = None
-        self._where: tuple[VolumeSlicer | None, float] = (None, 0.0)
+        self._where: tuple[VolumeSlicer | None, SlicePlane | None, float] = (None, None, 0.0)
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[SliceViewport, VolumeSlicer, object, QPixmap] | None = None
@@ -94,7 +95,7 @@ class SlicePainter:
     def forget(self) -> None:
         """Let go of the pictures."""
         self._slice, self._picture, self._outline, self._ground = None, None, None, None
-        self._where = (None, 0.0)
+        self._where = (None, None, 0.0)
         self.forget_points()
 
     def forget_points(self) -> None:
@@ -125,7 +126,7 @@ class SlicePainter:
             longest=_BAR_PIXELS,
             share=_BAR_SHARE,
         )
-        points, reach = self.points, reach_of(view.source, view.plane)
+        points, reach = self.points, reach_of(view.source, view.shown.plane)
         paint_lines(painter, points.lines, view.shown, reach=reach, colour=_on_black("computed"), ratio=ratio)
         for layer in view.layers:
             layer.paint(painter, view.shown, ratio)
@@ -164,9 +165,9 @@ class SlicePainter:
 
     def _paint_image(self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport) -> None:
         position = source.snap(shown.plane, shown.position)
-        if self._slice is None or self._slice_is_old(source, position):
+        if self._slice is None or self._slice_is_old(source, shown.plane, position):
             self._slice = source.image(shown.plane, position)
-            self._where = (source, position)
+            self._where = (source, shown.plane, position)
             self._picture = self._outline = None
         window = self._view.window_level()
         wanted = (window, self._preview)
@@ -175,8 +176,8 @@ class SlicePainter:
         (left, top), (right, bottom) = shown.image_corners(self._slice)
         painter.drawImage(QRectF(left, top, right - left, bottom - top), self._picture[1])
 
-    def _slice_is_old(self, source: VolumeSlicer, position: float) -> bool:
-        return self._where[0] is not source or self._where[1] != position
+    def _slice_is_old(self, source: VolumeSlicer, plane: SlicePlane, position: float) -> bool:
+        return self._where[0] is not source or self._where[1] is not plane or self._where[2] != position
 
     def _paint_outline(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         threshold = self._workspace.scan.threshold if self._preview is None else self._preview
@@ -197,22 +198,20 @@ class SlicePainter:
 
     def _paint_crosshair(self, painter: QPainter, shown: SliceViewport, theme: Theme, ratio: float) -> None:
         """Paint the other two slices as dashed lines in their colours."""
-        x, y = shown.scan_to_pixel(self._workspace.view.crosshair[None])[0] + 0.5
-        width, height = shown.size
+        middle = shown.scan_to_pixel(self._workspace.view.crosshair[None])[0] + 0.5
+        reach = float(np.linalg.norm(shown.size) + np.abs(middle).max())
         for plane in Plane:
-            if plane is shown.plane:
+            if plane is self._view.plane:
                 continue
             pen = QPen(QColor(theme.views[plane.value] if theme.is_dark else plane.colour), 1.0 * ratio)
             pen.setDashPattern([4, 3])
             painter.setPen(pen)
-            if np.abs(shown.plane.right[plane.axis]) > 0.5:  # it stands on this one as an upright line
-                painter.drawLine(QPointF(x, 0), QPointF(x, height))
-            else:
-                painter.drawLine(QPointF(0, y), QPointF(width, y))
+            along = shown.line_of(self._workspace.view.planes[plane.value])
+            painter.drawLine(QPointF(*(middle - reach * along)), QPointF(*(middle + reach * along)))
 
     def _paint_letters(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         width, height = shown.size
-        left, right, top, bottom = shown.plane.letters
+        left, right, top, bottom = self._workspace.view.frame.edge_letters(shown.plane)
         inset = self._text * ratio
         for letter, x, y in (
             (left, inset, height / 2),

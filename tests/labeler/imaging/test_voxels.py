@@ -77,8 +77,8 @@ def assert_same_scan(mapped: Volume, held: Volume) -> None:
     for stride in (1, 2):
         one, other = (extract_isosurface(v, threshold, stride=stride).points for v in (mapped, held))
         np.testing.assert_array_equal(one, other)
-    for plane in Plane:
-        position = float(held.extent[:, plane.axis].mean())
+    for plane in (plane.in_scan for plane in Plane):
+        position = plane.position_of(held.extent.mean(axis=0))
         one, other = (VolumeSlicer(v).image(plane, position) for v in (mapped, held))
         np.testing.assert_allclose(one.values, other.values, atol=1)
         np.testing.assert_array_equal(one.edges, other.edges)
@@ -112,7 +112,7 @@ def test_the_byte_order_of_another_machine_is_read_as_ours(tmp_path: Path) -> No
 def test_slices_across_the_voxels_of_a_mapped_file_are_interpolated(tmp_path: Path) -> None:
     path = written(tmp_path / "ball.nrrd", ball(), turned=True)
     mapped, held = read_volume(path, mapped=True), read_volume(path, mapped=False)
-    assert VolumeSlicer(held).oblique
+    assert all(VolumeSlicer(held).is_oblique(plane.in_scan) for plane in Plane)
     assert_same_scan(mapped, held)
 
 
@@ -276,8 +276,8 @@ def test_slices_measures_and_surfaces_never_ask_for_the_whole_scan() -> None:
     centre = volume.voxel_to_scan([[80.0, 80, 80]])[0]
     assert bone_distances(volume, threshold, {"CA": centre}) == {"CA": 0.0}
     assert volume.value_at(centre) > 400
-    for plane in Plane:
-        assert VolumeSlicer(volume).image(plane, float(centre[plane.axis])).values.max() > 400
+    for plane in (plane.in_scan for plane in Plane):
+        assert VolumeSlicer(volume).image(plane, plane.position_of(centre)).values.max() > 400
     box = np.stack([centre - 2.5, centre + 2.5])
     assert extract_isosurface(volume, threshold, box=box, smallest_mm=0).n_triangles
 

@@ -9,6 +9,7 @@ from pose_cases import pose
 from gp_core import Atlas, Side
 from gp_labeler.imaging.coil import _monotone
 from gp_labeler.imaging.mean_cochlea import BASE_MM, COIL, cochlea_tubes, duct_curve
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.scene.coil import section
 
 
@@ -56,7 +57,7 @@ def test_a_slice_cuts_the_duct_where_its_curve_crosses(side, axis) -> None:
     line, radii = duct_curve(side)
     scan = drawn.at(line)
     position = float(scan[:, axis].mean()) + 0.013
-    loops = section(cochlea_tubes(side)[0], drawn, axis, position)
+    loops = section(cochlea_tubes(side)[0], drawn, _across(axis), position)
     before, after = scan[:-1, axis] - position, scan[1:, axis] - position
     crossings = np.flatnonzero(before * after < 0)
     assert len(loops) > 1
@@ -74,7 +75,12 @@ def test_a_slice_cuts_the_duct_where_its_curve_crosses(side, axis) -> None:
 
 
 def test_a_slice_beside_it_cuts_nothing() -> None:
-    assert section(cochlea_tubes(Side.LEFT)[0], pose(), 1, 100.0) == []
+    assert section(cochlea_tubes(Side.LEFT)[0], pose(), _across(1), 100.0) == []
+
+
+def _across(axis: int) -> SlicePlane:
+    right, down = (n for n in range(3) if n != axis)
+    return SlicePlane(*np.eye(3)[[right, down, axis]])
 
 
 def _is_inside(point: np.ndarray, loop: np.ndarray) -> bool:

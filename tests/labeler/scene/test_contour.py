@@ -53,7 +53,7 @@ def test_a_circle_is_a_closed_line_of_its_length() -> None:
 
 
 def test_the_nearest_point_of_the_edge_lies_on_bone(ball) -> None:
-    edge = BoneEdge(VolumeSlicer(ball), Plane.CORONAL, 1000.0)
+    edge = BoneEdge(VolumeSlicer(ball), Plane.CORONAL.in_scan, 1000.0)
     middle = np.array(ball.extent.mean(axis=0))
     for angle in np.linspace(0, 2 * np.pi, 12):
         towards = np.array([np.cos(angle), 0, np.sin(angle)])

@@ -154,7 +154,7 @@ def test_the_mapping_is_slicers(button: Button, modifiers: Modifier, drag: DragM
 
 
 def test_slice_gestures() -> None:
-    view = SliceViewport(Plane.AXIAL, 5.0, np.array([10.0, 20.0]), 0.1, SIZE)
+    view = SliceViewport(Plane.AXIAL.in_scan, 5.0, np.array([10.0, 20.0]), 0.1, SIZE)
     control = SliceControl()
     assert not control.press(Button.LEFT, 10, 10)
     assert control.move(view, 60, 60) is view

@@ -175,9 +175,11 @@ def test_lines_and_slices_are_drawn_and_taken_away(scene: Scene3D) -> None:
         ),
         "slices": (
             lambda: scene.slices.show(
-                [source.image(p, MIDDLE[p.axis]) for p in Plane], WindowLevel.of(volume)
+                [source.image(p.in_scan, p.in_scan.position_of(MIDDLE)) for p in Plane],
+                WindowLevel.of(volume),
+                [p.colour for p in Plane],
             ),
-            lambda: scene.slices.show([], WindowLevel(0, 1)),
+            lambda: scene.slices.show([], WindowLevel(0, 1), []),
         ),
     }
     for name, (show, hide) in shows.items():
@@ -191,7 +193,8 @@ def test_slices_in_3d_show_the_marker_where_it_is(scene: Scene3D) -> None:
     volume = scan_of([(BALL, 1.0)], DIRECTIONS["mirrored"])
     source = VolumeSlicer(volume)
     for plane, letter in zip(Plane, "SLA", strict=True):
-        scene.slices.show([source.image(plane, BALL[plane.axis])], WindowLevel(0, 200))
+        image = source.image(plane.in_scan, plane.in_scan.position_of(BALL))
+        scene.slices.show([image], WindowLevel(0, 200), [plane.colour])
         scene.camera.view_from(letter)
         scene.camera.focus_on(MIDDLE, across_mm=14)
         rows, columns = np.nonzero(scene.image().min(axis=2) > 150)
@@ -203,9 +206,9 @@ def test_a_slice_before_the_cube_does_not_hide_it(scene: Scene3D) -> None:
     source = VolumeSlicer(scan_of([(BALL, 1.0)], np.eye(3)))
     scene.camera.view_from("A")
     scene.camera.focus_on(MIDDLE, across_mm=4)
-    slices = [source.image(Plane.CORONAL, BALL[1])]
+    slices = [source.image(Plane.CORONAL.in_scan, BALL[1])]
     scene.cube.visible = False
-    scene.slices.show(slices, WindowLevel(0, 200))
+    scene.slices.show(slices, WindowLevel(0, 200), [Plane.CORONAL.colour])
     without = scene.image().astype(int)
     scene.cube.visible = True
     assert (np.abs(scene.image() - without).max(axis=2) > 30).sum() > 300
@@ -281,7 +284,7 @@ def test_closing_lets_every_vtk_object_go(ball: Surface) -> None:
     scene.ghosts.show([GhostEllipsoid("b", BALL, np.eye(3), "IN?", active=True)])
     scene.lines.show([Segment(BALL - 1, BALL + 1, "#FF00FF")])
     source = VolumeSlicer(scan_of([(BALL, RADIUS)], DIRECTIONS["oblique"]))
-    scene.slices.show([source.image(Plane.AXIAL, BALL[2])], WindowLevel(0, 200))
+    scene.slices.show([source.image(Plane.AXIAL.in_scan, BALL[2])], WindowLevel(0, 200), ["#FF0000"])
     scene.render()
     objects = _drawn_objects(scene)
     assert len(objects) > 14

@@ -8,14 +8,21 @@ import time
 import numpy as np
 import pytest
 from scene_cases import DIRECTIONS, MIDDLE, scan_of
+from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
 
+from gp_core.errors import GeometryError
+from gp_core.frames import RigidTransform
+from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame, letter_of
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.scene.planes import Plane, letter_of, position_text
+from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slice_viewport import SliceViewport, scale_bar_length
 from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.window_level import WindowLevel
 
+AXIAL, SAGITTAL, CORONAL = PLANES = tuple(plane.in_scan for plane in Plane)
 MARKER = MIDDLE + np.array([2.5, -1.7, 3.1])
 
 
@@ -32,22 +39,22 @@ def _painted(source: VolumeSlicer, view: SliceViewport) -> np.ndarray:
     return painted.reshape(height, width)
 
 
-@pytest.mark.parametrize("plane", Plane)
+@pytest.mark.parametrize("plane", PLANES, ids=[plane.value for plane in Plane])
 @pytest.mark.parametrize("name", DIRECTIONS)
-def test_a_bright_marker_appears_where_it_is(name: str, plane: Plane) -> None:
+def test_a_bright_marker_appears_where_it_is(name: str, plane: SlicePlane) -> None:
     volume = scan_of([(MARKER, 0.8)], DIRECTIONS[name])
     source = VolumeSlicer(volume)
-    assert source.oblique == name.startswith("oblique")
-    view = SliceViewport.fitted(source, plane, (180, 150)).at(source.snap(plane, MARKER[plane.axis]))
+    assert source.is_oblique(plane) == name.startswith("oblique")
+    view = SliceViewport.fitted(source, plane, (180, 150)).at(source.snap(plane, plane.position_of(MARKER)))
     painted = _painted(source, view)
     rows, columns = np.nonzero(painted > 100)
     expected = view.scan_to_pixel(MARKER[None])[0]
     assert np.array([columns.mean(), rows.mean()]) == pytest.approx(expected, abs=0.12 / view.mm_per_pixel)
     assert (
-        abs(source.image(plane, view.position).position - MARKER[plane.axis])
+        abs(source.image(plane, view.position).position - plane.position_of(MARKER))
         <= 0.5 * source.step(plane) + 1e-9
     )
-    elsewhere = view.at(source.snap(plane, MARKER[plane.axis] + 3))
+    elsewhere = view.at(source.snap(plane, plane.position_of(MARKER) + 3))
     assert _painted(source, elsewhere).max() < 20
 
 
@@ -60,22 +67,24 @@ def test_patient_left_is_on_the_right_of_the_screen_and_the_nose_on_the_left(nam
     )
     source = VolumeSlicer(scan_of([(left, 1.0), (anterior, 0.7), (superior, 0.5)], DIRECTIONS[name]))
     seen = {}
-    for plane in Plane:
-        view = SliceViewport.fitted(source, plane, (120, 120)).at(source.snap(plane, MIDDLE[plane.axis]))
+    for plane in PLANES:
+        view = SliceViewport.fitted(source, plane, (120, 120)).at(
+            source.snap(plane, plane.position_of(MIDDLE))
+        )
         painted = _painted(source, view) > 100
         seen[plane] = [painted[:, 70:].sum(), painted[:, :50].sum(), painted[:50].sum(), painted[70:].sum()]
-    assert [bool(n) for n in seen[Plane.AXIAL]] == [True, False, True, False]  # left: right; anterior: top
-    assert [bool(n) for n in seen[Plane.SAGITTAL]] == [
+    assert [bool(n) for n in seen[AXIAL]] == [True, False, True, False]  # left: right; anterior: top
+    assert [bool(n) for n in seen[SAGITTAL]] == [
         False,
         True,
         True,
         False,
     ]  # anterior: left; superior: top
-    assert [bool(n) for n in seen[Plane.CORONAL]] == [True, False, True, False]  # left: right; superior: top
-    assert seen[Plane.AXIAL][0] > seen[Plane.AXIAL][2]
-    assert Plane.AXIAL.letters == ("R", "L", "A", "P")
-    assert Plane.CORONAL.letters == ("R", "L", "S", "I")
-    assert Plane.SAGITTAL.letters == ("A", "P", "S", "I")
+    assert [bool(n) for n in seen[CORONAL]] == [True, False, True, False]  # left: right; superior: top
+    assert seen[AXIAL][0] > seen[AXIAL][2]
+    assert SCAN_FRAME.edge_letters(AXIAL) == ("R", "L", "A", "P")
+    assert SCAN_FRAME.edge_letters(CORONAL) == ("R", "L", "S", "I")
+    assert SCAN_FRAME.edge_letters(SAGITTAL) == ("A", "P", "S", "I")
 
 
 def test_straight_slices_are_the_voxels_themselves() -> None:
@@ -89,7 +98,7 @@ def test_straight_slices_are_the_voxels_themselves() -> None:
     for direction in directions:
         volume = Volume.from_parts(array, (0.1, 0.2, 0.3), (5, 6, 7), direction)
         source = VolumeSlicer(volume)
-        for plane in Plane:
+        for plane in PLANES:
             low, high = source.limits(plane)
             image = source.image(plane, low + 0.4 * (high - low))
             assert np.shares_memory(image.values, volume.array)
@@ -105,7 +114,7 @@ def test_straight_slices_are_the_voxels_themselves() -> None:
 def test_every_slice_can_be_reached_and_no_other() -> None:
     volume = scan_of([(MIDDLE, 2.0)], DIRECTIONS["permuted"])
     source = VolumeSlicer(volume)
-    for plane in Plane:
+    for plane in PLANES:
         low, high = source.limits(plane)
         n = round((high - low) / source.step(plane)) + 1
         assert n in volume.size
@@ -120,8 +129,8 @@ def test_the_outline_is_where_the_mesh_is_cut(name: str) -> None:
     volume = scan_of([(MARKER, 2.0), (MIDDLE - 3, 1.0)], DIRECTIONS[name])
     surface = extract_isosurface(volume, 100, smallest_mm=0)
     source = VolumeSlicer(volume)
-    for plane in Plane:
-        image = source.image(plane, MARKER[plane.axis])
+    for plane in PLANES:
+        image = source.image(plane, plane.position_of(MARKER))
         outline = image.outline(100)
         points = plane.scan(outline.reshape(-1, 2), image.position)
         assert len(outline) > 30
@@ -130,10 +139,73 @@ def test_the_outline_is_where_the_mesh_is_cut(name: str) -> None:
         assert image.outline(250).shape == (0, 2, 2)
 
 
+@pytest.mark.parametrize("name", ["straight", "mirrored", "permuted"])
+@pytest.mark.parametrize("n", range(4))
+def test_a_plane_of_any_orientation_shows_what_lies_on_it(name: str, n: int) -> None:
+    """The values of the volume itself are the reference, interpolated by SciPy between the same voxels."""
+    volume = scan_of([(MARKER, 0.8), (MIDDLE, 1.5)], DIRECTIONS[name])
+    rng = np.random.default_rng(n)
+    plane = PLANES[n % 3].rotated(rng.normal(size=3), rng.uniform(0.2, 3.0), MIDDLE + rng.normal(size=3))
+    source = VolumeSlicer(volume)
+    assert source.is_oblique(plane)
+    image = source.image(plane, plane.position_of(MARKER))
+    assert image.position == pytest.approx(plane.position_of(MARKER), abs=1e-9)  # cut where it is asked for
+    row, column = np.indices(image.values.shape)
+    flat = image.origin + image.step * np.stack([column.ravel(), row.ravel()], axis=1)
+    points = plane.scan(flat, image.position)
+    index = volume.scan_to_voxel(points)
+    inside = np.all((index > 0) & (index < np.array(volume.size) - 1), axis=1)
+    expected = map_coordinates(volume.array.astype(float), index[inside, ::-1].T, order=1)
+    assert np.abs(image.values.ravel()[inside] - expected).max() <= 1.0
+    assert inside.mean() > 0.3
+    low, high = source.limits(plane)
+    for position in np.linspace(low, high, 5):  # the grid covers what of the plane lies in the volume
+        cut = source.image(plane, position)
+        edges = cut.edges
+        section = plane.flat(volume.voxel_to_scan(_on_plane(volume, plane, position)))
+        assert (section >= edges[0] - 1e-6).all()
+        assert (section <= edges[1] + 1e-6).all()
+
+
+def _on_plane(volume: Volume, plane: SlicePlane, position: float) -> np.ndarray:
+    """Voxels whose centres lie within half a voxel of a slice, moved onto it where that is inside."""
+    index = np.stack(np.unravel_index(np.arange(volume.array.size), volume.size), axis=1)
+    points = volume.voxel_to_scan(index)
+    near = np.abs(plane.depth(points) - position) < 0.05
+    return index[near]
+
+
+def test_planes_turn_about_a_point_and_stay_orthonormal() -> None:
+    plane, about = SAGITTAL, np.array([3.0, -2.0, 7.0])
+    for _ in range(2000):
+        plane = plane.rotated([0.3, -1.0, 0.2], 0.011, about)
+    assert plane.axes.T @ plane.axes == pytest.approx(np.eye(3), abs=1e-12)
+    assert np.linalg.det(plane.axes) == pytest.approx(np.linalg.det(SAGITTAL.axes))
+    back = plane.rotated([0.3, -1.0, 0.2], -0.011 * 2000, about)
+    assert back.axes == pytest.approx(SAGITTAL.axes, abs=1e-9)
+    assert plane.scan([[1.0, 2.0]], 3.0)[0] == pytest.approx(plane.origin + plane.axes @ [1.0, 2.0, 3.0])
+    with pytest.raises(GeometryError, match="orthogonal"):
+        SlicePlane([1, 0, 0], [0, 1, 0.1], [0, 0, 1])
+
+
+def test_letters_name_the_nearest_directions_in_the_frame() -> None:
+    R = Rotation.from_euler("zyx", [170, 20, -35], degrees=True).as_matrix()
+    head = AnatomicalFrame("head", RigidTransform.from_parts(R.T, -R.T @ MARKER, dst="head", src="scan"))
+    for plane in Plane:
+        turned = head.plane(plane.value)
+        assert head.edge_letters(turned) == SCAN_FRAME.edge_letters(plane.in_scan)
+        assert turned.position_of(MARKER) == pytest.approx(0.0)
+    assert head.letters(R @ [1, 0, 0]) == "L"
+    assert head.letters(R @ [0.7, -0.7, 0.1]) == "LA"
+    assert head.letters(R @ [0.2, -0.95, 0.1]) == "A"
+    oblique = SAGITTAL.rotated([0, 0, 1], np.radians(30), [0, 0, 0])
+    assert SCAN_FRAME.position_text(oblique, -2.0) == "-2.0 mm LP"
+
+
 def test_pixels_and_positions_are_inverse_and_the_view_moves_as_told() -> None:
     source = VolumeSlicer(scan_of([(MIDDLE, 2.0)], np.eye(3)))
     rng = np.random.default_rng(4)
-    for plane in Plane:
+    for plane in PLANES:
         view = SliceViewport.fitted(source, plane, (301, 201))
         pixels = rng.uniform(-50, 350, (20, 2))
         points = view.pixel_to_scan(pixels)
@@ -180,7 +252,7 @@ def test_grey_values_are_right_for_small_differences_of_large_values(dtype: str,
 def test_nothing_is_black_and_the_preview_is_tinted() -> None:
     volume = scan_of([(MIDDLE, 2.0)], np.eye(3))
     window = WindowLevel.of(volume)
-    image = VolumeSlicer(volume).image(Plane.AXIAL, MIDDLE[2])
+    image = VolumeSlicer(volume).image(AXIAL, MIDDLE[2])
     rgb = image.rgb(window, threshold=100)
     bone = image.values >= 100
     assert (rgb[bone, 0] > rgb[bone, 2]).all()
@@ -190,9 +262,9 @@ def test_nothing_is_black_and_the_preview_is_tinted() -> None:
 
 
 def test_words_and_scale_bars() -> None:
-    assert position_text(Plane.AXIAL, 12.44) == "S 12.4 mm"
-    assert position_text(Plane.SAGITTAL, -3) == "R 3.0 mm"
-    assert position_text(Plane.CORONAL, 9.1) == "P 9.1 mm"
+    assert SCAN_FRAME.position_text(AXIAL, 12.44) == "S 12.4 mm"
+    assert SCAN_FRAME.position_text(SAGITTAL, -3) == "R 3.0 mm"
+    assert SCAN_FRAME.position_text(CORONAL, 9.1) == "P 9.1 mm"
     assert letter_of([0.2, -0.9, 0.1]) == "A"
     for zoom in (1e-4, 0.0123, 0.05, 0.7, 9.0):
         length, pixels = scale_bar_length(zoom, 100)
@@ -206,11 +278,11 @@ def test_words_and_scale_bars() -> None:
 def test_straight_slices_are_quick() -> None:
     volume = Volume(np.zeros((256, 256, 256), np.uint16), np.diag([0.1, 0.1, 0.1, 1]))
     source, window = VolumeSlicer(volume), WindowLevel(0, 100)
-    source.image(Plane.AXIAL, 3.0).grey(window)
+    source.image(AXIAL, 3.0).grey(window)
     costs = []
     for n in range(30):
         start = time.thread_time()  # of this thread alone, whatever else the machine does
-        for plane in Plane:
+        for plane in PLANES:
             source.image(plane, 0.1 * n).grey(window)
         costs.append(time.thread_time() - start)
     assert min(costs) < 0.03

@@ -56,7 +56,8 @@ def window(qtbot, make_window):
 @pytest.mark.parametrize("plane", list(Plane))
 def test_a_bright_spot_is_seen_where_it_lies(window, plane, size) -> None:
     view, aside = window.grid.slice_views[plane], MIDDLE - 4.0
-    aside[plane.axis] = SPOT[plane.axis]  # in its slice, the crosshair's lines away from it
+    depth = plane.in_scan.position_of(SPOT)
+    aside = plane.in_scan.moved_to(aside, depth)  # in its slice, the crosshair's lines away from it
     window.workspace.view.set_crosshair(aside)
     image = picture(window, plane.value, size)
     found = brightest(image)

@@ -45,8 +45,8 @@ ONLY = {part: frozenset({part}) for part in PARTS}
 
 
 def through(point: np.ndarray, plane: Plane = Plane.CORONAL) -> SliceViewport:
-    flat = plane.flat(MIDDLE[None])[0]
-    return SliceViewport(plane, float(plane.depth(np.reshape(point, (1, 3)))[0]), flat, 0.03, SIZE)
+    cut = plane.in_scan
+    return SliceViewport(cut, cut.position_of(point), cut.flat(MIDDLE[None])[0], 0.03, SIZE)
 
 
 def painted(scene: PoseScene, shown: SliceViewport) -> np.ndarray:

@@ -61,7 +61,7 @@ def _pixel(view, position) -> QPoint:
 def test_they_are_drawn_on_slices_near_them_only(shown, plane) -> None:
     view, at = shown.grid.slice_views[plane], INSIDE
     away = np.zeros(3)
-    away[plane.axis] = 4.0
+    away[np.abs(plane.in_scan.normal).argmax()] = 4.0
     for crosshair, is_seen in ((at, True), (at + away, False)):
         shown.workspace.view.set_crosshair(crosshair)
         before = _pixels(view)

@@ -64,7 +64,7 @@ class CutRow(QWidget):
         cut = self._workspace.view.state.cut
         self._more.setVisible(cut is not None)
         if cut is not None:
-            self.where.setText(cut_text(cut))
+            self.where.setText(cut_text(cut, self._workspace.view.frame))
 
 
 def _plane_button(plane: str, action: QAction) -> QToolButton:
