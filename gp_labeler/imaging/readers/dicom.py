@@ -14,14 +14,12 @@ from gp_labeler.imaging.readers.choosing import Choice, choose
 from gp_labeler.imaging.readers.dicom_grid import Grid, on_grid
 from gp_labeler.imaging.readers.dicom_pixels import DicomSource, value_dtype, value_notes
 from gp_labeler.imaging.readers.dicom_series import Series, find_series
-from gp_labeler.imaging.readers.dicom_tags import DicomSlice, scan_dicom
+from gp_labeler.imaging.readers.dicom_tags import DicomSlice, same_pixel_size, scan_dicom
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, names, warning
 
 __all__ = ["inspect_dicom"]
-
-_SAME_SIZE = 1e-3
 
 
 def inspect_dicom(
@@ -115,7 +113,8 @@ def _plan(
 def _geometry(first: DicomSlice, grid: Grid) -> Geometry:
     """Return where the slices lie; their thickness is no distance, but a hint."""
     axes: FloatArray = np.eye(3) if grid.axes is None else grid.axes
-    place = first.position if grid.placed and first.position is not None else np.zeros(3)
+    place = first.position if grid.placed else grid.origin
+    place = np.zeros(3) if place is None else place
     x, y, z = (float(value) for value in place)
     spacing: Spacing | None = None
     suggested: Spacing | None = None
@@ -140,7 +139,7 @@ def _pixel_problems(slices: Sequence[DicomSlice]) -> list[Problem]:
     first = slices[0]
     if first.file.channels > 1:
         found.append(warning("colour", f"its pixels have {first.file.channels} channels; luminance is taken"))
-    other = next((one for one in slices if not _same_size(one, first)), None)
+    other = next((one for one in slices if not same_pixel_size(one, first)), None)
     if other is not None:
         text = f"PixelSpacing of {other.name} differs from that of {first.name}"
         remedy = "Choose another series, or accept the first's (--accept pixel-size)."
@@ -156,9 +155,3 @@ def _pixel_problems(slices: Sequence[DicomSlice]) -> list[Problem]:
         remedy = "Correct it, or accept the values as they are stored (--accept scaling)."
         found.append(Problem("scaling", text, remedy=remedy, resolved_by=("accept",)))
     return found
-
-
-def _same_size(one: DicomSlice, other: DicomSlice) -> bool:
-    if one.pixel is None or other.pixel is None:
-        return one.pixel is other.pixel
-    return bool(np.allclose(one.pixel, other.pixel, rtol=_SAME_SIZE))

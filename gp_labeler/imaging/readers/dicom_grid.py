@@ -40,6 +40,8 @@ class Grid:
         Columns: where x, y and the normal point; None where the files do not say.
     placed : bool
         Whether positions and orientations are known.
+    origin : (3,) array, mm, optional
+        Where the first slice lies, if only that is known.
     problems : tuple of Problem
         What stands against it.
     """
@@ -49,6 +51,7 @@ class Grid:
     axes: FloatArray | None
     placed: bool
     problems: tuple[Problem, ...]
+    origin: FloatArray | None = None
 
     @property
     def there(self) -> list[DicomSlice]:
@@ -69,7 +72,7 @@ def on_grid(slices: Sequence[DicomSlice]) -> Grid:
     if len(locations) == len(slices) and np.ptp(locations) > 0:
         text = f"{_lacking(slices)}: they are ordered by their SliceLocation, and lie as far apart"
         return _sorted(slices, np.array(locations), None, (warning("no-positions", text),))
-    return _by_number(slices)
+    return _by_number(slices, axes)
 
 
 def _positions(slices: Sequence[DicomSlice]) -> FloatArray | None:
@@ -214,11 +217,15 @@ def _lacking(slices: Sequence[DicomSlice]) -> str:
     return f"slices have no ImagePositionPatient, {names(lacking)}"
 
 
-def _by_number(slices: Sequence[DicomSlice]) -> Grid:
-    """Sort slices without places by their number, then by name."""
+def _by_number(slices: Sequence[DicomSlice], axes: FloatArray | None) -> Grid:
+    """Sort slices without places by number and name; the one position of a file is its first frame's."""
     ordered = sorted(slices, key=lambda one: (one.number, one.file.path.name, one.frame))
-    distance = ordered[0].file.between
+    first = ordered[0]
+    distance, origin = first.file.between, first.file_position if first.file.n_frames > 1 else None
     text = f"{_lacking(slices)}: they are ordered by their instance numbers"
+    if origin is not None and axes is not None:
+        text = "its frames have one position, taken for the first: the others follow it along the normal"
     if distance is not None:
         text += f", and lie {distance:.4g} mm apart (SpacingBetweenSlices)"
-    return Grid(tuple(ordered), distance, None, False, (warning("no-positions", text),))
+    found = (warning("no-positions", text),)
+    return Grid(tuple(ordered), distance, axes, placed=False, problems=found, origin=origin)

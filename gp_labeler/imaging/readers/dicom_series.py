@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from gp_labeler.imaging.readers.dicom_grid import on_grid
-from gp_labeler.imaging.readers.dicom_tags import DicomSlice
+from gp_labeler.imaging.readers.dicom_tags import DicomSlice, same_pixel_size
 from gp_labeler.imaging.readers.problems import Problem, warning
 
 __all__ = ["Series", "find_series"]
@@ -77,9 +77,15 @@ def find_series(slices: Iterable[DicomSlice]) -> list[Series]:
 
 def _by_axes(group: Sequence[DicomSlice]) -> list[list[DicomSlice]]:
     """Part slices that are turned against each other; noise in the last digits parts none."""
+    return _parted(group, _same_axes)
+
+
+def _parted(
+    group: Sequence[DicomSlice], same: Callable[[DicomSlice, DicomSlice], bool]
+) -> list[list[DicomSlice]]:
     parts: list[list[DicomSlice]] = []
     for one in group:
-        fitting = (part for part in parts if _same_axes(part[0], one))
+        fitting = (part for part in parts if same(part[0], one))
         part = next(fitting, None)
         parts.append([one]) if part is None else part.append(one)
     return parts
@@ -89,6 +95,10 @@ def _same_axes(one: DicomSlice, other: DicomSlice) -> bool:
     if one.axes is None or other.axes is None:
         return one.axes is other.axes
     return bool(np.abs(one.axes - other.axes).max() < _SAME_AXES)
+
+
+def _same_grid(one: DicomSlice, other: DicomSlice) -> bool:
+    return _same_axes(one, other) and same_pixel_size(one, other)
 
 
 def _by_repeats(group: Sequence[DicomSlice]) -> list[Series]:
@@ -111,25 +121,28 @@ def _repeats(part: Sequence[DicomSlice]) -> bool:
 
 
 def _joined(series: list[Series]) -> list[Series]:
-    """Join single slices, of a series each, that lie on one grid: anonymised, or exported one by one."""
-    alone: dict[tuple[Any, ...], list[DicomSlice]] = defaultdict(list)
+    """Join many series of few slices each that lie on one grid: anonymised, or exported one by one."""
+    few: dict[tuple[Any, ...], list[Series]] = defaultdict(list)
     for one in series:
-        if len(one.slices) == 1 and not one.first.file.localizer:
-            file = one.first.file
-            alone[file.shape, file.channels, one.first.pixel].append(one.first)
+        if not one.first.file.localizer and one.first.file.n_frames == 1:
+            few[one.first.file.shape, one.first.file.channels].append(one)
     joined = []
-    others = [one for one in series if len(one.slices) > 1]
-    for pool in alone.values():
-        for part in _by_axes(pool):
+    for pool in few.values():
+        small = [one for one in pool if len(one.slices) < max(2, len(pool) // 2)]
+        others = len(small) < len(series)
+        for part in _parted([slice_ for one in small for slice_ in one.slices], _same_grid):
             even = not any(problem.severity == "error" for problem in on_grid(part).problems)
-            if len(part) >= _FEWEST_ALONE and (even or not others):
-                joined.append(_as_one(part))
+            n = len({one.file.series for one in part})
+            if n >= _FEWEST_ALONE and (even or (n == len(part) and not others)):
+                joined.append(_as_one(part, n))
     taken = {id(one) for new in joined for one in new.slices}
     return [*joined, *(one for one in series if id(one.first) not in taken)]
 
 
-def _as_one(slices: Sequence[DicomSlice]) -> Series:
+def _as_one(slices: Sequence[DicomSlice], n_series: int) -> Series:
     text = f"each of the {len(slices)} slices has its own SeriesInstanceUID; they were put together by place"
+    if n_series < len(slices):
+        text = f"the {len(slices)} slices have {n_series} SeriesInstanceUIDs; they were put together by place"
     return Series(tuple(slices), found=(warning("uid-per-slice", text),))
 
 

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 import pydicom
 from pydicom.errors import InvalidDicomError
-from pydicom.uid import DeflatedExplicitVRLittleEndian
+from pydicom.uid import DeflatedExplicitVRLittleEndian, MediaStorageDirectoryStorage
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Report
 
-__all__ = ["DicomFile", "DicomSlice", "Stored", "is_dicom", "is_dicomdir", "scan_dicom"]
+__all__ = ["DicomFile", "DicomSlice", "Stored", "is_dicom", "is_dicomdir", "same_pixel_size", "scan_dicom"]
 
 _TAGS = [
     "SOPClassUID", "ImageType", "SeriesInstanceUID", "SeriesNumber", "SeriesDescription", "InstanceNumber",
@@ -37,7 +37,11 @@ _NUMBERS = {
 _PIXEL_DATA = {0x0010: "", 0x0008: "f4", 0x0009: "f8"}
 """Elements of group 7FE0, and the type of the floats in them."""
 
+_DIRECTORY_HEAD = 400
+"""Bytes in which group 2 says what a file is."""
+
 _LARGEST_SKEW = 0.1
+_SAME_SIZE = 1e-3
 _FIRST_VRS = (b"UL", b"UI", b"OB", b"CS", b"DA", b"TM", b"SH", b"LO", b"DT")
 
 
@@ -126,6 +130,8 @@ class DicomSlice:
         Which frame it is, and which number it counts by.
     position : (3,) array, mm, optional
         Centre of the first pixel, LPS.
+    file_position : (3,) array, mm, optional
+        The one position that a file gives for all of its frames: that of the first.
     axes : (3, 3) array, optional
         Columns: where x, y of the image and its normal point in LPS.
     skew : float
@@ -148,6 +154,7 @@ class DicomSlice:
     frame: int
     number: int
     position: FloatArray | None
+    file_position: FloatArray | None
     axes: FloatArray | None
     skew: float
     pixel: tuple[float, float] | None
@@ -165,6 +172,13 @@ class DicomSlice:
         return name if self.file.n_frames == 1 else f"frame {self.frame + 1} of {name}"
 
 
+def same_pixel_size(one: DicomSlice, other: DicomSlice) -> bool:
+    """Return whether two slices have pixels of one size, but for rounding."""
+    if one.pixel is None or other.pixel is None:
+        return one.pixel is other.pixel
+    return bool(np.allclose(one.pixel, other.pixel, rtol=_SAME_SIZE))
+
+
 def is_dicom(path: Path) -> bool:
     """Return whether a file begins as DICOM files do, or as their data do without the preamble."""
     with path.open("rb") as file:
@@ -173,8 +187,12 @@ def is_dicom(path: Path) -> bool:
 
 
 def is_dicomdir(path: Path) -> bool:
-    """Return whether a file is the directory of a DICOM disc."""
-    return path.name.upper() == "DICOMDIR"
+    """Return whether a file is the directory of a DICOM disc, by its name or by what it says it is."""
+    if path.name.upper() == "DICOMDIR":
+        return True
+    with path.open("rb") as file:
+        head = file.read(_DIRECTORY_HEAD)
+    return head[128:132] == b"DICM" and MediaStorageDirectoryStorage.encode() in head
 
 
 def _begins_bare(head: bytes) -> bool:
@@ -267,6 +285,7 @@ def _slice(
     pixel = _numbers(measures, "PixelSpacing", 2) or _numbers(tags, "NominalScannedPixelSpacing", 2)
     place = _first(frame.get("PlanePositionSequence")) if frame is not None else None
     own = None if place is None else _numbers(place, "ImagePositionPatient", 3)
+    common = _numbers(_group("PlanePositionSequence", None, shared, tags), "ImagePositionPatient", 3)
     plane = _group("PlaneOrientationSequence", frame, shared, tags)
     axes, skew = _axes(_numbers(plane, "ImageOrientationPatient", 6))
     rescale = _group("PixelValueTransformationSequence", frame, shared, tags)
@@ -277,6 +296,7 @@ def _slice(
         frame=n,
         number=(_whole(content, "InStackPositionNumber") or n) if file.n_frames > 1 else file.number,
         position=position if own is None else np.array(own),
+        file_position=None if common is None else np.array(common),
         axes=axes,
         skew=skew,
         pixel=(pixel[1], pixel[0]) if pixel is not None and min(pixel) > 0 else None,  # rows come first

@@ -24,7 +24,7 @@ from gp_labeler.imaging.readers.headers import (
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
-from gp_labeler.imaging.readers.raw_voxels import Stored, shortage, voxels_in
+from gp_labeler.imaging.readers.raw_voxels import Stored, length_problems, voxels_in
 
 __all__ = ["read_meta_header"]
 
@@ -80,7 +80,7 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
         source=source,
         files=tuple(dict.fromkeys((path, *files))),
         geometry=geometry,
-        found=(*shortage(source), *found),
+        found=(*length_problems(source, stored), *found),
         notes=(*notes, *_unscaled(fields)),
         channels=layout.channels,
         n_volumes=layout.n_volumes,

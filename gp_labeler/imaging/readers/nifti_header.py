@@ -22,8 +22,9 @@ from gp_labeler.imaging.readers.headers import Header, Layout, not_a
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
-from gp_labeler.imaging.readers.raw_voxels import Stored, shortage, voxels_in
+from gp_labeler.imaging.readers.raw_voxels import Stored, length_problems, voxels_in
 from gp_labeler.imaging.readers.source import Compression, Plane, open_stream
+from gp_labeler.imaging.readers.spm_matrix import SpmMatrix, read_spm_matrix
 
 __all__ = ["read_nifti_header"]
 
@@ -76,7 +77,7 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
     stored = Stored(base, _packing(voxel_file), skip=int(header.get_data_offset()))
     plain = layout.finish(channel) if colours > 1 else to_grey
     source = voxels_in([voxel_file], stored, layout, values.finish(plain))
-    geometry, more, units = _geometry(header)
+    geometry, more, units = _geometry(header, read_spm_matrix(voxel_file))
     scaled = (f"values were scaled by {values.slope:g} and shifted by {values.intercept:g}",)
     return Header(
         size=layout.size,
@@ -84,7 +85,7 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
         source=source,
         files=tuple(dict.fromkeys((header_file, voxel_file))),
         geometry=geometry,
-        found=(*shortage(source), *found, *complaints, *doubts, *more),
+        found=(*length_problems(source, stored), *found, *complaints, *doubts, *more),
         notes=(*units, *(scaled if values.scaled else ())),
         channels=layout.channels,
         n_volumes=layout.n_volumes,
@@ -191,23 +192,46 @@ def _scaling(header: Any) -> tuple[_Values, tuple[Problem, ...]]:
     return kept, (warning("scaling", f"{text}; what is no number was left out, as nibabel does"),)
 
 
-def _geometry(header: Any) -> tuple[Geometry, tuple[Problem, ...], tuple[str, ...]]:
-    """Place the voxels by the sform, else by the qform, as nibabel does, and say where the two disagree."""
+def _geometry(header: Any, spm: SpmMatrix | None) -> tuple[Geometry, tuple[Problem, ...], tuple[str, ...]]:
+    """Place the voxels by the sform, else by the qform, as nibabel does, and say where the two disagree.
+
+    Analyze has neither: SPM's matrix beside it counts, as for nibabel. Beside NIfTI it does not.
+    """
     unit = int(header["xyzt_units"]) & 7 if isinstance(header, Nifti1Header) else 2
     mm = _UNITS_MM.get(unit, 1.0)
     note = (f"lengths were converted from {_UNIT_NAMES[unit]} to mm",) if unit in _UNIT_NAMES else ()
     zooms = np.array(header.get_zooms()[:3], dtype=np.float64)
     forms, found = _forms(header)
+    if spm is not None and not isinstance(header, Nifti1Header):
+        return _placed(_LPS_FROM_RAS @ spm.affine, spm.sides_known), found, (f"placed by {spm.path.name}",)
     if not forms:
         spacing = _three(np.append(zooms, [1.0, 1.0])[:3] * mm)
         return Geometry(spacing, sides_known=False), found, note
-    affine = _LPS_FROM_RAS @ forms[0][1]
-    lengths = np.linalg.norm(affine[:3, :3], axis=0)
     apart, mirrored = _disagreement(header, forms, zooms, mm)
-    geometry = Geometry(
-        _three(lengths * mm), _three(affine[:3, 3] * mm), affine[:3, :3] / lengths, sides_known=not mirrored
+    if spm is not None:
+        more, turned = _against_spm(header, forms[0], spm, mm)
+        apart, mirrored = (*apart, *more), mirrored or turned
+    return _placed(_LPS_FROM_RAS @ forms[0][1], not mirrored, mm), (*found, *apart), note
+
+
+def _placed(affine: FloatArray, sides_known: bool, mm: float = 1.0) -> Geometry:
+    lengths = np.linalg.norm(affine[:3, :3], axis=0)
+    return Geometry(
+        _three(lengths * mm), _three(affine[:3, 3] * mm), affine[:3, :3] / lengths, sides_known=sides_known
     )
-    return geometry, (*found, *apart), note
+
+
+def _against_spm(
+    header: Any, form: tuple[str, FloatArray], spm: SpmMatrix, mm: float
+) -> tuple[tuple[Problem, ...], bool]:
+    """Say how far SPM's matrix, which other programs leave out, is from the placement in the header."""
+    name, matrix = form
+    apart, mirrored = _between(header, matrix, spm.affine / np.array([[mm], [mm], [mm], [1.0]]))
+    if apart <= _APART * np.linalg.norm(matrix[:3, :3], axis=0).min():
+        return (), False
+    how = "mirrors the voxels" if mirrored else f"places the voxels up to {apart * mm:.3g} mm elsewhere"
+    text = f"{spm.path.name} beside it, which only SPM obeys, {how}; the {name} is taken, as nibabel does"
+    return (warning("placement", text),), mirrored
 
 
 def _forms(header: Any) -> tuple[list[tuple[str, FloatArray]], tuple[Problem, ...]]:
@@ -244,16 +268,21 @@ def _disagreement(
         text = f"its pixdim says voxels of {sizes[0]}, its {name} {sizes[1]}; {taken}"
         return (warning("placement", text),), False
     other, second = forms[1]
-    last = np.array((*header.get_data_shape(), 1, 1)[:3]) - 1.0
-    corners = np.array([(*(last * corner), 1.0) for corner in np.ndindex(2, 2, 2)])
-    apart = float(np.linalg.norm(corners @ (matrix - second).T, axis=1).max())
+    apart, mirrored = _between(header, matrix, second)
     if apart <= _APART * voxel.min():
         return (), False
-    mirrored = bool(np.linalg.det(matrix[:3, :3]) * np.linalg.det(second[:3, :3]) < 0)
     how = (
         "are mirror images of each other" if mirrored else f"place the voxels up to {apart * mm:.3g} mm apart"
     )
     return (warning("placement", f"its {name} and its {other} {how}; {taken}"),), mirrored
+
+
+def _between(header: Any, one: FloatArray, other: FloatArray) -> tuple[float, bool]:
+    """Return how far two placements are apart at a corner, at worst, and whether they are mirror images."""
+    last = np.array((*header.get_data_shape(), 1, 1)[:3]) - 1.0
+    corners = np.array([(*(last * corner), 1.0) for corner in np.ndindex(2, 2, 2)])
+    apart = float(np.linalg.norm(corners @ (one - other).T, axis=1).max())
+    return apart, bool(np.linalg.det(one[:3, :3]) * np.linalg.det(other[:3, :3]) < 0)
 
 
 def _three(values: FloatArray) -> Spacing:

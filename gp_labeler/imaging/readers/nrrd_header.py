@@ -24,7 +24,7 @@ from gp_labeler.imaging.readers.headers import (
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.problems import VolumeError
-from gp_labeler.imaging.readers.raw_voxels import Stored, shortage, voxels_in
+from gp_labeler.imaging.readers.raw_voxels import Stored, length_problems, voxels_in
 
 __all__ = ["read_nrrd_header"]
 
@@ -99,7 +99,7 @@ def read_nrrd_header(path: Path, channel: int | None = None) -> Header:
         source=source,
         files=tuple(dict.fromkeys((path, *files))),
         geometry=geometry,
-        found=shortage(source),
+        found=length_problems(source, stored),
         notes=notes,
         channels=1 if layout.listed else layout.channels,
         n_volumes=layout.channels if layout.listed else layout.n_volumes,

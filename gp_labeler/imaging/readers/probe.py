@@ -10,6 +10,7 @@ from pathlib import Path
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.choosing import FEW
 from gp_labeler.imaging.readers.dicom import inspect_dicom
+from gp_labeler.imaging.readers.dicom_disc import lost_files
 from gp_labeler.imaging.readers.dicom_tags import is_dicom, is_dicomdir
 from gp_labeler.imaging.readers.formats import (
     DICOM_SUFFIXES,
@@ -95,8 +96,10 @@ def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> Imp
     images = _images(files)
     others = [file for file in files if file.suffix.lower() not in SLICE_SUFFIXES]
     dicom = [file for file in others if is_dicom(file) and not is_dicomdir(file)]
-    if not dicom and any(map(is_dicomdir, files)) and (disc := _dicom_below(folder)):
-        return inspect_dicom(folder, disc, options, report)
+    directory = None if dicom else next(filter(is_dicomdir, files), None)
+    if directory is not None and (disc := _dicom_below(folder)):
+        plan = inspect_dicom(folder, disc, options, report)
+        return replace(plan, found=(*plan.found, *lost_files(directory)))
     few = images if len(images) <= _FEW_IMAGES else []
     known = set(dicom)
     volumes = [file for file in (*others, *few) if file not in known and _is_volume(file)]

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from gp_labeler.imaging.readers.headers import Layout
-from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error
+from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, warning
 from gp_labeler.imaging.readers.source import Compression, Plane, RawSource, SliceSource
 
-__all__ = ["Chain", "Stored", "Whole", "shortage", "voxels_in"]
+__all__ = ["Chain", "Stored", "Whole", "length_problems", "voxels_in"]
 
 _LONGEST_LINE = 1 << 20
 
@@ -110,11 +110,27 @@ def voxels_in(
     return parts[0] if len(parts) == 1 else Chain(parts)
 
 
-def shortage(source: SliceSource) -> tuple[Problem, ...]:
-    """Return the problem that a file is too short, of the first that is."""
+def length_problems(source: SliceSource, stored: Stored) -> tuple[Problem, ...]:
+    """Return the problem that a file is too short for its voxels, or too long, of the first that is."""
     parts = source.parts if isinstance(source, Chain) else (source,)
-    every = (part.shortage() for part in parts if isinstance(part, RawSource))
-    return next((problems for problems in every if problems), ())
+    raw = [part for part in parts if isinstance(part, RawSource)]
+    short = next((problems for part in raw if (problems := part.shortage())), ())
+    if short or stored.tail is not None:  # voxels that are counted from the end may lie behind anything
+        return short
+    return next((problems for part in raw if (problems := _surplus(part))), ())
+
+
+def _surplus(part: RawSource) -> tuple[Problem, ...]:
+    """Return a warning of bytes that are left over; a question where they may be voxels."""
+    rest = 0 if part.compression != "none" else part.path.stat().st_size - part.bytes_needed
+    if rest <= 0:
+        return ()
+    text = f"{part.path.name} holds {rest:,} bytes more than its voxels need"
+    if rest % (part.plane_bytes * part.n_planes):
+        return (warning("rest", f"{text}; they are left out"),)
+    remedy = "Correct its header, or accept that the rest is left out (--accept rest)."
+    text += f", {rest // (part.plane_bytes * part.n_planes) + 1} times as many: its type or size may be wrong"
+    return (Problem("rest", text, remedy=remedy, resolved_by=("accept",)),)
 
 
 def _raw(

@@ -26,6 +26,9 @@ _sitk: Any = SimpleITK  # its functions carry no types
 
 __all__ = ["read_itk_header", "read_itk_planes"]
 
+_GIPL_HEADER = 256
+_VTK_HEAD = 4096
+
 
 def read_itk_header(path: Path, channel: int | None = None, *, kind: str = "") -> Header:
     """Read the header of a file of a format that states no frame: GIPL, VTK image.
@@ -45,9 +48,11 @@ def read_itk_header(path: Path, channel: int | None = None, *, kind: str = "") -
             raise _explained(problem, path) from None
     n = reader.GetDimension()
     size = (*reader.GetSize(), 1, 1)
+    dtype, channels = _dtype(reader.GetPixelIDValue()), reader.GetNumberOfComponents()
+    _check_length(path, int(np.prod(reader.GetSize(), dtype=np.float64)) * channels, dtype)
     return Header(
         size=(int(size[0]), int(size[1]), int(size[2])),
-        dtype=_dtype(reader.GetPixelIDValue()),
+        dtype=dtype,
         source=Whole(partial(read_itk_planes, path), lambda plane: to_grey(plane, channel)),
         files=(path,),
         geometry=Geometry(
@@ -56,21 +61,68 @@ def read_itk_header(path: Path, channel: int | None = None, *, kind: str = "") -
             _direction(reader.GetDirection(), n),
             sides_known=False,
         ),
-        channels=reader.GetNumberOfComponents(),
+        channels=channels,
         n_volumes=int(size[3]) if n > 3 else 1,
         format=kind or None,
     )
 
 
 def _check_image(path: Path) -> None:
-    """Refuse a VTK file that holds a mesh."""
+    """Refuse a VTK file that holds a mesh, or what ITK misreads without a word."""
     with path.open("rb") as file:
-        head = file.read(1000)
+        head = file.read(_VTK_HEAD)
+    if not head.startswith(b"# vtk"):
+        return
     kind = re.search(rb"^DATASET +(\w+)", head, re.MULTILINE)
-    if head.startswith(b"# vtk") and kind and kind[1].upper() != b"STRUCTURED_POINTS":
+    if kind and kind[1].upper() != b"STRUCTURED_POINTS":
         name = kind[1].decode("ascii", "replace")
         raise VolumeError(
             f"it holds {name}, which is no image", file=path, remedy="Give the scan it was made from."
+        )
+    text = head[: _vtk_data(head)]
+    if re.search(rb"^CELL_DATA", text, re.MULTILINE | re.IGNORECASE):
+        raise VolumeError(
+            "its values belong to cells (CELL_DATA), not to points",
+            file=path,
+            remedy="Save it as NRRD or MHA.",
+        )
+    if b"\r" in text and _is_binary(text):
+        raise VolumeError(
+            "its header has the line ends of Windows before binary voxels", file=path, remedy="Save it again."
+        )
+
+
+def _vtk_data(head: bytes) -> int:
+    """Return where the voxels of a VTK file begin: after the lines about them; 0 where none are found."""
+    found = re.search(rb"^(SCALARS[^\n]*\n(LOOKUP_TABLE[^\n]*\n)?|VECTORS[^\n]*\n)", head, re.M | re.I)
+    return found.end() if found else 0
+
+
+def _is_binary(head: bytes) -> bool:
+    return re.search(rb"^BINARY", head, re.MULTILINE | re.IGNORECASE) is not None
+
+
+def _check_length(path: Path, n_values: int, dtype: np.dtype[Any]) -> None:
+    """Refuse a file that is too short for its voxels: ITK leaves what is missing as it comes.
+
+    Raises
+    ------
+    VolumeError
+        It is.
+    """
+    with path.open("rb") as file:
+        head = file.read(_VTK_HEAD)
+    each = dtype.itemsize
+    start = _GIPL_HEADER
+    if head.startswith(b"# vtk"):
+        start = _vtk_data(head)
+        each = each if _is_binary(head[:start]) else 2  # a digit and a blank
+    have, need = path.stat().st_size, start + each * n_values - (each == 2 and dtype.itemsize != 2)
+    if have < need:
+        raise VolumeError(
+            f"{path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete",
+            file=path,
+            remedy="Copy it again.",
         )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -68,10 +69,7 @@ def read_log(path: Path) -> SkyScanLog | None:
     """
     with path.open("rb") as file:
         raw = file.read(_MOST_BYTES)
-    try:
-        text = raw.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
+    text = _decoded(raw)
     sections: dict[str, dict[str, str]] = {_ACQUISITION: {}, _RECONSTRUCTION: {}}
     fields: dict[str, str] = {}
     for line in text.splitlines():
@@ -95,6 +93,18 @@ def read_log(path: Path) -> SkyScanLog | None:
         max(1, _whole(fields.get("section to section step")) or 1),
         _pixel_mm(sections[_ACQUISITION]),
     )
+
+
+def _decoded(raw: bytes) -> str:
+    """Return the text of a log: Windows programs write UTF-16, UTF-8 or their own 8-bit letters."""
+    if raw.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return raw.decode("utf-16", "replace")
+    if b"\0" in raw[:2]:
+        return raw.decode("utf-16-be" if raw[:1] == b"\0" else "utf-16-le", "replace")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
 
 
 def _pixel_mm(fields: dict[str, str]) -> float | None:

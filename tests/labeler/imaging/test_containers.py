@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 import SimpleITK
 from bodies import LEVEL, ORIGIN, SIZE, SPACING, affine, middle, off_by, outside, surface_of, voxels
+from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from gp_labeler.imaging.readers import VolumeError, inspect_volume, read_volume
@@ -353,6 +354,8 @@ def test_metaimage(name: str, tmp_path: Path) -> None:
         (meta(Kinds="domain domain list"), "sequence of 2-D images"),
         (meta(Seq_Frame0000_Timestamp="0.0"), "sequence of 2-D images"),
         (meta(local=False, ElementDataFile="../nothing.raw"), "nothing.raw, which is not there"),
+        (meta(raw=RAW.astype("<u8").tobytes(), ElementType="MET_ULONG"), "2 times as many.*--accept rest"),
+        (meta(local=False, ElementType="MET_UCHAR"), "d.raw holds .* 2 times as many.*--accept rest"),
         (meta(local=False, ElementDataFile="s%03d.raw 1 100000000 1"), "names 100000000 files"),
         (meta(DimSize="46000 40000 34000", CompressedData="True"), "incomplete"),
     ],
@@ -366,6 +369,15 @@ def test_metaimage_says_where_letters_and_matrix_contradict_each_other(tmp_path:
     (warning,) = inspect_volume(meta(AnatomicalOrientation="LAS")(tmp_path)).warnings
     assert "AnatomicalOrientation, LAS, contradicts its TransformMatrix" in warning.text
     assert not inspect_volume(meta(TransformMatrix=None)(tmp_path)).sides_known
+
+
+def test_bytes_behind_the_voxels_are_said(tmp_path: Path) -> None:
+    path = attached(PLAIN + b"x" * 1000)(tmp_path)
+    assert off_by(path) < 0.1
+    (warning,) = inspect_volume(path).warnings
+    assert "1,000 bytes more than its voxels need; they are left out" in warning.text
+    first = meta(raw=np.stack([RAW, RAW // 3]).tobytes())(tmp_path)
+    assert off_by(first, accept=["rest"]) < 0.1
 
 
 # NIfTI and Analyze --------------------------------------------------------------------------------
@@ -541,6 +553,92 @@ def test_analyze_knows_no_sides(tmp_path: Path) -> None:
     assert (plan.format, plan.sides_known) == ("Analyze", False)
     at_home = np.diag([*SPACING, 1.0])
     assert off_by(tmp_path / "a.hdr", at_home) < 0.1
+
+
+MOVED = np.array([[1.0, 0, 0, 4], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+def spm_matrix(path: Path, affine_: np.ndarray, version: str = "5", name: str = "mat") -> None:
+    savemat(path, {name: affine_ @ np.linalg.inv(FROM_ONE)}, format=version)
+
+
+FROM_ONE = np.eye(4)
+FROM_ONE[:3, 3] = 1  # SPM counts voxels from 1
+
+
+@pytest.mark.parametrize("kind", [nibabel.Spm99AnalyzeImage, nibabel.Spm2AnalyzeImage])
+def test_analyze_is_placed_by_the_matrix_of_spm_as_nibabel_does(kind: type, tmp_path: Path) -> None:
+    nibabel.save(kind(RAW.astype("int16").T, RAS @ affine()), tmp_path / "a.img")
+    assert (tmp_path / "a.mat").exists()
+    for given in ("a.img", "a.hdr"):
+        assert off_by(tmp_path / given) < 0.1
+        assert inspect_volume(tmp_path / given).sides_known
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+def test_the_oldest_matrix_of_spm_mirrors_and_leaves_the_sides_unknown(version: str, tmp_path: Path) -> None:
+    nibabel.save(nibabel.AnalyzeImage(RAW.astype("int16").T, np.diag([*SPACING, 1])), tmp_path / "a.img")
+    unmirrored = np.diag([-1.0, 1, 1, 1]) @ RAS @ affine()
+    spm_matrix(tmp_path / "a.mat", unmirrored, version, "M")
+    assert off_by(tmp_path / "a.img") < 0.1
+    assert not inspect_volume(tmp_path / "a.img").sides_known
+    np.testing.assert_allclose(nibabel.load(tmp_path / "a.img").affine, RAS @ affine(), atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["a.nii", "a.nii.gz"])
+def test_nifti_is_not_moved_by_the_matrix_of_spm_but_says_so(name: str, tmp_path: Path) -> None:
+    path = nifti(name)(tmp_path)
+    spm_matrix(tmp_path / "a.mat", RAS @ affine())
+    assert not inspect_volume(path).warnings
+    spm_matrix(tmp_path / "a.mat", MOVED @ RAS @ affine())
+    assert off_by(path) < 0.1
+    (warning,) = inspect_volume(path).warnings
+    assert "a.mat beside it, which only SPM obeys, places the voxels up to 4 mm elsewhere" in warning.text
+    spm_matrix(tmp_path / "a.mat", RAS @ mirrored())
+    assert "mirrors the voxels" in inspect_volume(path).warnings[0].text
+    assert not inspect_volume(path).sides_known
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 300, b"MATLAB 5.0" + bytes(range(256))])
+def test_another_mat_file_beside_a_scan_does_not_count(content: bytes, tmp_path: Path) -> None:
+    written(tmp_path / "a.mat", content)
+    assert off_by(nifti()(tmp_path)) < 0.1
+    savemat(tmp_path / "a.mat", {"cc_L": np.zeros((20, 3, 2)), "mat": np.eye(3)})
+    assert not inspect_volume(tmp_path / "a.nii").warnings
+
+
+# GIPL and VTK: what ITK reads without a word ------------------------------------------------------
+
+
+def vtk(lines: str = "SCALARS s short 1\nLOOKUP_TABLE default\n", data: str = "POINT_DATA") -> bytes:
+    head = f"# vtk DataFile Version 3.0\nx\nBINARY\nDATASET STRUCTURED_POINTS\nDIMENSIONS {SIZES}\n"
+    head += "SPACING 0.25 0.25 0.3\nORIGIN -4.1 3.3 12.7\n"
+    return (head + f"{data} {RAW.size}\n{lines}").encode()
+
+
+BIG = RAW.astype(">i2").tobytes()
+
+
+@pytest.mark.parametrize("name", ["a.gipl", "a.vtk", "b.vtk"])
+def test_gipl_and_vtk(name: str, tmp_path: Path) -> None:
+    path = itk(name)(tmp_path) if name[0] == "a" else written(tmp_path / name, vtk() + BIG)
+    assert off_by(path) < 0.1
+    assert not inspect_volume(path).sides_known
+    path.write_bytes(path.read_bytes()[:-100])
+    assert_asked(path, "it is incomplete")
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (vtk("VECTORS s short\n") + BIG, "it is incomplete"),
+        (vtk(data="CELL_DATA") + BIG, "CELL_DATA"),
+        (vtk().replace(b"\n", b"\r\n") + BIG, "line ends of Windows"),
+        (vtk().replace(b"BINARY", b"ASCII") + b"1 2 3 " * 50, "it is incomplete"),
+    ],
+)
+def test_vtk_that_cannot_be_read_as_it_stands(content: bytes, words: str, tmp_path: Path) -> None:
+    assert_asked(written(tmp_path / "a.vtk", content), words)
 
 
 # All of them --------------------------------------------------------------------------------------

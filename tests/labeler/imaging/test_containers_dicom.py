@@ -162,6 +162,34 @@ def nudged(axis: int, by: Callable[[int], float]) -> Change:
 
 GRID_985 = affine(Rotation.from_euler("z", np.arccos(0.985)).as_matrix())
 HALF = RAW // 2
+
+
+def one_position(folder: Path, *, shared: bool) -> Path:
+    """Write frames of one file that gives one position, orientation and SpacingBetweenSlices for all."""
+    data = enhanced()
+    place = data.PerFrameFunctionalGroupsSequence[0].PlanePositionSequence
+    groups = data.SharedFunctionalGroupsSequence[0]
+    groups.PixelMeasuresSequence[0].SpacingBetweenSlices = "0.3"
+    for frame in data.PerFrameFunctionalGroupsSequence:
+        del frame.PlanePositionSequence
+    if shared:
+        groups.PlanePositionSequence = place
+    else:
+        del data.PerFrameFunctionalGroupsSequence
+        data.ImagePositionPatient = place[0].ImagePositionPatient
+    data.save_as(folder / "a.dcm", enforce_file_format=True)
+    return folder / "a.dcm"
+
+
+def renamed_directory(folder: Path) -> Path:
+    disc("DICOMDIR")(folder).rename(folder / "disc" / "index.dat")
+    return folder / "disc"
+
+
+def noisy_pixel_size(data: FileDataset, n: int) -> None:
+    data.PixelSpacing = [f"{0.25 + 1e-7 * (n % 3):.9f}"] * 2
+
+
 EIGHT_BIT = LEVEL * 250 / 1900
 
 READ: dict[str, tuple[Make, dict[str, object]]] = {
@@ -186,6 +214,15 @@ READ: dict[str, tuple[Make, dict[str, object]]] = {
         ),
         {},
     ),
+    "a uid for every two slices": (changed(setting(SeriesInstanceUID=lambda n: f"1.2.{n // 2}")), {}),
+    "a uid for each slice, pixel sizes with noise": (
+        changed(
+            lambda data, n: (noisy_pixel_size(data, n), setattr(data, "SeriesInstanceUID", f"1.2.{n}"))
+        ),
+        {},
+    ),
+    "pixel sizes with noise": (changed(noisy_pixel_size), {}),
+    "a directory of another name": (renamed_directory, {}),
     "no uid": (changed(without("SeriesInstanceUID")), {}),
     "jitter in the last digits": (changed(jittered(1e-6), grid=GRID_985), {"grid": GRID_985}),
     "positions with two decimals": (
@@ -445,6 +482,24 @@ def test_frames_with_offsets_from_one_position(tmp_path: Path) -> None:
     dose.GridFrameOffsetVector = decimal(SPACING[2] * np.arange(N))
     dose.save_as(tmp_path / "a.dcm", enforce_file_format=True)
     assert off_by(tmp_path / "a.dcm") < 0.1
+
+
+@pytest.mark.parametrize("shared", [False, True])
+def test_frames_with_one_position_follow_it_along_the_normal(shared: bool, tmp_path: Path) -> None:
+    path = one_position(tmp_path, shared=shared)
+    assert off_by(path) < 0.1
+    plan = inspect_volume(path)
+    assert not plan.sides_known
+    assert "one position, taken for the first" in plan.warnings[0].text
+
+
+def test_what_a_directory_names_and_the_disc_has_not_is_said(tmp_path: Path) -> None:
+    directory = disc("DICOMDIR")(tmp_path)
+    slices_there = [file for file in directory.parent.rglob("IM*") if file.is_file()]
+    assert not inspect_volume(directory).warnings
+    sorted(slices_there)[0].unlink()
+    (lost,) = inspect_volume(directory).warnings
+    assert "DICOMDIR names images that are not there: PT000000/ST000000/SE000000/IM000000" in lost.text
 
 
 PADDED: dict[str, Change] = {

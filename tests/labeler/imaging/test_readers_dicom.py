@@ -303,7 +303,7 @@ def test_with_one_position_for_all_slices_the_numbers_count(tmp_path: Path) -> N
     scan = small()
     volume = read_volume(write_series(scan, tmp_path / "a", change=same))
     np.testing.assert_array_equal(volume.array, scan.array)
-    assert volume.spacing[2] == 0.2
+    assert volume.spacing[2] == pytest.approx(0.2)
 
 
 def test_with_neither_positions_nor_thickness_the_distance_is_asked_for(tmp_path: Path) -> None:

@@ -398,7 +398,7 @@ def write_skyscan(tmp_path: Path, log: str = LOG, encoding: str = "latin-1") -> 
     return folder
 
 
-@pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-8-sig"])
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-8", "utf-8-sig", "utf-16", "utf-16-le", "utf-16-be"])
 def test_a_skyscan_folder_reads_by_its_log(encoding: str, tmp_path: Path) -> None:
     folder = write_skyscan(tmp_path, encoding=encoding)
     plan = inspect_volume(folder)
