@@ -191,7 +191,7 @@ def phantom(seed: int, names: tuple[str, ...], spacing: float, group: str, **giv
 
 
 def judged(case: Case, template: HeadTemplate) -> dict[str, Any]:
-    """Straighten one case and hold it against its truth."""
+    """Straighten one case and compare it with its truth."""
     row: dict[str, Any] = {"group": case.group, "name": case.name, "hard": case.hard}
     start = time.process_time()
     try:

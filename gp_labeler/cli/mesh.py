@@ -20,7 +20,7 @@ _EXAMPLE = """examples:
   gp-labeler mesh slices_tif/ -o head.stl --spacing 0.035 --reverse
   gp-labeler mesh dicom/ -o head.vtp --series bone --accept gap --threshold 1200
 
-Where a scan does not say all that is needed, the error names the option that settles it.
+Where a scan does not say all that is needed, the error names the option that states it.
 """
 
 

@@ -53,7 +53,7 @@ def _is_free(workspace: Workspace) -> bool:
     return mark is not None and not mark.locked
 
 
-def _is_settled(workspace: Workspace) -> bool:
+def _is_placed_or_unseen(workspace: Workspace) -> bool:
     mark = _mark(workspace)
     return mark is not None and mark.decided
 
@@ -147,7 +147,7 @@ def _toggle_glyphs(workspace: Workspace, ui: Ui) -> None:
     workspace.view.update(glyph_mm=None if is_mm else GLYPH_MM)
 
 
-def _auto_greys(workspace: Workspace, ui: Ui) -> None:
+def _auto_window_level(workspace: Workspace, ui: Ui) -> None:
     workspace.view.update(level=None, width=None)
 
 
@@ -291,7 +291,8 @@ def view_rows() -> Iterator[Action]:
         run = _let_place if tool == "place" else _set_tool(tool)
         yield row(f"tool.{tool}", title, (key,), run, checked=_has_tool(tool), group="tool",
                   hint="What the left button does over a slice")
-    yield row("view.auto_greys", "Automatic contrast", ("Shift+W",), _auto_greys, _has_scan, group="tool")
+    yield row("view.auto_window_level", "Automatic contrast", ("Shift+W",), _auto_window_level, _has_scan,
+              group="tool")
     for title, field, key in _SHOWN:
         yield row(f"view.{field}", title, (key,), _toggle(field), checked=_is_on(field), group="what")
     yield row("view.glyph_mm", "Points grow with the zoom", (), _toggle_glyphs,
@@ -358,11 +359,11 @@ def landmark_rows() -> Iterator[Action]:
     yield row("point.unseen", "Cannot be seen", ("X",), lambda w, ui: w.labels.mark_unseen(),
               _is_free, icon="unseen")
     yield row("point.clear", "Clear", ("Delete", "Backspace"), lambda w, ui: w.labels.clear(),
-              lambda w: _is_free(w) and (_is_settled(w) or _is_suggested(w)))
+              lambda w: _is_free(w) and (_is_placed_or_unseen(w) or _is_suggested(w)))
     yield row("point.check", "Mark as checked", ("K",), _toggle_check, _is_placed, checked=_is_checked,
               group="state")
-    yield row("point.lock", "Lock", ("L",), _toggle_lock, _is_settled, checked=_is_locked, group="state",
-              icon="lock")
+    yield row("point.lock", "Lock", ("L",), _toggle_lock, _is_placed_or_unseen, checked=_is_locked,
+              group="state", icon="lock")
     yield row("point.lock_all", "Lock all", ("Ctrl+L",),
               lambda w, ui: w.labels.lock_all(not _all_locked(w)), _has_labels,
               checked=_all_locked, group="state")

@@ -66,7 +66,7 @@ class Animals:
     confirmed: frozenset[tuple[str, Side, str]] = frozenset()
 
     @property
-    def doubts(self) -> tuple[Finding, ...]:
+    def problems(self) -> tuple[Finding, ...]:
         """Labels that a person should look at, the worst first."""
         found = () if self.screened is None else self.screened.problems
         return tuple(finding for finding in found if finding.kind != "other side")  # those are skipped

@@ -25,7 +25,7 @@ class AtlasSource:
     animals : tuple of Path
         Labelled animals, files or folders of them, to fit it to.
     keep_doubtful : bool
-        Whether labels that the check doubts are believed.
+        Whether labels that the check finds doubtful are used.
     """
 
     file: Path | None = None

@@ -21,7 +21,7 @@ from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_json import provenance_of
 from gp_labeler.document.state import How, Provenance
 
-__all__ = ["ImportLandmarks", "MisfitError", "Predicate", "import_landmarks"]
+__all__ = ["ImportLandmarks", "OffBoneError", "Predicate", "import_landmarks"]
 
 Predicate = Callable[[FloatArray], NDArray[np.bool_]]
 """Tells for (N, 3) points, mm, scan frame, whether each is inside, or near bone."""
@@ -29,7 +29,7 @@ Predicate = Callable[[FloatArray], NDArray[np.bool_]]
 _TURN_RAS = np.array([-1.0, -1.0, 1.0])
 
 
-class MisfitError(GpError):
+class OffBoneError(GpError):
     """Landmarks cannot belong to this scan: they lie outside it, or most lie off the bone."""
 
 
@@ -40,7 +40,7 @@ def import_landmarks(
     side: Side | str | None = None,
     names: Mapping[str, str] | None = None,
     near_bone: Predicate | None = None,
-    accept_misfit: bool = False,
+    accept_off_bone: bool = False,
     replace_placed: bool = True,
 ) -> tuple[str, ...]:
     """Take over the landmarks of one or more files; one edit, all or nothing.
@@ -60,7 +60,7 @@ def import_landmarks(
         Our code by the lab's own name of a point; see `gp_core.landmarks.labels.LabelNames`.
     near_bone : callable, optional
         Tells which points are near bone.
-    accept_misfit : bool
+    accept_off_bone : bool
         Import nevertheless.
     replace_placed : bool
         Whether placed points give way; otherwise only what is still to do is filled.
@@ -72,7 +72,7 @@ def import_landmarks(
 
     Raises
     ------
-    MisfitError
+    OffBoneError
         Points lie outside the volume, or more than half are off the bone.
     GpError
         A file cannot be read, or a point that would change is locked.
@@ -83,14 +83,14 @@ def import_landmarks(
         raise GpError("no landmark file was given")
     read = [(points, one) for points in lists for one in _sides(points, side)]
     sets = tuple(one for _, one in read)
-    off_bone = _misfit(document, sets, near_bone, accept_misfit)
+    off_bone = _check_bone(document, sets, near_bone, accept_off_bone)
     known = {key: found for points, one in read for key, found in _known(points, one.side).items()}
     source = ", ".join(points.source.name for points in lists)
     asked = {
         "files": [str(Path(path).absolute()) for path in paths],
         "side": None if side is None else Side.parse(side).value,
         "names": dict(names or {}),
-        "accept_misfit": accept_misfit,
+        "accept_misfit": accept_off_bone,
     }
     new = document.provenance(How.IMPORTED, source=source)
     with blaming(source):
@@ -112,7 +112,7 @@ def _suggested(sets: tuple[LandmarkSet, ...]) -> list[str]:
     return [f"{_shortened(list(names))} {many}: confirm or correct each"]
 
 
-def _misfit(
+def _check_bone(
     document: SpecimenDocument, sets: tuple[LandmarkSet, ...], near_bone: Predicate | None, accepted: bool
 ) -> tuple[str, ...]:
     observed = {(s.side, code): s[code] for s in sets for code in s.placed if not feature(code).computed}
@@ -133,7 +133,7 @@ def _misfit(
         problem = f"{_listed(names, off)} lie off the bone"
     if problem and not accepted:
         remedy = remedy or "Are they of another scan? Import them nevertheless only if you know why."
-        raise MisfitError(problem, specimen=document.state.specimen, remedy=remedy)
+        raise OffBoneError(problem, specimen=document.state.specimen, remedy=remedy)
     warning = problem or (f"{_listed(names, off)} lie off the bone" if off.any() else "")
     return (warning,) if warning else ()
 

@@ -81,7 +81,7 @@ def new_specimen(directory: Path | None = None, *, specimen: str = "unnamed") ->
     directory : Path, optional
         State directory (`paths.default_directory()` in the window); None keeps no journal.
     specimen : str
-        Its name; characters that cannot stand in a file name are replaced.
+        Its name; characters that are not allowed in a file name are replaced.
 
     Raises
     ------

@@ -57,7 +57,7 @@ class RenameSpecimen:
         return f"rename to {self.name}"
 
     def apply(self, state: SpecimenState) -> SpecimenState:
-        """Return the state with this name; raises `GpError` where it cannot stand in a file name."""
+        """Return the state with this name; raises `GpError` where a file cannot have it."""
         return replace(state, specimen=self.name)
 
 

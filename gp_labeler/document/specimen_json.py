@@ -1,6 +1,6 @@
 """The state of a specimen as the JSON document that is saved and journalled, and back.
 
-What is unknown or still to do has no entry. Numbers keep every bit: Python writes the shortest text that
+What is unknown or still to do has no entry. Numbers have full precision: Python writes the shortest text that
 reads back as the same float.
 """
 

@@ -270,7 +270,7 @@ class SpecimenState:
     Raises
     ------
     GpError
-        The name cannot stand in a file name, the threshold is not finite, CA and CB are at the same place,
+        No file can have the name, the threshold is not finite, CA and CB are at the same place,
         touches of a side are partly in the tracker's frame and partly in the scan's, or two measurements have
         the same name.
     """

@@ -1,4 +1,4 @@
-"""Whether the state directory can be written, and what can stand in for it."""
+"""Whether the state directory can be written, and what can take its place."""
 
 from __future__ import annotations
 

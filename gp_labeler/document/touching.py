@@ -100,10 +100,10 @@ def load_touches(document: SpecimenDocument, path: str | PathLike[str], side: Si
     with blaming(path):
         document.do(TakeTouches(Side.parse(side), taken))
     named, unseen = named_side(source), " ".join(sorted(touched.unseen))
-    doubts = [f"Not seen by the tracker: {unseen}"] if unseen else []
+    warnings = [f"Not seen by the tracker: {unseen}"] if unseen else []
     if named not in (None, Side.parse(side)):
-        doubts.append(f"By its name it is of the {named.word} side: check the side")
-    return tuple(doubts)
+        warnings.append(f"By its name it is of the {named.word} side: check the side")
+    return tuple(warnings)
 
 
 def misnamed_files(document: SpecimenDocument, side: Side) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.procrustes import fit_rigid
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone, bone_of
-from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_greys
+from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import agreement_of
 from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError
@@ -178,7 +178,7 @@ def _refined(volume: Volume, start: MidPlane, threshold: float | None) -> _Refin
         fine, bone = bone_of(volume, threshold)
     except GpError as error:
         return start, None, None, [f"not refined by the bone: {error}"]
-    plane = refined_by_greys(GreyValues(fine), start)
+    plane = refined_by_grey_values(GreyValues(fine), start)
     agreement = agreement_of(bone, plane)
     before = agreement_of(bone, start)
     confidence = Confidence(agreement.share, agreement.overlap, agreement.share - before.share)

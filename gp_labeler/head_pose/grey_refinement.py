@@ -8,7 +8,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone
 from gp_labeler.head_pose.mid_plane import MidPlane
 
-__all__ = ["refined_by_greys"]
+__all__ = ["refined_by_grey_values"]
 
 _N_POINTS = 12_000
 _BLUR_VOXELS = 1.0
@@ -37,23 +37,23 @@ class GreyValues:
         low = max(threshold - (bright - soft) / 2, soft)
         high = max(bright, 2 * threshold - low)
         self.bone = bone
-        self.greys = gaussian_filter(np.clip((grid - low) / max(high - low, 1e-6), 0, 1), _BLUR_VOXELS)
+        self.grey_values = gaussian_filter(np.clip((grid - low) / max(high - low, 1e-6), 0, 1), _BLUR_VOXELS)
         shell = binary_dilation(bone.mask) & ~binary_erosion(bone.mask)
         places = np.argwhere(shell)
         chosen = places[np.random.default_rng(0).permutation(len(places))[:_N_POINTS]]
-        self.own = self.greys[tuple(chosen.T)].astype(np.float64)
+        self.own = self.grey_values[tuple(chosen.T)].astype(np.float64)
         T = bone.scan.T_scan_index
         self.points: FloatArray = chosen[:, ::-1] @ T[:3, :3].T + T[:3, 3]
 
     def differences(self, plane: MidPlane) -> FloatArray:
         """Return how much brighter each point's mirror image is; 0 beyond the scan."""
         mirrored = plane.mirrored(self.points)
-        found: FloatArray = self.bone.scan.sampled(self.greys, mirrored) - self.own
+        found: FloatArray = self.bone.scan.sampled(self.grey_values, mirrored) - self.own
         found[~self.bone.scan.inside(mirrored)] = 0.0
         return found
 
 
-def refined_by_greys(values: GreyValues, plane: MidPlane) -> MidPlane:
+def refined_by_grey_values(values: GreyValues, plane: MidPlane) -> MidPlane:
     """Return the plane whose mirror image agrees best, near a first one: two angles and an offset.
 
     Parameters

@@ -66,10 +66,10 @@ def search_planes(bone: Bone, report: Report) -> list[MidPlane]:
     for n, start in enumerate(starts):
         report(0.6 + 0.3 * n / len(starts))
         plane = refined_by_points(bone, start, (1.2 * clip, 0.35 * clip), 10, every=3)
-        found.append((_misfit(bone, plane, clip / 2, every=2), plane))
+        found.append((_distance_score(bone, plane, clip / 2, every=2), plane))
     found.sort(key=lambda pair: pair[0])
     finer = [refined_by_points(bone, plane, (0.5 * clip, 0.12 * clip), 14) for _, plane in found[:_FINER]]
-    finer.sort(key=lambda plane: _misfit(bone, plane, clip / 2))
+    finer.sort(key=lambda plane: _distance_score(bone, plane, clip / 2))
     report(1.0)
     return distinct(finer, 3.0)
 
@@ -157,7 +157,7 @@ def refined_by_points(
     return plane
 
 
-def _misfit(bone: Bone, plane: MidPlane, clip: float, *, every: int = 1) -> float:
+def _distance_score(bone: Bone, plane: MidPlane, clip: float, *, every: int = 1) -> float:
     """Return the mean clipped distance between mirrored and unmirrored surface, 0 to 1."""
     mirrored = plane.mirrored(bone.points[::every])
     distance = np.minimum(bone.tree.query(mirrored, distance_upper_bound=clip)[0], clip)

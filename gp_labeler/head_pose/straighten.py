@@ -19,7 +19,7 @@ from gp_labeler.head_pose.bone import (
     finest_step,
     threshold_candidates,
 )
-from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_greys
+from gp_labeler.head_pose.grey_refinement import GreyValues, refined_by_grey_values
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import Agreement, agreement_of, search_planes
 from gp_labeler.head_pose.result import Confidence, HeadPose, HeadPoseError
@@ -146,7 +146,7 @@ def _best_plane(bone: Bone, fine: Bone, report: Report) -> _Found:
     judged: list[tuple[Agreement, MidPlane]] = []
     for n, start in enumerate(starts):
         report(0.6 + 0.4 * n / len(starts))
-        plane = refined_by_greys(values, start)
+        plane = refined_by_grey_values(values, start)
         judged.append((agreement_of(bone, plane), plane))
     seen = [pair for pair in judged if pair[0].overlap >= _LEAST_OVERLAP] or judged
     best, plane = max(seen, key=lambda pair: pair[0].share)

@@ -103,7 +103,7 @@ class InPlane:
         Columns: left, posterior and superior in the scan; left is normal to the mid-plane.
     origin : (3,) array, LPS mm
         Where the template's origin comes to, on the mid-plane.
-    misfit : float
+    score : float
         0 where the template lies on the bone, 1 where nothing fits.
     margin : float
         How much worse the best fit that is turned by more than 25 degrees is.
@@ -111,7 +111,7 @@ class InPlane:
 
     axes: FloatArray
     origin: FloatArray
-    misfit: float
+    score: float
     margin: float
 
 
@@ -122,18 +122,18 @@ def front_and_up(bone: Bone, plane: MidPlane, template: HeadTemplate, report: Re
     for n, start in enumerate(_starts(bone, plane, template)):
         report(0.3 + 0.4 * n / _KEPT)
         fit = _fitted(bone, template, start, (1.6 * clip, 0.5 * clip), 12, every=4)
-        fits.append((_misfit(bone, template, fit, clip, every=2), fit))
+        fits.append((_distance_score(bone, template, fit, clip, every=2), fit))
     fits.sort(key=lambda pair: pair[0])
     finer = []
     for n, (_, fit) in enumerate(fits[:_FINER]):
         report(0.7 + 0.3 * n / _FINER)
         fine = _fitted(bone, template, fit, (0.8 * clip, 0.2 * clip), 16, every=2)
-        finer.append((_misfit(bone, template, fine, clip), fine))
+        finer.append((_distance_score(bone, template, fine, clip), fine))
     finer.sort(key=lambda pair: pair[0])
-    misfit, best = finer[0]
+    score, best = finer[0]
     others = [score for score, fit in (*finer, *fits) if _angle_deg(fit.rotation, best.rotation) > _APART_DEG]
     axes = axes_in_plane(best.rotation, plane)
-    return InPlane(axes, plane.nearest(best.shift), misfit, min([*others, 1.0]) - misfit)
+    return InPlane(axes, plane.nearest(best.shift), score, min([*others, 1.0]) - score)
 
 
 def axes_in_plane(rotation: FloatArray, plane: MidPlane) -> FloatArray:
@@ -220,7 +220,7 @@ def _similarity(a: FloatArray, b: FloatArray, weights: FloatArray, scales: tuple
     return _Fit(scale, rotation, cb - scale * rotation @ ca)
 
 
-def _misfit(bone: Bone, template: HeadTemplate, fit: _Fit, clip: float, *, every: int = 1) -> float:
+def _distance_score(bone: Bone, template: HeadTemplate, fit: _Fit, clip: float, *, every: int = 1) -> float:
     there = fit.forth(template.points[::every])
     inside = bone.scan.inside(there)
     d = np.minimum(bone.tree.query(there, distance_upper_bound=clip)[0], clip)

@@ -52,7 +52,7 @@ def read_mesh(path: str | PathLike[str]) -> pv.PolyData:
     Notes
     -----
     Every format but OBJ says how much there should be; so an OBJ file of another program that is cut off
-    between two lines cannot be told from a smaller one. Ours say it in their first line.
+    between two lines cannot be distinguished from a smaller one. Ours say it in their first line.
     """
     file = Path(path)
     suffix = file.suffix.lower()

@@ -85,7 +85,7 @@ class FitAtlas:
     paths : tuple of Path
         Files and folders.
     keep_doubtful : bool
-        Believe the labels that the check doubts, too.
+        Use the labels that the check finds doubtful, too.
     """
 
     paths: tuple[Path, ...]

@@ -41,7 +41,7 @@ class PhysicalResult:
 
 @dataclass(frozen=True, eq=False)
 class PhysicalTest:
-    """Hold touches against the labels and skull features of the same skull's scan.
+    """Compare touches with the labels and skull features of the same skull's scan.
 
     Parameters
     ----------

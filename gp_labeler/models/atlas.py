@@ -1,4 +1,4 @@
-"""The atlas behind ghosts, doubts and poses: which one is in use, where it came from, and how good it is."""
+"""The atlas behind ghosts, problems and poses: which is in use, where it came from, how good it is."""
 
 from __future__ import annotations
 
@@ -121,7 +121,7 @@ class AtlasModel:
 
     @property
     def text(self) -> str:
-        """Which atlas ghosts and doubts come from, where it is not the published one."""
+        """Which atlas ghosts and problems come from, where it is not the published one."""
         if self._atlas is None or self.is_published:
             return ""
         without = f" without {self._document.state.specimen}" if self.is_held_out else ""
@@ -235,7 +235,7 @@ class AtlasModel:
         self._jobs.submit(TryAtlas(self._specimens), self._take_trial, key=_TRIAL)
 
     def use(self, atlas: Atlas, specimens: Iterable[Specimen] = (), *, file: Path | None = None) -> None:
-        """Take another atlas for ghosts, doubts and poses.
+        """Take another atlas for ghosts, problems and poses.
 
         Parameters
         ----------
@@ -297,11 +297,11 @@ class AtlasModel:
         self._take(fitted.atlas, fitted.animals, source)
         n = len(fitted.animals.skipped)
         text = f"The atlas was fitted to {fitted.animals.text}" + (f"; {n} skipped" if n else "")
-        doubted = list(dict.fromkeys(finding.specimen for finding in fitted.animals.doubts))
-        if doubted:
-            many = "animal" if len(doubted) == 1 else "animals"
-            text += f"; {len(doubted)} {many} in doubt: {', '.join(doubted)}"
-        self._messages.say(text, "warning" if n or doubted else "info")
+        doubtful = list(dict.fromkeys(finding.specimen for finding in fitted.animals.problems))
+        if doubtful:
+            many = "animal" if len(doubtful) == 1 else "animals"
+            text += f"; {len(doubtful)} {many} with problems: {', '.join(doubtful)}"
+        self._messages.say(text, "warning" if n or doubtful else "info")
 
     def _take_trial(self, trial: Trial) -> None:
         self.trial = trial

@@ -31,7 +31,7 @@ class LabelChecks:
     Parameters
     ----------
     check : callable, optional
-        The checker; None doubts nothing.
+        The checker; None finds no problem.
     measure : callable, optional
         Asks the scan; None where there is none.
     """
@@ -70,16 +70,16 @@ class LabelChecks:
         return found
 
     def known_problems(self, landmarks: LandmarkSet) -> Mapping[str, Finding]:
-        """Return the doubts where they are known, else as the last edit leaves those before it; at once.
+        """Return the problems where they are known, else as the last edit leaves those before it; at once.
 
-        What other points are doubted for waits for the next check, lest all doubts blink at every edit; a
+        Problems of other points wait for the next check, so that they do not blink at every edit; a
         point that was moved is compared with the place where the others expect it, which stays.
         """
         known = self.known(landmarks)
         return self._carried(landmarks) if known is None else known.problems
 
     def remember(self, landmarks: LandmarkSet, found: SideCheck) -> None:
-        """Take the check of a side from which the doubts after the next edit follow."""
+        """Take the check of a side from which the problems after the next edit follow."""
         with self._lock:
             self._latest[landmarks.side] = landmarks, found
 
@@ -91,19 +91,19 @@ class LabelChecks:
         moved = {f.code for f, stayed in zip(FEATURES, stays, strict=True) if not (stayed or f.computed)}
         if len(moved) > 1:
             return {}
-        carried = {code: doubt for code, doubt in found.problems.items() if code in landmarks}
+        carried = {code: problem for code, problem in found.problems.items() if code in landmarks}
         for code in moved & set(carried):
-            doubt = _moved(carried.pop(code), code, landmarks)
-            if doubt is not None:
-                carried[code] = doubt
+            problem = _moved(carried.pop(code), code, landmarks)
+            if problem is not None:
+                carried[code] = problem
         return carried
 
 
-def _moved(doubt: Finding, code: str, landmarks: LandmarkSet) -> Finding | None:
-    """Return what is doubted of a point after it was moved; None where only the next check can say."""
-    was = doubt.deviation_of(code)
-    if doubt.kind == "other side":
-        return doubt
+def _moved(problem: Finding, code: str, landmarks: LandmarkSet) -> Finding | None:
+    """Return the problem of a point after it was moved; None where only the next check can say."""
+    was = problem.deviation_of(code)
+    if problem.kind == "other side":
+        return problem
     if was is None:
         return None
     away = deviation(code, landmarks[code], was.expected, was.covariance)
@@ -112,7 +112,7 @@ def _moved(doubt: Finding, code: str, landmarks: LandmarkSet) -> Finding | None:
 
 @dataclass(frozen=True)
 class CheckLabels:
-    """A job (see `jobs`) that checks one side, so that its doubts are known afterwards."""
+    """A job (see `jobs`) that checks one side, so that its problems are known afterwards."""
 
     checks: LabelChecks
     landmarks: LandmarkSet

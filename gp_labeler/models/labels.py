@@ -1,4 +1,4 @@
-"""The labels of the specimen: the active point, where points are expected, what is doubted, and edits."""
+"""The labels of the specimen: the active point, where points are expected, what is wrong, and edits."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ class LabelsModel:
     scan : ScanModel
         Labels are checked against its bone.
     atlas : AtlasModel
-        Says where features are expected, and what is doubted.
+        Says where features are expected, and what is wrong.
     jobs : Jobs
         Where labels are checked.
     messages : Messages
@@ -76,7 +76,7 @@ class LabelsModel:
     active_changed = Signal(object)
     """The `Active` point."""
     ghosts_changed = Signal()
-    """Another atlas is behind ghosts and doubts; they also follow the landmarks, without this signal."""
+    """Another atlas is behind ghosts and problems; they also follow the landmarks, without this signal."""
     checked = Signal()
     """Labels were checked: ask for `deviations` again."""
     problems_changed = Signal()
@@ -132,7 +132,7 @@ class LabelsModel:
         return self._expectations.ghosts(self.document.landmarks(side), self.document.landmarks(side.other))
 
     def problems(self, side: Side) -> Mapping[str, Finding]:
-        """Return what is doubted of the points of one side, by feature; this may take some 50 ms."""
+        """Return the problems of the points of one side, by feature; this may take some 50 ms."""
         return self._checks.found(self.document.landmarks(side)).problems
 
     def known_problems(self, side: Side) -> Mapping[str, Finding]:
@@ -149,13 +149,13 @@ class LabelsModel:
         return None if known is None else known.deviations
 
     def checking(self, side: Side) -> CheckLabels:
-        """Return the job that checks one side as it stands, for `point_states` to know its doubts."""
+        """Return the job that checks one side as it stands, for `point_states` to know its problems."""
         return CheckLabels(self._checks, self.document.landmarks(side))
 
     def point_states(self, side: Side, *, wait: bool = True) -> dict[str, PointState]:
         """Return how far every feature of one side is, in the table's order.
 
-        Without `wait`, doubts are `known_problems`: run `checking`, then ask again.
+        Without `wait`, problems are `known_problems`: run `checking`, then ask again.
         """
         ghosts, state = self.ghosts(side), self.document.state
         problems = self.problems(side) if wait else self.known_problems(side)
@@ -166,7 +166,7 @@ class LabelsModel:
         return progress(self.document.state, side)
 
     def expect(self, predict: Predict | None, check: Check | None = None) -> None:
-        """Take another atlas for ghosts and doubts, or none."""
+        """Take another atlas for ghosts and problems, or none."""
         self._expectations = Expectations(predict)
         self._checks = LabelChecks(check, self._checks.measure)
         self.ghosts_changed.emit()
@@ -345,7 +345,7 @@ class LabelsModel:
             self._view.set_crosshair(where)
 
     def go_to(self, side: Side | str, code: str) -> None:
-        """Choose a point, and bring it, or where it is suggested or expected, into sight in every view."""
+        """Choose a point, and bring it, or where it is suggested or expected, into view in every view."""
         self.choose(side, code)
         if self.place_of(Side.parse(side), code) is not None:
             self._view.show_point(self._view.crosshair)
@@ -364,13 +364,17 @@ class LabelsModel:
     def lock_all(self, locked: bool = True) -> bool:
         """Lock every point that is placed or not seen, or unlock all."""
         codes = [f.code for f in FEATURES if not f.computed]
-        settled = [
+        placed_or_unseen = [
             (side, code)
             for side in Side
             for code in codes
             if self.document.state.landmark(side, code).decided
         ]
-        points = [(side, code) for side, code in settled if not (feature(code).shared and side is Side.RIGHT)]
+        points = [
+            (side, code)
+            for side, code in placed_or_unseen
+            if not (feature(code).shared and side is Side.RIGHT)
+        ]
         return bool(points) and self.document.do(LockPoints(tuple(points), locked))
 
     def place_of(self, side: Side, code: str) -> FloatArray | None:
@@ -451,7 +455,7 @@ class LabelsModel:
             self._check(Side, after=0.0)
 
     def _check(self, sides: Iterable[Side], *, after: float) -> None:
-        """Find the doubts of some sides in the background."""
+        """Find the problems of some sides in the background."""
         for side in sides:
             done = partial(self._take_checked, bool(self.known_problems(side)))
             self._jobs.submit(self.checking(side), done, key=f"checking {side.value}", after=after)

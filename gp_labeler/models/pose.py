@@ -96,7 +96,7 @@ class PoseModel:
     atlas : AtlasModel
         What estimates are made by.
     view : ViewModel
-        Brings touched points into sight.
+        Brings touched points into view.
     jobs : Jobs
         Where compiled code is made ready.
     messages : Messages
@@ -336,7 +336,7 @@ class PoseModel:
         self.changed.emit()
 
     @property
-    def file_doubts(self) -> tuple[GateReason, ...]:
+    def file_warnings(self) -> tuple[GateReason, ...]:
         """What the names of its files say against the side of the touches."""
         return tuple(named_for_other_side(file, self.side) for file in self.misnamed)
 
@@ -365,7 +365,7 @@ class PoseModel:
         return best
 
     def show(self, name: str) -> None:
-        """Bring a touched point into sight in every view; nothing happens where it is not in the scan."""
+        """Bring a touched point into view in every view; nothing happens where it is not in the scan."""
         estimate, touch = self.estimate, self._document.state.touches.get((self.side, name))
         registered = None if estimate is None else estimate.registered
         if touch is None or (registered is None and touch.frame != "scan"):
@@ -377,10 +377,10 @@ class PoseModel:
 
     def load(self, path: str | PathLike[str]) -> None:
         """Take the touches of a file for this side in place of those there are."""
-        doubts = touching.load_touches(self._document, path, self.side)
+        warnings = touching.load_touches(self._document, path, self.side)
         self._aim(self._first_untouched())
         taken = f"Took {len(self._touched())} touches from {Path(path).name}"
-        self._messages.say(". ".join((taken, *doubts)), "warning" if doubts else "info")
+        self._messages.say(". ".join((taken, *warnings)), "warning" if warnings else "info")
 
     # What leaves
 
@@ -401,7 +401,7 @@ class PoseModel:
         """
         pose = self._pose()
         if not (accept_warnings or says_its_state(path)):
-            self._check_doubt(pose, path)
+            self._check_writable(pose, path)
         file = save_pose(pose, path)
         self._messages.say(f"Wrote {file.name}, y to the {pose.round_window} round window")
         self._messages.wrote.emit("pose", file)
@@ -430,16 +430,16 @@ class PoseModel:
         """
         if self._path is None:
             raise GpError("there is no insertion path", remedy="Carry one to the estimate first.")
-        self._check_doubt(self._pose(), path)
+        self._check_writable(self._pose(), path)
         assert self.estimate is not None
         file = self._path.save_carried(self.estimate, path)
         self._messages.say(f"Wrote {file.name}")
         self._messages.wrote.emit("path", file)
         return file
 
-    def _check_doubt(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
+    def _check_writable(self, pose: CochleaPose, path: str | PathLike[str]) -> None:
         """Refuse to write for a robot what is in doubt, unless a person has accepted this very estimate."""
-        reasons = (*reasons_against_writing(pose), *self.file_doubts)
+        reasons = (*reasons_against_writing(pose), *self.file_warnings)
         estimate = self.estimate
         accepted = estimate is not None and verdict_on(estimate, self._document.state) == "accept"
         if reasons and not accepted:

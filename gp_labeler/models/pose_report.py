@@ -206,7 +206,7 @@ class PoseReport:
         )
 
     def _residual(self, name: str) -> tuple[float | None, bool]:
-        """Return how far a touch is from its feature, or a skull feature from its fellow in the scan."""
+        """Return how far a touch is from its feature, or a skull feature from its counterpart in the scan."""
         pose, registered = self.estimate.pose, self.estimate.registered
         if pose is not None and name in pose.residuals:
             return pose.residuals[name], name in pose.suspects

@@ -64,7 +64,7 @@ class PoseSending:
         state: SpecimenState,
         doubtful: tuple[str, ...],
         reference_age_s: float | None,
-        file_doubts: tuple[GateReason, ...] = (),
+        file_warnings: tuple[GateReason, ...] = (),
     ) -> None:
         """Send how the pose stands now.
 
@@ -77,7 +77,7 @@ class PoseSending:
             Touches that may lie in another frame than what the tracker reads now.
         reference_age_s : float or None
             How long ago the reference was read, seconds; None where no touch hangs on one.
-        file_doubts : tuple of GateReason
+        file_warnings : tuple of GateReason
             What the names of the touches' files say against the side.
         """
         if self._sender is None:
@@ -92,7 +92,7 @@ class PoseSending:
                 pose, accepted=verdict_on(estimate, state) == "accept", reference_age_s=reference_age_s
             ),
             *_reasons_of_touches(pose, doubtful),
-            *file_doubts,
+            *file_warnings,
         )
         if verdict_on(estimate, state) == "reject":
             reasons = (

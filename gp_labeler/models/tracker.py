@@ -457,7 +457,9 @@ class TrackerModel:
     def _update_sending(self, *_: object) -> None:
         if self._sending.on:
             pose, state = self._pose, self._document.state
-            self._sending.update(pose.estimate, state, self.doubtful, self._reference_age(), pose.file_doubts)
+            self._sending.update(
+                pose.estimate, state, self.doubtful, self._reference_age(), pose.file_warnings
+            )
 
     def _reference_age(self) -> float | None:
         """Return how long ago the reference was read, s; None where no touch was taken in its frame."""

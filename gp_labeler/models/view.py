@@ -93,7 +93,7 @@ class ViewState:
     cut : Cut, optional
         What cuts bone open in the 3D view; None leaves it whole.
     slices_visible : bool
-        Whether the slices stand in the 3D view.
+        Whether the 3D view shows the slices.
     camera : Camera, optional
         None until the first picture.
     """
@@ -143,7 +143,7 @@ class ViewModel:
     planes_changed = Signal()
     """The slice views show other planes, or name directions in another frame."""
     point_shown = Signal(object)
-    """(3,) scan position that every view shall bring into sight, mm."""
+    """(3,) scan position that every view shall bring into view, mm."""
 
     reset_asked = Signal()
     """Every view shall show everything again."""
@@ -231,7 +231,7 @@ class ViewModel:
         self.set_planes({n: plane.rotated(axis, angle, self._crosshair) for n, plane in others.items()})
 
     def show_point(self, position: ArrayLike) -> None:
-        """Move the crosshair to a (3,) position, and bring it into sight in every view; mm, scan frame."""
+        """Move the crosshair to a (3,) position, and bring it into view in every view; mm, scan frame."""
         self.set_crosshair(position)
         self.point_shown.emit(self._crosshair)
 

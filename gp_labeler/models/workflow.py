@@ -87,7 +87,7 @@ def point_state(
     ghosts: Mapping[str, Ghost],
     problems: Mapping[str, Finding],
 ) -> PointState:
-    """Return how far a point is; a point that a person checked is not doubted."""
+    """Return how far a point is; a point that a person checked counts as sound."""
     if feature(code).computed:
         return PointState.COMPUTED if code in state.side(side) else PointState.TO_DO
     landmark = state.landmark(side, code)
@@ -133,14 +133,14 @@ def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Act
             mark = state.landmark(side, code)
             if not mark.decided and mark.suggestion is None:
                 return Active(side, code)
-        if suggested := _by_doubt(state, side, after=active.code if side is active.side else None):
+        if suggested := _least_certain_first(state, side, after=active.code if side is active.side else None):
             return Active(side, suggested[0])
     if active.code is not None and not state.landmark(active.side, active.code).decided:
         return active
     return Active(active.side)
 
 
-def _by_doubt(state: SpecimenState, side: Side, *, after: str | None) -> list[str]:
+def _least_certain_first(state: SpecimenState, side: Side, *, after: str | None) -> list[str]:
     """Return what is suggested on one side, the least certain first; round from `after`, which comes last."""
     radii = {code: found.radius_95 for code, found in state.side(side).suggested.items()}
     order = sorted(radii, key=lambda code: -(radii[code] or np.inf))

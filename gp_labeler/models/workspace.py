@@ -44,7 +44,7 @@ class Workspace:
     dispatcher : callable, optional
         Brings results of jobs to this thread.
     atlas : Atlas, optional
-        Behind ghosts, doubts and poses; by default the one chosen last, loaded as a job by `atlas.load`.
+        Behind ghosts, problems and poses; by default the one chosen last, loaded as a job by `atlas.load`.
     author : str, optional
         Who labels; by default who said so before, as the state directory remembers it.
     """

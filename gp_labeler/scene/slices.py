@@ -61,7 +61,7 @@ class SliceImage:
         return corners
 
     def grey(self, window: WindowLevel) -> NDArray[np.uint8]:
-        """Return the slice as 8-bit greys, (h, w)."""
+        """Return the slice as 8-bit grey values, (h, w)."""
         return np.ascontiguousarray(window.grey(self.values))
 
     def rgb(

@@ -53,7 +53,7 @@ class WindowLevel:
         return WindowLevel(middle - half, middle + half)
 
     def grey(self, values: NDArray[Any]) -> Grey:
-        """Return values as 8-bit greys, black for NaN."""
+        """Return values as 8-bit grey values, black for NaN."""
         if values.dtype in _TABLED:
             unsigned = values.view(f"u{values.dtype.itemsize}")
             shown: Grey = _table(self, values.dtype.str)[unsigned]
@@ -63,7 +63,7 @@ class WindowLevel:
 
 @lru_cache(maxsize=8)
 def _table(scale: WindowLevel, dtype: str) -> Grey:
-    """Greys of all values of a small integer type, in the order of their bit patterns."""
+    """Grey values of all values of a small integer type, in the order of their bit patterns."""
     size = np.dtype(dtype).itemsize
     table = _scaled(scale, np.arange(256**size, dtype=f"u{size}").view(dtype))
     table.setflags(write=False)

@@ -82,6 +82,6 @@ def _inside(widget: QWidget, x: float, y: float) -> QPoint:
     if not widget.rect().contains(point):
         raise GpError(
             f"pixel {point.x()}, {point.y()} lies outside the view, {widget.width()} x {widget.height()}",
-            remedy="Bring it into sight first: view, with go_to.",
+            remedy="Bring it into view first: view, with go_to.",
         )
     return point

@@ -174,7 +174,7 @@ class WindowDriver:
         return self.scene if name == "3d" else self.window.grid.slice_views[Plane(name)]
 
     def bring(self, position: FloatArray) -> None:
-        """Bring a (3,) scan position into sight in every view, as a click on a row does."""
+        """Bring a (3,) scan position into view in every view, as a click on a row does."""
         self.workspace.view.set_crosshair(position)
         self.workspace.view.point_shown.emit(np.asarray(position, dtype=np.float64))
 

@@ -68,7 +68,7 @@ class _State:
     segment: int = 0
     last: Sample | None = None
     left: tuple[_Left, ...] = ()
-    doubted_since: float | None = None
+    suspicious_since: float | None = None
 
 
 class JumpFilter:
@@ -103,11 +103,11 @@ class JumpFilter:
 
     def _believe(self, sample: Sample) -> Sample:
         state = self._state
-        doubted = state.doubted_since
-        if doubted is not None and sample.received - doubted < self.limits.settle_s:
+        suspicious = state.suspicious_since
+        if suspicious is not None and sample.received - suspicious < self.limits.confirm_s:
             return replace(sample, fault=Fault.JUMP, detail=self._words(sample), segment=state.segment)
         believed = replace(sample, segment=state.segment)
-        self._state = replace(state, last=believed, doubted_since=None)
+        self._state = replace(state, last=believed, suspicious_since=None)
         return believed
 
     def _is_jump(self, motion: _Motion, earlier: _Motion | None) -> bool:
@@ -152,7 +152,7 @@ class JumpFilter:
         for at in range(len(left) - 1, -1, -1):
             if self._is_back(left[at], sample):
                 return _State(left[at].number, left[at].last, left[:at])
-        if state.last is not None and state.doubted_since is None:
+        if state.last is not None and state.suspicious_since is None:
             left = (*left, _Left(state.segment, state.last, T_jump))[-_MOST_SEGMENTS:]
         return _State(next(self._numbers), None, left, sample.received)
 

@@ -1,4 +1,4 @@
-"""Which messages of a tracker can be believed: every doubt has a name, and doubtful ones record nothing."""
+"""Which messages of a tracker can be believed: every fault has a name, and doubtful ones record nothing."""
 
 from __future__ import annotations
 

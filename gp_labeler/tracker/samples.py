@@ -54,7 +54,7 @@ class Limits:
         The same of the reference on the head: one that moves faster was knocked, or is read wrongly.
     noise_mm, noise_deg : float
         Steps up to this are no jump, however short the time.
-    settle_s : float
+    confirm_s : float
         How long nothing is recorded after a jump that the marker does not take back.
     late_s : float
         How much longer than the quickest a message may take.
@@ -74,7 +74,7 @@ class Limits:
     head_acceleration_mm_s2: float = 1_000.0
     noise_mm: float = 1.5
     noise_deg: float = 3.0
-    settle_s: float = 2.0
+    confirm_s: float = 2.0
     late_s: float = 0.25
     reference_gap_s: float = 0.12
     frozen_s: float | None = 0.2

@@ -19,7 +19,7 @@ from gp_labeler.tracker.samples import Fault, Sample
 __all__ = ["RecordedTouch", "RefusedTouch", "TouchRecorder", "TouchSettings"]
 
 _SECONDS_BETWEEN_LOOKS = 0.015
-_SETTLING = 0.2
+_INITIAL_SHARE = 0.2
 """The part of the window, at its beginning, in which a tip that comes to rest is not averaged yet."""
 
 _SPOILING = (Fault.JUMP, Fault.FROZEN)
@@ -220,8 +220,8 @@ class TouchRecorder:
         self.progress = min(_seconds(window) / self.settings.window_s, 1.0)
         if self.progress < 1.0:
             return None
-        settled = window[0].time + _SETTLING * self.settings.window_s
-        outcome = self._average([s for s in window if s.time >= settled])
+        at_rest = window[0].time + _INITIAL_SHARE * self.settings.window_s
+        outcome = self._average([s for s in window if s.time >= at_rest])
         if isinstance(outcome, RefusedTouch):
             return None
         self._finish(outcome)

@@ -86,15 +86,15 @@ def _shown_at(landmarks: LandmarkSet, code: str) -> FloatArray | None:
 
 
 def drawn_ghosts(workspace: Workspace) -> list[GhostEllipsoid]:
-    """Return where the active point is expected: to do, suggested, or doubted where it was placed."""
+    """Return where the active point is expected: to do, suggested, or doubtful where it was placed."""
     document, labels = workspace.document, workspace.labels
     side, code = labels.active.side, labels.active.code
     if code is None or not workspace.view.state.ghosts_visible:
         return []
     ghost = labels.ghosts(side).get(code)
-    doubt = labels.known_problems(side).get(code)
-    if doubt is not None and labels.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
-        away = doubt.deviation_of(code)
+    problem = labels.known_problems(side).get(code)
+    if problem is not None and labels.point_states(side, wait=False)[code] is PointState.DOUBTFUL:
+        away = problem.deviation_of(code)
         if away is None or away.distance > HEAD_MM:  # such a place would mean nothing
             return []
         return [GhostEllipsoid(key_of(side, code), away.expected, away.covariance, f"{code}?", active=True)]

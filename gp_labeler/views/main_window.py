@@ -149,7 +149,7 @@ class MainWindow(QMainWindow):
         return self._pose.take_file(path)
 
     def judge_pose(self, verdict: str) -> bool:
-        """Keep a verdict on the estimate with the initials and the note that stand in the panel."""
+        """Keep a verdict on the estimate with the initials and the note from the panel."""
         return self._pose.verdict.judge(verdict)
 
     def _dock(self) -> None:

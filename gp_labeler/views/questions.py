@@ -8,7 +8,7 @@ from typing import Any
 
 from gp_core.errors import GpError
 from gp_labeler.document.landmark_export import export_landmarks
-from gp_labeler.document.landmark_import import MisfitError, import_landmarks
+from gp_labeler.document.landmark_import import OffBoneError, import_landmarks
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.prompts import Prompts
@@ -59,10 +59,10 @@ def import_asking(workspace: Workspace, files: Sequence[Path], prompts: Prompts,
     """Take over landmark files; asks where they cannot belong to the scan."""
     try:
         notes = import_landmarks(workspace.document, files, near_bone=workspace.scan.near_bone, **how)
-    except MisfitError as error:
+    except OffBoneError as error:
         answers = ["Import nevertheless"]
         if prompts.choose("Do they belong here?", error.problem, answers, detail=error.remedy or ""):
-            import_asking(workspace, files, prompts, accept_misfit=True)
+            import_asking(workspace, files, prompts, accept_off_bone=True)
         return
     words = ". ".join(notes) or f"Imported {', '.join(file.name for file in files)}"
     workspace.say(words, "warning" if notes else "info")

@@ -148,7 +148,7 @@ def atlas_of_shape() -> Atlas:
 
 
 check = partial(check_side, atlas=atlas_of_shape())
-"""Doubts what is not where `shape` has it."""
+"""Finds a problem with what is not where `shape` has it."""
 
 
 def text_of(state: SpecimenState) -> str:

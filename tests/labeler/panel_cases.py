@@ -1,4 +1,4 @@
-"""Shared by the tests of the panels: a workspace with a small scan, points of the atlas laid into it."""
+"""Shared by the tests of the panels: a workspace with a small scan, points of the atlas placed in it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PANEL_WIDTH = 472
 
 
 def grey_volume(seed: int = 0) -> Volume:
-    """Noise around two greys, as air and bone have; 60 mm wide."""
+    """Noise around two grey values, as air and bone have; 60 mm wide."""
     rng = np.random.default_rng(seed)
     array = rng.normal(40, 12, (40, 40, 40))
     array[12:28, 12:28, 12:28] = rng.normal(180, 15, (16, 16, 16))

@@ -73,7 +73,7 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
     colours = len(dtype.names or ()) or 1
     layout = Layout(shape, (0, 1, 2)) if colours == 1 else Layout((colours, *shape), (1, 2, 3))
     base = dtype[0] if dtype.names else dtype
-    values, doubts = _scaling(header) if dtype.names is None else (_Values(), ())
+    values, warnings = _scaling(header) if dtype.names is None else (_Values(), ())
     stored = Stored(base, _packing(voxel_file), skip=int(header.get_data_offset()))
     plain = layout.finish(channel) if colours > 1 else to_grey
     source = voxels_in([voxel_file], stored, layout, values.finish(plain))
@@ -85,7 +85,7 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
         source=source,
         files=tuple(dict.fromkeys((header_file, voxel_file))),
         geometry=geometry,
-        found=(*length_problems(source, stored), *found, *complaints, *doubts, *more),
+        found=(*length_problems(source, stored), *found, *complaints, *warnings, *more),
         notes=(*units, *(scaled if values.scaled else ())),
         channels=layout.channels,
         n_volumes=layout.n_volumes,

@@ -31,7 +31,7 @@ class PixelSize:
         Which part of the file says so.
     reason : str
         Why a length is not known, where the file says something else in its place.
-    doubts : tuple of str
+    warnings : tuple of str
         What a person should know of how the lengths were read.
     """
 
@@ -40,7 +40,7 @@ class PixelSize:
     z: float | None = None
     said_by: str = ""
     reason: str = ""
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
 
     def turned(self) -> PixelSize:
         """Return the size of pixels whose rows and columns are exchanged."""
@@ -91,16 +91,16 @@ def _imagej(meta: Mapping[str, Any], x: float, y: float) -> PixelSize:
     unit_x, unit_y, unit_z = (unit_in_mm(word) for word in words)
     if unit_x is None or unit_y is None:
         return UNKNOWN
-    doubts: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     try:
         depth = float(meta.get("spacing", 0))
     except (TypeError, ValueError):
         depth = 0.0
     if depth < 0:
-        doubts = (f"ImageJ's description gives a spacing of {depth:g}; its size counts, as in ImageJ",)
+        warnings = (f"ImageJ's description gives a spacing of {depth:g}; its size counts, as in ImageJ",)
     z = None if depth == 0 or unit_z is None or not np.isfinite(depth) else abs(depth) * unit_z
     reason = "" if unit_z is not None else f"ImageJ's description gives the slice distance in {words[2]!r}"
-    return PixelSize(unit_x / x, unit_y / y, z, "ImageJ's description", reason, doubts)
+    return PixelSize(unit_x / x, unit_y / y, z, "ImageJ's description", reason, warnings)
 
 
 def _ome(image: OmeImage) -> PixelSize:

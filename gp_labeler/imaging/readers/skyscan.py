@@ -157,7 +157,7 @@ def log_geometry(
         if hint is None:
             return Geometry(sides_known=False), []
         return Geometry(sides_known=False, suggested=(hint, hint, hint * step), reason=reason), []
-    found = _doubts(log, pattern, numbers)
+    found = _warnings(log, pattern, numbers)
     n_slices = (max(numbers) - min(numbers)) // step + 1
     size = f"{shape[1]} x {shape[0]}"
     if log.width and log.height and (log.height, log.width) != shape:
@@ -174,7 +174,7 @@ def log_geometry(
     return Geometry(spacing, sides_known=False), found
 
 
-def _doubts(log: SkyScanLog, pattern: str, numbers: Sequence[int]) -> list[Problem]:
+def _warnings(log: SkyScanLog, pattern: str, numbers: Sequence[int]) -> list[Problem]:
     found = []
     if log.prefix and not pattern.lower().startswith(log.prefix.lower()):
         text = f"{log.path.name} speaks of slices {log.prefix}..., these are {pattern}; it is believed"

@@ -97,12 +97,12 @@ def spacing_problems(
     if spacing is None:
         text = reason or "the voxel size is not in the file"
         return (Problem("spacing-missing", text, "error", ask, ("spacing",)),)
-    if not given and (doubt := _doubt(spacing)):
-        return (Problem(*doubt, "error", ask, ("spacing",)),)
+    if not given and (reason := _implausible(spacing)):
+        return (Problem(*reason, "error", ask, ("spacing",)),)
     return _size_problem(spacing, size)
 
 
-def _doubt(spacing: Spacing) -> tuple[str, str] | None:
+def _implausible(spacing: Spacing) -> tuple[str, str] | None:
     if all(abs(length - 1) < 1e-9 for length in spacing):
         return "spacing-unit", "the voxel size in the file is 1 mm, which programs write when they know none"
     if abs(spacing[2] - 1) < 1e-9 or abs(spacing[0] - 1) < 1e-9:

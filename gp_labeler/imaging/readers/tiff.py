@@ -88,7 +88,7 @@ def inspect_tiff(path: Path, options: ImportOptions) -> ImportPlan:
                 *rivals,
                 *(source.shortage() if isinstance(source, RawSource) else ()),
                 *_findings(stack, path),
-                *(warning("pixel-size", text) for text in size.doubts),
+                *(warning("pixel-size", text) for text in size.warnings),
                 *page_problems(stack.first, options.channel),
             ),
             choices=choices if len(choices) > 1 else (),

@@ -30,7 +30,7 @@ class Fit(Step):
     path : str
         The atlas file.
     keep_doubtful : bool
-        Believe labels that the check doubts, too; by default they are left out, and named.
+        Use labels that the check finds doubtful, too; by default they are left out, and named.
     """
 
     do: ClassVar[str] = "fit"
@@ -44,13 +44,13 @@ class Fit(Step):
         atlas = fit_plain_atlas(specimens) if self.keep_doubtful else fit_screened_atlas(screened)
         atlas.save(file)
         kept = "believed" if self.keep_doubtful else "left out"
-        doubts = [f"{f.specimen} {f.side.word}: {f.text}, {kept}" for f in screened.left_out]
-        return ". ".join((f"{driver.wrote(file)}, {len(specimens)} animals", *doubts))
+        left_out = [f"{f.specimen} {f.side.word}: {f.text}, {kept}" for f in screened.left_out]
+        return ". ".join((f"{driver.wrote(file)}, {len(specimens)} animals", *left_out))
 
 
 @dataclass(frozen=True)
 class UseAtlas(Step):
-    """Take another atlas: for where features are expected, for doubts and for poses.
+    """Take another atlas: for where features are expected, for problems and for poses.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ class UseAtlas(Step):
     specimens : text or texts
         Instead: labelled animals, files or folders of them, to fit one to.
     keep_doubtful : bool
-        Fit it to labels that the check doubts, too.
+        Fit it to labels that the check finds doubtful, too.
     """
 
     do: ClassVar[str] = "atlas"

@@ -51,7 +51,7 @@ class Import(Step):
             side=self.side,
             names=self.names,
             near_bone=driver.workspace.scan.near_bone,
-            accept_misfit=self.accept_misfit,
+            accept_off_bone=self.accept_misfit,
             replace_placed=not self.keep,
         )
         for note in notes:

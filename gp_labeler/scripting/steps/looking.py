@@ -56,7 +56,7 @@ class Look(Step):
     camera : str or three numbers, optional
         Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``, or in a direction.
     go_to : three numbers or str, optional
-        A scan position, mm, or a point such as ``CA L``, to bring into sight in every view.
+        A scan position, mm, or a point such as ``CA L``, to bring into view in every view.
     axial, sagittal, coronal : float, optional
         Positions of the slices, mm.
     zoom : float, optional

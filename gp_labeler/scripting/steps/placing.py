@@ -117,7 +117,7 @@ class Place(Step):
 
 
 def _seen_in(driver: WindowDriver, name: str, code: str, aim: FloatArray) -> str:
-    """Bring a position into sight, and return the name of the view to click in."""
+    """Bring a position into view, and return the name of the view to click in."""
     if name == "best":
         name = feature(code).view.lower()
         if name == "3d" and not aim_at_bone(driver, aim, turn=True):

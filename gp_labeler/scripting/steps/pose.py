@@ -273,7 +273,7 @@ class Overlay(Step):
         return options | {part: part in self.parts for part in PARTS}
 
     def _find(self, driver: WindowDriver) -> None:
-        """Choose what is drawn, and bring it into sight."""
+        """Choose what is drawn, and bring it into view."""
         placed = current_estimate(driver, self.side or driver.workspace.pose.side).in_scan()
         if placed is None:
             raise GpError(

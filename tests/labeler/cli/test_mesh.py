@@ -1,4 +1,4 @@
-"""`gp-labeler mesh`: every option that an error names settles that error, and the surface is right."""
+"""`gp-labeler mesh`: every option that an error names resolves that error, and the surface is right."""
 
 from __future__ import annotations
 

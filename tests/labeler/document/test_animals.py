@@ -30,7 +30,7 @@ def test_both_sides_of_an_animal_come_together(tmp_path) -> None:
     assert animals.text == "3 animals, 6 sides"
     assert [animal.name for animal in animals.specimens] == ["GP01", "GP02", "GP03"]
     assert not animals.skipped
-    assert not animals.doubts
+    assert not animals.problems
     assert told == sorted(told)
     assert 0 <= told[0] < told[-1] < 1
 
@@ -85,7 +85,7 @@ def test_a_label_far_off_is_read_and_named(tmp_path) -> None:
     write_side(tmp_path, "GP01", side.with_point("LLI", side["LLI"] + [2.5, 0, 0]))
     animals = read_animals([tmp_path])
     assert animals.text == "1 animal, 1 side"
-    assert ("far", ("LLI",)) in [(f.kind, f.landmarks) for f in animals.doubts]
+    assert ("far", ("LLI",)) in [(f.kind, f.landmarks) for f in animals.problems]
 
 
 def test_folders_of_folders_are_searched_and_empty_ones_named(tmp_path) -> None:

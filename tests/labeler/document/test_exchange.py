@@ -14,7 +14,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
 from gp_labeler.document.edits import CheckPoint
 from gp_labeler.document.landmark_export import FORMATS, export_landmarks
-from gp_labeler.document.landmark_import import ImportLandmarks, MisfitError, import_landmarks
+from gp_labeler.document.landmark_import import ImportLandmarks, OffBoneError, import_landmarks
 from gp_labeler.document.recent_files import RecentFiles
 from gp_labeler.document.specimen_json import document_of, state_of
 from gp_labeler.document.state import How, SpecimenState
@@ -124,11 +124,11 @@ def test_points_that_cannot_be_of_this_scan_are_refused(editing, tmp_path):
     (file,) = export_landmarks(far.document.state, tmp_path).files
     before = editing.document.state
     with pytest.raises(
-        MisfitError, match=r"specimen GP-014: 2 of 19 points .MN left, ZL left. lie outside the scan"
+        OffBoneError, match=r"specimen GP-014: 2 of 19 points .MN left, ZL left. lie outside the scan"
     ):
         import_landmarks(editing.document, [file])
     assert editing.document.state is before
-    warnings = import_landmarks(editing.document, [file], accept_misfit=True)
+    warnings = import_landmarks(editing.document, [file], accept_off_bone=True)
     assert warnings[0] == "far_L.mrk.json is of specimen far"
     assert warnings[1].startswith("2 of 19 points")
 
@@ -142,7 +142,7 @@ def test_a_flipped_file_is_recognised(editing, tmp_path):
     flipped.document.do(ImportLandmarks((shape(L).with_point("IN", (1, 0, 0)),), MARK))
     (file,) = export_landmarks(flipped.document.state, tmp_path).files
     editing.document.attach_volume(Octant())
-    with pytest.raises(MisfitError, match="With x and y negated all lie inside: is the file RAS"):
+    with pytest.raises(OffBoneError, match="With x and y negated all lie inside: is the file RAS"):
         import_landmarks(editing.document, [file])
 
 
@@ -152,7 +152,9 @@ def test_points_off_the_bone(editing, tmp_path):
     def near(n_off):
         return lambda points: np.arange(len(points)) >= n_off
 
-    with pytest.raises(MisfitError, match=r"10 of 19 points \(CA left, CB left, .*\.\.\.\) lie off the bone"):
+    with pytest.raises(
+        OffBoneError, match=r"10 of 19 points \(CA left, CB left, .*\.\.\.\) lie off the bone"
+    ):
         import_landmarks(editing.document, [left], near_bone=near(10))
     assert import_landmarks(editing.document, [left], near_bone=near(1)) == (
         "1 of 19 points (CA left) lie off the bone",

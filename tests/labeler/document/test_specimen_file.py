@@ -1,4 +1,4 @@
-"""The specimen file keeps every bit, and says what is wrong with one that was damaged."""
+"""The specimen file keeps full precision, and says what is wrong with one that was damaged."""
 
 from __future__ import annotations
 

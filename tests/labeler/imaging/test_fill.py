@@ -1,4 +1,4 @@
-"""Values that stand for nothing leave threshold, histogram, greys and surface as they were without them."""
+"""Fill values leave threshold, histogram, grey values and surface as they were without them."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ def test_an_atlas_fitted_here_is_saved_and_opened_again(workspace, folder, tmp_p
     assert workspace.atlas.specimens == ()
 
 
-def test_a_fit_to_an_animal_in_doubt_warns_and_names_it(workspace, tmp_path) -> None:
+def test_a_fit_to_an_animal_with_problems_warns_and_names_it(workspace, tmp_path) -> None:
     animals = drawn_animals(5, seed=5)
     right = animals[2].side("R")
     wrong = right.with_point("CA", right["CB"]).with_point("CB", right["CA"])
@@ -70,7 +70,7 @@ def test_a_fit_to_an_animal_in_doubt_warns_and_names_it(workspace, tmp_path) -> 
     workspace.wait()
     level, text = workspace.said[-1]
     assert level == "warning"
-    assert text == "The atlas was fitted to 5 animals, 10 sides; 1 animal in doubt: GP03"
+    assert text == "The atlas was fitted to 5 animals, 10 sides; 1 animal with problems: GP03"
 
 
 def test_leave_one_out_of_the_animals_by_both_methods(workspace, folder) -> None:
@@ -302,7 +302,7 @@ def test_views_are_told_of_a_check_that_changes_what_they_show(workspace) -> Non
     assert told == [], "no point looks otherwise than before"
     workspace.labels.place(mean["MH"] + [0, 3, 0], side=L, code="MH")
     workspace.wait()
-    assert told == [1], "a doubt was found"
+    assert told == [1], "a problem was found"
     workspace.labels.place(mean["OS"] + 0.01, side=L, code="OS")
     workspace.wait()
-    assert told == [1, 1], "the doubt that is shown was looked at again"
+    assert told == [1, 1], "the problem that is shown was looked at again"

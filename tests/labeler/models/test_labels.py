@@ -247,18 +247,18 @@ def test_the_checker_is_asked_once_for_the_same_points():
     assert len(asked) == 1
 
 
-def test_nonsense_is_doubted_in_words_not_in_kilometres():
+def test_nonsense_is_described_in_words_not_in_kilometres():
     published = partial(check_side, atlas=Atlas.published())
     rng = np.random.default_rng(0)
     heap = {code: 1e-3 * rng.normal(size=3) for code in CODES if code != "CO"}
     assert not published(LandmarkSet.from_mapping(heap, L)).deviations
     off = {code: Atlas.published()[code] for code in heap} | {"ZL": (300.0, 0, 0)}
-    doubt = published(LandmarkSet.from_mapping(off, L)).problems["ZL"]
-    assert doubt.word == "far off"
-    assert "check names, side and units" in doubt.text
+    problem = published(LandmarkSet.from_mapping(off, L)).problems["ZL"]
+    assert problem.word == "far off"
+    assert "check names, side and units" in problem.text
 
 
-def test_doubts_can_be_found_by_a_job():
+def test_problems_can_be_found_by_a_job():
     editing = Editing(BOTH.apply(SpecimenState()), check=check)
     editing.document.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
     assert editing.labels.point_states(L, wait=False)["FPP"] is PointState.PLACED
@@ -267,35 +267,35 @@ def test_doubts_can_be_found_by_a_job():
     assert editing.labels.point_states(L, wait=False)["FPP"] is PointState.DOUBTFUL
 
 
-def test_doubts_do_not_blink_while_an_edit_is_judged():
+def test_problems_do_not_blink_while_an_edit_is_judged():
     editing = Editing(BOTH.apply(SpecimenState()), check=check)
     editing.document.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 3, 0], MARK))
 
-    def doubted() -> dict[str, float]:
+    def distances() -> dict[str, float]:
         states = editing.labels.point_states(L, wait=False)
         assert set(editing.labels.known_problems(L)) == {
             c for c, s in states.items() if s is PointState.DOUBTFUL
         }
-        doubts = editing.labels.known_problems(L)
-        return {code: round(doubt.deviation_of(code).distance, 1) for code, doubt in doubts.items()}
+        problems = editing.labels.known_problems(L)
+        return {code: round(problem.deviation_of(code).distance, 1) for code, problem in problems.items()}
 
-    assert doubted() == {}, "nobody has looked yet"
+    assert distances() == {}, "nobody has looked yet"
     editing.labels.checking(L).run(lambda fraction: None)
-    assert doubted() == {"FPP": 3.0}
+    assert distances() == {"FPP": 3.0}
     editing.document.do(PlacePoint(L, "OS", shape()["OS"] + 0.01, MARK))
-    assert doubted() == {"FPP": 3.0}, "another point was moved"
+    assert distances() == {"FPP": 3.0}, "another point was moved"
     editing.labels.checking(L).run(lambda fraction: None)
     editing.document.do(PlacePoint(L, "FPP", shape()["FPP"] + [0, 2, 0], MARK))
-    assert doubted() == {"FPP": 2.0}, "its own place tells by itself"
+    assert distances() == {"FPP": 2.0}, "its own place tells by itself"
     editing.document.do(PlacePoint(L, "FPP", shape()["FPP"], MARK))
-    assert doubted() == {}
+    assert distances() == {}
     editing.document.undo()
     editing.document.do(ClearPoint(L, "FPP"))
-    assert doubted() == {}, "what is not placed is not doubted"
+    assert distances() == {}, "what is not placed has no problem"
     editing.document.undo()
     editing.labels.checking(L).run(lambda fraction: None)
     editing.document.do(SwapSides())
-    assert doubted() == {}, "all is new"
+    assert distances() == {}, "all is new"
 
 
 def test_labels_under_the_name_of_the_other_side_are_called_so():
@@ -321,7 +321,7 @@ def test_labels_under_the_name_of_the_other_side_are_called_so():
     assert not judged(R), "one that is off says nothing of the side"
 
 
-def test_a_point_far_off_is_doubted_and_its_ghost_comes_where_it_belongs():
+def test_a_point_far_off_is_doubtful_and_its_ghost_comes_where_it_belongs():
     atlas = Atlas.published()
     rng = np.random.default_rng(3)
     points = {code: atlas[code] + rng.normal(size=3) * 0.1 for code in atlas.codes}

@@ -112,7 +112,7 @@ def test_the_estimate_follows_the_session_and_the_atlas(workspace, animal):
     assert len(told) == before + 1, "it listens to the new specimen"
 
 
-def test_the_other_side_begins_anew(workspace, animal):
+def test_the_other_side_begins_again(workspace, animal):
     workspace.pose.record(animal[ORDER[0]], TouchHow.TYPED)
     workspace.pose.choose(side=Side.RIGHT)
     assert workspace.pose.target == ORDER[0]

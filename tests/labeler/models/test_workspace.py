@@ -192,7 +192,7 @@ def test_a_scan_that_moved_is_named_and_found_again(workspace, ball_file, tmp_pa
     assert workspace.scan.volume is not None
 
 
-def test_a_phantom_which_is_in_no_file_is_made_anew(workspace, tmp_path) -> None:
+def test_a_phantom_which_is_in_no_file_is_made_again(workspace, tmp_path) -> None:
     workspace.scan.open_demo(seed=3, spacing=0.5)
     workspace.wait()
     workspace.labels.place(workspace.scan.truth.side("L")["CA"], side=Side.LEFT, code="CA")
@@ -370,14 +370,14 @@ def test_what_is_given_up_is_not_offered_again(on_ball, ball_file) -> None:
     assert find_recoveries(on_ball.directory) == ()
 
 
-def test_a_single_point_off_the_bone_is_doubted_by_the_scan(on_ball) -> None:
+def test_a_single_point_off_the_bone_is_found_by_the_scan(on_ball) -> None:
     on_ball.atlas.use(Atlas.published())
     out = np.array([0.0, 0.0, 1.0])
     on_ball.labels.place(MIDDLE + (BALL_MM + 1.0) * out, side=Side.LEFT, code="IN")
     on_ball.wait()
-    doubt = on_ball.labels.known_problems(Side.LEFT)["IN"]
-    assert doubt.kind == "off bone"
-    distance = float(doubt.text.split()[2])
+    problem = on_ball.labels.known_problems(Side.LEFT)["IN"]
+    assert problem.kind == "off bone"
+    distance = float(problem.text.split()[2])
     assert distance == pytest.approx(1.0, abs=VOXEL_MM)
     on_ball.labels.go_to(Side.LEFT, "IN")
     assert "from bone" in content_of(on_ball.labels, has_scan=True).status

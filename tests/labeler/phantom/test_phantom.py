@@ -184,8 +184,8 @@ def test_the_oval_window_opens_between_its_rims(ear):
 def test_the_malleus_handle_is_seen_through_the_ear_canal(ear):
     volume, landmarks, sign = ear
     middle = landmarks.array(["OS", "OI"]).mean(axis=0)
-    sight = middle + sign * np.array([1.5, 0, 0]) - landmarks["MH"]
-    ray = values_along(volume, landmarks["MH"] + 0.3 * sight / np.linalg.norm(sight), landmarks["MH"] + sight)
+    line = middle + sign * np.array([1.5, 0, 0]) - landmarks["MH"]
+    ray = values_along(volume, landmarks["MH"] + 0.3 * line / np.linalg.norm(line), landmarks["MH"] + line)
     assert np.nanmax(ray) < BONE
 
 

@@ -10,7 +10,7 @@ import pytest
 from gp_labeler.scene.colours import DARK, LIGHT, SceneColours, rgb
 
 THEMES = {"dark": DARK, "light": LIGHT}
-SIGHTS = {
+VISIONS = {
     "all cones": np.eye(3),
     "no red": [[0.1523, 1.0526, -0.2049], [0.1145, 0.7863, 0.0992], [-0.0039, -0.0481, 1.0520]],
     "no green": [[0.3673, 0.8606, -0.2280], [0.2801, 0.6725, 0.0474], [-0.0118, 0.0429, 0.9689]],
@@ -47,10 +47,12 @@ def test_they_stand_out_from_bone_and_background(theme: SceneColours, role: str)
 
 
 @pytest.mark.parametrize("theme", THEMES.values(), ids=THEMES)
-@pytest.mark.parametrize("sight", SIGHTS.values(), ids=SIGHTS)
-def test_two_estimates_are_told_apart_by_everybody(theme: SceneColours, sight: object) -> None:
+@pytest.mark.parametrize("vision", VISIONS.values(), ids=VISIONS)
+def test_two_estimates_are_told_apart_by_everybody(theme: SceneColours, vision: object) -> None:
     """A difference of 40 is as from orange to green; the labelled axis differs by its shape as well."""
-    seen = {role: lab(np.asarray(sight) @ linear(theme.states[role])) for role in ("pose", "pose_2", "truth")}
+    seen = {
+        role: lab(np.asarray(vision) @ linear(theme.states[role])) for role in ("pose", "pose_2", "truth")
+    }
     assert np.linalg.norm(seen["pose"] - seen["pose_2"]) > 80
     for one, other in combinations(seen, 2):
         assert np.linalg.norm(seen[one] - seen[other]) > 10

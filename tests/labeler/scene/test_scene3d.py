@@ -421,7 +421,7 @@ def test_bone_drawn_in_chunks_is_the_same_bone(
     assert off.max() < 32  # what lies behind what is judged a piece at a time
 
 
-def test_a_camera_that_moves_while_bone_is_drawn_begins_anew(
+def test_a_camera_that_moves_while_bone_is_drawn_begins_again(
     scene: Scene3D, ball: Surface, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("gp_labeler.scene.mesh_chunks.chunks_of.__defaults__", (ball.n_triangles // 5,))

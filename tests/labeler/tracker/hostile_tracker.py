@@ -41,8 +41,8 @@ class Made:
     hertz: float
     error_mm: float
     segment: int
-    doubted_at_once: bool
-    doubted: bool = False
+    flagged_at_once: bool
+    flagged: bool = False
 
 
 @dataclass
@@ -59,15 +59,15 @@ class Tally:
     @property
     def silent(self) -> list[Made]:
         """Wrong, and not called doubtful by the end of the session."""
-        return [m for m in self.wrong if not (m.doubted_at_once or m.doubted)]
+        return [m for m in self.wrong if not (m.flagged_at_once or m.flagged)]
 
     def __str__(self) -> str:
         lines = [
             f"{self.tried} touches tried, {len(self.made)} recorded, "
-            f"{sum(m.doubted_at_once for m in self.made)} of them called doubtful at once, "
-            f"{sum(m.doubted_at_once or m.doubted for m in self.made)} by the end of the session",
+            f"{sum(m.flagged_at_once for m in self.made)} of them called doubtful at once, "
+            f"{sum(m.flagged_at_once or m.flagged for m in self.made)} by the end of the session",
             f"{len(self.wrong)} wrong by more than {WRONG_MM:g} mm: "
-            f"{sum(m.doubted_at_once for m in self.wrong)} called doubtful at once, "
+            f"{sum(m.flagged_at_once for m in self.wrong)} called doubtful at once, "
             f"{len(self.wrong) - len(self.silent)} by the end, {len(self.silent)} never",
         ]
         return "\n".join([*lines, *(f"  never: {m.error_mm:.1f} mm at {m.hertz:g} Hz" for m in self.silent)])
@@ -193,14 +193,14 @@ class Session:
         samples = self.samples.take(messages, self.now)
         for sample in samples:
             for made in self.made:
-                made.doubted |= sample.segment != made.segment
+                made.flagged |= sample.segment != made.segment
         self.outcomes += self.recorder.update(samples)
 
     def _connect_again(self) -> None:
         """As a `TrackerLink` does where the stream is damaged."""
         self.connections += 1
         for made in self.made:  # whether anything was moved meanwhile is not known
-            made.doubted = True
+            made.flagged = True
         self.decoder = MessageDecoder()
         self.samples = SampleFilter("Probe", "Head")
         self.recorder.cancel()

@@ -33,7 +33,7 @@ def test_touches_without_a_jump_between_them_are_in_one_frame() -> None:
     assert _Touches("CL", "OS", "MN").doubtful == []
 
 
-def test_after_a_jump_earlier_touches_are_in_doubt_until_it_is_taken_back() -> None:
+def test_after_a_jump_earlier_touches_are_doubtful_until_it_is_taken_back() -> None:
     touches = _Touches("CL", "OS")
     touches.check.follow((1, 1))
     assert touches.doubtful == ["CL", "OS"]
@@ -41,7 +41,7 @@ def test_after_a_jump_earlier_touches_are_in_doubt_until_it_is_taken_back() -> N
     assert touches.doubtful == []
 
 
-def test_a_touch_made_during_a_jump_is_in_doubt_once_it_is_taken_back() -> None:
+def test_a_touch_made_during_a_jump_is_doubtful_once_it_is_taken_back() -> None:
     touches = _Touches("CL")
     touches.touch("OS", (1, 1))
     assert touches.doubtful == ["CL"]
@@ -59,7 +59,7 @@ def test_a_feature_touched_again_at_its_place_joins_what_a_jump_parted() -> None
     assert touches.doubtful == []
 
 
-def test_a_feature_touched_again_elsewhere_puts_all_others_in_doubt() -> None:
+def test_a_feature_touched_again_elsewhere_makes_all_others_doubtful() -> None:
     touches = _Touches("CL", "OS", "MN")
     repeated = touches.touch("CL", (1, 0), off=4.0)
     assert repeated is not None

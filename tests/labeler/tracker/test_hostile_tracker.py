@@ -15,7 +15,7 @@ def test_a_tracker_that_fails_records_next_to_nothing_wrong_without_saying_so() 
     assert len(tally.silent) <= 1, str(tally)
 
 
-def test_a_tracker_that_does_not_fail_records_every_touch_without_a_doubt() -> None:
+def test_a_tracker_that_does_not_fail_records_every_touch_without_a_warning() -> None:
     session = Session(np.random.default_rng(1), every_s=1e9)
     for _ in range(10):
         outcome, truth = session.touch(session.rng.uniform(-20, 20, 3))

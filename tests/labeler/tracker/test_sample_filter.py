@@ -1,4 +1,4 @@
-"""Which messages are believed: each doubt is named, and what was doubtful is believed again in time."""
+"""Which messages are believed: each fault is named, and what was doubtful is believed again in time."""
 
 from __future__ import annotations
 
@@ -139,16 +139,16 @@ def test_a_jump_and_back_records_nothing_between() -> None:
     assert set(faults[:20] + faults[32:]) == {Fault.NONE}
 
 
-def test_a_second_jump_to_a_third_place_is_doubted_too() -> None:
+def test_a_second_jump_to_a_third_place_is_held_back_too() -> None:
     faults = _stream(SampleFilter("ProbeToTracker"), [0.0] * 20 + [40.0] * 12 + [-700.0] * 12)
     assert faults[20:] == [Fault.JUMP] * 24
 
 
 def test_after_a_jump_that_stays_nothing_is_believed_for_two_seconds() -> None:
     faults = _stream(SampleFilter("ProbeToTracker"), [0.0] * 20 + [40.0] * 160)
-    doubted = faults.count(Fault.JUMP)
-    assert 2.0 <= doubted * _STEP <= 2.05
-    assert set(faults[20 + doubted :]) == {Fault.NONE}
+    held_back = faults.count(Fault.JUMP)
+    assert 2.0 <= held_back * _STEP <= 2.05
+    assert set(faults[20 + held_back :]) == {Fault.NONE}
 
 
 def _samples(xs: list[float], step: float = _STEP, seed: int = 0) -> list[Sample]:
@@ -196,9 +196,9 @@ def test_a_vigorous_hand_is_no_jump(hertz) -> None:
 
 def test_where_readings_are_rare_a_vigorous_hand_costs_its_first_one_only() -> None:
     samples = _samples(_there_and_back(20), 1 / 20)
-    doubted = [k for k, s in enumerate(samples) if not s.usable]
-    assert len(doubted) <= 8
-    assert all(b - a > 1 for a, b in pairwise(doubted))
+    held_back = [k for k, s in enumerate(samples) if not s.usable]
+    assert len(held_back) <= 8
+    assert all(b - a > 1 for a, b in pairwise(held_back))
     assert {s.segment for s in samples if s.usable} == {0}
 
 
@@ -210,7 +210,7 @@ def test_a_flick_costs_samples_and_begins_no_segment() -> None:
 
 
 @pytest.mark.parametrize("shift", [-3600.0, -1.2, 0.9, 3600.0])
-def test_a_clock_that_was_set_anew_is_named_and_followed(shift) -> None:
+def test_a_clock_that_was_set_again_is_named_and_followed(shift) -> None:
     samples = SampleFilter("ProbeToTracker")
     got = []
     for k in range(600):

@@ -158,7 +158,7 @@ def test_a_right_ear_is_coiled_the_other_way(scene) -> None:
     np.testing.assert_allclose(ends[0], -ends[1][::-1], atol=2.0)
 
 
-def test_a_probe_out_of_sight_is_grey(scene) -> None:
+def test_a_probe_that_is_hidden_is_grey(scene) -> None:
     scene.pose.show(PoseScene(tip=TIP))
     assert like(frame_of(scene), DARK.states["touch"]).any()
     scene.pose.show_tip(replace(TIP, visible=False))

@@ -82,7 +82,7 @@ def test_the_published_atlas_is_described(panel) -> None:
     assert cell(panel, "RWA", 2) == "–"  # noqa: RUF001
 
 
-def test_labels_are_held_against_it_and_doubts_flagged(workspace, panel, qtbot) -> None:
+def test_labels_are_compared_with_it_and_problems_flagged(workspace, panel, qtbot) -> None:
     place(workspace, "CA", "CB", "RWA", "RWP", "OS", "LLI")
     workspace.labels.place(np.add(in_scan("OI"), [0, 0, 3.0]), side=L, code="OI")
     deliver(workspace)
@@ -99,12 +99,12 @@ def test_labels_are_held_against_it_and_doubts_flagged(workspace, panel, qtbot) 
     assert (workspace.labels.active.side, workspace.labels.active.code) == (L, "OI")
 
 
-def test_points_that_are_doubted_for_another_reason_are_named_beside_the_table(workspace, panel) -> None:
+def test_points_with_another_problem_are_named_beside_the_table(workspace, panel) -> None:
     place(workspace, "CA", "CB", "RWP", "OS", "LLI")
     workspace.labels.place(in_scan("LLI"), side=L, code="RWA")  # half a millimetre off, and on LLI
     deliver(workspace)
     assert panel.labels.verdict.text() == (
-        "All 6 labels that can be checked fit the atlas; 2 have other doubts: LLI left, RWA left."
+        "All 6 labels that can be checked fit the atlas; 2 have other problems: LLI left, RWA left."
     )
     workspace.labels.place(in_scan("RWA"), side=L, code="RWA")
     deliver(workspace)

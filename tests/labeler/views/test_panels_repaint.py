@@ -153,19 +153,19 @@ def test_what_changes_nothing_draws_nothing(workspace, panel):
     assert painted.taken().isEmpty()
 
 
-def test_doubts_are_told_where_there_are_any_and_judging_is_always(workspace):
+def test_problems_are_announced_where_there_are_any_and_judging_is_always(workspace):
     told: list[str] = []
     workspace.labels.checked.connect(lambda: told.append("judged"))
-    workspace.labels.problems_changed.connect(lambda: told.append("doubts"))
+    workspace.labels.problems_changed.connect(lambda: told.append("problems"))
     place(workspace, "CA", "RWP", "OS", "RWA", "FPP", "MH")
     deliver(workspace)
     assert set(told) == {"judged"}
     workspace.labels.nudge((2.5, 0, 0), side=LEFT, code="FPP")
     deliver(workspace)
-    assert told[-2:] == ["judged", "doubts"]
+    assert told[-2:] == ["judged", "problems"]
 
 
-def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(workspace, panel):
+def test_what_was_drawn_bit_by_bit_is_what_drawing_all_again_gives(workspace, panel):
     for what in edits(workspace):
         deliver(workspace)
         wait_until_idle()
@@ -175,7 +175,7 @@ def test_what_was_drawn_bit_by_bit_is_what_drawing_all_anew_gives(workspace, pan
 def test_the_table_is_never_stale(workspace, qtbot):
     model = LandmarkTableModel(workspace)
     for what in edits(workspace):
-        deliver(workspace)  # until then, one made now may know of doubts that nobody told of
+        deliver(workspace)  # until then, one made now may know of problems that nobody told of
         fresh = LandmarkTableModel(workspace)
         for row in range(len(CODES)):
             cells = [[m.itemData(m.index(row, column)) for column in range(3)] for m in (model, fresh)]

@@ -119,7 +119,7 @@ def test_the_proposed_threshold_parts_the_two_grey_values(workspace, panel, qtbo
     assert 60 < workspace.document.state.threshold < 170
 
 
-# Greys and mesh
+# Window, level and mesh
 
 
 def test_grey_presets_set_the_window_and_auto_takes_it_back(workspace, panel, qtbot):

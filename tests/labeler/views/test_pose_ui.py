@@ -78,7 +78,7 @@ def test_a_file_named_for_the_other_side_is_told_and_moved_by_a_click(qtbot, mak
     panel = window.steps["pose"]
     assert panel.take_file(shared_data / "probe" / "SkullD_Right.dat")
     assert "By its name SkullD_Right.dat is of the right side." in told(panel)
-    assert [reason.code for reason in window.workspace.pose.file_doubts] == ["side undecided"]
+    assert [reason.code for reason in window.workspace.pose.file_warnings] == ["side undecided"]
     qtbot.mouseClick(panel.result.other_side, Qt.MouseButton.LeftButton)
     assert window.workspace.pose.side is Side.RIGHT
     assert not any("By its name" in text for text in told(panel))

@@ -84,14 +84,14 @@ def test_what_is_painted_follows(window, act) -> None:
         np.testing.assert_array_equal(kept.positions, places)
 
 
-def test_a_doubted_point_shows_where_it_should_be(window, qtbot, monkeypatch) -> None:
+def test_a_doubtful_point_shows_where_it_should_be(window, qtbot, monkeypatch) -> None:
     workspace, view = window.workspace, next(iter(window.grid.slice_views.values()))
     workspace.atlas.use(ATLAS)
     for code in ("CA", "CB", "RWA", "RWP", "OS", "LLI"):
         _place(workspace, code)
     _place(workspace, "RWL", shift=2.0)
     workspace.labels.set_active(Active(Side.LEFT, "RWL"))
-    wait_until_idle(qtbot, window)  # doubts are known a moment before the views are told of them
+    wait_until_idle(qtbot, window)  # problems are known a moment before the views are told of them
     assert drawn_ghosts(workspace) != []
     view.grab()
     (ghost,) = view.slice_painter.points.ghosts

@@ -359,7 +359,7 @@ def test_a_resting_pointer_tells_what_comes_to_lie_under_it(window, scene, qtbot
     assert told.text() == "", "and here on none"
 
 
-def test_a_table_row_brings_the_point_into_sight(window, scene) -> None:
+def test_a_table_row_brings_the_point_into_view(window, scene) -> None:
     labels = window.workspace.labels
     where = on_ball(1, 0.2, 0.4)
     labels.place(where, side=Side.RIGHT, code="FPA")

@@ -65,7 +65,7 @@ def walk_states(window: MainWindow, folder: Path, look: Look) -> None:
     _without_scan(window, look)
     workspace.atlas.use(ATLAS)
     workspace.scan.begin(grey_volume())
-    _settle(window)
+    _wait(window)
     _scan(window, look)
     _label(window, look)
     _messages(window, look)
@@ -74,7 +74,7 @@ def walk_states(window: MainWindow, folder: Path, look: Look) -> None:
     _dialogs(window, folder, look)
 
 
-def _settle(window: MainWindow) -> None:
+def _wait(window: MainWindow) -> None:
     end = time.monotonic() + 180
     while window.workspace.jobs.running and time.monotonic() < end:
         QApplication.processEvents()
@@ -93,7 +93,7 @@ def _without_scan(window: MainWindow, look: Look) -> None:
     animal = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
     for code in PROBE:
         _touch(window, code, animal[code] + THERE)
-    _settle(window)
+    _wait(window)
     look("pose, alone, estimated", window)
     touching.clear_touches(window.workspace.document, LEFT)
     window.set_step("scan")
@@ -117,7 +117,7 @@ def _label(window: MainWindow, look: Look) -> None:
     window.set_step("label")
     look("label, nothing placed", window)
     place(workspace, "CA", "CB", "RWP")
-    _settle(window)
+    _wait(window)
     for state, code, edit in (
         ("ghost", "RWA", lambda: None),
         ("placed", "CA", lambda: None),
@@ -127,11 +127,11 @@ def _label(window: MainWindow, look: Look) -> None:
     ):
         labels.set_active(Active(LEFT, code))
         edit()
-        _settle(window)
+        _wait(window)
         look(f"label, {state}", window)
     labels.accept_all_ghosts(side=LEFT)
     labels.set_active(Active(LEFT, "MN"))
-    _settle(window)
+    _wait(window)
     look("label, suggested", window)
     workspace.interaction.arm_replacing()
     look("label, re-placing", window)
@@ -139,18 +139,18 @@ def _label(window: MainWindow, look: Look) -> None:
     document.undo()
     place(workspace, "OS", "LLI", "RWA")
     labels.place(np.add(in_scan("OI"), [0, 0, 3.0]), side=LEFT, code="OI")
-    _settle(window)
+    _wait(window)
     labels.set_active(Active(LEFT, "OI"))
     look("label, doubtful", window)
     labels.suggest(in_scan("DTM"), radius_95=0.8, source="atlas", side=LEFT, code="DTM")
     labels.set_active(Active(LEFT, "DTM"))
-    _settle(window)
+    _wait(window)
     look("label, suggested", window)
     for code in ("RWA", "DTL", "IN", "ZL", "MN", "FPP"):
         labels.set_active(Active(RIGHT, code))
         look(f"label, {code} right", window.steps["label"])
     place(workspace, "CA", "CB", "RWA", "RWP", "OS", side=RIGHT)
-    _settle(window)
+    _wait(window)
     look("label, both sides", window)
 
 
@@ -184,24 +184,24 @@ def _pose(window: MainWindow, look: Look) -> None:
         _touch(window, code, moved[code] + 0.05 * rng.normal(size=3))
     for n, corner in enumerate(np.eye(3) * 9, 1):
         touching.record_touch(document, LEFT, f"S{n}", corner)
-    _settle(window)
+    _wait(window)
     look("pose, estimated", window)
     window.judge_pose("accept")
     touching.leave_out(document, LEFT, "OS", True)
-    _settle(window)
+    _wait(window)
     look("pose, one left out, judged", window)
     touching.leave_out(document, LEFT, "OS", False)
     _touch(window, "MN", moved["MN"] + [3.0, 0, 0])
-    _settle(window)
+    _wait(window)
     look("pose, a mistouch", window)
     _touch(window, "MN", moved["OS"])
     _touch(window, "OS", moved["MN"])
-    _settle(window)
+    _wait(window)
     look("pose, names exchanged", window)
     workspace.pose.choose(side=RIGHT)
     for code in PROBE:
         _touch(window, code, moved[code])
-    _settle(window)
+    _wait(window)
     look("pose, wrong side", window)
     workspace.pose.choose(side=LEFT)
     for code in PROBE:
@@ -209,10 +209,10 @@ def _pose(window: MainWindow, look: Look) -> None:
     window.steps["pose"].touches.model.show_skull(True)
     window.steps["pose"].touches.refresh()
     workspace.pose.choose(registration="skull")
-    _settle(window)
+    _wait(window)
     look("pose, skull features", window)
     workspace.pose.choose(registration="auto", methods=("robust", "jrmpc"))
-    _settle(window)
+    _wait(window)
     look("pose, both methods, no animals", window)
     workspace.atlas.problem = f"The atlas of {LONG_NAME}.json cannot be had any more: it does not exist."
     workspace.atlas.details_changed.emit()
@@ -232,13 +232,13 @@ def _atlas(window: MainWindow, folder: Path, look: Look) -> None:
     (animals / "torn_L.mrk.json").write_text("{")
     workspace.atlas.fit([animals])
     look("atlas, being fitted", window)
-    _settle(window)
+    _wait(window)
     look("atlas, fitted", window)
     workspace.atlas.try_out()
-    _settle(window)
+    _wait(window)
     look("atlas, tried out", window)
     window.set_step("pose")
-    _settle(window)
+    _wait(window)
     look("pose, both methods", window)
 
 
@@ -246,7 +246,7 @@ def _dialogs(window: MainWindow, folder: Path, look: Look) -> None:
     for name, make in _dialog_makers(window, folder).items():
         dialog = make()
         dialog.show()
-        _settle(window)
+        _wait(window)
         look(name, dialog)
         dialog.close()
         QApplication.processEvents()

@@ -89,8 +89,8 @@ class FeatureTableModel(QAbstractTableModel):
         return sum(found.is_outlier for away in self._away.values() for found in away.values())
 
     @property
-    def others_doubted(self) -> tuple[str, ...]:
-        """Points that are doubted for another reason than their distance, such as ``IN`` or ``MN left``."""
+    def with_other_problems(self) -> tuple[str, ...]:
+        """Points with another problem than their distance, such as ``IN`` or ``MN left``."""
         labels = self._workspace.labels
         found = {
             code if feature(code).shared else point_text(side, code): None

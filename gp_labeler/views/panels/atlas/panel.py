@@ -289,7 +289,7 @@ def _findings(animals: Animals, kept: bool) -> list[FindingRow]:
             f"Left out. {each.remedy}" if each in left_out else each.remedy,
             target=each,
         )
-        for each in animals.doubts
+        for each in animals.problems
     ]
     rows += [FindingRow(f"Skipped {each.what}", sentence(each.why)) for each in animals.skipped]
     notes = () if animals.screened is None else animals.screened.notes
@@ -325,10 +325,10 @@ class LabelsCard(Card):
             words = f"{rows.n_doubtful} of {rows.n_judged} labels should be looked at again."
         else:
             words = f"All {rows.n_judged} labels that can be checked fit the atlas."
-        others = rows.others_doubted
+        others = rows.with_other_problems
         if rows.n_judged and others:
             have = "has" if len(others) == 1 else "have"
-            words = f"{words.removesuffix('.')}; {len(others)} {have} other doubts: {', '.join(others)}."
+            words = f"{words.removesuffix('.')}; {len(others)} {have} other problems: {', '.join(others)}."
         self.verdict.setText(words)
 
 

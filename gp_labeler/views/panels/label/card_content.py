@@ -70,7 +70,7 @@ def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardC
     has_scan : bool
         Whether there is a scan to place anything on.
     atlas : str
-        Which atlas is behind ghosts and doubts, such as ``the atlas of 8 animals``; empty for the published
+        Which atlas is behind ghosts and problems, such as ``the atlas of 8 animals``; empty for the published
         one.
     """
     active = labels.active
@@ -96,7 +96,7 @@ def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardC
         aside_hint=hint,
         definition=row.definition,
         where=f"{row.where} Best seen in {_VIEWS[row.view]}.",
-        status=f"{_settled_words(labels, side, row.code)} Locked against change." if mark.locked else status,
+        status=f"{_status_words(labels, side, row.code)} Locked against change." if mark.locked else status,
         status_role="hint" if mark.locked else role,
         state="locked" if mark.locked else state.value,
         action=action,
@@ -130,12 +130,12 @@ _ACTIONS = {
 
 
 def _next_action(labels: LabelsModel, side: Side, code: str, state: PointState) -> tuple[str, str]:
-    """Return id and words of the one next action: for a doubt that has a remedy, that remedy."""
-    doubt = labels.known_problems(side).get(code) if state is PointState.DOUBTFUL else None
-    if doubt is not None and doubt.kind == "other side":
+    """Return id and words of the one next action: for a problem that has a remedy, that remedy."""
+    problem = labels.known_problems(side).get(code) if state is PointState.DOUBTFUL else None
+    if problem is not None and problem.kind == "other side":
         return "swap_sides", "Exchange left and right"
-    if doubt is not None and doubt.kind == "exchanged":
-        return "swap_names", "Exchange " + " and ".join(doubt.landmarks)
+    if problem is not None and problem.kind == "exchanged":
+        return "swap_names", "Exchange " + " and ".join(problem.landmarks)
     return _ACTIONS[state]
 
 
@@ -149,20 +149,20 @@ def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tu
         said = suggestion_text(labels.document.landmarks(side).suggested[code])
         source = f" ({said})" if said else ""
         return f"Not confirmed{source}. It counts once you confirm or correct it.", "ghost"
-    doubt = labels.known_problems(side).get(code)
-    if state is PointState.DOUBTFUL and doubt is not None:
-        words = doubt.text
+    problem = labels.known_problems(side).get(code)
+    if state is PointState.DOUBTFUL and problem is not None:
+        words = problem.text
         return f"{words[:1].upper()}{words[1:]}.", "danger"
     if state is PointState.CHECKED:
         return "Placed, looked at again and found right.", "good"
     if state is PointState.PLACED:
-        return f"{_settled_words(labels, side, code)} Drag, nudge or re-place it to correct it.", "hint"
+        return f"{_status_words(labels, side, code)} Drag, nudge or re-place it to correct it.", "hint"
     if state is PointState.UNSEEN:
         return "Looked for, not seen. Click to place it after all.", "hint"
     return _first_ones(labels, side), "hint"
 
 
-def _settled_words(labels: LabelsModel, side: Side, code: str) -> str:
+def _status_words(labels: LabelsModel, side: Side, code: str) -> str:
     """Return how a point came to be where it is, such as ``Placed on bone.``."""
     mark = labels.document.state.landmark(side, code)
     if mark.unseen:
@@ -238,11 +238,11 @@ def _between(labels: LabelsModel) -> CardContent:
         s is PointState.DOUBTFUL for side in Side for s in labels.point_states(side, wait=False).values()
     )
     many = "One point" if doubtful == 1 else f"{doubtful} points"
-    doubts = f"{many} should be looked at again: see the red triangles. " if doubtful else ""
+    warning = f"{many} should be looked at again: see the red triangles. " if doubtful else ""
     return CardContent(
         totals,
         name="Everything is labelled",
-        definition=f"{doubts}Export the landmarks of both sides when you are content with them.",
+        definition=f"{warning}Export the landmarks of both sides when you are content with them.",
         status="Nothing is left to do.",
         status_role="good",
         state="checked",

@@ -185,21 +185,21 @@ class ExportDialog(QDialog):
             found.append(
                 ("warning" if to_do or suggested or lacks_co else "info" if unseen else "good", f"{words}.")
             )
-            found += self._doubts(side)
+            found += self._label_problems(side)
         return found
 
-    def _doubts(self, side: Side) -> list[tuple[str, str]]:
-        """Return what is doubted of a side: one notice for each kind of mistake."""
+    def _label_problems(self, side: Side) -> list[tuple[str, str]]:
+        """Return the problems of a side: one notice for each kind of mistake."""
         labels = self._workspace.labels
         states = labels.point_states(side, wait=False)
-        doubts = {
-            code: doubt
-            for code, doubt in labels.known_problems(side).items()
+        problems = {
+            code: problem
+            for code, problem in labels.known_problems(side).items()
             if states[code] is PointState.DOUBTFUL
         }
-        far = [code for code, doubt in doubts.items() if doubt.kind == "far"]
-        others = dict.fromkeys(doubt for doubt in doubts.values() if doubt.kind != "far")
-        words = [f"On the {side.word} side {doubt.text}. {doubt.remedy}" for doubt in others]
+        far = [code for code, problem in problems.items() if problem.kind == "far"]
+        others = dict.fromkeys(problem for problem in problems.values() if problem.kind != "far")
+        words = [f"On the {side.word} side {problem.text}. {problem.remedy}" for problem in others]
         if far:
             many = (
                 "lie far from where the atlas expects them"

@@ -245,9 +245,9 @@ def _swap_names(workspace: Workspace) -> None:
     """Exchange the active point with the one that seems to have its name."""
     labels = workspace.labels
     side, code = labels.active.side, labels.active.code
-    doubt = labels.known_problems(side).get(code or "")
-    if doubt is not None and doubt.kind == "exchanged":
-        workspace.labels.swap(side, *doubt.landmarks)
+    problem = labels.known_problems(side).get(code or "")
+    if problem is not None and problem.kind == "exchanged":
+        workspace.labels.swap(side, *problem.landmarks)
 
 
 def _place_at_crosshair(workspace: Workspace) -> None:

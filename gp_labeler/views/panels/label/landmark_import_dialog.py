@@ -23,7 +23,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.document.lab_names import LabNamesMemory
-from gp_labeler.document.landmark_import import MisfitError, Predicate, import_landmarks
+from gp_labeler.document.landmark_import import OffBoneError, Predicate, import_landmarks
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.label.lab_names_table import LabNamesTable
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, emptied, open_at, scrolled, text_label
@@ -213,10 +213,10 @@ class LandmarkImportDialog(QDialog):
                 side=self.side.currentData(),
                 names=self._codes(),
                 near_bone=self._near_bone,
-                accept_misfit=self.anyway.isChecked(),
+                accept_off_bone=self.anyway.isChecked(),
                 replace_placed=not self.keep.isChecked(),
             )
-        except MisfitError as error:
+        except OffBoneError as error:
             self._objection = error.problem
             self._show([("warning", _sentence(error.problem) + " " + (error.remedy or ""))])
         except GpError as error:

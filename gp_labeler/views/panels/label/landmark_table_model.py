@@ -137,8 +137,10 @@ class LandmarkTableModel(QAbstractTableModel):
     def _word(self, code: str, side: Side, state: PointState, is_active: bool) -> str:
         if is_active and state in (PointState.TO_DO, PointState.GHOST):
             return "place"
-        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.known_problems(side).get(code)):
-            return doubt.word
+        if state is PointState.DOUBTFUL and (
+            problem := self._workspace.labels.known_problems(side).get(code)
+        ):
+            return problem.word
         if feature(code).computed and state is PointState.TO_DO:
             return "by itself"
         return str(state.value)
@@ -147,8 +149,10 @@ class LandmarkTableModel(QAbstractTableModel):
         text = f"{code} {side.word}: {state.value}"
         if feature(code).computed and state is PointState.TO_DO:
             return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
-        if state is PointState.DOUBTFUL and (doubt := self._workspace.labels.known_problems(side).get(code)):
-            text += f", {doubt.text}"
+        if state is PointState.DOUBTFUL and (
+            problem := self._workspace.labels.known_problems(side).get(code)
+        ):
+            text += f", {problem.text}"
         if state is PointState.SUGGESTED:
             said = suggestion_text(self._workspace.document.landmarks(side).suggested[code])
             text += f", not confirmed{f' ({said})' if said else ''}"

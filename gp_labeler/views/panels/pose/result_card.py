@@ -218,7 +218,7 @@ def _notices(workspace: Workspace, estimate: Estimate) -> Iterator[tuple[str, ..
             yield ("error", f"{METHOD_NAMES[method]}: {estimate.problems[method]}")
     if "jrmpc" in workspace.pose.settings.methods and not workspace.pose.joint_ready:
         yield ("info", "JRMPC is being made ready; that takes some seconds once.")
-    for reason in workspace.pose.file_doubts:
+    for reason in workspace.pose.file_warnings:
         yield ("warning", sentence(reason.text), "Nothing is sent to a robot until you say which side it is.")
     said: set[str] = set()
     for pose in estimate.poses.values():

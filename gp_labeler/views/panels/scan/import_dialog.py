@@ -185,9 +185,9 @@ class ImportDialog(QDialog):
             self.stride.setCurrentIndex(max(0, self.stride.findData(plan.options.stride)))
             self.reverse.setChecked(plan.options.reverse)
         self._accepts = {}
-        doubted = any("spacing" in p.resolved_by for p in bare(plan).errors)
+        implausible = any("spacing" in p.resolved_by for p in bare(plan).errors)
         self.spacing.offer(
-            plan.suggested_spacing if not doubted else plan.geometry.suggested, from_file=not doubted
+            plan.suggested_spacing if not implausible else plan.geometry.suggested, from_file=not implausible
         )
         self.sides.setVisible(not plan.sides_known)
         self._update()
