@@ -97,8 +97,8 @@ def spacing_problems(
     if spacing is None:
         text = reason or "the voxel size is not in the file"
         return (Problem("spacing-missing", text, "error", ask, ("spacing",)),)
-    if not given and (reason := _implausible(spacing)):
-        return (Problem(*reason, "error", ask, ("spacing",)),)
+    if not given and (unlikely := _implausible(spacing)):
+        return (Problem(*unlikely, "error", ask, ("spacing",)),)
     return _size_problem(spacing, size)
 
 
