@@ -37,7 +37,7 @@ class BeginLabelling:
     round : int, optional
         By default the one that follows the observer's labellings so far.
     blind : bool
-        Whether the observer labels without sight of the others.
+        Whether the observer labels without seeing the others.
     """
 
     do: ClassVar[str] = "begin_labelling"

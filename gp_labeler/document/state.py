@@ -206,7 +206,7 @@ class StoredLabelling:
     landmarks : mapping of PointKey to Landmark
         What was placed, suggested or marked.
     blind : bool
-        Whether it was begun without sight of the others.
+        Whether it was begun without seeing the others.
     scan_evidence : mapping of Side to ScanEvidence
         Distances of its points from bone, as last measured.
     measurements : tuple of Measurement
@@ -263,7 +263,7 @@ class SpecimenState:
     round : int
         Which of the observer's labellings it is, from 1.
     blind : bool
-        Whether it was begun without sight of the others.
+        Whether it was begun without seeing the others.
     others : tuple of StoredLabelling
         The other labellings, which are never shown with the one in work.
 

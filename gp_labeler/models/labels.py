@@ -426,7 +426,7 @@ class LabelsModel:
         self._check_again()
 
     def _on_labelling(self) -> None:
-        """Begin at the first feature, and forget what was doubted of the labelling before."""
+        """Begin at the first feature, and forget the problems of the labelling before."""
         self._checks = LabelChecks(self._checks.check, self._checks.measure)
         self._last = None
         self._begin()
