@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
+import logging
 import os
 import re
 import stat
@@ -22,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.errors import FileFormatError, GpError
+from gp_core.terminal import printable
 
 try:
     import fcntl
@@ -43,6 +45,8 @@ __all__ = [
     "write_bytes",
     "write_text",
 ]
+
+_log = logging.getLogger(__name__)
 
 AnyPath = str | PathLike[str]
 
@@ -124,6 +128,7 @@ def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
         raise _unreadable(path, error) from None
     if len(content) > max_bytes:
         raise _too_large(path, what, max_bytes)
+    _log.info("read %s (%d bytes)", printable(os.fspath(path)), len(content))
     return content
 
 
@@ -285,6 +290,7 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
             if target.exists():
                 draft.chmod(stat.S_IMODE(target.stat().st_mode))
             draft.replace(target)
+        _log.info("wrote %s", printable(str(target)))
         with contextlib.suppress(OSError):  # flush the directory entry too, where the system can
             _to_disk(target.parent)
     except (OSError, ValueError) as error:

@@ -8,7 +8,7 @@ from gp_core.errors import GpError
 
 __all__ = ["EXTRAS", "missing_package", "need_extra"]
 
-EXTRAS = {"figures": "matplotlib", "jrmpc": "numba", "cluster": "distributed"}
+EXTRAS = {"figures": "matplotlib", "jrmpc": "numba", "cluster": "distributed", "completion": "shtab"}
 """The package that each extra of the distribution brings to `gp_core`."""
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import sys
 from collections.abc import Sequence
 
@@ -26,7 +25,7 @@ from gp_core.cli import (
     touches,
 )
 from gp_core.cli.options import keeping_inputs
-from gp_core.command_line import CommandParser
+from gp_core.command_line import CommandParser, add_completion
 from gp_core.errors import GpError
 from gp_core.extras import missing_package
 from gp_core.terminal import leave_output, plain_terminal
@@ -65,6 +64,7 @@ def make_parser() -> argparse.ArgumentParser:
         description="Atlas of guinea-pig ear landmarks, and cochlea poses from touched points.",
     )
     parser.add_argument("--version", action="version", version=f"gp-core {__version__}")
+    add_completion(parser)
     commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
     for module in _COMMANDS:
         module.add(commands)
@@ -91,7 +91,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    logging.basicConfig(format="gp-core: %(message)s", level=logging.WARNING)
     args = make_parser().parse_args(arguments)
     try:
         with keeping_inputs(args):

@@ -19,6 +19,7 @@ from typing import Any, TypeVar
 from gp_core.errors import GpError
 from gp_core.extras import missing_package
 from gp_core.processors import n_cores
+from gp_core.settings import setting
 
 __all__ = ["open_executor", "run_map"]
 
@@ -115,7 +116,7 @@ def open_executor(workers: int | None = None, scheduler: str | None = None) -> I
     GpError
         A number below 1, Dask is not installed, or nothing answers at the address.
     """
-    count = n_cores() if workers is None else workers
+    count = (setting("workers") or n_cores()) if workers is None else workers
     if count < 1:
         raise GpError(f"the number of workers must be 1 or more, got {count}")
     if scheduler is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import platform
@@ -22,7 +23,7 @@ from gp_labeler.system.installation import INSTALL, check_display, explain_impor
 from gp_labeler.system.libraries import advice, missing
 from gp_labeler.system.qt_binding import BINDINGS, choose_binding
 
-__all__ = ["Examination", "examine", "run_doctor"]
+__all__ = ["Examination", "examine", "make_doctor_parser", "run_doctor"]
 
 _EXTRAS = ("", "app")
 _ENOUGH_BYTES = 200e6
@@ -51,6 +52,15 @@ class Examination:
         return [*text, "Wrong", *(f"  {number}. {line}" for number, line in enumerate(self.wrong, start=1))]
 
 
+def make_doctor_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``gp-labeler doctor``."""
+    return CommandParser(
+        prog="gp-labeler doctor",
+        description="Print what this machine has: versions, system libraries, display, OpenGL, fonts, state "
+        "folder; and what is wrong. Ends with 0, or with 2 where something is wrong.",
+    )
+
+
 def run_doctor(arguments: Sequence[str]) -> int:
     """Run the command.
 
@@ -59,12 +69,7 @@ def run_doctor(arguments: Sequence[str]) -> int:
     int
         0; 2 where something is wrong.
     """
-    parser = CommandParser(
-        prog="gp-labeler doctor",
-        description="Print what this machine has: versions, system libraries, display, OpenGL, fonts, state "
-        "folder; and what is wrong. Ends with 0, or with 2 where something is wrong.",
-    )
-    parser.parse_args(arguments)
+    make_doctor_parser().parse_args(arguments)
     found = examine()
     sys.stdout.write("\n".join(found.lines()) + "\n")
     return 2 if found.wrong else 0

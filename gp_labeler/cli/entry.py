@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import logging
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from gp_core import __version__
-from gp_core.command_line import CommandParser
+from gp_core.command_line import CommandParser, add_completion
 from gp_core.errors import GpError
 from gp_core.terminal import leave_output, plain_terminal
-from gp_labeler.cli.export import run_export
-from gp_labeler.cli.mesh import run_mesh
-from gp_labeler.cli.phantom import run_phantom
-from gp_labeler.cli.straighten import run_straighten
+from gp_labeler.cli.subcommands import SUBCOMMANDS, with_subcommands
 from gp_labeler.system.installation import explain_import
 from gp_labeler.system.plain_numbers import use_plain_numbers
 
@@ -44,6 +40,7 @@ def make_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
+    add_completion(parser, lambda: with_subcommands(make_parser()))
     parser.add_argument("path", nargs="?", type=Path, metavar="VOLUME|SPECIMEN", help="what to open")
     parser.add_argument("--demo", action="store_true", help="open a synthetic head")
     parser.add_argument(
@@ -60,6 +57,13 @@ def make_parser() -> argparse.ArgumentParser:
     offscreen.add_argument(
         "--specimens", nargs="+", default=(), metavar="S", help="what {specimen} in the script stands for"
     )
+    desktop = parser.add_argument_group("on the desktop")
+    desktop.add_argument(
+        "--install-desktop",
+        action="store_true",
+        help="add gp-labeler to the menu of programs, and open specimens and NRRD scans with it (Linux)",
+    )
+    desktop.add_argument("--remove-desktop", action="store_true", help="take that away again")
     return parser
 
 
@@ -77,25 +81,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: Sequence[str] | None) -> int:
-    logging.basicConfig(format="gp-labeler: %(message)s", level=logging.WARNING)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        if given[:1] == ["mesh"]:
-            return run_mesh(given[1:])
-        if given[:1] == ["phantom"]:
-            return run_phantom(given[1:])
-        if given[:1] == ["straighten"]:
-            return run_straighten(given[1:])
-        if given[:1] == ["export"]:
-            return run_export(given[1:])
-        if given[:1] == ["simulate-tracker"]:
-            from gp_labeler.tracker.simulator import main as simulate  # here: nothing else needs a server
-
-            return simulate(given[1:], prog="gp-labeler simulate-tracker")
-        if given[:1] == ["doctor"]:
-            from gp_labeler.cli.doctor import run_doctor
-
-            return run_doctor(given[1:])
+        if given and given[0] in SUBCOMMANDS:
+            return SUBCOMMANDS[given[0]].run(given[1:])
         return _window(make_parser().parse_args(given))
     except GpError as error:
         return _refuse(error)
@@ -121,6 +110,8 @@ def _refuse(error: GpError) -> int:
 
 def _window(args: argparse.Namespace) -> int:
     _check_together(args)
+    if args.install_desktop or args.remove_desktop:
+        return _change_desktop(install=args.install_desktop)
     if args.offscreen is not None:
         from gp_labeler.scripting.command import run_offscreen
 
@@ -132,6 +123,14 @@ def _window(args: argparse.Namespace) -> int:
     from gp_labeler.views.application import run_window  # here: `--help` need not wait for Qt and VTK
 
     return run_window(args.path, demo=args.demo, directory=args.state)
+
+
+def _change_desktop(*, install: bool) -> int:
+    from gp_labeler.system.desktop_entry import install_desktop, remove_desktop
+
+    for path in install_desktop() if install else remove_desktop():
+        sys.stdout.write(f"{'wrote' if install else 'removed'} {path}\n")
+    return 0
 
 
 def _check_together(args: argparse.Namespace) -> None:

@@ -11,6 +11,7 @@ from uuid import uuid4
 from platformdirs import user_state_path
 
 from gp_core.errors import GpError
+from gp_core.settings import setting
 
 __all__ = [
     "UNSAVED",
@@ -27,8 +28,9 @@ UNSAVED = "unsaved-"
 
 
 def default_directory() -> Path:
-    """Return the user's state directory; tests and scripts give their own."""
-    return user_state_path("gp-labeler", appauthor=False)
+    """Return the user's state directory, of the settings or the system; tests and scripts give their own."""
+    named = setting("state")
+    return Path(named).expanduser() if named else user_state_path("gp-labeler", appauthor=False)
 
 
 def absolute_path(path: str | PathLike[str]) -> Path:

@@ -12,9 +12,11 @@ from pathlib import Path
 from types import TracebackType
 
 from qtpy.QtCore import QLocale, QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
+from qtpy.QtGui import QIcon
 from qtpy.QtWidgets import QApplication
 
 from gp_core.errors import GpError
+from gp_core.resources import resource_path
 from gp_labeler.document.paths import default_directory
 from gp_labeler.document.recovery import find_recoveries, unreadable_journals
 from gp_labeler.models.workspace import Workspace
@@ -59,6 +61,8 @@ def make_application() -> QApplication:
     use_plain_numbers()  # Qt has just taken the locale from the environment
     app.setApplicationName("gp-labeler")
     app.setApplicationDisplayName("gp-labeler")
+    app.setDesktopFileName("gp-labeler")
+    app.setWindowIcon(QIcon(str(resource_path("icons/gp-labeler.svg"))))
     app.setStyle("Fusion")
     if app.platformName() == "offscreen":
         qInstallMessageHandler(_tell)

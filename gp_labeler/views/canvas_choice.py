@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -11,7 +10,7 @@ from qtpy.QtCore import QCoreApplication, Qt
 from qtpy.QtGui import QSurfaceFormat
 from qtpy.QtWidgets import QApplication, QWidget
 
-from gp_core.validation import check_option
+from gp_core.settings import setting
 from gp_labeler.views.canvas import Canvas, PaintedCanvas
 from gp_labeler.views.opengl import is_software, opengl_format, renderer_name
 from gp_labeler.views.window_state import WindowState
@@ -90,7 +89,7 @@ def choose_canvas(memory: WindowState) -> CanvasChoice:
     Raises
     ------
     GpError
-        The variable ``GP_LABELER_CANVAS``, which overrules the setting, names no canvas.
+        The variable ``GP_LABELER_CANVAS``, or the user's settings, which overrule it, name no canvas.
     """
     app = QApplication.instance()
     made = None if app is None else app.property(_PROPERTY)
@@ -104,12 +103,11 @@ def choose_canvas(memory: WindowState) -> CanvasChoice:
 
 def wanted_canvas(memory: WindowState) -> str:
     """Return the setting that holds: of `SETTINGS`."""
-    named = os.environ.get(VARIABLE)
-    if named:
-        check_option(named, f"the 3D canvas ({VARIABLE})", SETTINGS)
+    named: str | None = setting("canvas")
+    if named is not None:
         return named
-    setting: str = memory.get("canvas", str, "automatic")
-    return setting if setting in SETTINGS else "automatic"
+    remembered: str = memory.get("canvas", str, "automatic")
+    return remembered if remembered in SETTINGS else "automatic"
 
 
 def canvas_for(

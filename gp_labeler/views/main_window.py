@@ -19,6 +19,7 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from gp_core.settings import setting
 from gp_labeler.document.animals import may_hold_labels
 from gp_labeler.models.view import ViewModel as SessionView
 from gp_labeler.models.view import ViewState
@@ -92,8 +93,8 @@ class MainWindow(QMainWindow):
         self.ui = WindowUi(self, workspace, prompts or Prompts(self))
         self.setAcceptDrops(True)
         self._recall_view(workspace.view)
-        self.theme_name = self.memory.get("theme", str, "dark")
-        self.text_size = nearest_text_size(self.memory.get("text_size", int, 100))
+        self.theme_name = self.memory.get("theme", str, setting("theme") or "dark")
+        self.text_size = nearest_text_size(self.memory.get("text_size", int, setting("text_size") or 100))
         self._restyle()
         self.grid = ViewGrid(workspace)
         self.pose_display = PoseDisplay(workspace, self.grid)

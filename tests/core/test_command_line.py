@@ -1,0 +1,43 @@
+"""What all commands share: messages on the terminal and in a log, and completion in a shell."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+_TOUCHES = str(Path(__file__).resolve().parents[2] / "docs" / "example" / "touches.csv")
+
+
+def _estimate(*words: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "gp_core.cli", "estimate", _TOUCHES, "--side", "L", *words]
+    return subprocess.run(command, capture_output=True, text=True, check=False, cwd=cwd)
+
+
+def test_verbose_says_what_is_read_and_written(tmp_path: Path) -> None:
+    quiet = _estimate("--json", "pose.json", cwd=tmp_path)
+    told = _estimate("--json", "pose.json", "--verbose", cwd=tmp_path)
+    assert quiet.stderr == ""
+    assert quiet.stdout == told.stdout
+    assert f"gp-core: read {_TOUCHES}" in told.stderr
+    assert f"gp-core: wrote {tmp_path / 'pose.json'}" in told.stderr
+
+
+def test_a_log_holds_everything_and_grows(tmp_path: Path) -> None:
+    for _ in range(2):
+        done = _estimate("--log-file", "run.log", cwd=tmp_path)
+        assert (done.returncode, done.stderr) == (0, "")
+    lines = (tmp_path / "run.log").read_text().splitlines()
+    assert sum("gp-core estimate" in line or "--side L" in line for line in lines) == 2
+    assert sum(f"read {_TOUCHES}" in line for line in lines) == 2
+
+
+@pytest.mark.parametrize("name", ["touches.csv", "nowhere/run.log"])
+def test_a_log_is_never_appended_to_data(tmp_path: Path, name: str) -> None:
+    (tmp_path / "touches.csv").write_text("CL,1,2,3\n")
+    done = _estimate("--log-file", name, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr.count("\n") == 1
+    assert (tmp_path / "touches.csv").read_text() == "CL,1,2,3\n"
