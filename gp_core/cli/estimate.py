@@ -69,7 +69,9 @@ def add(commands: Subparsers) -> None:
         example="gp-core estimate touches.dat --side R --json pose.json",
     )
     parser.add_argument(
-        "touches", metavar="TOUCHES", help=".dat, .csv, .mrk.json or .fcsv with three or more touches"
+        "touches",
+        metavar="TOUCHES",
+        help=".dat, .csv, .mrk.json or .fcsv with three or more touches; a feature may have several",
     )
     add_names(parser)
     parser.add_argument("--side", required=True, choices=("L", "R"), help="side of the head")
@@ -344,11 +346,21 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
     yield ""
     yield "  touch   from the mean, mm"
     for code, distance in pose.residuals.items():
-        yield f"  {code:<7} {distance:6.2f}{'   doubtful' if code in pose.suspects else ''}"
+        doubtful = "   doubtful" if code in pose.suspects else ""
+        yield f"  {code:<7} {distance:6.2f}{_repeats_of(pose, code)}{doubtful}"
     for warning in pose.warnings:
         yield f"  ! {warning}"
     if next_touches:
         yield f"  {_advice(next_touches[0])}"
+
+
+def _repeats_of(pose: CochleaPose, code: str) -> str:
+    """Return how often a feature was touched, and the spread of its touches."""
+    one = pose.repeats.get(code)
+    if one is None:
+        return ""
+    of = f" of {len(one.points)}" if one.outliers else ""
+    return f"   mean of {one.n_used}{of} touches, spread {one.spread_mm:.2f} mm"
 
 
 def _position_lines(pose: CochleaPose) -> Iterator[str]:

@@ -47,7 +47,7 @@ def add(commands: Subparsers) -> None:
         "--order",
         default=",".join(PROBE),
         metavar="NAMES",
-        help="what was touched, in this order (default: %(default)s)",
+        help="what was touched, in this order; a name may be there several times (default: %(default)s)",
     )
     add_transforms(parser)
     parser.add_argument(
@@ -89,10 +89,11 @@ def run(args: argparse.Namespace) -> int:
     names = [_touched_name(name) for name in args.order.split(",") if name.strip()]
     with blaming(args.recording):
         touches = recorded_touches(recording, _tip(args.tip), names)
-    lines = [",".join((as_csv_cell(name), *map(repr, place.tolist()))) for name, place in touches.items()]
+    rows = [(name, place) for name, places in touches.items() for place in np.atleast_2d(places)]
+    lines = [",".join((as_csv_cell(name), *map(repr, place.tolist()))) for name, place in rows]
     write_text(args.output, "\n".join(("name,x,y,z", *lines)) + "\n")
-    say(f"{len(touches)} touches from {Path(args.recording).name}, mm")
-    for name, place in touches.items():
+    say(f"{len(rows)} touches from {Path(args.recording).name}, mm")
+    for name, place in rows:
         say(f"  {name:<5} " + " ".join(f"{value:10.3f}" for value in place))
     return 0
 

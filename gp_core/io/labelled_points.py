@@ -54,7 +54,8 @@ class LabelledPoint(NamedTuple):
     """One point of a file: label, (3,) position in mm or None, how far it is, free text, side if it says one.
 
     A suggested point has no `position`, which would be an observation, but a `suggestion`. What the
-    description says of observer, certainty, note and check is in `provenance`.
+    description says of observer, certainty, note and check is in `provenance`. `trial` is the number of a
+    touch among several of one feature; 0 where the file gives none.
     """
 
     label: str
@@ -65,6 +66,7 @@ class LabelledPoint(NamedTuple):
     side: Side | None = None
     provenance: LabelProvenance | None = None
     round: int = 1
+    trial: int = 0
 
 
 @dataclass(frozen=True, eq=False)

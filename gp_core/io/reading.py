@@ -17,6 +17,7 @@ from gp_core.io.fcsv import read_fcsv
 from gp_core.io.file_names import is_named_suggested, labelling_named, name_parts, specimen_named
 from gp_core.io.labelled_points import LabelledPoint, PointList, as_suggested
 from gp_core.io.markups import read_markups
+from gp_core.io.repeated_points import split_trial, with_repeats_combined
 from gp_core.io.table import read_table
 from gp_core.io.text import shown
 from gp_core.io.text_files import check_file
@@ -71,7 +72,9 @@ def _suffix(path: str | PathLike[str]) -> str:
     return found
 
 
-def read_points(path: str | PathLike[str], *, names: LabelNames | None = None) -> PointList:
+def read_points(
+    path: str | PathLike[str], *, names: LabelNames | None = None, numbered: bool = False
+) -> PointList:
     """Read the labelled points of a landmark file, whatever their labels are.
 
     Parameters
@@ -80,6 +83,8 @@ def read_points(path: str | PathLike[str], *, names: LabelNames | None = None) -
         ``.mrk.json``, ``.json``, ``.fcsv``, ``.csv``, ``.tsv`` or ``.dat``.
     names : LabelNames, optional
         A lab's own names of the features.
+    numbered : bool
+        Whether a label may end in the number of a touch, as ``MN#2`` does.
 
     Returns
     -------
@@ -98,11 +103,20 @@ def read_points(path: str | PathLike[str], *, names: LabelNames | None = None) -
     suffix = _suffix(path)
     points = _READERS[suffix](path)
     known = names or LabelNames({})
-    taken = tuple(_with_name(p, known, path) for p in points.points if not known.leaves_out(p.label))
+    listed = (_with_trial(p, known) if numbered else p for p in points.points)
+    taken = tuple(_with_name(p, known, path) for p in listed if not known.leaves_out(p.label))
     points = replace(points, points=taken)
     if not is_named_suggested(path, suffix):
         return points
     return replace(points, points=tuple(as_suggested(point) for point in points.points))
+
+
+def _with_trial(point: LabelledPoint, names: LabelNames) -> LabelledPoint:
+    """Return a point with the number of its touch taken out of its label, unless a lab's name ends in it."""
+    label, trial = split_trial(point.label)
+    if not trial or names.translate(point.label) != point.label or names.leaves_out(point.label):
+        return point
+    return point._replace(label=label, trial=point.trial or trial)
 
 
 def _with_name(point: LabelledPoint, names: LabelNames, file: str | PathLike[str]) -> LabelledPoint:
@@ -230,7 +244,8 @@ def read_touches(
     Parameters
     ----------
     path : path
-        See `read_points`. In a file of any kind, -1000 -1000 -1000 and 0 0 0 stand for *not seen*.
+        See `read_points`. In a file of any kind, -1000 -1000 -1000 and 0 0 0 stand for *not seen*. A feature
+        may be there several times, by the same name, or as ``MN#1``, ``MN#2``, ...: each is one touch.
     side : Side or str
         Side of the head.
     unknown : {"error", "extra"}
@@ -241,23 +256,25 @@ def read_touches(
     Returns
     -------
     LandmarkSet
-        Positions in mm, tracker frame; the eight skull features in `extra`.
+        Positions in mm, tracker frame; the eight skull features in `extra`. What was touched several times is
+        at the mean of its touches, without outliers, and all of them are in `LandmarkSet.repeats`.
 
     Raises
     ------
     FileFormatError
         The file cannot be read.
     FeatureError
-        A label is unknown or doubled, or the file says that it is the other side.
+        A label is unknown, a touch is a copy of another one, or the file says that it is the other side.
     GeometryError
         All points are at one place, or are not in millimetres.
     """
-    points = read_points(path, names=names)
+    points = read_points(path, names=names, numbered=True)
     wanted = Side.parse(side)
     _check_side(wanted, points.header.side if points.header else None, points)
     points = _one_side(points, wanted)
     seen = replace(points, points=tuple(_without_sentinel(point) for point in points.points))
-    touches = _landmark_set(seen, wanted, "tracker", unknown)
+    each_once, repeats = with_repeats_combined(seen)
+    touches = replace(_landmark_set(each_once, wanted, "tracker", unknown), repeats=repeats)
     check_plausible_size(touches, path)
     if touches.suggested:
         _log.warning("%s: suggestions are no touches, left out: %s", path, " ".join(touches.suggested))

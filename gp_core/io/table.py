@@ -52,6 +52,7 @@ _ABOUT = {
 _NO = ("0", "false", "no")
 _SEPARATOR_LINE = re.compile(r"\"?sep=([,;\t|])\"?[,;]*", re.IGNORECASE)  # for Excel, in the first line
 _SIDE_COLUMNS = ("side", "ear", "laterality")
+_TRIAL_COLUMNS = ("trial", "repeat", "replicate")
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,9 @@ def read_table(path: str | PathLike[str]) -> PointList:
     """Read a table of named points.
 
     With a header, columns are found by name: ``label`` (or ``name``, ``landmark``, ...); ``l,p,s``,
-    ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``side``, ``defined``, ``status`` and
-    ``description``. Without one, the columns are name, x, y, z. Row names as written by R, whose column has
-    no name, are labels; the first line ``sep=;`` of a spreadsheet is understood.
+    ``r,a,s`` or ``x,y,z`` (taken as LPS); and, where present, ``side``, ``trial``, ``defined``, ``status``
+    and ``description``. Without one, the columns are name, x, y, z. Row names as written by R, whose column
+    has no name, are labels; the first line ``sep=;`` of a spreadsheet is understood.
 
     Parameters
     ----------
@@ -188,7 +189,7 @@ def _point(fields: list[str], columns: _Columns, number: int, file: str | PathLi
         file=file,
         description=of_csv_cell(other("description")),
         flip_xy=columns.flip_xy,
-    )._replace(side=_side(other, label, file))
+    )._replace(side=_side(other, label, file), trial=_trial(other, label, file))
     about = {key: text for name, key in _ABOUT.items() if (text := of_csv_cell(other(name)))}
     if point.provenance is not None or not about:
         return point
@@ -210,6 +211,21 @@ def _side(other: Callable[[str], str], label: str, file: str | PathLike[str]) ->
             landmark=label[:40],
             remedy="Correct it, or leave it empty.",
         ) from None
+
+
+def _trial(other: Callable[[str], str], label: str, file: str | PathLike[str]) -> int:
+    """Return the number of a touch among several of one feature; 0 where the row gives none."""
+    word = next((found for name in _TRIAL_COLUMNS if (found := other(name).strip())), "")
+    if not word:
+        return 0
+    if not (word.isascii() and word.isdigit() and 0 < int(word) < 10_000):
+        raise FileFormatError(
+            f"its column 'trial' must hold a whole number from 1, got {shown(word)}",
+            file=file,
+            landmark=label[:40],
+            remedy="Correct it, or leave it empty.",
+        )
+    return int(word)
 
 
 def _status(word: str, defined: str, label: str, file: str | PathLike[str]) -> Status:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +10,19 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray, as_points, freeze_arrays
 
-__all__ = ["RepeatedTouches", "combine_repeats"]
+__all__ = ["RepeatedTouches", "combine_repeats", "repeat_noise", "repeat_warnings"]
 
 _OUTLIER_SQUARED = 20.0
 """Squared Mahalanobis distance, chi-squared with 3 degrees of freedom: of ordinary touches, 1 in 6000."""
 
 _LEAST_SPREAD_MM = 0.1
 """Smallest standard deviation assumed for a repeated touch, mm a coordinate."""
+
+_APART_MM = 2.5
+"""Distance of two touches of one feature that ordinary ones of 0.4 mm a coordinate hardly ever have."""
 
 _PRIOR_SPREAD_MM = 0.25
 """What one touch more, of this spread, says beforehand: two repeats alone hardly determine it."""
@@ -64,6 +68,27 @@ class RepeatedTouches:
         }
 
     @property
+    def n_used(self) -> int:
+        """How many touches make up the mean."""
+        return int(self.used.sum())
+
+    def moved(self, T_dst_src: RigidTransform) -> RepeatedTouches:
+        """Return the touches in another frame.
+
+        Parameters
+        ----------
+        T_dst_src : RigidTransform
+            From their frame.
+
+        Returns
+        -------
+        RepeatedTouches
+            In the frame `dst`.
+        """
+        points, mean = T_dst_src.apply(self.points), T_dst_src.apply(self.mean[None])[0]
+        return RepeatedTouches(points, self.used, mean, self.spread_mm)
+
+    @property
     def outliers(self) -> tuple[int, ...]:
         """Which touches lie apart from the others; the first is 1."""
         return tuple(int(i) + 1 for i in np.flatnonzero(~self.used))
@@ -93,6 +118,51 @@ def combine_repeats(touches: Mapping[str, ArrayLike]) -> dict[str, RepeatedTouch
     several = {name: _several(points, name) for name, points in touches.items() if _is_several(points)}
     variance = _pooled_variance([points for points in several.values() if len(points) > 1])
     return {name: _combined(points, variance) for name, points in several.items()}
+
+
+def repeat_noise(repeats: Mapping[str, RepeatedTouches]) -> float:
+    """Return the standard deviation of one touch, as the touches that are used show it.
+
+    Parameters
+    ----------
+    repeats : mapping of str to RepeatedTouches
+        Features that were touched more than once.
+
+    Returns
+    -------
+    float
+        mm a coordinate; 0 where no feature has two touches that are used.
+    """
+    freedom = 3 * sum(one.n_used - 1 for one in repeats.values())
+    squares = sum(one.n_used * one.spread_mm**2 for one in repeats.values())
+    return float(np.sqrt(squares / freedom)) if freedom else 0.0
+
+
+def repeat_warnings(repeats: Mapping[str, RepeatedTouches]) -> Iterator[str]:
+    """Yield a sentence on each outlier among repeated touches, and on two touches that disagree.
+
+    Parameters
+    ----------
+    repeats : mapping of str to RepeatedTouches
+        Features that were touched more than once.
+
+    Yields
+    ------
+    str
+        A sentence without a full stop.
+    """
+    for code, one in repeats.items():
+        for number in one.outliers:
+            off = float(np.linalg.norm(one.points[number - 1] - one.mean))
+            yield (
+                f"touch {number} of {len(one.points)} of {code} lies {off:.1f} mm from the others and is "
+                "left out: check that they are of the same place"
+            )
+        if one.n_used == 2 and (apart := 2 * one.spread_mm) > _APART_MM:
+            yield (
+                f"the two touches of {code} lie {apart:.1f} mm apart, and nothing says which one is wrong: "
+                "touch it a third time"
+            )
 
 
 def _is_several(points: ArrayLike) -> bool:

@@ -15,7 +15,9 @@ from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import CODES, Side, check_codes, feature, index_of
+from gp_core.landmarks.labels import is_skull_feature, tidy_label
 from gp_core.landmarks.provenance import LabelProvenance
+from gp_core.landmarks.repeats import RepeatedTouches, combine_repeats
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray, as_points
@@ -33,6 +35,10 @@ class Status(str, Enum):
     SUGGESTED = "suggested"
     TO_DO = "undefined"
     UNSEEN = "missing"
+
+
+_SAME_MM = 1e-9
+"""Up to here a position is that of the mean of its touches: moving both to another frame rounds."""
 
 
 def _nothing() -> Mapping[str, Any]:
@@ -70,6 +76,9 @@ class LandmarkSet:
         Who labelled this side; empty where nobody said.
     round : int
         Which of the observer's labellings of this side it is, from 1.
+    repeats : mapping of str to RepeatedTouches
+        Points, also extra ones, that were touched more than once: the position is their mean. Dropped for a
+        point that is moved.
 
     Examples
     --------
@@ -88,6 +97,7 @@ class LandmarkSet:
     provenance: Mapping[str, LabelProvenance] = field(default_factory=_nothing)
     observer: str = ""
     round: int = 1
+    repeats: Mapping[str, RepeatedTouches] = field(default_factory=_nothing)
 
     def __post_init__(self) -> None:
         check_fields(self, leaving_out=("points", "side", "unseen", "extra"))
@@ -109,8 +119,15 @@ class LandmarkSet:
             decided = self.unseen.union(self.placed)
             kept = {code: known[code] for code in CODES if code in known and code in decided}
             object.__setattr__(self, "provenance", MappingProxyType(kept))
+        if self.repeats:
+            kept_repeats = {name: one for name, one in self.repeats.items() if self._is_mean(name, one)}
+            object.__setattr__(self, "repeats", MappingProxyType(kept_repeats))
         if not isinstance(self.round, int) or self.round < 1:
             raise GpError(f"a round is a whole number from 1, got {self.round!r:.40}")
+
+    def _is_mean(self, name: str, repeated: RepeatedTouches) -> bool:
+        position = self.points[CODES.index(name)] if name in CODES else self.extra.get(name)
+        return position is not None and np.allclose(position, repeated.mean, rtol=0, atol=_SAME_MM)
 
     def _freeze_extra(self) -> None:
         if not isinstance(self.extra, Mapping):
@@ -146,6 +163,47 @@ class LandmarkSet:
             All positions are NaN.
         """
         return cls(np.full((len(CODES), 3), np.nan), Side.parse(side), frame)
+
+    @classmethod
+    def from_touches(
+        cls,
+        touches: Mapping[str, ArrayLike],
+        side: Side | str,
+        *,
+        frame: str = "tracker",
+    ) -> LandmarkSet:
+        """Make a set from named touches, of which a feature may have several.
+
+        Parameters
+        ----------
+        touches : mapping of str to (3,) or (n, 3) array_like
+            Positions by name, mm: features, and skull features (``S1``, ...), which go to `extra`.
+        side : {"L", "R"}
+            Side of the head.
+        frame : str
+            Frame of the positions.
+
+        Returns
+        -------
+        LandmarkSet
+            With these points placed; a feature that was touched several times at the mean of its touches,
+            without outliers, which are all in `repeats`.
+
+        Raises
+        ------
+        FeatureError
+            A name is unknown, or given twice.
+        GpError
+            A position is not three finite numbers.
+        """
+        combined = combine_repeats(touches)
+        means = {name: combined[name].mean if name in combined else at for name, at in touches.items()}
+        skull = {
+            tidy_label(name): _position(at, name) for name, at in means.items() if is_skull_feature(name)
+        }
+        features = {name: at for name, at in means.items() if not is_skull_feature(name)}
+        repeats = {tidy_label(name): one for name, one in combined.items() if len(one.points) > 1}
+        return replace(cls.from_mapping(features, side, frame=frame), extra=skull, repeats=repeats)
 
     @classmethod
     @checks_arguments
@@ -188,7 +246,7 @@ class LandmarkSet:
     def __reduce__(self) -> tuple[object, ...]:
         """Let pickle carry the set to other processes, though it cannot carry a read-only mapping."""
         mappings = (dict(self.extra), dict(self.suggested))
-        about = (self.scan_evidence, dict(self.provenance), self.observer, self.round)
+        about = (self.scan_evidence, dict(self.provenance), self.observer, self.round, dict(self.repeats))
         return LandmarkSet, (self.points, self.side, self.frame, self.unseen, *mappings, *about)
 
     @checks_arguments
@@ -435,6 +493,7 @@ class LandmarkSet:
             extra=MappingProxyType(extra),
             suggested={code: suggestion.moved(T_dst_src) for code, suggestion in self.suggested.items()},
             scan_evidence=None if evidence is None else evidence.moved(T_dst_src),
+            repeats={name: one.moved(T_dst_src) for name, one in self.repeats.items()},
         )
 
 

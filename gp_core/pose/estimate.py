@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.argument_types import checks_arguments_but
@@ -16,7 +15,7 @@ from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.plausible_size import check_plausible_size
-from gp_core.landmarks.repeats import RepeatedTouches, combine_repeats
+from gp_core.landmarks.repeats import repeat_warnings
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.hypothesis_check import hypothesis_warnings
@@ -48,8 +47,9 @@ def estimate_pose(
     ----------
     touches : mapping of str to (3,) or (n, 3) array_like, or LandmarkSet
         Position of each touched feature in the tracker's frame, mm; three or more, not collinear. A feature
-        that was touched n times may have all its touches: their mean is used, without outliers, and counts as
-        one touch does.
+        that was touched n times may have all its touches: their mean is used, without outliers, and the error
+        of the mean is 1 / sqrt(n) of that of a touch. Skull features (``S1``, ...) may be among them; no pose
+        is estimated from these.
     side : {"L", "R"}
         Side of the head.
     atlas : Atlas, optional
@@ -93,8 +93,7 @@ def estimate_pose(
     """
     check_option(method, "method", METHODS)
     check_option(round_window, "round window", ROUND_WINDOWS)
-    repeats = combine_repeats(touches) if isinstance(touches, Mapping) else {}
-    landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side, repeats)
+    landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
     check_plausible_size(landmarks, strict=True)
@@ -108,33 +107,21 @@ def estimate_pose(
             shared_error=shared_error,
             times=times,
         )
+    repeats = {name: one for name, one in landmarks.repeats.items() if name in pose.residuals}
     if repeats:
-        pose = replace(pose, repeats=repeats, warnings=(*pose.warnings, *_repeat_warnings(repeats)))
+        pose = replace(pose, repeats=repeats, warnings=(*pose.warnings, *repeat_warnings(repeats)))
     if round_window == "expected":
         return pose
     return towards_touched_window(pose, landmarks)
 
 
-def _repeat_warnings(repeats: Mapping[str, RepeatedTouches]) -> Iterator[str]:
-    for code, one in repeats.items():
-        for number in one.outliers:
-            off = float(np.linalg.norm(one.points[number - 1] - one.mean))
-            yield (
-                f"touch {number} of {len(one.points)} of {code} lies {off:.1f} mm from the others and is "
-                "left out: check that they are of the same place"
-            )
-
-
-def _as_landmarks(
-    touches: Mapping[str, ArrayLike], side: Side | str, repeats: Mapping[str, RepeatedTouches]
-) -> LandmarkSet:
+def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:
     if not isinstance(touches, Mapping):
         raise GpError(
             f"touches must be a mapping of names to points, or a LandmarkSet, got {type(touches).__name__}",
             remedy="Read a file of touches with read_touches.",
         )
-    means = {code: one.mean for code, one in repeats.items()}
-    return LandmarkSet.from_mapping({**touches, **means}, side, frame="tracker")
+    return LandmarkSet.from_touches(touches, side, frame="tracker")
 
 
 def _with_hypotheses(

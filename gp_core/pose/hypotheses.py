@@ -149,8 +149,9 @@ def _exchanges(
     for i, j in combinations(range(n), 2):
         exchanged = points.copy()
         exchanged[[i, j]] = points[[j, i]]
-        if approximate_neg_log_posterior(model, exchanged, fit.quaternion) <= limit:
-            other = _fitted(model, exchanged)
+        renamed = model.with_counts_exchanged(i, j)
+        if approximate_neg_log_posterior(renamed, exchanged, fit.quaternion) <= limit:
+            other = _fitted(renamed, exchanged)
             if other is not None:
                 yield (i, j), other
 
@@ -175,7 +176,8 @@ def log_evidence(model: TouchModel, fit: NamedFit) -> float:
         noise2, prior = _NOISE2, _LOG_SIGMA2_PRIOR
     else:
         noise2, prior = model.noise**2 / _WEIGHTS[None, None], np.zeros(1)
-    variance = model.variances[:, None] + noise2  # (scale, touch, weight)
+    # (scale, touch, weight)
+    variance = model.variances[:, None] + noise2 / fit.counts[:, None]
     logs = -1.5 * np.log(variance) - squared / (2 * variance)
     largest = logs.max(axis=2)
     shares = np.exp(logs - largest[..., None]) * _WEIGHT_PRIOR

@@ -164,4 +164,6 @@ def with_names_exchanged(touches: LandmarkSet, pair: tuple[str, str]) -> Landmar
             f"{a} and {b} cannot be exchanged: {' and '.join(missing)} not touched",
             remedy=f"Touched are {' '.join(touches.placed)}.",
         )
-    return touches.with_point(a, touches[b]).with_point(b, touches[a])
+    other = {a: b, b: a}
+    repeats = {other.get(name, name): one for name, one in touches.repeats.items()}
+    return replace(touches.with_point(a, touches[b]).with_point(b, touches[a]), repeats=repeats)

@@ -124,12 +124,14 @@ def _with_touch(atlas: Atlas, model: TouchModel, fit: NamedFit, code: str) -> tu
             codes=(*model.codes, code),
             mean=np.vstack([model.mean, point]),
             variances=np.append(model.variances, variance),
+            counts=np.append(fit.counts, 1.0),
         ),
         replace(
             fit,
             points=np.vstack([fit.points, point]),
             residual=np.append(fit.residual, np.zeros(3)),
             weights=np.append(fit.weights, 1.0),
+            counts=np.append(fit.counts, 1.0),
             precision=np.append(fit.precision, np.repeat(1 / (variance + noise), 3)),
         ),
     )

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.errors import FeatureError, GeometryError, GpError
+from gp_core.errors import GeometryError, GpError
 from gp_core.io.tracker_recordings import Recording
 from gp_core.validation import FloatArray
 
@@ -38,25 +38,21 @@ def recorded_touches(
     tip_offset : (3,) array_like
         The tip in the marker's frame, mm; zeros where the recorded poses are those of the tip itself.
     names : sequence of str
-        What was touched, in the order of the touches.
+        What was touched, in the order of the touches; a feature may be there several times.
 
     Returns
     -------
-    dict of str to (3,) array
-        Median position of the tip during each rest, mm, tracker frame.
+    dict of str to (3,) or (n, 3) array
+        Median position of the tip during each rest, mm, tracker frame; a row for each touch of a feature that
+        is named several times.
 
     Raises
     ------
     GpError
         The tip offset is not three numbers.
-    FeatureError
-        A name occurs twice.
     GeometryError
         The number of rests differs from the number of names.
     """
-    double = next((name for name in names if list(names).count(name) > 1), None)
-    if double is not None:
-        raise FeatureError("is named twice", landmark=double, remedy="Name each touch once, in their order.")
     places = resting_places(recording, tip_offset)
     if len(places) != len(names):
         where = "; ".join(f"{x:.1f} {y:.1f} {z:.1f}" for x, y, z in places[:12])
@@ -64,7 +60,13 @@ def recorded_touches(
             f"the tip rested {len(places)} times ({where} mm), but {len(names)} touches are named",
             remedy=f"A touch is {_REST_S:g} s within {_RADIUS_MM:g} mm; name as many, in their order.",
         )
-    return dict(zip(names, places, strict=True))
+    touched: dict[str, list[FloatArray]] = {name: [] for name in names}
+    for name, place in zip(names, places, strict=True):
+        touched[name].append(place)
+    return {
+        name: np.squeeze(positions, 0) if len(positions) == 1 else np.array(positions)
+        for name, positions in touched.items()
+    }
 
 
 def resting_places(recording: Recording, tip_offset: ArrayLike) -> FloatArray:

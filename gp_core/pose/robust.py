@@ -15,6 +15,7 @@ from gp_core.errors import FeatureError, GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.anatomy import axis_frame, cochlea_origin, mirror_right, touched_features
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.repeats import repeat_noise
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.covariance import cochlea_jacobian
@@ -203,7 +204,11 @@ def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -
             f"{': ' + ' '.join(usable) if usable else ''}",
             remedy="Touch more of them.",
         )
-    return TouchModel(usable, atlas.rows(usable), atlas.variances(usable), probe_noise)
+    repeats = {code: one for code, one in touches.repeats.items() if code in usable}
+    counts = np.array([repeats[code].n_used if code in repeats else 1.0 for code in usable])
+    return TouchModel(
+        usable, atlas.rows(usable), atlas.variances(usable), probe_noise, counts, repeat_noise(repeats)
+    )
 
 
 def defining_points(atlas: Atlas, model: TouchModel, fit: NamedFit) -> FloatArray:
@@ -300,8 +305,9 @@ def pose_covariance(
     of_shape[:, atlas.coordinates(DEFINING_FEATURES)] = to_frame
     of_shape[:, atlas.coordinates(model.codes)] -= of_touches
     covariance = of_shape @ atlas.scatter @ of_shape.T
+    least = max(systematic.noise_floor(len(model.codes)), model.repeat_noise)
     variances = np.maximum(
-        _touch_variances(fit, systematic.outlier_squared), systematic.noise_floor(len(model.codes)) ** 2
+        _touch_variances(fit, systematic.outlier_squared), np.repeat(least**2 / fit.counts, 3)
     )
     covariance += (of_touches * variances) @ of_touches.T
     covariance += systematic.covariance(atlas, fit, of_touches, of_shape)

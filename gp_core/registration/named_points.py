@@ -6,7 +6,8 @@ Model, in the atlas frame (left side). The point touched at feature j is
 
 where s_j is the deviation of this animal's feature from the mean, with the variance v_j that the atlas gives
 it, and e_j is the error of the touch. A Student-t distribution is a Gaussian of variance sigma^2 / w_j whose
-weight w_j is itself unknown, so an outlying touch is down-weighted. The fit is by expectation conditional
+weight w_j is itself unknown, so an outlying touch is down-weighted. Where the feature was touched n_j times,
+y_j is the mean of its touches, and its scale is sigma / sqrt(n_j). The fit is by expectation conditional
 maximisation: first the weights and sigma from the expected squared errors, then the pose by weighted
 Procrustes with the shape integrated out.
 
@@ -31,7 +32,7 @@ import importlib
 import math
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import count
 from typing import NamedTuple
@@ -83,12 +84,38 @@ class TouchModel:
         Variance between animals of one coordinate of each feature.
     noise : float or None
         Scale of the touch errors, mm a coordinate; None: estimated with the pose.
+    counts : (n,) array or None
+        Of how many touches each point is the mean; None: one each.
+    repeat_noise : float
+        Standard deviation of one touch as repeated touches show it, mm a coordinate; 0 without repeats. It
+        bounds the noise of the 95 % region from below.
     """
 
     codes: tuple[str, ...]
     mean: FloatArray
     variances: FloatArray
     noise: float | None = None
+    counts: FloatArray | None = None
+    repeat_noise: float = 0.0
+
+    def with_counts_exchanged(self, i: int, j: int) -> TouchModel:
+        """Return the model for touches whose rows i and j are exchanged.
+
+        Parameters
+        ----------
+        i, j : int
+            Two rows.
+
+        Returns
+        -------
+        TouchModel
+            The counts go with the touches.
+        """
+        if self.counts is None:
+            return self
+        counts = self.counts.copy()
+        counts[[i, j]] = self.counts[[j, i]]
+        return replace(self, counts=counts)
 
 
 @dataclass(frozen=True)
@@ -103,24 +130,25 @@ class LeaveOneOutResiduals:
         Squared deviations, mm^2.
     variances : (n, 3) array
         Of pose and shape, to which each touch adds its own error, mm^2.
-    noise : float
-        Scale of an ordinary touch error, mm.
+    touch_variances : (n,) array
+        Squared scale of the error of each touch, mm^2: smaller for the mean of several touches.
     """
 
     deviations: FloatArray
     variances: FloatArray
-    noise: float
+    touch_variances: FloatArray
 
     @cached_property
     def squared(self) -> FloatArray:
         """(n,) squared Mahalanobis distances: chi-squared with 3 degrees of freedom for ordinary touches."""
-        squared: FloatArray = (self.deviations / (self.variances + self.noise**2)).sum(axis=1)
+        spread = self.variances + self.touch_variances[:, None]
+        squared: FloatArray = (self.deviations / spread).sum(axis=1)
         return squared
 
     @property
     def error_variance(self) -> FloatArray:
         """(n,) error variance that would make the deviation of each touch average, mm^2 a coordinate."""
-        variance = np.full(len(self.deviations), self.noise**2)
+        variance = self.touch_variances.copy()
         for _ in range(_NEWTON_STEPS):
             spread = self.variances + variance[:, None]
             squared = (self.deviations / spread).sum(axis=1)
@@ -155,6 +183,8 @@ class NamedFit:
         Negative log posterior up to a constant; the lower, the better, among hypotheses on the same touches.
     converged : bool
         False where the maximum number of iterations was reached first.
+    counts : (n,) array
+        Of how many touches each point is the mean.
     """
 
     quaternion: FloatArray
@@ -168,6 +198,7 @@ class NamedFit:
     precision: FloatArray
     neg_log_posterior: float
     converged: bool
+    counts: FloatArray
 
     @property
     def has_outlier(self) -> bool:
@@ -200,7 +231,8 @@ class NamedFit:
         """
         jacobian = self.jacobian.reshape(-1, 3, 6)
         precision = self.precision[::3]
-        variances = 1 / precision - self.noise**2 / self.weights
+        scales = self.noise**2 / self.counts
+        variances = 1 / precision - scales / self.weights
         covariance = np.linalg.inv((self.precision[:, None] * self.jacobian).T @ self.jacobian)
         of_pose = jacobian @ covariance @ jacobian.transpose(0, 2, 1)
         # the factor keeps the matrix invertible where one touch alone determines the pose
@@ -208,7 +240,7 @@ class NamedFit:
         deviation = release @ self.residual.reshape(-1, 3, 1)
         spread, axes = np.linalg.eigh(of_pose @ release)
         deviations = (axes.transpose(0, 2, 1) @ deviation)[..., 0] ** 2
-        return LeaveOneOutResiduals(deviations, spread + variances[:, None], self.noise)
+        return LeaveOneOutResiduals(deviations, spread + variances[:, None], scales)
 
     @cached_property
     def touch_variances(self) -> FloatArray:
@@ -219,7 +251,8 @@ class NamedFit:
         """
         freedom = 3 * len(self.weights) - 6 + PRIOR_WEIGHT
         inflation = freedom / (freedom - 2) if self.noise_estimated else 1.0
-        variances: FloatArray = inflation * NU / (NU - 2) * self.noise**2 / self.weights
+        scales = self.noise**2 / self.counts
+        variances: FloatArray = inflation * NU / (NU - 2) * scales / self.weights
         return variances
 
 
@@ -371,7 +404,7 @@ def _fit_student_t(
 ) -> _StudentTFit:
     """Run the fit from given weights and a given rotation; by default from weights of 1 and the identity."""
     buffers = _buffers(model, touches, weights, quaternion)
-    _, _, _, weights, precision, points, _, pose = buffers
+    _, _, _, _, weights, precision, points, _, pose = buffers
     return _StudentTFit(
         *_run("fit_student_t", *buffers, noise or 0.0, n_iterations), weights, precision, points, pose
     )
@@ -387,7 +420,8 @@ def _buffers(
     return (
         np.ascontiguousarray(model.mean).reshape(-1),
         np.ascontiguousarray(model.variances),
-        np.array(touches).reshape(-1),  # a copy: the exchanges write into it
+        np.array(touches).reshape(-1),  # copies: the exchanges write into them
+        np.ones(n) if model.counts is None else np.array(model.counts, dtype=np.float64),
         np.ones(n) if weights is None else weights,
         np.empty(n),
         np.empty(3 * n),
@@ -425,6 +459,7 @@ def _as_fit(model: TouchModel, solution: _StudentTFit) -> NamedFit:
         precision=np.repeat(solution.precision, 3),
         neg_log_posterior=solution.neg_log_posterior,
         converged=solution.change < TOLERANCE,
+        counts=np.ones(len(points)) if model.counts is None else model.counts,
     )
 
 

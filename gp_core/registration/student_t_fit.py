@@ -57,6 +57,7 @@ def fit_student_t(
     mean: Buffer,
     variances: Buffer,
     touches: Buffer,
+    counts: Buffer,
     weights: Buffer,
     precision: Buffer,
     points: Buffer,
@@ -73,6 +74,8 @@ def fit_student_t(
         Mean of the atlas, and the touches, mm.
     variances : (n,)
         Variances of the features between animals, mm^2 a coordinate.
+    counts : (n,)
+        Of how many touches each one is the mean: the squared scale of its error is that much smaller.
     weights : (n,)
         In: start values. Out: about 1 for an ordinary touch, towards 0 for an outlier.
     precision, points, errors : (n,), (3 n,), (n,)
@@ -94,32 +97,37 @@ def fit_student_t(
     sigma2 = noise * noise if given else TYPICAL_NOISE_MM * TYPICAL_NOISE_MM
     change, shift, stride = math.inf, 0.0, _STRIDE
     for iteration in range(n_iterations + 1):
-        total = _update_precision(variances, weights, sigma2, precision)
+        total = _update_precision(variances, counts, weights, sigma2, precision)
         centre, touch_centre = _mean_of(mean, precision, total), _mean_of(touches, precision, total)
         _update_rotation(mean, centre, touches, touch_centre, precision, total, pose)
         _to_atlas_frame(touches, touch_centre, pose, centre, points)
-        change = _expected_errors(mean, centre, weights, sigma2, total, precision, points, errors)
+        change = _expected_errors(mean, centre, counts, weights, sigma2, total, precision, points, errors)
         if not given:
-            previous, shift = shift, _log_scale_step(errors, sigma2)
+            previous, shift = shift, _log_scale_step(counts, errors, sigma2)
             stride = _next_stride(stride, previous, shift)
             change = max(change, abs(shift))
         if change < TOLERANCE or iteration == n_iterations:
             break
         for k in range(len(weights)):
-            weights[k] = (NU + 3.0) / (NU + errors[k] / sigma2)
+            weights[k] = (NU + 3.0) / (NU + counts[k] * errors[k] / sigma2)
         sigma2 *= math.exp(stride * shift)
     for a in range(3):
         r = 7 + 3 * a
         pose[4 + a] = touch_centre[a] - (
             pose[r] * centre[0] + pose[r + 1] * centre[1] + pose[r + 2] * centre[2]
         )
-    return sigma2, change, _neg_log_posterior(mean, variances, weights, precision, points, sigma2, given)
+    return (
+        sigma2,
+        change,
+        _neg_log_posterior(mean, variances, counts, weights, precision, points, sigma2, given),
+    )
 
 
 def best_exchange(
     mean: Buffer,
     variances: Buffer,
     touches: Buffer,
+    counts: Buffer,
     weights: Buffer,
     precision: Buffer,
     points: Buffer,
@@ -137,7 +145,7 @@ def best_exchange(
 
     Parameters
     ----------
-    mean, variances, touches, weights, precision, points, errors, pose, noise, n_iterations
+    mean, variances, touches, counts, weights, precision, points, errors, pose, noise, n_iterations
         As for `fit_student_t`.
     below : float
         Negative log posterior below which an exchange is of interest.
@@ -155,7 +163,7 @@ def best_exchange(
     start = (pose[0], pose[1], pose[2], pose[3])
     for i in range(n):
         for j in range(i + 1, n):
-            _exchange(touches, i, j)
+            _exchange(touches, counts, i, j)
             neg_log_posterior = below + _SLACK
             for n_most in (_SCREENING_ITERATIONS, n_iterations):
                 if neg_log_posterior > below + _SLACK:
@@ -164,24 +172,27 @@ def best_exchange(
                     weights[k] = 1.0
                 pose[0], pose[1], pose[2], pose[3] = start
                 _, _, neg_log_posterior = fit_student_t(
-                    mean, variances, touches, weights, precision, points, errors, pose, noise, n_most
+                    mean, variances, touches, counts, weights, precision, points, errors, pose, noise, n_most
                 )
             if neg_log_posterior < least:
                 least, first, second = neg_log_posterior, i, j
-            _exchange(touches, i, j)
+            _exchange(touches, counts, i, j)
     return 1.0 * first, 1.0 * second, least
 
 
-def _exchange(touches: Buffer, i: int, j: int) -> None:
+def _exchange(touches: Buffer, counts: Buffer, i: int, j: int) -> None:
+    counts[i], counts[j] = counts[j], counts[i]
     for a in range(3):
         touches[3 * i + a], touches[3 * j + a] = touches[3 * j + a], touches[3 * i + a]
 
 
-def _update_precision(variances: Buffer, weights: Buffer, sigma2: float, precision: Buffer) -> float:
+def _update_precision(
+    variances: Buffer, counts: Buffer, weights: Buffer, sigma2: float, precision: Buffer
+) -> float:
     """Write the inverse variance of each touch, with the shape integrated out, and return their sum."""
     total = 0.0
     for j in range(len(variances)):
-        p = 1.0 / (variances[j] + sigma2 / weights[j])
+        p = 1.0 / (variances[j] + sigma2 / (counts[j] * weights[j]))
         precision[j] = p
         total += p
     return total
@@ -250,6 +261,7 @@ def _to_atlas_frame(
 def _expected_errors(
     mean: Buffer,
     centre: Vector,
+    counts: Buffer,
     weights: Buffer,
     sigma2: float,
     total: float,
@@ -272,11 +284,11 @@ def _expected_errors(
         )
         x, y, z = px - mean[3 * j], py - mean[3 * j + 1], pz - mean[3 * j + 2]
         p, w = precision[j], weights[j]
-        noise = sigma2 / w
+        noise = sigma2 / (counts[j] * w)
         squared = x * x + y * y + z * z + 3.0 / total + through_rotation
         error = noise * noise * p * p * squared + 3.0 * noise * (1.0 - noise * p)
         errors[j] = error
-        step = abs((NU + 3.0) / (NU + error / sigma2) - w)
+        step = abs((NU + 3.0) / (NU + counts[j] * error / sigma2) - w)
         if not step <= change:
             change = step
     return change
@@ -312,11 +324,12 @@ def _inverse(n: Symmetric3) -> Symmetric3:
     )
 
 
-def _log_scale_step(errors: Buffer, sigma2: float) -> float:
+def _log_scale_step(counts: Buffer, errors: Buffer, sigma2: float) -> float:
     """Return the change of the logarithm of the squared scale that the expected errors suggest."""
     total = PRIOR_WEIGHT * TYPICAL_NOISE_MM * TYPICAL_NOISE_MM
     for k in range(len(errors)):
-        total += (NU + 3.0) / (NU + errors[k] / sigma2) * errors[k]
+        error = counts[k] * errors[k]
+        total += (NU + 3.0) / (NU + error / sigma2) * error
     return math.log(total / ((PRIOR_WEIGHT + 3.0 * len(errors)) * sigma2))
 
 
@@ -332,6 +345,7 @@ def _next_stride(stride: float, previous: float, shift: float) -> float:
 def _neg_log_posterior(
     mean: Buffer,
     variances: Buffer,
+    counts: Buffer,
     weights: Buffer,
     precision: Buffer,
     points: Buffer,
@@ -347,9 +361,9 @@ def _neg_log_posterior(
             points[3 * j + 2] - mean[3 * j + 2],
         )
         squared = precision[j] * precision[j] * (x * x + y * y + z * z)
-        noise = sigma2 / weights[j]
+        noise = sigma2 / (counts[j] * weights[j])
         shape += variances[j] * squared
-        touch += math.log1p(noise * noise * squared / (NU * sigma2))
+        touch += math.log1p(counts[j] * noise * noise * squared / (NU * sigma2))
     neg_log_posterior = 0.5 * (shape + (NU + 3.0) * touch)
     if given:
         return neg_log_posterior

@@ -8,7 +8,7 @@ from gp_core.registration.rotation_compiled import as_matrix, optimal_rotation
 
 __all__ = ["best_exchange", "fit_student_t"]
 
-_BUFFERS = ", ".join(["float64[::1]"] * 8)
+_BUFFERS = ", ".join(["float64[::1]"] * 9)
 _SIGNATURES = {
     "fit_student_t": f"UniTuple(float64, 3)({_BUFFERS}, float64, int64)",
     "best_exchange": f"UniTuple(float64, 3)({_BUFFERS}, float64, int64, float64)",

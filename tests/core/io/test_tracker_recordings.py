@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from gp_core import read_touches
 from gp_core.cli import main
 from gp_core.errors import FileFormatError, GeometryError, GpError
 from gp_core.io.tracker_recordings import Recording, is_sequence, read_recording
@@ -191,6 +192,17 @@ def test_the_places_where_the_tip_rested_are_found_in_their_order(timed) -> None
     assert named["OS"] == pytest.approx(_PLACES[2], abs=0.1 if timed else 0.3)
 
 
+def test_a_feature_may_be_touched_several_times(tmp_path) -> None:
+    recording = _touching(_PLACES)
+    named = recorded_touches(recording, _TIP, ["CL", "MN", "OS", "RWA", "CL"])
+    assert named["CL"] == pytest.approx(_PLACES[[0, 4]], abs=0.1)
+    assert named["MN"].shape == (3,)
+    file, csv = _mha(tmp_path / "a.mha", recording.poses), tmp_path / "t.csv"
+    tip = ",".join(map(str, _TIP))
+    assert main(["touches", str(file), "--order", "CL,MN,OS,RWA,CL", "--tip", tip, "-o", str(csv)]) == 0
+    assert len(read_touches(csv, "L").repeats["CL"].points) == 2
+
+
 def test_more_or_fewer_rests_than_names_are_said() -> None:
     with pytest.raises(
         GeometryError, match=r"rested 5 times \(.*10\.0 12\.\d .*mm\), but 6 touches are named"
@@ -214,7 +226,6 @@ def test_a_tip_that_slips_a_little_is_one_touch() -> None:
 @pytest.mark.parametrize(
     ("order", "tip", "said"),
     [
-        ("RWA,CL,RWA", "0,0,0", "RWA: is named twice"),
         ("RWA,CA", "0,0,0", "CA: is inside the bone"),
         ("RWA,FOO", "0,0,0", "FOO: is no feature"),
         ("RWA,CL", "0.001,0,0.16", "only 0.16 mm from its marker. Give it in mm"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gp_core import PROBE, Atlas, GpError, estimate_pose
+from gp_core import PROBE, Atlas, GpError, LandmarkSet, RigidTransform, estimate_pose, read_as
 from gp_core.landmarks.repeats import combine_repeats
 
 ATLAS = Atlas.published()
@@ -16,16 +16,66 @@ def _touched(n: int, noise: float, rng: np.random.Generator) -> dict[str, np.nda
     return {code: point + noise * rng.normal(size=(n, 3)) for code, point in ANIMAL.items()}
 
 
-def test_repeats_are_estimated_by_their_means() -> None:
+def test_the_mean_of_n_touches_has_the_error_of_one_over_root_n() -> None:
+    touches = _touched(4, 0.2, np.random.default_rng(0))
+    pose = estimate_pose(touches, "L", ATLAS, probe_noise=0.2)
+    means = {code: points.mean(axis=0) for code, points in touches.items()}
+    alone = estimate_pose(means, "L", ATLAS, probe_noise=0.1)
+    np.testing.assert_allclose(pose.transform, alone.transform, atol=1e-12)
+    np.testing.assert_allclose(pose.residuals["MN"], alone.residuals["MN"], atol=1e-12)
+
+
+def test_all_touches_are_kept_with_their_spread() -> None:
     touches = _touched(3, 0.2, np.random.default_rng(0))
     pose = estimate_pose(touches, "L", ATLAS)
-    means = {code: points.mean(axis=0) for code, points in touches.items()}
-    np.testing.assert_allclose(pose.transform, estimate_pose(means, "L", ATLAS).transform, atol=1e-12)
     assert set(pose.repeats) == set(PROBE)
     one = pose.repeats["CL"]
     np.testing.assert_array_equal(one.points, touches["CL"])
     assert one.spread_mm == pytest.approx(np.sqrt(((one.points - one.mean) ** 2).sum(axis=1).mean()))
     assert pose.as_dict()["repeated_touches"]["CL"]["spread_mm"] == one.spread_mm
+
+
+def test_a_feature_touched_more_often_weighs_more() -> None:
+    rng = np.random.default_rng(4)
+    weighted, plain = [], []
+    for _ in range(60):
+        touches: dict[str, np.ndarray] = {code: _touched(1, 0.4, rng)[code][0] for code in PROBE}
+        touches |= {code: ANIMAL[code] + 0.4 * rng.normal(size=(8, 3)) for code in ("CL", "OS", "RWP")}
+        means = {code: np.atleast_2d(points).mean(axis=0) for code, points in touches.items()}
+        weighted.append(np.linalg.norm(estimate_pose(touches, "L", ATLAS).origin))
+        plain.append(np.linalg.norm(estimate_pose(means, "L", ATLAS).origin))
+    assert np.mean(weighted) < 0.97 * np.mean(plain)
+
+
+def test_the_shared_error_does_not_shrink_with_repeats() -> None:
+    rng = np.random.default_rng(5)
+    pose = estimate_pose(_touched(50, 0.2, rng), "L", ATLAS, shared_error=1.0)
+    alone = np.sqrt(7.814727903251179 / 3)  # chi-squared, 3 degrees of freedom, 95 %
+    assert alone < pose.radius_95 < 1.3 * alone
+
+
+def test_the_spread_of_repeats_bounds_the_noise_from_below() -> None:
+    rng = np.random.default_rng(6)
+    offsets = 0.8 * rng.normal(size=(6, 5, 3))
+    offsets -= offsets.mean(axis=1, keepdims=True)  # the means fit exactly: only the repeats show the noise
+    rough = {code: ANIMAL[code] + off for code, off in zip(PROBE, offsets, strict=True)}
+    exact = {code: ANIMAL[code] + 0.01 * off for code, off in zip(PROBE, offsets, strict=True)}
+    wide, narrow = (estimate_pose(touches, "L", ATLAS).plain_radius_95 for touches in (rough, exact))
+    assert wide > 1.2 * narrow
+
+
+def test_repeats_keep_their_weight_under_another_name() -> None:
+    touches = _touched(3, 0.05, np.random.default_rng(7))
+    exchanged = {**touches, "CL": touches["OS"], "OS": touches["CL"][:1]}
+    landmarks = LandmarkSet.from_touches(exchanged, "L")
+    pose = estimate_pose(landmarks, "L", ATLAS)
+    assert pose.likelier_hypothesis is not None
+    renamed = read_as(landmarks, pose.likelier_hypothesis)
+    assert len(renamed.repeats["OS"].points) == 3
+    assert "CL" not in renamed.repeats
+    moved = landmarks.moved(RigidTransform(np.diag([-1.0, -1, 1, 1]), "scan", "tracker"))
+    assert moved.repeats.keys() == landmarks.repeats.keys()
+    assert not landmarks.with_point("CL", (1, 2, 3)).repeats.keys() & {"CL"}
 
 
 def test_touching_three_and_five_times_sharpens_the_pose() -> None:

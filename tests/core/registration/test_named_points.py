@@ -113,7 +113,7 @@ def test_an_odd_touch_is_as_wrong_as_makes_its_deviation_an_average_one() -> Non
     assert others.squared[j] > 8
     assert (others.deviations[j] / spread).sum() == pytest.approx(3, rel=1e-6)
     ordinary = others.squared < 3
-    np.testing.assert_allclose(others.error_variance[ordinary], others.noise**2)
+    np.testing.assert_allclose(others.error_variance[ordinary], others.touch_variances[ordinary])
 
 
 def test_three_touches_say_nothing_against_each_other() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -29,6 +30,8 @@ def _drawn(seed: int) -> tuple[TouchModel, np.ndarray]:
     rng = np.random.default_rng(seed)
     codes = tuple(rng.choice(EXTERNAL, rng.integers(3, 12), replace=False).tolist())
     model = _model(codes, noise=(None, None, 0.2)[seed % 3])
+    if seed % 4 == 0:
+        model = replace(model, counts=rng.integers(1, 6, len(codes)).astype(float))
     touches = model.mean + rng.choice([0.05, 0.2, 0.8]) * rng.normal(size=model.mean.shape)
     touches[rng.integers(len(codes))] += rng.choice([0, 0, 3, 10]) * rng.normal(size=3)
     return model, random_pose(rng).apply(touches)
@@ -41,7 +44,8 @@ def _run(
     pose = np.zeros(student_t_fit.POSE_SIZE)
     pose[0] = 1
     out = [np.ones(n), np.empty(n), np.empty(3 * n), np.empty(n), pose]
-    buffers = [model.mean.ravel(), model.variances, touches.ravel().copy(), *out]
+    counts = np.ones(n) if model.counts is None else model.counts.copy()
+    buffers = [model.mean.ravel(), model.variances, touches.ravel().copy(), counts, *out]
     if module is student_t_fit:
         buffers = [buffer.data for buffer in buffers]
     answer = getattr(module, kernel)(*buffers, model.noise or 0.0, 500, *more)
