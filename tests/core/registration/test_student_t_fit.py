@@ -112,13 +112,14 @@ def test_a_converged_fit_solves_its_own_equations(seed: int) -> None:
     np.testing.assert_allclose(step, 0, atol=1e-8)
     used = np.linalg.inv((fit.precision[:, None] * jacobian).T @ jacobian)
     through_pose = np.einsum("ij,jk,ik->i", jacobian, used, jacobian).reshape(-1, 3).sum(axis=1)
-    noise = fit.noise**2 / fit.weights
+    noise = fit.noise**2 / (fit.counts * fit.weights)
     squared = (noise * precision) ** 2 * (fit.squared_residuals + through_pose) + 3 * noise * (
         1 - noise * precision
     )
-    np.testing.assert_allclose(fit.weights, 7 / (4 + squared / fit.noise**2), atol=2e-5)
+    of_one_touch = fit.counts * squared
+    np.testing.assert_allclose(fit.weights, 7 / (4 + of_one_touch / fit.noise**2), atol=2e-5)
     if model.noise is None:
-        scale = (2 * 0.05**2 + (fit.weights * squared).sum()) / (2 + 3 * len(touches))
+        scale = (2 * 0.05**2 + (fit.weights * of_one_touch).sum()) / (2 + 3 * len(touches))
         assert fit.noise**2 == pytest.approx(scale, rel=1e-4)
 
 
