@@ -49,6 +49,9 @@ def make_parser() -> argparse.ArgumentParser:
         metavar="DIR",
         help="where unsaved edits are kept; by default a folder of the user",
     )
+    parser.add_argument(
+        "--observer", metavar="NAME", help="who labels, from now on; by default who said so in the window"
+    )
     offscreen = parser.add_argument_group("without a display")
     offscreen.add_argument(
         "--offscreen", metavar="SCRIPT|demo", help="do what a script says, in the same window, unseen"
@@ -122,7 +125,7 @@ def _window(args: argparse.Namespace) -> int:
         )
     from gp_labeler.views.application import run_window  # here: `--help` need not wait for Qt and VTK
 
-    return run_window(args.path, demo=args.demo, directory=args.state)
+    return run_window(args.path, demo=args.demo, directory=args.state, observer=args.observer)
 
 
 def _change_desktop(*, install: bool) -> int:
@@ -142,7 +145,8 @@ def _check_together(args: argparse.Namespace) -> None:
         if args.demo and args.path is not None:
             raise GpError("--demo opens the synthetic head, and a path was given too", remedy="Give one.")
         return
-    for option, value in (("--demo", args.demo), ("--state", args.state), (f"{args.path}", args.path)):
+    words = (("--demo", args.demo), ("--state", args.state), ("--observer", args.observer))
+    for option, value in (*words, (f"{args.path}", args.path)):
         if value:
             raise GpError(f"{option} is for the window, not for --offscreen", remedy="Leave it out.")
 

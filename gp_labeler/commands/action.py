@@ -29,6 +29,7 @@ class Ui(Protocol):
     def ask_save_mesh(self) -> None: ...  # noqa: D102
     def ask_screenshot(self) -> None: ...  # noqa: D102
     def ask_swap(self) -> None: ...  # noqa: D102
+    def show_labellings(self) -> None: ...  # noqa: D102
     def ask_open_touches(self) -> None: ...  # noqa: D102
     def ask_open_skull(self) -> None: ...  # noqa: D102
     def judge_pose(self, verdict: str) -> None: ...  # noqa: D102

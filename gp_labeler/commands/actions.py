@@ -8,6 +8,7 @@ from types import MappingProxyType
 from gp_core.errors import GpError
 from gp_labeler.commands.action import MENUS, Action, Ui
 from gp_labeler.commands.atlas_rows import atlas_rows
+from gp_labeler.commands.labelling_rows import labelling_rows
 from gp_labeler.commands.pose_rows import pose_rows
 from gp_labeler.commands.rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
 from gp_labeler.commands.view_rows import cut_rows
@@ -24,6 +25,7 @@ ACTIONS: Mapping[str, Action] = MappingProxyType(
             view_rows,
             cut_rows,
             landmark_rows,
+            labelling_rows,
             atlas_rows,
             pose_rows,
             help_rows,

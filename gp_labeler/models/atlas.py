@@ -87,6 +87,7 @@ class AtlasModel:
         self.is_refitting = False
         """Whether an atlas without the open specimen is being fitted, by which it will be checked."""
         document.reset.connect(self._on_reset)
+        document.labelling_changed.connect(self._on_reset)
         jobs.cancelled.connect(self._on_cancelled)
 
     @property
@@ -319,13 +320,19 @@ class AtlasModel:
         others = tuple(animal for animal in self._specimens if animal.name != name)
         enough = sum(len(animal.sides) for animal in others) >= FEWEST_ANIMALS
         self.is_refitting = self.is_held_out and enough
-        self._expected_by = atlas
+        self._expected_by = self._without_earlier_labels(atlas)
         if self.is_refitting:
             confirmed = frozenset() if self.animals is None else self.animals.confirmed
             job = RefitAtlas(others, keep_doubtful=self.keeps_doubtful, confirmed=confirmed)
             self._jobs.submit(job, self._hold_out, key="atlas without")
-        if before is not atlas:
+        if before is not self._expected_by:
             self.expectations_changed.emit()
+
+    def _without_earlier_labels(self, atlas: Atlas | None) -> Atlas | None:
+        """Return the published atlas for one that knows labels that a blind labelling shall not follow."""
+        state = self._document.state
+        knows = atlas is not None and (state.specimen in atlas.specimens or self.is_held_out)
+        return Atlas.published() if state.blind and knows else atlas
 
     def _hold_out(self, atlas: Atlas) -> None:
         self.is_refitting, self._expected_by = False, atlas

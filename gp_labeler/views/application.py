@@ -93,7 +93,13 @@ def make_window(directory: Path | None = None, *, atlas: bool = True) -> MainWin
     return window
 
 
-def run_window(path: Path | None = None, *, demo: bool = False, directory: Path | None = None) -> int:
+def run_window(
+    path: Path | None = None,
+    *,
+    demo: bool = False,
+    directory: Path | None = None,
+    observer: str | None = None,
+) -> int:
     """Open the window and stay until it is closed.
 
     Parameters
@@ -104,6 +110,8 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
         Whether to open the phantom.
     directory : Path, optional
         State directory; the user's by default.
+    observer : str, optional
+        Who labels; remembered.
 
     Returns
     -------
@@ -124,6 +132,8 @@ def run_window(path: Path | None = None, *, demo: bool = False, directory: Path 
     wanted = directory or default_directory()
     directory = directory_to_use(wanted, Prompts(None))
     window = make_window(directory)
+    if observer is not None:
+        window.workspace.set_observer(observer)
     sys.excepthook = lambda kind, error, trace: _report(window, kind, error, trace)
     window.show()
 

@@ -21,6 +21,7 @@ from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.canvas_ui import ask_canvas
 from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.panels.label.export_dialog import ExportDialog
+from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.scan.import_dialog import ImportDialog
 from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
@@ -180,6 +181,10 @@ class WindowUi(AtlasUi, PoseUi):
         folder = self.prompts.folder("Export landmarks into this folder", self._folder)
         if folder is not None:
             export_asking(self._workspace, folder, self.prompts)
+
+    def show_labellings(self) -> None:
+        """Show who labels, and all labellings of the specimen."""
+        LabellingsDialog(self._workspace, self._window).open()
 
     def ask_save_mesh(self) -> None:
         """Ask where, and write the bone surface."""

@@ -9,6 +9,7 @@ from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.steps.atlas import Check, Fit, UseAtlas
 from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
+from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
 from gp_labeler.scripting.steps.looking import Act, Key, Look, Screenshot, Undo
 from gp_labeler.scripting.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
 from gp_labeler.scripting.steps.pose import CarryPath, Estimate, Overlay, Report, Verdict
@@ -21,6 +22,9 @@ _ALL: tuple[type[Step], ...] = (
     *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, Key, Act, Undo),
     *(
         Details,
+        Observer,
+        LabelAgain,
+        OpenOther,
         Import,
         Reference,
         AddMesh,

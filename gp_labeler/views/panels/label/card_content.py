@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
+from gp_labeler.document.state import Landmark
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.workflow import OPENING, PointState
 from gp_labeler.views.bind import mm_text, suggestion_text
 from gp_labeler.views.panels.parts import breakable
+from gp_labeler.views.times import time_text
 
 __all__ = ["CardContent", "content_of"]
 
@@ -168,13 +170,22 @@ def _status_words(labels: LabelsModel, side: Side, code: str) -> str:
     if mark.unseen:
         return "Looked for, not seen."
     how = mark.provenance.how.value if mark.provenance else ""
+    by = _by_words(labels, mark)
     words = {
         "mesh": "Placed on bone.",
         "slice": "Placed on a slice.",
         "confirmed suggestion": "Suggested and confirmed.",
         "nudged suggestion": "Suggested, then corrected by you: it counts.",
     }
-    return words.get(how, f"{how.capitalize()}." if how else "Placed.")
+    return words.get(how, f"{how.capitalize()}." if how else "Placed.") + by
+
+
+def _by_words(labels: LabelsModel, mark: Landmark) -> str:
+    """Return who placed a point, and when, where that is not the one who labels now."""
+    about = mark.provenance
+    if about is None or not about.by or about.by == labels.document.author:
+        return ""
+    return f" By {about.by}, {time_text(about.time)}."
 
 
 def _first_ones(labels: LabelsModel, side: Side) -> str:

@@ -28,6 +28,7 @@ from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.label.annotation_row import AnnotationRow
 from gp_labeler.views.panels.label.card_content import CardContent, content_of
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.theme import theme_of
@@ -92,6 +93,7 @@ class FeatureCard(QWidget):
         self._show_chip()
         self.picture.show_feature(now.code or None, labels.active.side)
         self.picture.setVisible(bool(now.code))
+        self.annotation.refresh()
         self._refresh_buttons(now)
 
     def _make_widgets(self) -> None:
@@ -99,6 +101,7 @@ class FeatureCard(QWidget):
         self._aside, self._definition = _label("shared"), _label("", wrap=True)
         self._where, self._status = _label("hint", wrap=True), _label("hint", wrap=True)
         self._chip = QLabel()
+        self.annotation = AnnotationRow(self._workspace)
         self.picture = FeaturePicture()
         self.picture.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Expanding)
         self.primary = QPushButton()
@@ -166,6 +169,7 @@ class FeatureCard(QWidget):
         layout.addLayout(heading)
         layout.addLayout(self._body, 1)
         layout.addLayout(status)
+        layout.addWidget(self.annotation)
         layout.addLayout(buttons)
 
     def _listen(self) -> None:

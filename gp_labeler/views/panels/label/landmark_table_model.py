@@ -158,4 +158,11 @@ class LandmarkTableModel(QAbstractTableModel):
             text += f", not confirmed{f' ({said})' if said else ''}"
         if state is PointState.GHOST:
             text += f", expected within {mm_text(self._workspace.labels.ghosts(side)[code].radius_95)} (95 %)"
-        return text
+        return text + self._annotation(code, side)
+
+    def _annotation(self, code: str, side: Side) -> str:
+        if feature(code).computed:
+            return ""
+        mark = self._workspace.document.state.landmark(side, code)
+        certainty = f", {mark.certainty.value}" if mark.certainty else ""
+        return certainty + (f": {mark.note}" if mark.note else "")
