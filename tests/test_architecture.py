@@ -102,3 +102,9 @@ def test_every_benchmark_finds_what_it_imports(path: Path) -> None:
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=_ROOT
     )
     assert done.returncode == 0, done.stderr[-500:]
+
+
+def test_files_of_tests_have_names_of_their_own() -> None:
+    """Pytest imports test files and their helpers by their mere names: of two it would collect neither."""
+    files = [path.name for path in (_ROOT / "tests").rglob("*.py") if path.name != "conftest.py"]
+    assert sorted(files) == sorted(set(files))

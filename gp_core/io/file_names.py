@@ -22,9 +22,9 @@ _SUGGESTED_ENDING = re.compile(r"[ _.\-]+suggested$", re.IGNORECASE)
 _MARKS = " _.-"
 _LABELLING = re.compile(r"(?P<specimen>.+)_(?P<observer>[^_]+)_r(?P<round>[1-9][0-9]{0,3})", re.IGNORECASE)
 """GP01_AB_r2: specimen, observer, round."""
-# left_GP01, GP01_L_final: a whole word, wherever it stands
+# left_GP01, GP01_L_final, GP01 (R): a whole word, wherever it stands
 _SIDE_WORDS = tuple(
-    re.compile(rf"(?<![^ _.\-])(?P<side>{words})(?![^ _.\-])", re.IGNORECASE)
+    re.compile(rf"(?<![^ _.\-])[(\[]?(?P<side>{words})[)\]]?(?![^ _.\-])", re.IGNORECASE)
     for words in ("left|right", "l|r")
 )
 

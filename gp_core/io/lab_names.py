@@ -15,6 +15,7 @@ from gp_core.landmarks.labels import LabelNames
 __all__ = ["read_lab_names"]
 
 _HEADERS = ("their name", "name", "label", "landmark", "from")
+_CODE_HEADERS = ("our code", "code", "feature", "to")
 _FORM = "Give two columns, their name and our code (CA, or CA_L), or a JSON object of the same."
 
 
@@ -61,7 +62,7 @@ def _json_pairs(path: str | PathLike[str]) -> list[tuple[str, str]]:
 
 
 def _table_pairs(path: str | PathLike[str]) -> list[tuple[str, str]]:
-    rows = read_rows(path)
+    rows = _without_row_names(read_rows(path))
     if rows and rows[0][1][0].lower() in _HEADERS:
         rows = rows[1:]
     wrong = next((number for number, fields in rows if len(fields) != 2 or not fields[0]), None)
@@ -69,3 +70,13 @@ def _table_pairs(path: str | PathLike[str]) -> list[tuple[str, str]]:
         what = "holds no names" if not rows else f"line {wrong} does not hold two columns"
         raise FileFormatError(what, file=path, remedy=_FORM)
     return [(of_csv_cell(theirs), of_csv_cell(ours)) for _, (theirs, ours) in rows]
+
+
+def _without_row_names(rows: list[tuple[int, list[str]]]) -> list[tuple[int, list[str]]]:
+    """Return rows without the first column where R wrote its row names there, under a blank name or none."""
+    if len(rows) < 2 or len(rows[1][1]) != 3 or rows[0][1][-1].lower() not in _CODE_HEADERS:
+        return rows
+    header = rows[0][1]
+    if len(header) == 2:
+        return [rows[0], *((number, fields[1:]) for number, fields in rows[1:])]
+    return [(number, fields[1:]) for number, fields in rows] if len(header) == 3 and not header[0] else rows

@@ -14,7 +14,7 @@ from gp_core.argument_types import checks_arguments
 from gp_core.errors import FeatureError, FileFormatError, GeometryError, GpError
 from gp_core.io.dat import is_sentinel, read_dat
 from gp_core.io.fcsv import read_fcsv
-from gp_core.io.file_names import is_named_suggested, labelling_named, name_parts, specimen_named
+from gp_core.io.file_names import is_named_suggested, labelling_named, name_parts, named_side, specimen_named
 from gp_core.io.labelled_points import LabelledPoint, PointList, as_suggested
 from gp_core.io.markups import read_markups
 from gp_core.io.repeated_points import split_trial, with_repeats_combined
@@ -316,6 +316,8 @@ def _side_of(points: PointList, side: Side | str | None) -> Side:
         return given
     if given is not None and points.sides:
         return given
+    if points.header is None and points.sides:
+        _check_named_side(next(iter(points.sides)), points)
     said = points.header.side if points.header else next(iter(points.sides), None)
     said = said or name_parts(points.source, _suffix(points.source))[1]
     if given is not None:
@@ -327,6 +329,15 @@ def _side_of(points: PointList, side: Side | str | None) -> Side:
             remedy="Give the side (L or R), or let the file's name end in _L or _R.",
         )
     return found
+
+
+def _check_named_side(told: Side, points: PointList) -> None:
+    if named_side(points.source) is told.other:
+        raise FeatureError(
+            f"is named as the {told.other.word} side, but its labels or its column 'side' say {told.word}",
+            file=points.source,
+            remedy=f"Give the side {told.value}, or correct the file or its name.",
+        )
 
 
 def _one_side(points: PointList, side: Side) -> PointList:

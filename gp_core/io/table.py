@@ -50,7 +50,7 @@ _ABOUT = {
 """Columns of what is known of a label, and the keys of `LabelProvenance.from_json`."""
 
 _NO = ("0", "false", "no")
-_SEPARATOR_LINE = re.compile(r"\"?sep=([,;\t|])\"?[,;]*", re.IGNORECASE)  # for Excel, in the first line
+_SEPARATOR_LINE = re.compile(r"\"?sep=([,;\t|]?)\"?[,;]*", re.IGNORECASE)  # for Excel; a tab is stripped
 _SIDE_COLUMNS = ("side", "ear", "laterality")
 _TRIAL_COLUMNS = ("trial", "repeat", "replicate")
 
@@ -102,12 +102,13 @@ def _header_names(rows: list[tuple[int, list[str]]]) -> list[str]:
     if not rows:
         return []
     names = [_UNIT_MM.sub("", field.lower()) for field in rows[0][1]]
-    if any(name in _NAME_COLUMNS for name in names) or not any(set(axes) <= set(names) for axes in _AXES):
+    if not any(set(axes) <= set(names) for axes in _AXES):
         return names
-    if not names[0]:
+    named = any(name in _NAME_COLUMNS for name in names)
+    if not named and not names[0]:
         return ["name", *names[1:]]
-    unnamed = len(rows) > 1 and len(rows[1][1]) == len(names) + 1
-    return ["name", *names] if unnamed else names
+    unnamed = len(rows) > 1 and len(rows[1][1]) == len(names) + 1 and rows[1][1][-1] != ""
+    return ["" if named else "name", *names] if unnamed else names
 
 
 def read_rows(
@@ -142,7 +143,7 @@ def read_rows(
     stated = _SEPARATOR_LINE.fullmatch(lines[0][1].strip()) if lines else None
     if stated is not None:
         lines = lines[1:]
-    delimiter = stated[1] if stated is not None else _delimiter_of(lines[0][1]) if lines else ","
+    delimiter = stated[1] or "\t" if stated is not None else _delimiter_of(lines[0][1]) if lines else ","
     if aligned and delimiter == " ":
         lines = [(number, " ".join(line.split())) for number, line in lines]
     return [(number, split_fields(line, delimiter, number, path)) for number, line in lines]

@@ -7,6 +7,7 @@ such as ``Seq_Frame0007_StylusToTrackerTransform``. Only its header is read.
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from os import PathLike
@@ -31,6 +32,7 @@ _PROBE = re.compile(r"stylus|probe|pointer", re.IGNORECASE)
 _FIELD = re.compile(
     rb"^Seq_Frame(?P<frame>\d+)_(?P<field>\w+?)\s*:?=\s*(?P<value>[^\r\n]*?)\s*$", re.MULTILINE
 )
+_OPPOSITE = "TrackerTo"
 _POSE, _STATUS, _TIME = "Transform", "TransformStatus", "Timestamp"
 
 _NOT_SEEN = ("", "na", "nan", "null", "missing")
@@ -42,9 +44,15 @@ _TRANSLATION = (("tx", "ty", "tz"), ("x", "y", "z"), ("px", "py", "pz"))
 _EULER = ("rz", "ry", "rx")
 """Columns of a table with a header; angles as NDI's ToolBox writes them: degrees, about z, then y, then x."""
 
+_PREFIXES = {
+    **dict.fromkeys(("q", "quat", "quaternion", "rot", "rotation", "orientation"), "q"),
+    **dict.fromkeys(("t", "trans", "translation"), "t"),
+    **dict.fromkeys(("p", "pos", "position"), "p"),
+}
+_LONG_NAME = re.compile(rf"(?P<what>{'|'.join(_PREFIXES)})[ _.\-]?(?P<axis>[wxyz])")
 _TIMES = ("t", "time", "timestamp", "seconds", "frame")
 _STATES = ("state", "status", "valid")
-_SEEN_STATES = ("ok", "1", "true", "valid", "enabled")
+_SEEN_STATES = ("ok", "true", "valid", "enabled")
 _FORM = "Export the marker's 4x4 matrices row by row, or quaternions under a header (qw,qx,qy,qz,tx,ty,tz)."
 
 
@@ -80,7 +88,18 @@ def is_sequence(path: str | PathLike[str]) -> bool:
     bool
         False for other files.
     """
-    return _FIELD.search(read_head(Path(path), 100_000)) is not None
+    return _FIELD.search(_head(path, 100_000)) is not None
+
+
+def _head(path: str | PathLike[str], n_bytes: int) -> bytes:
+    """Return the first bytes of a file, unpacked where it is gzipped as a whole."""
+    head = read_head(Path(path), n_bytes)
+    if not head.startswith(b"\x1f\x8b"):
+        return head
+    try:
+        return zlib.decompressobj(zlib.MAX_WBITS | 16).decompress(head, n_bytes)
+    except zlib.error:
+        return b""
 
 
 def read_recording(
@@ -92,7 +111,7 @@ def read_recording(
     ----------
     path : path-like
         A sequence file of PLUS or 3D Slicer (``.igs.mha``, ``.mha``, ``.nrrd``, or its text header alone), or
-        a table: see `read_marker_poses`.
+        a table: see `read_marker_poses`. A sequence file may be gzipped as a whole.
     transform : str, optional
         Name of the transform in a sequence, such as ``StylusToTracker``; required where the sequence has
         several and not exactly one of them is a stylus, probe or pointer.
@@ -122,11 +141,10 @@ def read_recording(
     if not names:
         raise FileFormatError("its frames hold no transforms", file=path, remedy="Record the stylus with it.")
     chosen = _chosen(names, transform, reference, path)
-    poses = np.array([frame.pose(chosen) for frame in frames])
+    poses = _to_tracker(frames, chosen)
     if reference is not None:
         known = _chosen(names, reference, None, path)
-        T_tracker_reference = np.array([frame.pose(known) for frame in frames])
-        poses = _in_reference(T_tracker_reference, poses)
+        poses = _in_reference(_to_tracker(frames, known), poses)
     times = np.array([frame.time for frame in frames])
     return Recording(poses, times if np.isfinite(times).all() else None, chosen)
 
@@ -162,7 +180,7 @@ def _read_frames(path: str | PathLike[str]) -> list[_Frame]:
 
 
 def _fields(path: str | PathLike[str]) -> Iterator[tuple[int, str, str]]:
-    head = read_head(Path(path), _MAX_HEADER_BYTES)
+    head = _head(path, _MAX_HEADER_BYTES)
     ends = [end for mark in (b"ElementDataFile", b"\n\n", b"\r\n\r\n") if (end := head.find(mark)) >= 0]
     head = head[: min(ends, default=len(head))]  # the images that follow are not needed
     for match in _FIELD.finditer(head):
@@ -206,6 +224,15 @@ def _chosen(names: list[str], wanted: str | None, reference: str | None, file: s
     return likely[0]
 
 
+def _to_tracker(frames: list[_Frame], name: str) -> FloatArray:
+    """Return ``T_tracker_marker`` in every frame; one whose name says the opposite is inverted."""
+    poses = np.array([frame.pose(name) for frame in frames])
+    if not name.startswith(_OPPOSITE):
+        return poses
+    every = np.tile(np.eye(4), (len(poses), 1, 1))
+    return _in_reference(poses, every)
+
+
 def _in_reference(T_tracker_reference: FloatArray, T_tracker_marker: FloatArray) -> FloatArray:
     """Return ``T_reference_marker``, NaN where one of the two was not seen."""
     both = np.concatenate([T_tracker_reference, T_tracker_marker], axis=1)
@@ -241,9 +268,18 @@ def read_marker_poses(path: str | PathLike[str]) -> FloatArray:
         Not such a table.
     """
     rows = read_rows(path, aligned=True, at_most=_MAX_ROWS)
-    names = [field.lower() for field in rows[0][1]] if rows else []
+    names = [_column_name(field) for field in rows[0][1]] if rows else []
+    if len(rows) > 1 and len(rows[1][1]) == len(names) + 1 and rows[1][1][-1]:
+        names = ["", *names]  # R's row names, whose column has no name
     found = _named_columns(names)
     return _poses_by_name(rows[1:], found, path) if found is not None else _matrices(rows, path)
+
+
+def _column_name(field: str) -> str:
+    """Return the name of a column in the form of `_QUATERNION`: ``Quat_X`` is qx, ``Pos.x [mm]`` is px."""
+    name = re.sub(r"\s*[\[(]\s*mm\s*[\])]$", "", field.lower())
+    found = _LONG_NAME.fullmatch(name)
+    return f"{_PREFIXES[found['what']]}{found['axis']}" if found else name
 
 
 @dataclass(frozen=True)
@@ -274,7 +310,7 @@ def _poses_by_name(
 ) -> FloatArray:
     poses = np.full((len(rows), 4, 4), np.nan)
     for pose, (number, fields) in zip(poses, rows, strict=True):
-        if columns.state is not None and _field(fields, columns.state).lower() not in _SEEN_STATES:
+        if columns.state is not None and not _is_seen(_field(fields, columns.state)):
             continue
         turn = np.array([_value(_field(fields, i), number, file) for i in columns.rotation])
         place = [_value(_field(fields, i), number, file) for i in columns.translation]
@@ -282,6 +318,13 @@ def _poses_by_name(
             pose[:] = np.eye(4)
             pose[:3, :3], pose[:3, 3] = _rotation(turn), place
     return poses
+
+
+def _is_seen(state: str) -> bool:
+    try:
+        return float(state) == 1
+    except ValueError:
+        return state.lower() in _SEEN_STATES
 
 
 def _rotation(numbers: FloatArray) -> FloatArray:

@@ -14,13 +14,14 @@ from gp_core.validation import near_matches
 __all__ = ["LabelNames", "ParsedLabel", "is_skull_feature", "parse_label", "same_label", "tidy_label"]
 
 _SKULL_FEATURE = re.compile(r"S[0-9]{1,2}", re.IGNORECASE)
+_MARK = r"[\s_.:,;/|\-–—]"  # noqa: RUF001 - dashes of word processors
 _WITH_SIDE = (
     # left CA, L_CA, L-CA, (L) CA
-    re.compile(r"[(\[]?(?P<side>l|r|left|right)[)\]]?[\s_.:\-]+(?P<name>\S.*)", re.IGNORECASE),
-    # CA_L, CA-left, CA right
-    re.compile(r"(?P<name>.*\S)[\s_.:\-]+(?P<side>l|r|left|right)", re.IGNORECASE),
+    re.compile(rf"[(\[]?(?P<side>l|r|left|right)[)\]]?{_MARK}+(?P<name>\S.*)", re.IGNORECASE),
+    # CA_L, CA-left, CA right, CA__R, CA/L
+    re.compile(rf"(?P<name>\S.*?){_MARK}+(?P<side>l|r|left|right)", re.IGNORECASE),
     # CA (L), CA[left]
-    re.compile(r"(?P<name>.*\S)[\s_.:\-]*[(\[]\s*(?P<side>l|r|left|right)\s*[)\]]", re.IGNORECASE),
+    re.compile(rf"(?P<name>\S.*?){_MARK}*[(\[]\s*(?P<side>l|r|left|right)\s*[)\]]", re.IGNORECASE),
 )
 
 
@@ -107,11 +108,16 @@ def parse_label(label: str) -> ParsedLabel:
     text = tidy_label(label)
     if _is_known(text):
         return ParsedLabel(text)
+    parted = (ParsedLabel(tidy_label(name), side) for name, side in _with_side(text))
+    return next((one for one in parted if _is_known(one.name)), ParsedLabel(text))
+
+
+def _with_side(text: str) -> Iterator[tuple[str, Side]]:
+    """Yield the ways to read a label as a name and a side before or after it."""
     for pattern in _WITH_SIDE:
         match = pattern.fullmatch(text)
-        if match and _is_known(name := tidy_label(match["name"])):
-            return ParsedLabel(name, Side.parse(match["side"]))
-    return ParsedLabel(text)
+        if match:
+            yield match["name"], Side.parse(match["side"])
 
 
 def _is_known(name: str) -> bool:
@@ -126,7 +132,8 @@ class LabelNames:
     ----------
     codes : mapping of str to str
         For each of the lab's names, a feature's code, with a side (``CA_L``) or without; an empty text for a
-        point that is left out. Letter case and blanks of the lab's names do not count.
+        point that is left out. Letter case and blanks of the lab's names do not count. A label may have a
+        side before or after such a name, as features may (``left Apex``).
 
     Raises
     ------
@@ -170,7 +177,7 @@ class LabelNames:
         bool
             True where the lab's table gives it an empty code.
         """
-        return self.codes.get(_key(label)) == ""
+        return self._code(label)[0] == ""
 
     def translate(self, label: str) -> str:
         """Return the code that stands for a label, or the label itself.
@@ -185,7 +192,20 @@ class LabelNames:
         str
             A feature's code, perhaps with a side.
         """
-        return self.codes.get(_key(label)) or label
+        code, side = self._code(label)
+        if not code:
+            return label
+        name, own = parse_label(code)
+        if own not in (None, side or own):  # left of a name that stands for a point of the right
+            return label
+        return code if side is None else f"{name}_{side.value}"
+
+    def _code(self, label: str) -> tuple[str | None, Side | None]:
+        """Return the code of a label, None where it is not in the table, and the side that the label adds."""
+        if _key(label) in self.codes:
+            return self.codes[_key(label)], None
+        parted = ((_key(name), side) for name, side in _with_side(" ".join(label.split())))
+        return next(((self.codes[key], side) for key, side in parted if key in self.codes), (None, None))
 
 
 def _key(label: str) -> str:

@@ -39,7 +39,11 @@ def _both(label: str, *, header: str = "name,x,y,z\n") -> str:
 
 
 @pytest.mark.parametrize(
-    "label", ["CA_L", "CA-L", "L_CA", "l.ca", "left CA", "CA left", "CA (L)", "Left: ca"]
+    "label",
+    [
+        *("CA_L", "CA-L", "L_CA", "l.ca", "left CA", "CA left", "CA (L)", "Left: ca"),
+        *("CA__L", "CA/left", "CA, left", "CA – L", "L|CA", "(left) CA", "CA[l]"),  # noqa: RUF001
+    ],
 )
 def test_a_side_before_or_behind_a_code_is_read(label) -> None:
     assert parse_label(label) == ("CA", Side.LEFT)
@@ -116,6 +120,8 @@ def test_a_label_that_contradicts_the_column_is_named(tmp_path) -> None:
         ("GP01 right (2)", ("GP01 (2)", Side.RIGHT)),
         ("L_12_right", ("L_12", Side.RIGHT)),
         ("GP-left-ear", ("GP-ear", Side.LEFT)),
+        ("GP01_(R)", ("GP01", Side.RIGHT)),
+        ("GP01 [left] final", ("GP01 final", Side.LEFT)),
         ("rat of L and R", ("rat of L and R", None)),
         ("Larry", ("Larry", None)),
     ],
@@ -124,11 +130,28 @@ def test_the_side_may_stand_anywhere_in_a_file_name(name, told) -> None:
     assert name_parts(f"{name}.csv", ".csv") == told
 
 
+@pytest.mark.parametrize("name", ["GP01_R", "right_GP01"])
+def test_a_file_name_that_contradicts_labels_or_column_is_refused(tmp_path, name) -> None:
+    labels = "name,x,y,z\n" + "".join(_row(f"{code}_L", *place) for code, place in _PLACES.items())
+    for text in (labels, _with_column("left")):
+        file = tmp_path / f"{name}.csv"
+        file.write_text(text, encoding="utf-8")
+        with pytest.raises(FeatureError, match="is named as the right side, but its labels or its column"):
+            read_landmarks(file)
+        with pytest.raises(FeatureError, match="is named as the right side"):
+            load_specimens(file)
+        assert read_landmarks(file, side="L").side is Side.LEFT
+
+
 _R_TABLES = {
     "write.csv": '"","x","y","z"\n' + "".join(f'"{c}",{x},{y},{z}\n' for c, (x, y, z) in _PLACES.items()),
     "write.table": "x y z\n" + "".join(f"{c} {x} {y} {z}\n" for c, (x, y, z) in _PLACES.items()),
     "row numbers": '"","landmark","x","y","z"\n'
     + "".join(f'"{i}","{c}",{x},{y},{z}\n' for i, (c, (x, y, z)) in enumerate(_PLACES.items(), 1)),
+    "row numbers without a name": "landmark x y z\n"
+    + "".join(f"{i} {c} {x} {y} {z}\n" for i, (c, (x, y, z)) in enumerate(_PLACES.items(), 1)),
+    "spreadsheet, tabs": "sep=\t\nname\tx\ty\tz\n"
+    + "".join(_row(c, *p, mark="\t") for c, p in _PLACES.items()),
     "spreadsheet": "sep=;\nname;x;y;z\n" + "".join(_row(c, *p, mark=";") for c, p in _PLACES.items()),
     "spreadsheet, quoted": '"sep=;"\r\nname;x;y;z\r\n'
     + "".join(_row(c, *p, mark=";") for c, p in _PLACES.items()),
@@ -181,6 +204,29 @@ def test_other_names_are_translated_by_a_small_table(tmp_path, form) -> None:
     assert set(read.placed) == {"CA", "CB", "RWA", "RWP"}
     assert read["RWA"] == pytest.approx(_PLACES["RWA"])
     assert not read.extra
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '"","name","code"\n"1","Apex","CA"\n"2","Base","CB"\n',
+        '"name" "code"\n"1" "Apex" "CA"\n"2" "Base" "CB"\n',
+    ],
+)
+def test_a_table_of_names_that_r_wrote_is_read(tmp_path, text) -> None:
+    table = tmp_path / "names.csv"
+    table.write_text(text, encoding="utf-8")
+    assert read_lab_names(table).codes == {"apex": "CA", "base": "CB"}
+
+
+@pytest.mark.parametrize("label", ["left Apex", "Apex_L", "L-apex", "Apex (left)"])
+def test_a_name_of_the_table_may_carry_a_side(label) -> None:
+    names = LabelNames({"Apex": "CA", "Base": "CB_R", "Bolt": ""})
+    assert parse_label(names.translate(label)) == ("CA", Side.LEFT)
+    assert names.translate("Base_R") == "CB_R"
+    assert names.translate("left Base") == "left Base"  # it stands for the right one
+    assert names.leaves_out("Bolt_R")
+    assert not names.leaves_out(label)
 
 
 def test_without_the_table_the_first_unknown_name_is_said(tmp_path) -> None:

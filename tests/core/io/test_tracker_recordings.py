@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 
 import numpy as np
@@ -91,6 +92,55 @@ _WRITERS = {
         folder / "a.csv", "\n".join(str(p.ravel().tolist()) for p in poses) + "\n"
     ),
 }
+
+
+def _named(path, header: str, order: str, poses: np.ndarray):
+    parts = {"q": lambda p: _quaternion(p), "x": lambda p: _quaternion(p)[1:] + _quaternion(p)[:1]}
+    parts |= {"t": lambda p: p[:3, 3].tolist(), "1": lambda _: [1.0]}
+    return _table(path, header, [[x for part in order for x in parts[part](p)] for p in poses])
+
+
+_COLUMNS = {
+    "w last": ("qx,qy,qz,qw,tx,ty,tz", "xt"),
+    "position first": ("X,Y,Z,QX,QY,QZ,QW", "tx"),
+    "underscores": ("t_x,t_y,t_z,q_w,q_x,q_y,q_z", "tq"),
+    "points": ("pos.x,pos.y,pos.z,quat.x,quat.y,quat.z,quat.w", "tx"),
+    "units": ("Position X [mm],Position Y [mm],Position Z [mm],Rot_W,Rot_X,Rot_Y,Rot_Z", "tq"),
+    "state is a number": ("qw,qx,qy,qz,tx,ty,tz,state", "qt1"),
+    "row names of R": ("qw,qx,qy,qz,tx,ty,tz", "1qt"),
+}
+
+
+@pytest.mark.parametrize("kind", _COLUMNS)
+def test_columns_of_quaternions_are_found_by_their_names(tmp_path, kind) -> None:
+    poses = _turning(12)
+    found = read_recording(_named(tmp_path / "a.csv", *_COLUMNS[kind], poses)).poses
+    assert found == pytest.approx(poses)
+
+
+@pytest.mark.parametrize("order", ["tq", "tx", "1tq"])
+def test_quaternions_without_names_of_columns_are_refused(tmp_path, order) -> None:
+    file = _named(tmp_path / "a.csv", "", order, _turning(12))
+    with pytest.raises(FileFormatError, match=r"quaternions under a header"):
+        read_recording(file)
+
+
+@pytest.mark.parametrize("write", [_mha, _nrrd])
+def test_a_sequence_that_is_gzipped_as_a_whole_is_read(tmp_path, write) -> None:
+    poses = _turning(12)
+    plain = write(tmp_path / "a.igs", poses)
+    packed = tmp_path / f"{plain.name}.gz"
+    packed.write_bytes(gzip.compress(plain.read_bytes()))
+    assert is_sequence(packed)
+    assert read_recording(packed).poses == pytest.approx(poses, abs=1e-6)
+
+
+def test_a_transform_whose_name_says_the_opposite_is_inverted(tmp_path) -> None:
+    poses = _turning(12)
+    text = _fields(np.linalg.inv(poses), " = ").replace("StylusToTracker", "TrackerToStylus")
+    found = read_recording(_text(tmp_path / "a.txt", text))
+    assert found.transform == "TrackerToStylus"
+    assert found.poses == pytest.approx(poses, abs=1e-5)
 
 
 def _text(path, text: str):
