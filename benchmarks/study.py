@@ -26,7 +26,7 @@ from gp_core.atlas.sampling import draw_animal  # noqa: E402
 from gp_core.landmarks.features import index_of  # noqa: E402
 from gp_core.pose.jrmpc_estimator import training_sides  # noqa: E402
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings  # noqa: E402
-from gp_core.study.backward_elimination import Codes, Problem  # noqa: E402
+from gp_core.study.backward_elimination import Codes, SelectionProblem  # noqa: E402
 from gp_core.study.leave_one_out import Folds, folds_of  # noqa: E402
 from gp_core.study.scoring import PoseErrors, angle_between_deg, jrmpc_errors  # noqa: E402
 from gp_core.study.simulation import simulate_sides  # noqa: E402
@@ -97,7 +97,7 @@ def search_case(animals: Sequence[Specimen]) -> None:
     row("search, one step, 6 animals, defaults", fits, fast_s, plain_s, float(np.abs(fast - plain).max()))
 
 
-def scores(problem: Problem, choices: Sequence[Codes]) -> FloatArray:
+def scores(problem: SelectionProblem, choices: Sequence[Codes]) -> FloatArray:
     """Return E_T of some choices of probe features."""
     score = problem.scorer(TRAINING)
     return np.array([score(probe) for probe in choices])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -73,7 +74,17 @@ def test_no_module_imports_in_a_circle(package: str) -> None:
         pytest.fail(f"import cycle: {' <- '.join(error.args[1])}")
 
 
-def test_the_core_speaks_the_words_of_the_field() -> None:
+def test_one_name_is_one_class() -> None:
+    names = [
+        node.name
+        for path in _SOURCES
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_")
+    ]
+    assert [name for name, many in Counter(names).items() if many > 1] == []
+
+
+def test_the_project_speaks_the_words_of_the_field() -> None:
     command = [sys.executable, "tools/words"]
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=_ROOT)
     assert done.returncode == 0, done.stdout

@@ -16,7 +16,7 @@ from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, EXTERNAL, PROBE, TRAINING, check_codes
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcSettings
-from gp_core.study.backward_elimination import Progress
+from gp_core.study.backward_elimination import SearchProgress
 from gp_core.study.parallel import open_executor
 
 __all__ = [
@@ -245,7 +245,7 @@ class ProgressLine:
         if self._live and self._shown:
             sys.stderr.write("\n")
 
-    def __call__(self, progress: Progress) -> None:
+    def __call__(self, progress: SearchProgress) -> None:
         """Show the progress."""
         if not self._live and progress.seconds < self._next:
             return

@@ -8,7 +8,7 @@ import numpy as np
 
 from gp_core.disk import read_bytes
 from gp_core.errors import FileFormatError
-from gp_core.registration.icp_targets import Surface
+from gp_core.registration.icp_targets import TriangleMesh
 from gp_core.validation import FloatArray
 
 __all__ = ["read_stl"]
@@ -19,7 +19,7 @@ _HEADER = 80
 _RECORD = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def read_stl(path: str | PathLike[str]) -> Surface:
+def read_stl(path: str | PathLike[str]) -> TriangleMesh:
     """Read a surface.
 
     Parameters
@@ -29,7 +29,7 @@ def read_stl(path: str | PathLike[str]) -> Surface:
 
     Returns
     -------
-    Surface
+    TriangleMesh
         The triangles, mm.
 
     Raises
@@ -43,7 +43,7 @@ def read_stl(path: str | PathLike[str]) -> Surface:
         corners = _text(raw)
     if corners is None or not len(corners) or not np.isfinite(corners).all():
         raise FileFormatError("is no surface in STL", file=path, remedy=_REMEDY)
-    return Surface(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    return TriangleMesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
 
 
 def _binary(raw: bytes) -> FloatArray | None:

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike
 
 from gp_core.errors import FrameError, GeometryError
 from gp_core.frames import RigidTransform
-from gp_core.registration.icp_targets import Cloud, Surface, Target
+from gp_core.registration.icp_targets import Cloud, Target, TriangleMesh
 from gp_core.registration.procrustes import weighted_procrustes
 from gp_core.validation import FloatArray, as_points
 
-__all__ = ["Cloud", "IcpResult", "Surface", "icp"]
+__all__ = ["Cloud", "IcpResult", "TriangleMesh", "icp"]
 
 _FEWEST_POINTS = 3
 
@@ -61,7 +61,7 @@ def icp(
     ----------
     source : (N, 3) array_like
         Points in frame `src`, mm; at least three, not collinear.
-    target : Cloud or Surface
+    target : Cloud or TriangleMesh
         In frame `dst`, mm.
     start : RigidTransform, optional
         ``T_dst_src`` to start from. By default the centroids and principal axes are superimposed in all 24

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from gp_core.errors import GeometryError, GpError
 from gp_core.validation import FloatArray, as_points
 
-__all__ = ["Cloud", "Surface", "Target"]
+__all__ = ["Cloud", "Target", "TriangleMesh"]
 
 _FEWEST_POINTS = 3
 _SMALLEST_AREA_MM2 = 1e-12
@@ -83,7 +83,7 @@ class Cloud:
         return found
 
 
-class Surface:
+class TriangleMesh:
     """A triangle mesh as a target; nearest points are exact, inside triangles as well as at their corners.
 
     Parameters

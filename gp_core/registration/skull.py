@@ -12,7 +12,7 @@ from gp_core.frames import RigidTransform
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.icp import icp
-from gp_core.registration.icp_targets import Cloud, Surface
+from gp_core.registration.icp_targets import Cloud, TriangleMesh
 from gp_core.registration.result import RegistrationResult
 from gp_core.validation import FloatArray, as_points
 
@@ -68,14 +68,14 @@ def register_by_icp(touches: LandmarkSet, ct: LandmarkSet) -> RegistrationResult
     return RegistrationResult(found.transform, tuple(names), residuals, rms, fiducials=labelled, method="icp")
 
 
-def register_to_surface(points: ArrayLike, bone: Surface, start: RigidTransform) -> RegistrationResult:
+def register_to_surface(points: ArrayLike, bone: TriangleMesh, start: RigidTransform) -> RegistrationResult:
     """Register points touched anywhere on the bone to its surface.
 
     Parameters
     ----------
     points : (N, 3) array_like, mm, tracker frame
         Spread over the skull; names are not needed.
-    bone : Surface
+    bone : TriangleMesh
         From the CT, mm, scan frame.
     start : RigidTransform
         ``T_scan_tracker`` to within some millimetres and ten degrees, such as `register_by_names` gives for a

@@ -19,8 +19,8 @@ __all__ = [
     "Codes",
     "Elimination",
     "ProbeStep",
-    "Problem",
-    "Progress",
+    "SearchProgress",
+    "SelectionProblem",
     "Ticker",
     "TrainingStep",
     "external",
@@ -34,7 +34,7 @@ FEWEST = 3
 """The smallest number of training and of probe features: fewer points determine no pose."""
 
 
-class Problem(Protocol):
+class SelectionProblem(Protocol):
     """What is to be chosen for: leave-one-out of some animals by some method."""
 
     @property
@@ -102,7 +102,7 @@ class TrainingStep:
 
 
 @dataclass(frozen=True)
-class Progress:
+class SearchProgress:
     """Progress of a search.
 
     Attributes
@@ -131,10 +131,10 @@ class Ticker:
     Parameters
     ----------
     tell : callable or None
-        Receives a `Progress` for each candidate; if it raises, the search stops.
+        Receives a `SearchProgress` for each candidate; if it raises, the search stops.
     """
 
-    def __init__(self, tell: Callable[[Progress], None] | None = None) -> None:
+    def __init__(self, tell: Callable[[SearchProgress], None] | None = None) -> None:
         self.fits = 0
         self.later = 0.0  # work of the searches after the present one
         self._tell = tell
@@ -181,7 +181,7 @@ class Ticker:
         if self._tell is not None:
             rest, seconds = ahead + self.later, self.seconds
             left = seconds * rest / self._fresh if self._fresh else math.nan
-            self._tell(Progress(self.fits, self._done / (self._done + rest), seconds, left, text))
+            self._tell(SearchProgress(self.fits, self._done / (self._done + rest), seconds, left, text))
 
 
 @dataclass(frozen=True)
@@ -190,7 +190,7 @@ class Elimination:
 
     Parameters
     ----------
-    problem : Problem
+    problem : SelectionProblem
         Scores a feature subset.
     executor : concurrent.futures.Executor or None
         Runs the candidates.
@@ -202,7 +202,7 @@ class Elimination:
         Which search of a study this is: part of the checkpoint's tasks and of the progress text.
     """
 
-    problem: Problem
+    problem: SelectionProblem
     executor: Executor | None
     memory: Checkpoint
     ticker: Ticker
@@ -329,7 +329,7 @@ def run_all(searches: Sequence[Elimination], start: Codes, fewest: int) -> list[
     return found
 
 
-def _curve_of(task: tuple[Problem, Codes]) -> tuple[ProbeStep, ...]:
+def _curve_of(task: tuple[SelectionProblem, Codes]) -> tuple[ProbeStep, ...]:
     return probe_curve(*task)
 
 
@@ -349,12 +349,12 @@ def external(training: Codes) -> Codes:
     return tuple(code for code in EXTERNAL if code in training)
 
 
-def probe_curve(problem: Problem, training: Codes) -> tuple[ProbeStep, ...]:
+def probe_curve(problem: SelectionProblem, training: Codes) -> tuple[ProbeStep, ...]:
     """Drop one probe feature at a time, from all external training features down to three.
 
     Parameters
     ----------
-    problem : Problem
+    problem : SelectionProblem
         Scores the features.
     training : tuple of str
         Training features.

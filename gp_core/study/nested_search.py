@@ -15,7 +15,14 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
 from gp_core.landmarks.sets import Specimen
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
-from gp_core.study.backward_elimination import Codes, Elimination, Progress, Ticker, TrainingStep, run_all
+from gp_core.study.backward_elimination import (
+    Codes,
+    Elimination,
+    SearchProgress,
+    Ticker,
+    TrainingStep,
+    run_all,
+)
 from gp_core.study.checkpoint import Checkpoint, fingerprint
 from gp_core.study.leave_one_out import LeaveOneOutReport, Row, leave_one_out, summarise
 from gp_core.study.scoring import PoseErrors
@@ -108,7 +115,7 @@ def nested_search(
     settings: JrmpcSettings = DEFAULTS,
     executor: Executor | None = None,
     checkpoint: str | PathLike[str] | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[SearchProgress], None] | None = None,
 ) -> NestedReport:
     """Search inside each fold: hold an animal out, select features on the others, then estimate it.
 

@@ -19,7 +19,7 @@ from gp_core.landmarks.features import CODES, EXTERNAL, TRAINING
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.estimate import estimate_pose
-from gp_core.registration.icp_targets import Surface
+from gp_core.registration.icp_targets import TriangleMesh
 from gp_core.registration.result import RegistrationResult
 from gp_core.registration.skull import (
     register_by_icp,
@@ -111,7 +111,7 @@ def physical_test(
     *,
     atlas: Atlas | None = None,
     specimens: Sequence[Specimen] | None = None,
-    bone: Surface | None = None,
+    bone: TriangleMesh | None = None,
 ) -> PhysicalReport:
     """Estimate a cochlea from touches of a skull, and compare it with the CT of the same skull.
 
@@ -125,7 +125,7 @@ def physical_test(
         For the robust method; by default fitted to `specimens`, or else the published one.
     specimens : sequence of Specimen, optional
         Labelled animals other than this one; without them there is no JRMPC estimate.
-    bone : Surface, optional
+    bone : TriangleMesh, optional
         The bone in the CT, scan frame, mm. Touched points in `extra` that the CT does not name are then
         registered to it, starting from the registration by names.
 

@@ -18,8 +18,8 @@ from gp_core.study.backward_elimination import (
     FEWEST,
     Codes,
     Elimination,
-    Problem,
-    Progress,
+    SearchProgress,
+    SelectionProblem,
     Ticker,
     TrainingStep,
     external,
@@ -162,7 +162,7 @@ def search_features(
     settings: JrmpcSettings = DEFAULTS,
     executor: Executor | None = None,
     checkpoint: str | PathLike[str] | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: Callable[[SearchProgress], None] | None = None,
 ) -> SearchReport:
     """Find the features with the smallest leave-one-out error E_T, dropping one at a time.
 
@@ -189,7 +189,7 @@ def search_features(
     checkpoint : path-like, optional
         Where results are stored as they come in; a search that finds this file resumes from it.
     progress : callable, optional
-        Receives a `Progress` for each candidate; if it raises, the search stops.
+        Receives a `SearchProgress` for each candidate; if it raises, the search stops.
 
     Returns
     -------
@@ -254,7 +254,7 @@ def check_start(
     return start, fewest
 
 
-def problem_of(specimens: Sequence[Specimen], method: str, settings: JrmpcSettings) -> Problem:
+def problem_of(specimens: Sequence[Specimen], method: str, settings: JrmpcSettings) -> SelectionProblem:
     """Return the leave-one-out problem of some animals.
 
     Parameters
@@ -268,7 +268,7 @@ def problem_of(specimens: Sequence[Specimen], method: str, settings: JrmpcSettin
 
     Returns
     -------
-    Problem
+    SelectionProblem
         Scores features.
     """
     if method == "robust":

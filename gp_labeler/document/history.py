@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
-__all__ = ["History", "Step"]
+__all__ = ["History", "UndoStep"]
 
 S = TypeVar("S")
 
@@ -15,7 +15,7 @@ LIMIT = 1000
 
 
 @dataclass(frozen=True)
-class Step(Generic[S]):
+class UndoStep(Generic[S]):
     """One edit that can be undone or redone.
 
     Parameters
@@ -46,8 +46,8 @@ class History(Generic[S]):
 
     def __init__(self, state: S, *, limit: int = LIMIT) -> None:
         self._state = state
-        self._past: deque[Step[S]] = deque(maxlen=limit)
-        self._future: deque[Step[S]] = deque(maxlen=limit)
+        self._past: deque[UndoStep[S]] = deque(maxlen=limit)
+        self._future: deque[UndoStep[S]] = deque(maxlen=limit)
 
     @property
     def state(self) -> S:
@@ -55,12 +55,12 @@ class History(Generic[S]):
         return self._state
 
     @property
-    def to_undo(self) -> Step[S] | None:
+    def to_undo(self) -> UndoStep[S] | None:
         """What undo would take back, with the state before it; None where there is nothing."""
         return self._past[-1] if self._past else None
 
     @property
-    def to_redo(self) -> Step[S] | None:
+    def to_redo(self) -> UndoStep[S] | None:
         """What redo would do again, with the state after it; None where there is nothing."""
         return self._future[-1] if self._future else None
 
@@ -71,11 +71,11 @@ class History(Generic[S]):
         """
         last = self.to_undo
         if not (merge and last is not None and last.text == text and not self._future):
-            self._past.append(Step(text, self._state, focus))
+            self._past.append(UndoStep(text, self._state, focus))
         self._future.clear()
         self._state = state
 
-    def undo(self, *, focus: object = None, state: S | None = None, text: str = "") -> Step[S]:
+    def undo(self, *, focus: object = None, state: S | None = None, text: str = "") -> UndoStep[S]:
         """Go back one edit and return the step taken.
 
         Where nothing is left to undo, `state` and `text` (from a journal, whose writer remembered more) stand
@@ -88,20 +88,25 @@ class History(Generic[S]):
         """
         return self._step(self._past, self._future, focus, state, text)
 
-    def redo(self, *, focus: object = None, state: S | None = None, text: str = "") -> Step[S]:
+    def redo(self, *, focus: object = None, state: S | None = None, text: str = "") -> UndoStep[S]:
         """Do again what was undone last; the rest as in `undo`."""
         return self._step(self._future, self._past, focus, state, text)
 
     def _step(
-        self, source: deque[Step[S]], target: deque[Step[S]], focus: object, state: S | None, text: str
-    ) -> Step[S]:
+        self,
+        source: deque[UndoStep[S]],
+        target: deque[UndoStep[S]],
+        focus: object,
+        state: S | None,
+        text: str,
+    ) -> UndoStep[S]:
         if source:
             step = source.pop()
         elif state is not None:
-            step = Step(text, state)
+            step = UndoStep(text, state)
         else:
             raise LookupError("nothing to undo or redo")
-        target.append(Step(step.text, self._state, focus))
+        target.append(UndoStep(step.text, self._state, focus))
         self._state = step.state
         return step
 

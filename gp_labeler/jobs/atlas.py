@@ -20,6 +20,7 @@ from gp_labeler.jobs.runner import Progress
 
 __all__ = [
     "FEWEST_ANIMALS",
+    "AtlasTrial",
     "FitAtlas",
     "FittedAtlas",
     "LoadAtlas",
@@ -27,7 +28,6 @@ __all__ = [
     "RecallAtlas",
     "Recalled",
     "RefitAtlas",
-    "Trial",
     "TryAtlas",
 ]
 
@@ -168,7 +168,7 @@ class RefitAtlas:
 
 
 @dataclass(frozen=True)
-class Trial:
+class AtlasTrial:
     """How well each animal's cochlea is found from the others.
 
     Parameters
@@ -211,7 +211,7 @@ class TryAtlas:
     specimens: tuple[Specimen, ...]
     title = "Leave-one-out"
 
-    def run(self, progress: Progress) -> Trial:
+    def run(self, progress: Progress) -> AtlasTrial:
         """Estimate by both methods.
 
         Raises
@@ -230,7 +230,7 @@ class TryAtlas:
         progress(0.9, "Leave-one-out: JRMPC, compiled on its first use")
         jrmpc = leave_one_out(animals, method="jrmpc", training=training)
         reports = (LeaveOneOutReport("robust", training, PROBE, None, tuple(robust)), jrmpc)
-        return Trial(reports, len(animals), skipped)
+        return AtlasTrial(reports, len(animals), skipped)
 
 
 def _complete(specimens: tuple[Specimen, ...]) -> tuple[list[Specimen], tuple[Skipped, ...]]:

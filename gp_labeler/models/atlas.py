@@ -21,6 +21,7 @@ from gp_labeler.document.atlas_memory import AtlasMemory, AtlasSource
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.jobs.atlas import (
     FEWEST_ANIMALS,
+    AtlasTrial,
     FitAtlas,
     FittedAtlas,
     LoadAtlas,
@@ -28,7 +29,6 @@ from gp_labeler.jobs.atlas import (
     RecallAtlas,
     Recalled,
     RefitAtlas,
-    Trial,
     TryAtlas,
 )
 from gp_labeler.jobs.runner import Jobs, Task
@@ -83,7 +83,7 @@ class AtlasModel:
         self.problem = ""  # why the one chosen last is not in use
         self.animals: Animals | None = None
         self.keep_doubtful = False  # in the fits to come
-        self.trial: Trial | None = None
+        self.trial: AtlasTrial | None = None
         self.is_refitting = False
         """Whether an atlas without the open specimen is being fitted, by which it will be checked."""
         document.reset.connect(self._on_reset)
@@ -304,7 +304,7 @@ class AtlasModel:
             text += f"; {len(doubtful)} {many} with problems: {', '.join(doubtful)}"
         self._messages.say(text, "warning" if n or doubtful else "info")
 
-    def _take_trial(self, trial: Trial) -> None:
+    def _take_trial(self, trial: AtlasTrial) -> None:
         self.trial = trial
         self.details_changed.emit()
 

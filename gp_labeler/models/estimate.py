@@ -1,6 +1,6 @@
 """The cochlea of one side estimated from its touches, and compared with the scan where there is one.
 
-Nothing here changes: an `Estimate` is made again whenever touches, labels, settings or the atlas change.
+Nothing here changes: a `SideEstimate` is made again whenever touches, labels, settings or the atlas change.
 """
 
 from __future__ import annotations
@@ -30,7 +30,15 @@ from gp_core.validation import FloatArray
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.touches import TouchHow
 
-__all__ = ["Estimate", "EstimateSettings", "PoseInScan", "Registered", "apart", "make_estimate", "verdict_on"]
+__all__ = [
+    "EstimateSettings",
+    "PoseInScan",
+    "Registered",
+    "SideEstimate",
+    "apart",
+    "make_estimate",
+    "verdict_on",
+]
 
 REGISTRATIONS = ("auto", "features", "skull")
 _SAME_MM, _SAME_DEG = 0.001, 0.01
@@ -123,7 +131,7 @@ class PoseInScan:
 
 
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class SideEstimate:
     """What is known of the cochlea of one side.
 
     Parameters
@@ -249,7 +257,7 @@ class Estimate:
         return (mm, degrees) if mm > _SAME_MM or degrees > _SAME_DEG else None
 
 
-def verdict_on(estimate: Estimate, state: SpecimenState) -> str:
+def verdict_on(estimate: SideEstimate, state: SpecimenState) -> str:
     """Return what was said last of this very estimate; empty where nothing was, or it has changed since."""
     last = next((check for check in reversed(state.pose_checks) if check.side is estimate.side), None)
     return "" if last is None or not estimate.is_that_of(last.pose) else last.verdict
@@ -278,7 +286,7 @@ def make_estimate(
     specimens: Sequence[Specimen] = (),
     *,
     known: RigidTransform | None = None,
-) -> Estimate:
+) -> SideEstimate:
     """Estimate the cochlea of one side from the touches in a state.
 
     Parameters
@@ -294,7 +302,7 @@ def make_estimate(
 
     Returns
     -------
-    Estimate
+    SideEstimate
         With as much as could be found; its `problems` say what could not, and why.
     """
     touches = state.touched(settings.side)
@@ -311,7 +319,9 @@ def make_estimate(
     except GpError as error:
         problems["registration"] = str(error)
     labels = state.side(settings.side)
-    return Estimate(settings, touches, poses, problems, registered, labelled_cochlea(labels), labels, atlas)
+    return SideEstimate(
+        settings, touches, poses, problems, registered, labelled_cochlea(labels), labels, atlas
+    )
 
 
 def _pose(

@@ -37,8 +37,8 @@ from gp_labeler.models.scan import ScanModel
 from gp_labeler.models.view import ViewModel
 from gp_labeler.models.workflow import (
     Active,
+    LabellingProgress,
     PointState,
-    Progress,
     click_text,
     next_point,
     point_state,
@@ -161,7 +161,7 @@ class LabelsModel:
         problems = self.problems(side) if wait else self.known_problems(side)
         return {code: point_state(state, side, code, ghosts=ghosts, problems=problems) for code in CODES}
 
-    def progress(self, side: Side) -> Progress:
+    def progress(self, side: Side) -> LabellingProgress:
         """Return how many of the 20 points of one side are done."""
         return progress(self.document.state, side)
 

@@ -30,7 +30,7 @@ from gp_labeler.document.touches import TouchHow
 from gp_labeler.jobs.pose import WarmFit, WarmJoint
 from gp_labeler.jobs.runner import Jobs
 from gp_labeler.models.atlas import AtlasModel
-from gp_labeler.models.estimate import Estimate, EstimateSettings, verdict_on
+from gp_labeler.models.estimate import EstimateSettings, SideEstimate, verdict_on
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.pose_estimator import PoseEstimator
 from gp_labeler.models.pose_exports import InsertionPath, save_pose, says_its_state
@@ -128,7 +128,7 @@ class PoseModel:
         self._target: str | None = ORDER[0]
         self._overlay = OverlayOptions()
         self._skipped: frozenset[tuple[Side, str]] = frozenset()
-        self._gains: tuple[Estimate, tuple[TouchGain, ...]] | None = None
+        self._gains: tuple[SideEstimate, tuple[TouchGain, ...]] | None = None
         self._path: InsertionPath | None = None
         self._prepared = False
         self._confirmed: set[tuple[Side, str]] = set()
@@ -153,11 +153,11 @@ class PoseModel:
         return self.settings.side
 
     @property
-    def estimate(self) -> Estimate | None:
+    def estimate(self) -> SideEstimate | None:
         """The estimate of that side; None without an atlas or with fewer than three touches."""
         return self.of_side(self.side)
 
-    def of_side(self, side: Side) -> Estimate | None:
+    def of_side(self, side: Side) -> SideEstimate | None:
         """Return the estimate of a side, as `estimate` does for the one that is touched."""
         return self._estimator.of_side(self._document.state, side)
 

@@ -1,4 +1,4 @@
-"""The estimate of a side from its touches: settings, atlas, and the `Estimate` that belongs to them now."""
+"""The estimate of a side from its touches: settings, atlas, and the `SideEstimate` that follows."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from gp_core.pose.systematic_error import SystematicError
 from gp_core.validation import check_option
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.touch_edits import LeaveOutTouch
-from gp_labeler.models.estimate import REGISTRATIONS, Estimate, EstimateSettings, apart, make_estimate
+from gp_labeler.models.estimate import REGISTRATIONS, EstimateSettings, SideEstimate, apart, make_estimate
 
 __all__ = ["PoseEstimator"]
 
@@ -32,7 +32,7 @@ class _Made:
     chosen: EstimateSettings
     side: Side
     key: tuple[Any, ...]
-    estimate: Estimate | None
+    estimate: SideEstimate | None
 
     def is_of(self, state: SpecimenState, chosen: EstimateSettings, side: Side) -> bool:
         """Whether nothing at all changed; asked dozens of times a touch."""
@@ -104,7 +104,7 @@ class PoseEstimator:
             return f"{more} more touch{'' if more == 1 else 'es'} for an estimate"
         return "Loading the atlas" if self._atlas is None else ""
 
-    def of_side(self, state: SpecimenState, side: Side) -> Estimate | None:
+    def of_side(self, state: SpecimenState, side: Side) -> SideEstimate | None:
         """Return the estimate of a side; None without an atlas or with fewer than three touches."""
         chosen, made = self.settings, self._made
         if made is not None and made.is_of(state, chosen, side):
@@ -131,7 +131,7 @@ class PoseEstimator:
         mine = current.pose
         return None if other is None else apart(mine.origin, mine.axis, other.origin, other.axis)
 
-    def _make(self, state: SpecimenState, settings: EstimateSettings) -> Estimate | None:
+    def _make(self, state: SpecimenState, settings: EstimateSettings) -> SideEstimate | None:
         if self._atlas is None or len(state.touched(settings.side).placed) < FEWEST_TOUCHES:
             return None
         known = self._known.get(settings.side)

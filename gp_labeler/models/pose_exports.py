@@ -20,7 +20,7 @@ from gp_core.pose.insertion_path import (
     write_path,
 )
 from gp_core.validation import FloatArray
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 
 __all__ = ["FORMATS", "InsertionPath", "save_pose", "says_its_state"]
 
@@ -165,20 +165,20 @@ class InsertionPath:
             raise GpError(f"rows of the path must be 2 to {len(self.points)}, got {n}", file=self.source)
         return replace(self, points=self.points[:n], rows=n)
 
-    def in_touches(self, estimate: Estimate) -> FloatArray | None:
+    def in_touches(self, estimate: SideEstimate) -> FloatArray | None:
         """Return the path (N, 3) in the frame of the touches, mm; None without a pose."""
         if estimate.pose is None:
             return None
         return carry_path(self.points, estimate.pose, path_side=self.side)
 
-    def in_scan(self, estimate: Estimate) -> FloatArray | None:
+    def in_scan(self, estimate: SideEstimate) -> FloatArray | None:
         """Return the path (N, 3) in the scan, mm; None where the estimate does not lie in one."""
         carried = self.in_touches(estimate)
         if carried is None or estimate.registered is None:
             return None
         return estimate.registered.T_scan_touches.apply(carried)
 
-    def save_carried(self, estimate: Estimate, path: str | PathLike[str]) -> Path:
+    def save_carried(self, estimate: SideEstimate, path: str | PathLike[str]) -> Path:
         """Write the path in the frame of the touches, for the robot.
 
         Raises

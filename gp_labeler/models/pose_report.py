@@ -20,7 +20,7 @@ from gp_core.pose.cochlea_pose import CochleaPose
 from gp_labeler.document.specimen_file import application
 from gp_labeler.document.state import PoseCheck, SpecimenState
 from gp_labeler.document.touches import Touch
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 
 __all__ = ["PoseReport"]
 
@@ -42,7 +42,7 @@ class PoseReport:
     Parameters
     ----------
     state : SpecimenState
-    estimate : Estimate
+    estimate : SideEstimate
         Of the side reported; it has a pose.
     pictures : mapping of str to bytes
         PNG files by caption, in the order they are shown, six at most for one page.
@@ -51,7 +51,7 @@ class PoseReport:
     """
 
     state: SpecimenState
-    estimate: Estimate
+    estimate: SideEstimate
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     time: str = ""
 

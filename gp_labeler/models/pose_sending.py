@@ -7,7 +7,7 @@ from psygnal import Signal
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.gate import GateReason, PoseGate
 from gp_labeler.document.state import SpecimenState
-from gp_labeler.models.estimate import Estimate, verdict_on
+from gp_labeler.models.estimate import SideEstimate, verdict_on
 from gp_labeler.tracker import PoseMessage, PoseSender
 
 __all__ = ["PoseSending"]
@@ -60,7 +60,7 @@ class PoseSending:
 
     def update(
         self,
-        estimate: Estimate | None,
+        estimate: SideEstimate | None,
         state: SpecimenState,
         doubtful: tuple[str, ...],
         reference_age_s: float | None,

@@ -16,8 +16,8 @@ from gp_labeler.models.ghosts import Ghost
 
 __all__ = [
     "Active",
+    "LabellingProgress",
     "PointState",
-    "Progress",
     "click_text",
     "next_point",
     "placing_order",
@@ -56,7 +56,7 @@ class Active:
 
 
 @dataclass(frozen=True)
-class Progress:
+class LabellingProgress:
     """How far one side is; CO counts once it is computed."""
 
     n_placed: int
@@ -73,10 +73,12 @@ class Progress:
         return f"{placed}, {self.n_unseen} not seen" if self.n_unseen else placed
 
 
-def progress(state: SpecimenState, side: Side) -> Progress:
+def progress(state: SpecimenState, side: Side) -> LabellingProgress:
     """Count the points of one side."""
     landmarks = state.side(side)
-    return Progress(len(landmarks.placed), len(landmarks.unseen), n_suggested=len(landmarks.suggested))
+    return LabellingProgress(
+        len(landmarks.placed), len(landmarks.unseen), n_suggested=len(landmarks.suggested)
+    )
 
 
 def point_state(

@@ -12,7 +12,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Report
 from gp_labeler.phantom.solids import Grid, Solid, Values
 
-__all__ = ["Canvas"]
+__all__ = ["VoxelCanvas"]
 
 _SILENT = Report()
 _WORKERS = 2
@@ -26,7 +26,7 @@ _BLOCK = 1_500_000
 """Voxels worked on at a time in one thread: bounds the memory of the temporary arrays."""
 
 
-class Canvas:
+class VoxelCanvas:
     """Grey values on a grid along the axes of the scan frame.
 
     Parameters
@@ -121,12 +121,12 @@ class Canvas:
             out[k] = np.clip(np.rint(noisy), 0, 65535)
         return out
 
-    def part(self, axis: int, kept: slice) -> Canvas:
+    def part(self, axis: int, kept: slice) -> VoxelCanvas:
         """Return the part of the canvas at some voxels along x (0), y (1) or z (2)."""
         axes = [a[kept] if n == axis else a for n, a in enumerate(self.axes)]
         index: list[slice] = [slice(None)] * 3
         index[2 - axis] = kept
-        part = Canvas([a[0] for a in axes], [a[0] for a in axes], self.spacing, 0.0)
+        part = VoxelCanvas([a[0] for a in axes], [a[0] for a in axes], self.spacing, 0.0)
         part.origin, part.axes = np.array([a[0] for a in axes]), axes
         part.grey = np.ascontiguousarray(self.grey[tuple(index)])
         return part

@@ -10,7 +10,7 @@ import numpy as np
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.coil import CAP_MM, RISE, TURNS, Coil
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.layout import Ear, unit
 from gp_labeler.phantom.rim import Rim
 from gp_labeler.phantom.solids import (
@@ -138,7 +138,7 @@ class Cochlea:
         top = self.ear["CA"] - thick[-1] * self.axis  # its round end touches the bony cap at CA
         return np.concatenate([start[None], line, top[None]]), np.concatenate([[0.5], thick, thick[-1:]])
 
-    def paint_bone(self, canvas: Canvas) -> None:
+    def paint_bone(self, canvas: VoxelCanvas) -> None:
         """Paint the capsule with the lips of its windows, the corner CL and the root at CC."""
         round_window, oval = self.round_window, self.oval_window
         parts = [
@@ -162,7 +162,7 @@ class Cochlea:
         ridge = sheet([behind - 0.6 * self.axis, behind + 0.4 * self.axis], wall, 0.22)
         return union([cone(cl - 1.3 * out, tip, 0.75, 0.28), ridge])
 
-    def paint_inside(self, canvas: Canvas) -> None:
+    def paint_inside(self, canvas: VoxelCanvas) -> None:
         """Paint duct, vestibule, nerve canal, modiolus and the open windows."""
         line, thick = self.duct_line()
         oval, axis, base = self.oval_window, self.axis, self.ear["CB"]
@@ -184,14 +184,14 @@ class Cochlea:
         inner = self.ear["CC"] - 0.32 * out
         return inner - 0.3 * self.axis, inner
 
-    def _open_round_window(self, canvas: Canvas) -> None:
+    def _open_round_window(self, canvas: VoxelCanvas) -> None:
         """Open the round window, fluid within and air without, and make its lip whole again."""
         rim = self.round_window
         canvas.paint(rim.plug(-0.9, 0.0), grey.FLUID)
         canvas.paint(rim.plug(0.0, 1.2, flare=0.4), grey.AIR)
         canvas.paint(rim.ring(_LIP), grey.BONE)
 
-    def _paint_lamina(self, canvas: Canvas, line: FloatArray, thick: FloatArray) -> None:
+    def _paint_lamina(self, canvas: VoxelCanvas, line: FloatArray, thick: FloatArray) -> None:
         """Paint the spiral lamina and basilar membrane: a shelf across the duct, thinner than a voxel."""
         inward = -(line - self.ear["CB"])
         inward = inward - (inward @ self.axis)[:, None] * self.axis
@@ -199,7 +199,7 @@ class Cochlea:
         shelf = sheet(line + 1.1 * thick[:, None] * inward, line, 0.05)
         canvas.paint(shelf, grey.CANCELLOUS)
 
-    def paint_stapes(self, canvas: Canvas) -> None:
+    def paint_stapes(self, canvas: VoxelCanvas) -> None:
         """Paint the stapes: its footplate free in the oval window, two limbs and the head."""
         oval = self.oval_window
         gap = 0.38

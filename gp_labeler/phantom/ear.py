@@ -6,7 +6,7 @@ import numpy as np
 
 from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.cochlea import Cochlea
 from gp_labeler.phantom.layout import Ear, unit
 from gp_labeler.phantom.rim import Rim
@@ -32,7 +32,7 @@ _RECESS = 0.85
 _LIMB = 0.24
 
 
-def paint_ear(canvas: Canvas, ear: Ear, thickness: float = 1.0) -> None:
+def paint_ear(canvas: VoxelCanvas, ear: Ear, thickness: float = 1.0) -> None:
     """Paint one ear, from the bone outside to the ossicles inside.
 
     The wall of the bulla grows outwards by the factor `thickness`: the cavity stays.
@@ -126,7 +126,7 @@ def _canal_depth(ear: Ear, canal: Rim) -> float:
     return float(np.clip(room, *_CANAL_DEPTH))
 
 
-def _paint_outer_ear(canvas: Canvas, ear: Ear, canal: Rim) -> None:
+def _paint_outer_ear(canvas: VoxelCanvas, ear: Ear, canal: Rim) -> None:
     """Paint the soft ear canal out to the skin, and the ear."""
     start = canal.centre + 0.5 * canal.normal
     way = np.stack([start, ear.at((15.5, -1.5, 2.0)), ear.at((21.5, -2.5, 4.5))])
@@ -171,7 +171,7 @@ def _ossicles(ear: Ear) -> Solid:
     )
 
 
-def _paint_drum(canvas: Canvas, ear: Ear, canal: Rim, depth: float) -> None:
+def _paint_drum(canvas: VoxelCanvas, ear: Ear, canal: Rim, depth: float) -> None:
     """Paint the eardrum: a thin cone of membrane from the inner end of the canal to the tip of the handle."""
     edge = canal.curve(0.1 - 0.3 * depth, 24) - depth * canal.normal
     tip = np.broadcast_to(ear.at(_UMBO), edge.shape)

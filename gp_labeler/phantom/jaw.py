@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.layout import Ear, HeadLayout
 from gp_labeler.phantom.solids import Solid, sheet, tip_centre, tube, union
 
@@ -14,7 +14,7 @@ __all__ = ["paint_jaw"]
 _TIP_RADIUS = 0.5
 
 
-def paint_jaw(canvas: Canvas, head: HeadLayout) -> None:
+def paint_jaw(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Paint both halves of the lower jaw with their teeth."""
     for ear in head.ears:
         canvas.paint(_half_jaw(ear), grey.BONE)

@@ -9,7 +9,7 @@ import numpy as np
 from gp_core.landmarks.features import Side
 from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.layout import Ear, HeadLayout, unit
 from gp_labeler.phantom.solids import (
     Grid,
@@ -32,7 +32,7 @@ _TUBE_MM, _TUBE_WALL_MM, _ROD_MM = 28.0, 1.2, 1.6
 _WIRE_MM, _CLIP_MM = 0.15, 0.35
 
 
-def paint_objects(canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int) -> None:
+def paint_objects(canvas: VoxelCanvas, head: HeadLayout, variation: HeadVariation, seed: int) -> None:
     """Paint over a head what a variation adds to it."""
     if variation.broken_bulla:
         _break_bulla(canvas, _ear(head, variation.broken_bulla), generator_of(seed, "broken_bulla"))
@@ -49,7 +49,7 @@ def _ear(head: HeadLayout, side: str) -> Ear:
     return head.ears[0 if Side(side) is Side.LEFT else 1]
 
 
-def _break_bulla(canvas: Canvas, ear: Ear, rng: np.random.Generator) -> None:
+def _break_bulla(canvas: VoxelCanvas, ear: Ear, rng: np.random.Generator) -> None:
     """Knock a hole into the floor of the bulla, with blood in the hole and a chip inside."""
     aside, ahead = rng.uniform(-0.8, 0.8, 2)
     hole = np.array([7.2 + aside, 0.6 + ahead, -7.8])

@@ -19,13 +19,13 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.ear import paint_ear, pinna
 from gp_labeler.phantom.jaw import paint_jaw
 from gp_labeler.phantom.layout import HeadLayout
 from gp_labeler.phantom.loft import skin
 from gp_labeler.phantom.objects import holder_of, paint_objects
-from gp_labeler.phantom.placing import Placement, cropped, placement_of
+from gp_labeler.phantom.placing import HeadPlacement, cropped, placement_of
 from gp_labeler.phantom.scanner import FILL, distort, stored, with_fill
 from gp_labeler.phantom.skull import (
     paint_arches,
@@ -135,7 +135,7 @@ def make_phantom(
     report = Report(progress, cancel)
     low, high = _head_box(head, varied, seed) if box is None else box
     painting = report.part(0.0, _PAINTED)
-    canvas = Canvas(low, high, spacing, grey.AIR, report=painting, n_solids=_N_SOLIDS)
+    canvas = VoxelCanvas(low, high, spacing, grey.AIR, report=painting, n_solids=_N_SOLIDS)
     _paint(canvas, head, varied, seed)
     canvas, placement = _placed(canvas, head, varied, seed)
     report(_PLACED)
@@ -168,7 +168,7 @@ def _head_box(head: HeadLayout, variation: HeadVariation, seed: int) -> FloatArr
     return np.stack([low - _AIR_MM, high + _AIR_MM])
 
 
-def _paint(canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int) -> None:
+def _paint(canvas: VoxelCanvas, head: HeadLayout, variation: HeadVariation, seed: int) -> None:
     paint_skin(canvas, head)
     paint_skull(canvas, head, variation.bone_thickness)
     paint_arches(canvas, head)
@@ -181,8 +181,8 @@ def _paint(canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int
 
 
 def _placed(
-    canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int
-) -> tuple[Canvas, Placement | None]:
+    canvas: VoxelCanvas, head: HeadLayout, variation: HeadVariation, seed: int
+) -> tuple[VoxelCanvas, HeadPlacement | None]:
     """Return the voxels of the scan, and how the head got there."""
     placement = placement_of(canvas, head, variation, seed)
     moved = canvas if placement is None else placement.canvas(canvas)
@@ -190,7 +190,7 @@ def _placed(
 
 
 def _volume(
-    canvas: Canvas, scanned: NDArray[np.uint16], variation: HeadVariation, seed: int, name: str
+    canvas: VoxelCanvas, scanned: NDArray[np.uint16], variation: HeadVariation, seed: int, name: str
 ) -> tuple[Volume, FloatArray]:
     voxels = with_fill(canvas, scanned, variation.circle) if variation.circle else scanned
     voxels, T_stored_scan, parts = stored(voxels, canvas, variation.mirrored)
@@ -204,7 +204,7 @@ def _volume(
 def _specimen_in(
     volume: Volume,
     animal: Specimen,
-    placement: Placement | None,
+    placement: HeadPlacement | None,
     T_stored_scan: FloatArray,
     variation: HeadVariation,
 ) -> Specimen:
@@ -225,7 +225,9 @@ def _specimen_in(
     return Specimen(animal.name, sides)
 
 
-def _head_pose(head: HeadLayout, placement: Placement | None, T_stored_scan: FloatArray) -> RigidTransform:
+def _head_pose(
+    head: HeadLayout, placement: HeadPlacement | None, T_stored_scan: FloatArray
+) -> RigidTransform:
     """Return ``T_head_scan``; where the scan is a mirror image, of the head that the scan shows."""
     origin, axes = head.shift, head.rotation
     if placement is not None:

@@ -9,12 +9,12 @@ import numpy as np
 
 from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.layout import HeadLayout
 from gp_labeler.phantom.solids import Values
 from gp_labeler.phantom.variation import HeadVariation, generator_of
 
-__all__ = ["Placement", "cropped", "placement_of"]
+__all__ = ["HeadPlacement", "cropped", "placement_of"]
 
 _BETWEEN_MM, _WIDTH_MM = 8.0, 6.0
 """Distance of the random displacements from each other, and the reach of each (standard deviation)."""
@@ -59,7 +59,7 @@ class Displacement:
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class HeadPlacement:
     """Where the painted head comes to in its scan.
 
     Parameters
@@ -90,15 +90,15 @@ class Placement:
         back = (points - self.centre) @ self.rotation + self.centre
         return back if self.displacement is None else back + self.displacement.at(back)
 
-    def canvas(self, painted: Canvas) -> Canvas:
+    def canvas(self, painted: VoxelCanvas) -> VoxelCanvas:
         """Return the painted voxels, moved: a canvas around all that is not air."""
         low, high = self._box(painted)
-        moved = Canvas(low, high, painted.spacing, grey.AIR)
+        moved = VoxelCanvas(low, high, painted.spacing, grey.AIR)
         for layers, places in _slabs(moved):
             moved.grey[layers] = _values_at(painted, self.sources(places)).reshape(moved.grey[layers].shape)
         return moved
 
-    def _box(self, painted: Canvas) -> FloatArray:
+    def _box(self, painted: VoxelCanvas) -> FloatArray:
         """Return the (2, 3) corners of a box around what was painted, once it is moved."""
         step = max(1, round(1.0 / painted.spacing))
         there = np.argwhere(painted.grey[::step, ::step, ::step] > grey.AIR + 500)[:, ::-1]
@@ -106,7 +106,9 @@ class Placement:
         return np.stack([places.min(axis=0) - _AIR_MM, places.max(axis=0) + _AIR_MM])
 
 
-def placement_of(canvas: Canvas, head: HeadLayout, variation: HeadVariation, seed: int) -> Placement | None:
+def placement_of(
+    canvas: VoxelCanvas, head: HeadLayout, variation: HeadVariation, seed: int
+) -> HeadPlacement | None:
     """Return how a variation moves a head; None where it leaves it as it was painted."""
     from scipy.spatial.transform import Rotation
 
@@ -114,10 +116,10 @@ def placement_of(canvas: Canvas, head: HeadLayout, variation: HeadVariation, see
         return None
     displacement = _displacement(canvas, head, variation.asymmetry, seed) if variation.asymmetry else None
     rotation = Rotation.from_rotvec(variation.turn, degrees=True).as_matrix()
-    return Placement(rotation, head.roughly(np.array([[0.0, -15.0, 0.0]]))[0], displacement)
+    return HeadPlacement(rotation, head.roughly(np.array([[0.0, -15.0, 0.0]]))[0], displacement)
 
 
-def _displacement(canvas: Canvas, head: HeadLayout, rms: float, seed: int) -> Displacement:
+def _displacement(canvas: VoxelCanvas, head: HeadLayout, rms: float, seed: int) -> Displacement:
     """Draw a displacement of random bumps that neither moves nor turns the bone as a whole."""
     rng = generator_of(seed, "asymmetry")
     knots = head.roughly(_region(_BETWEEN_MM))
@@ -135,7 +137,7 @@ def _displacement(canvas: Canvas, head: HeadLayout, rms: float, seed: int) -> Di
     return Displacement(low, field.T.reshape(3, *x.shape))
 
 
-def _bone_of(canvas: Canvas) -> FloatArray:
+def _bone_of(canvas: VoxelCanvas) -> FloatArray:
     """Return places (N, 3) all over the painted bone."""
     voxels = np.argwhere(canvas.grey > _HALF_BONE)[:, ::-1]
     chosen = voxels[:: max(1, len(voxels) // _N_PLACES)]
@@ -175,7 +177,7 @@ def _motion(places: FloatArray, rigid: FloatArray) -> FloatArray:
     return moved
 
 
-def _slabs(canvas: Canvas) -> Iterator[tuple[slice, FloatArray]]:
+def _slabs(canvas: VoxelCanvas) -> Iterator[tuple[slice, FloatArray]]:
     """Yield the layers of a canvas, some at a time, with the places (N, 3) of their voxels."""
     xs, ys, zs = canvas.axes
     at_once = max(1, _SLAB // (len(xs) * len(ys)))
@@ -184,7 +186,7 @@ def _slabs(canvas: Canvas) -> Iterator[tuple[slice, FloatArray]]:
         yield slice(k, k + at_once), np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
 
 
-def _values_at(canvas: Canvas, places: FloatArray) -> Values:
+def _values_at(canvas: VoxelCanvas, places: FloatArray) -> Values:
     from scipy.ndimage import map_coordinates
 
     index = ((places - canvas.origin) / canvas.spacing)[:, ::-1].T
@@ -192,7 +194,7 @@ def _values_at(canvas: Canvas, places: FloatArray) -> Values:
     return found
 
 
-def cropped(canvas: Canvas, crop: tuple[float, str]) -> Canvas:
+def cropped(canvas: VoxelCanvas, crop: tuple[float, str]) -> VoxelCanvas:
     """Return the canvas without the part at one face that holds a fraction of the bone."""
     fraction, face = crop
     axis, positive = {"L": (0, True), "R": (0, False), "P": (1, True), "A": (1, False)}.get(

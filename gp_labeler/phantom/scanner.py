@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.objects import METAL
 from gp_labeler.phantom.solids import Values
 from gp_labeler.phantom.variation import HeadVariation, generator_of
@@ -24,7 +24,7 @@ _RING_MM = 0.3
 _STREAKS, _STREAK_GREY, _STREAK_MM = 9, 5_000.0, 5.0
 
 
-def distort(canvas: Canvas, variation: HeadVariation, seed: int) -> None:
+def distort(canvas: VoxelCanvas, variation: HeadVariation, seed: int) -> None:
     """Change grey values as a scanner does, before its blur and its noise."""
     if variation.electrode or variation.clip:
         _add_streaks(canvas, generator_of(seed, "streaks"))
@@ -36,7 +36,7 @@ def distort(canvas: Canvas, variation: HeadVariation, seed: int) -> None:
         canvas.grey += _rings(canvas, variation.rings, generator_of(seed, "rings"))
 
 
-def _harden(canvas: Canvas, share: float) -> None:
+def _harden(canvas: VoxelCanvas, share: float) -> None:
     """Darken what lies amid much bone: there few soft rays are left."""
     from scipy.ndimage import gaussian_filter, zoom
 
@@ -48,7 +48,7 @@ def _harden(canvas: Canvas, share: float) -> None:
     canvas.grey *= 1 - np.float32(share) * zoom(load, factors, order=1, mode="nearest", grid_mode=True)
 
 
-def _average(canvas: Canvas, edge: float) -> None:
+def _average(canvas: VoxelCanvas, edge: float) -> None:
     """Make each voxel the mean of a cube of this edge, in voxels: its share of the outermost is a part."""
     from scipy.ndimage import convolve1d
 
@@ -59,21 +59,21 @@ def _average(canvas: Canvas, edge: float) -> None:
         canvas.grey = convolve1d(canvas.grey, weights / edge, axis=axis, mode="nearest")
 
 
-def _rings(canvas: Canvas, strength: float, rng: np.random.Generator) -> Values:
+def _rings(canvas: VoxelCanvas, strength: float, rng: np.random.Generator) -> Values:
     """Return the (1, ny, nx) error of detectors that are a little off, alike in all slices."""
     radius = _radius(canvas)
     bins = (radius / _RING_MM).astype(np.intp)
     return np.asarray(strength * rng.standard_normal(int(bins.max()) + 1)[bins][None], dtype=np.float32)
 
 
-def _radius(canvas: Canvas) -> FloatArray:
+def _radius(canvas: VoxelCanvas) -> FloatArray:
     """Return the (ny, nx) distance from the axis of the scanner, the middle of the slices, mm."""
     x, y = (axis - (axis[0] + axis[-1]) / 2 for axis in canvas.axes[:2])
     radius: FloatArray = np.hypot(x[None, :], y[:, None])
     return radius
 
 
-def _add_streaks(canvas: Canvas, rng: np.random.Generator) -> None:
+def _add_streaks(canvas: VoxelCanvas, rng: np.random.Generator) -> None:
     """Draw rays, bright and dark, from the metal in each slice that holds some."""
     x, y = canvas.axes[0][None, :], canvas.axes[1][:, None]
     phase = rng.uniform(0, 2 * np.pi, 2)
@@ -89,7 +89,7 @@ def _add_streaks(canvas: Canvas, rng: np.random.Generator) -> None:
         layer += (_STREAK_GREY / 2 * rays * fade).astype(np.float32)
 
 
-def with_fill(canvas: Canvas, voxels: NDArray[np.uint16], circle: float) -> NDArray[np.uint16]:
+def with_fill(canvas: VoxelCanvas, voxels: NDArray[np.uint16], circle: float) -> NDArray[np.uint16]:
     """Return (z, y, x) voxels that hold `FILL` outside a circle in every slice, and above it inside."""
     extent = min(np.ptp(canvas.axes[0]), np.ptp(canvas.axes[1]))
     outside = _radius(canvas) > circle * extent / 2
@@ -97,7 +97,7 @@ def with_fill(canvas: Canvas, voxels: NDArray[np.uint16], circle: float) -> NDAr
 
 
 def stored(
-    voxels: NDArray[np.uint16], canvas: Canvas, mirrored: str
+    voxels: NDArray[np.uint16], canvas: VoxelCanvas, mirrored: str
 ) -> tuple[NDArray[np.uint16], FloatArray, dict[str, Any]]:
     """Return the voxels as a file holds them.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from gp_core.validation import FloatArray
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.layout import Ear, HeadLayout, unit
 from gp_labeler.phantom.loft import roof_heights, skin, skull_body
 from gp_labeler.phantom.solids import (
@@ -36,7 +36,7 @@ _CRIBRIFORM = 24.0
 """Anterior position of the plate between brain and nose."""
 
 
-def paint_skin(canvas: Canvas, head: HeadLayout) -> None:
+def paint_skin(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Paint the soft outline of the head, with eyes and nostrils."""
     canvas.paint(skin(head), grey.SOFT)
     for ear in head.ears:
@@ -46,7 +46,7 @@ def paint_skin(canvas: Canvas, head: HeadLayout) -> None:
         canvas.paint(ellipsoid(ear.at((13.0, 21.5, 5.8)), head.semi_axes(1.7, 2.1, 2.1)), grey.LENS)
 
 
-def paint_skull(canvas: Canvas, head: HeadLayout, thickness: float = 1.0) -> None:
+def paint_skull(canvas: VoxelCanvas, head: HeadLayout, thickness: float = 1.0) -> None:
     """Paint braincase and snout as one shell, the brain, the nose, and the openings.
 
     The wall grows inwards by the factor `thickness`: its outer surface stays.
@@ -83,7 +83,7 @@ def _half_space(point: FloatArray, normal: FloatArray) -> Solid:
     return Solid(distance, np.full(3, -np.inf), np.full(3, np.inf))
 
 
-def _paint_nose(canvas: Canvas, head: HeadLayout, inner: Solid) -> None:
+def _paint_nose(canvas: VoxelCanvas, head: HeadLayout, inner: Solid) -> None:
     """Paint the septum, scrolled turbinates on both sides, and the solid roots of the incisors."""
     lines = [head.at([(0, a, z) for a in (25, 32, 40, 48)]) for z in (11.0, -4.0)]
     parts = [sheet(lines[0], lines[1], 0.22)]
@@ -108,7 +108,7 @@ def _scroll(ear: Ear, anterior: float, up: float, wide: float, turn: float) -> F
     )
 
 
-def _paint_openings(canvas: Canvas, head: HeadLayout) -> None:
+def _paint_openings(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Open nose and foramen magnum, and the optic and incisive foramen of each side."""
     nose = ellipsoid(head.at((0, 53.2, -0.2)), head.semi_axes(3.4, 5.2, 3.6))
     canvas.paint(nose, grey.SOFT)
@@ -122,7 +122,7 @@ def _paint_openings(canvas: Canvas, head: HeadLayout) -> None:
         canvas.paint(cone(palate[0], palate[1], 0.55), grey.SOFT)
 
 
-def _paint_crests(canvas: Canvas, head: HeadLayout) -> None:
+def _paint_crests(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Paint what stands out behind: occipital crest and condyles, the processes beside the bullae."""
     crest = head.at([(x, -11.0 + 0.012 * x * x, 11.2 - 0.035 * x * x) for x in np.linspace(-7.5, 7.5, 13)])
     parts = [tube(crest, 0.6)]
@@ -135,7 +135,7 @@ def _paint_crests(canvas: Canvas, head: HeadLayout) -> None:
     canvas.paint(union(parts), grey.BONE)
 
 
-def _paint_sutures(canvas: Canvas, head: HeadLayout) -> None:
+def _paint_sutures(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Paint the seams of the roof: sagittal, coronal, lambdoid, and between nose and forehead."""
     wiggle = 0.25 * (-1.0) ** np.arange(60)
     along = np.linspace(-8.5, 50.0, 60)
@@ -149,7 +149,7 @@ def _paint_sutures(canvas: Canvas, head: HeadLayout) -> None:
         canvas.paint(sheet(edge[0], edge[1], 0.09), grey.SUTURE)
 
 
-def paint_arches(canvas: Canvas, head: HeadLayout) -> None:
+def paint_arches(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Paint the cheek arch of each side, whose lateralmost point is ZL."""
     for ear in head.ears:
         canvas.paint(_arch(ear), grey.BONE)
@@ -183,7 +183,7 @@ def _arch(ear: Ear) -> Solid:
     )
 
 
-def paint_upper_teeth(canvas: Canvas, head: HeadLayout) -> None:
+def paint_upper_teeth(canvas: VoxelCanvas, head: HeadLayout) -> None:
     """Paint palate, cheek teeth and incisors; IN is the lowest point of the bone between the incisors."""
     tip = head.ears[0]["IN"]
     up = np.array([0.0, 0.0, 1.0])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gp_labeler.phantom import grey
-from gp_labeler.phantom.canvas import Canvas
+from gp_labeler.phantom.canvas import VoxelCanvas
 from gp_labeler.phantom.solids import Values
 from gp_labeler.phantom.variation import HeadVariation, generator_of
 
@@ -18,7 +18,7 @@ _ALIKE = 200.0
 """Grey values this near to soft tissue are: brain, fluid and edges are farther."""
 
 
-def alter_tissue(canvas: Canvas, variation: HeadVariation, seed: int) -> None:
+def alter_tissue(canvas: VoxelCanvas, variation: HeadVariation, seed: int) -> None:
     """Change the grey values of a painted head as a variation says; shapes stay."""
     if variation.marrow:
         _hollow_bone(canvas, variation.marrow, generator_of(seed, "marrow"))
@@ -31,7 +31,7 @@ def alter_tissue(canvas: Canvas, variation: HeadVariation, seed: int) -> None:
         _take_soft_tissue_away(canvas)
 
 
-def _hollow_bone(canvas: Canvas, contrast: float, rng: np.random.Generator) -> None:
+def _hollow_bone(canvas: VoxelCanvas, contrast: float, rng: np.random.Generator) -> None:
     """Put marrow between trabeculae wherever bone is thick; what lies near its surface stays."""
     from scipy.ndimage import gaussian_filter
 
@@ -43,20 +43,20 @@ def _hollow_bone(canvas: Canvas, contrast: float, rng: np.random.Generator) -> N
     canvas.grey -= np.float32(contrast) * deep * gaps * np.maximum(canvas.grey - np.float32(_MARROW), 0)
 
 
-def _mix_soft_tissue(canvas: Canvas, contrast: float, rng: np.random.Generator) -> None:
+def _mix_soft_tissue(canvas: VoxelCanvas, contrast: float, rng: np.random.Generator) -> None:
     """Make some of the soft tissue fat, in lobules."""
     soft = np.abs(canvas.grey - np.float32(grey.SOFT)) < _ALIKE
     fat = np.clip(2 * _field(canvas, _LOBULE_MM, rng), 0, 1)
     canvas.grey -= np.float32(contrast) * soft * fat * np.float32(grey.SOFT - _FAT)
 
 
-def _take_soft_tissue_away(canvas: Canvas) -> None:
+def _take_soft_tissue_away(canvas: VoxelCanvas) -> None:
     """Make air of all that is no bone; its edges stay between bone and air."""
     share = np.clip((canvas.grey - np.float32(grey.SOFT)) / np.float32(grey.BONE - grey.SOFT), 0, None)
     canvas.grey[:] = np.where(share < 1, grey.AIR + share * np.float32(grey.BONE - grey.AIR), canvas.grey)
 
 
-def _field(canvas: Canvas, width: float, rng: np.random.Generator) -> Values:
+def _field(canvas: VoxelCanvas, width: float, rng: np.random.Generator) -> Values:
     """Return random values of mean 0 and standard deviation 1 that change over about `width` mm."""
     from scipy.ndimage import gaussian_filter
 

@@ -8,13 +8,13 @@ from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import SceneCamera
 from gp_labeler.scene.pose_data import DrawnPose
 
-__all__ = ["Placement", "along_axis", "place_camera", "through_round_window"]
+__all__ = ["CameraPlacement", "along_axis", "place_camera", "through_round_window"]
 
 _ACROSS_MM = 12.0
 
 
 @dataclass(frozen=True, eq=False)
-class Placement:
+class CameraPlacement:
     """Where a camera looks.
 
     Parameters
@@ -35,17 +35,17 @@ class Placement:
     across_mm: float = _ACROSS_MM
 
 
-def along_axis(pose: DrawnPose) -> Placement:
+def along_axis(pose: DrawnPose) -> CameraPlacement:
     """Look from without the apex down the modiolar axis, CO in the middle and the round window up."""
-    return Placement(-pose.axis, pose.towards_window, pose.origin)
+    return CameraPlacement(-pose.axis, pose.towards_window, pose.origin)
 
 
-def through_round_window(pose: DrawnPose) -> Placement:
+def through_round_window(pose: DrawnPose) -> CameraPlacement:
     """Look from without through the middle of the round window to CO, the top of the head up."""
-    return Placement(-pose.towards_window, pose.up, pose.origin)
+    return CameraPlacement(-pose.towards_window, pose.up, pose.origin)
 
 
-def place_camera(camera: SceneCamera, placement: Placement) -> None:
+def place_camera(camera: SceneCamera, placement: CameraPlacement) -> None:
     """Move a camera there; the scene is to be drawn again."""
     camera.focus_on(placement.focus, across_mm=placement.across_mm)
     camera.look(placement.direction, placement.up)

@@ -12,7 +12,7 @@ from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.io.text import as_csv_cell
 from gp_labeler.document.opening import tidy_name
-from gp_labeler.scripting.report import Report
+from gp_labeler.scripting.report import RunReport
 from gp_labeler.scripting.runner import Tell, run_script
 from gp_labeler.scripting.script import Script
 
@@ -25,7 +25,7 @@ _COLUMNS = ("specimen", "ok", "steps", "placed", "suggested", "seconds", "larges
 
 def run_batch(
     script: Script, specimens: Sequence[str], output: Path, *, tell: Tell | None = None
-) -> Mapping[str, Report]:
+) -> Mapping[str, RunReport]:
     """Run a script once for each specimen, and write ``summary.csv``.
 
     Parameters
@@ -41,7 +41,7 @@ def run_batch(
 
     Returns
     -------
-    mapping of str to Report
+    mapping of str to RunReport
         By specimen, also of those that failed.
 
     Raises
@@ -61,7 +61,7 @@ def run_batch(
     return reports
 
 
-def summary_lines(reports: Mapping[str, Report]) -> list[str]:
+def summary_lines(reports: Mapping[str, RunReport]) -> list[str]:
     """Return a table for the terminal."""
     width = max(len(name) for name in reports)
     lines = [f"{'specimen':<{max(width, 8)}}  steps  placed  suggested  seconds"]
@@ -73,11 +73,11 @@ def summary_lines(reports: Mapping[str, Report]) -> list[str]:
     return [*lines, f"{len(reports) - failed} of {len(reports)} done"]
 
 
-def _run_one(script: Script, name: str, output: Path, tell: Tell | None) -> Report:
+def _run_one(script: Script, name: str, output: Path, tell: Tell | None) -> RunReport:
     try:
         return run_script(script.for_specimen(name), output, tell=tell)
     except GpError as error:
-        return Report(script.name, name, str(error))
+        return RunReport(script.name, name, str(error))
 
 
 def _check(script: Script, specimens: Sequence[str]) -> None:
@@ -94,7 +94,7 @@ def _check(script: Script, specimens: Sequence[str]) -> None:
         )
 
 
-def _table(reports: Mapping[str, Report]) -> str:
+def _table(reports: Mapping[str, RunReport]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, _COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -104,7 +104,7 @@ def _table(reports: Mapping[str, Report]) -> str:
     return text.getvalue()
 
 
-def _row(name: str, report: Report) -> dict[str, Any]:
+def _row(name: str, report: RunReport) -> dict[str, Any]:
     content = report.as_dict()
     largest = content["largest_error_mm"]
     return {

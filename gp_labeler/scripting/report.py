@@ -13,7 +13,7 @@ from gp_core.disk import write_text
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.scripting.window_driver import WindowDriver
 
-__all__ = ["Report", "StepRecord", "feature_rows", "pose_rows", "suggested_rows"]
+__all__ = ["RunReport", "StepRecord", "feature_rows", "pose_rows", "suggested_rows"]
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class StepRecord:
 
 
 @dataclass
-class Report:
+class RunReport:
     """The result of one run.
 
     Parameters

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gp_core.errors import GpError
 from gp_labeler.document.specimen_file import SUFFIX
-from gp_labeler.scripting.report import Report, StepRecord
+from gp_labeler.scripting.report import RunReport, StepRecord
 from gp_labeler.scripting.script import Script, StepError
 from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.window_driver import WindowDriver
@@ -24,7 +24,7 @@ REPORT = "report.json"
 Tell = Callable[[str], None]
 
 
-def run_script(script: Script, output: Path, *, tell: Tell | None = None) -> Report:
+def run_script(script: Script, output: Path, *, tell: Tell | None = None) -> RunReport:
     """Open a window, do all steps, close it, and write ``report.json``.
 
     Parameters
@@ -38,11 +38,11 @@ def run_script(script: Script, output: Path, *, tell: Tell | None = None) -> Rep
 
     Returns
     -------
-    Report
+    RunReport
         With `error` where a step failed: the rest was not done, and what had been labelled is saved.
     """
     _make(output)
-    report = Report(script.name)
+    report = RunReport(script.name)
     driver = WindowDriver(output, script.folder)
     try:
         with driver.watching():

@@ -9,10 +9,10 @@ import numpy as np
 from gp_core.frames import cross_matrix
 from gp_core.validation import FloatArray
 
-__all__ = ["Step", "nearest_rigid", "rotation_of", "step_between", "turn_deg", "why_not_rigid"]
+__all__ = ["PoseDistance", "nearest_rigid", "rotation_of", "step_between", "turn_deg", "why_not_rigid"]
 
 
-class Step(NamedTuple):
+class PoseDistance(NamedTuple):
     """How far apart two poses are."""
 
     mm: float
@@ -53,10 +53,10 @@ def turn_deg(rotation: FloatArray) -> FloatArray:
     return angle
 
 
-def step_between(before: FloatArray, after: FloatArray) -> Step:
+def step_between(before: FloatArray, after: FloatArray) -> PoseDistance:
     """Return the distance of the origins, mm, and the angle between two (4, 4) poses."""
     degrees = float(turn_deg(before[:3, :3].T @ after[:3, :3]))
-    return Step(float(np.linalg.norm(after[:3, 3] - before[:3, 3])), degrees)
+    return PoseDistance(float(np.linalg.norm(after[:3, 3] - before[:3, 3])), degrees)
 
 
 def rotation_of(vector: FloatArray) -> FloatArray:

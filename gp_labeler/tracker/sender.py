@@ -75,7 +75,7 @@ class PoseSender:
         self._status = "Waiting for a pose."
         self._peers = 0
         self._connection = None if host is None else Connection(host, port)
-        self._server = _Server(interface, port) if host is None else None
+        self._server = _PoseServer(interface, port) if host is None else None
         self.port = port if self._server is None else self._server.port
         """Where it listens, or connects to."""
         self._thread = threading.Thread(target=self._run, name="gp-pose-sender", daemon=True)
@@ -150,7 +150,7 @@ class PoseSender:
             self._connection.send(data)
 
 
-class _Server:
+class _PoseServer:
     """Serves whoever connects; what they say is not read."""
 
     def __init__(self, interface: str, port: int) -> None:

@@ -6,7 +6,7 @@ from gp_core.constants import METHOD_NAMES
 from gp_core.pose.mixture import UNDECIDED
 from gp_core.validation import FloatArray
 from gp_labeler.document.touches import Touches
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.pose import OverlayOptions
 from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.models.workspace import Workspace
@@ -58,7 +58,7 @@ def _parts(options: OverlayOptions) -> frozenset[str]:
     return frozenset(part for part in PARTS if getattr(options, part))
 
 
-def _poses(estimate: Estimate) -> tuple[DrawnPose, ...]:
+def _poses(estimate: SideEstimate) -> tuple[DrawnPose, ...]:
     assert estimate.registered is not None
     many, T_scan_touches = len(estimate.poses) > 1, estimate.registered.T_scan_touches
     drawn = [
@@ -79,14 +79,14 @@ def _poses(estimate: Estimate) -> tuple[DrawnPose, ...]:
     return tuple(drawn)
 
 
-def _truths(estimate: Estimate) -> tuple[DrawnTruth, ...]:
+def _truths(estimate: SideEstimate) -> tuple[DrawnTruth, ...]:
     truth = estimate.truth
     if truth is None:
         return ()
     return (DrawnTruth(estimate.side, truth.translation, truth.rotation[:, 0]),)
 
 
-def _touches(estimate: Estimate, touches: Touches) -> tuple[DrawnTouch, ...]:
+def _touches(estimate: SideEstimate, touches: Touches) -> tuple[DrawnTouch, ...]:
     assert estimate.registered is not None
     T_scan_touches = estimate.registered.T_scan_touches
     suspects = () if estimate.pose is None else estimate.pose.suspects
@@ -97,12 +97,12 @@ def _touches(estimate: Estimate, touches: Touches) -> tuple[DrawnTouch, ...]:
     )
 
 
-def _paths(path: InsertionPath | None, estimate: Estimate) -> tuple[FloatArray, ...]:
+def _paths(path: InsertionPath | None, estimate: SideEstimate) -> tuple[FloatArray, ...]:
     carried = None if path is None else path.in_scan(estimate)
     return () if carried is None else (carried,)
 
 
-def _features(estimate: Estimate) -> tuple[DrawnFeature, ...]:
+def _features(estimate: SideEstimate) -> tuple[DrawnFeature, ...]:
     return tuple(
         DrawnFeature(code, position, METHOD_ROLES[method])
         for method in estimate.poses
@@ -111,7 +111,7 @@ def _features(estimate: Estimate) -> tuple[DrawnFeature, ...]:
     )
 
 
-def _vectors(estimate: Estimate) -> tuple[DrawnVector, ...]:
+def _vectors(estimate: SideEstimate) -> tuple[DrawnVector, ...]:
     """Return the errors of the first estimate's features against the labels."""
     placed = estimate.in_scan()
     if placed is None:

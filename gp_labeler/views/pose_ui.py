@@ -13,7 +13,7 @@ from gp_core.landmarks.features import Side
 from gp_core.pose.insertion_path import UNITS
 from gp_labeler.document import touching
 from gp_labeler.models.pose_exports import FORMATS, InsertionPath
-from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
+from gp_labeler.scene.pose_camera import CameraPlacement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
 from gp_labeler.views.guide import GuideWindow
 from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
@@ -135,7 +135,7 @@ class PoseUi(UiPart):
         """Look at the estimated cochlea through its round window."""
         self._look_at_pose(through_round_window)
 
-    def _look_at_pose(self, placement: Callable[[DrawnPose], Placement]) -> None:
+    def _look_at_pose(self, placement: Callable[[DrawnPose], CameraPlacement]) -> None:
         estimate = self._workspace.pose.estimate
         if estimate is None or estimate.pose is None or estimate.registered is None:
             raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")

@@ -11,10 +11,10 @@ from qtpy.QtGui import QImage, QPageLayout, QPageSize, QPdfWriter, QTextDocument
 
 from gp_core.disk import write_bytes, write_text
 from gp_core.errors import GpError
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.pose_report import PoseReport
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.pose_camera import Placement, along_axis, place_camera, through_round_window
+from gp_labeler.scene.pose_camera import CameraPlacement, along_axis, place_camera, through_round_window
 from gp_labeler.scene.pose_data import DrawnPose
 from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.pictures import picture, picture_bytes
@@ -27,7 +27,7 @@ __all__ = ["report_of", "report_pictures", "reported_estimate", "save_report"]
 
 _PICTURE_SIZE = (720, 520)
 _SLICE_MM = 24.0
-_LOOKS: Mapping[str, Callable[[DrawnPose], Placement]] = {
+_LOOKS: Mapping[str, Callable[[DrawnPose], CameraPlacement]] = {
     "Along the axis": along_axis,
     "Through the round window": through_round_window,
 }
@@ -44,7 +44,7 @@ def report_of(window: MainWindow) -> PoseReport:
     return PoseReport(document.state, estimate, report_pictures(window), document.now())
 
 
-def reported_estimate(workspace: Workspace) -> Estimate:
+def reported_estimate(workspace: Workspace) -> SideEstimate:
     """Return the estimate a report would be of; raises `GpError` where there is none."""
     pose = workspace.pose
     if pose.estimate is None or pose.estimate.pose is None:

@@ -27,7 +27,7 @@ from pydicom.uid import (
     RLELossless,
 )
 
-from gp_labeler.imaging.readers.dicom_tags import DicomFile, DicomSlice, Stored
+from gp_labeler.imaging.readers.dicom_tags import DicomFile, DicomSlice, StoredPixels
 from gp_labeler.imaging.readers.grey import to_grey
 from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error
 from gp_labeler.imaging.readers.simpleitk import read_itk_planes
@@ -101,7 +101,7 @@ class DicomSource:
             return _filled(plane, found, file.padding, fill)
 
 
-def _lying(one: DicomSlice, stored: Stored) -> Plane:
+def _lying(one: DicomSlice, stored: StoredPixels) -> Plane:
     """Read the numbers of a slice from the file, as they lie there."""
     n_pixels = one.file.shape[0] * one.file.shape[1]
     start = n_pixels * one.frame
@@ -116,7 +116,7 @@ def _lying(one: DicomSlice, stored: Stored) -> Plane:
     return plane
 
 
-def _used_bits(plane: Plane, stored: Stored) -> Plane:
+def _used_bits(plane: Plane, stored: StoredPixels) -> Plane:
     """Remove the unused bits, in which old files keep overlays."""
     size = 8 * stored.dtype.itemsize
     if stored.dtype.kind == "f" or stored.bits == size:

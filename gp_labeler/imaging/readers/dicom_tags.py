@@ -17,7 +17,15 @@ from pydicom.uid import DeflatedExplicitVRLittleEndian, MediaStorageDirectorySto
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.progress import Report
 
-__all__ = ["DicomFile", "DicomSlice", "Stored", "is_dicom", "is_dicomdir", "same_pixel_size", "scan_dicom"]
+__all__ = [
+    "DicomFile",
+    "DicomSlice",
+    "StoredPixels",
+    "is_dicom",
+    "is_dicomdir",
+    "same_pixel_size",
+    "scan_dicom",
+]
 
 _TAGS = [
     "SOPClassUID", "ImageType", "SeriesInstanceUID", "SeriesNumber", "SeriesDescription", "InstanceNumber",
@@ -46,7 +54,7 @@ _FIRST_VRS = (b"UL", b"UI", b"OB", b"CS", b"DA", b"TM", b"SH", b"LO", b"DT")
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredPixels:
     """Where the unpacked pixels of a file begin, and how they are stored.
 
     Of each number of `dtype`, which has its byte order, `bits` count, up to the bit `high`. In `exchanged`
@@ -92,7 +100,7 @@ class DicomFile:
         Whether low numbers are bright (MONOCHROME1).
     localizer : bool
         Whether it calls itself a scout image.
-    stored : Stored, optional
+    stored : StoredPixels, optional
         Where its pixels lie; None where they are packed or in colour.
     padding : (2,) float, optional
         Lowest and highest stored number that stands for no measurement (PixelPaddingValue).
@@ -114,7 +122,7 @@ class DicomFile:
     integral: bool
     inverted: bool
     localizer: bool
-    stored: Stored | None
+    stored: StoredPixels | None
     padding: tuple[float, float] | None
 
 
@@ -390,7 +398,7 @@ def _syntax(tags: Any) -> Any:
     return tags.file_meta.get("TransferSyntaxUID") if "file_meta" in tags.__dict__ else None
 
 
-def _stored(tags: Any, element: int, header: bytes, offset: int) -> Stored | None:
+def _stored(tags: Any, element: int, header: bytes, offset: int) -> StoredPixels | None:
     """Find the pixels behind their tag and its length, if they are plain numbers."""
     syntax = _syntax(tags)
     packed = syntax is not None and (syntax.is_compressed or syntax == DeflatedExplicitVRLittleEndian)
@@ -410,7 +418,7 @@ def _stored(tags: Any, element: int, header: bytes, offset: int) -> Stored | Non
     bits = _whole(tags, "BitsStored") or allocated
     high = _whole(tags, "HighBit") or bits - 1
     words = not little and allocated == 8 and header[4:6] == b"OW"
-    return Stored(offset - 4 if implicit else offset, dtype, bits, high, words)
+    return StoredPixels(offset - 4 if implicit else offset, dtype, bits, high, words)
 
 
 def _padding(tags: Any, *, signed: bool) -> tuple[float, float] | None:

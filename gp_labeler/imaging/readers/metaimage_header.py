@@ -24,7 +24,7 @@ from gp_labeler.imaging.readers.headers import (
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
-from gp_labeler.imaging.readers.raw_voxels import Stored, length_problems, voxels_in
+from gp_labeler.imaging.readers.raw_voxels import StoredVoxels, length_problems, voxels_in
 
 __all__ = ["read_meta_header"]
 
@@ -107,7 +107,7 @@ def _beside(path: Path, said: str) -> Path:
     return packed if packed.is_file() and not (path.parent / said).exists() else beside(path, said)
 
 
-def _stored(fields: dict[str, str], header_bytes: int, *, packed: bool) -> Stored:
+def _stored(fields: dict[str, str], header_bytes: int, *, packed: bool) -> StoredVoxels:
     code = _TYPES.get(fields["elementtype"].upper())
     if code is None:
         raise VolumeError(
@@ -122,7 +122,9 @@ def _stored(fields: dict[str, str], header_bytes: int, *, packed: bool) -> Store
     if skip < -1 or (skip == -1 and packing != "none"):
         raise VolumeError(f"its HeaderSize is {skip}", remedy="Correct its header.")
     offset = skip if skip > 0 else header_bytes
-    return Stored(np.dtype((">" if big else "<") + code), packing, offset, tail=0 if skip == -1 else None)
+    return StoredVoxels(
+        np.dtype((">" if big else "<") + code), packing, offset, tail=0 if skip == -1 else None
+    )
 
 
 def _is_true(said: str) -> bool:

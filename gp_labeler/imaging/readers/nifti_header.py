@@ -22,7 +22,7 @@ from gp_labeler.imaging.readers.headers import Header, Layout, not_a
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, warning
-from gp_labeler.imaging.readers.raw_voxels import Stored, length_problems, voxels_in
+from gp_labeler.imaging.readers.raw_voxels import StoredVoxels, length_problems, voxels_in
 from gp_labeler.imaging.readers.source import Compression, Plane, open_stream
 from gp_labeler.imaging.readers.spm_matrix import SpmMatrix, read_spm_matrix
 
@@ -74,7 +74,7 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
     layout = Layout(shape, (0, 1, 2)) if colours == 1 else Layout((colours, *shape), (1, 2, 3))
     base = dtype[0] if dtype.names else dtype
     values, warnings = _scaling(header) if dtype.names is None else (_Values(), ())
-    stored = Stored(base, _packing(voxel_file), skip=int(header.get_data_offset()))
+    stored = StoredVoxels(base, _packing(voxel_file), skip=int(header.get_data_offset()))
     plain = layout.finish(channel) if colours > 1 else to_grey
     source = voxels_in([voxel_file], stored, layout, values.finish(plain))
     geometry, more, units = _geometry(header, read_spm_matrix(voxel_file))

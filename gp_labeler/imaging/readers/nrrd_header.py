@@ -24,7 +24,7 @@ from gp_labeler.imaging.readers.headers import (
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.readers.plan import Geometry
 from gp_labeler.imaging.readers.problems import VolumeError
-from gp_labeler.imaging.readers.raw_voxels import Stored, length_problems, voxels_in
+from gp_labeler.imaging.readers.raw_voxels import StoredVoxels, length_problems, voxels_in
 
 __all__ = ["read_nrrd_header"]
 
@@ -149,7 +149,7 @@ def _files(path: Path, text: str, fields: dict[str, str], layout: Layout) -> lis
     return file_series(path, said, listed[-1].splitlines(), layout.n_planes) or [beside(path, said)]
 
 
-def _stored(fields: dict[str, str], header_bytes: int) -> Stored:
+def _stored(fields: dict[str, str], header_bytes: int) -> StoredVoxels:
     code = next((code for code, words in _TYPES.items() if fields.get("type", "").lower() in words), None)
     packing = _PACKING.get(fields.get("encoding", "").lower())
     if code is None or packing is None:
@@ -172,7 +172,7 @@ def _stored(fields: dict[str, str], header_bytes: int) -> Stored:
             f"its line skip is {lines}, its byte skip {skip}: backwards works for raw bytes only",
             remedy="Correct its header.",
         )
-    return Stored(
+    return StoredVoxels(
         np.dtype((order or "<") + code),
         packing,
         header_bytes,

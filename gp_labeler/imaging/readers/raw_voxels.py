@@ -14,13 +14,13 @@ from gp_labeler.imaging.readers.headers import Layout
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, warning
 from gp_labeler.imaging.readers.source import Compression, Plane, RawSource, SliceSource
 
-__all__ = ["Chain", "Stored", "Whole", "length_problems", "voxels_in"]
+__all__ = ["Chain", "StoredVoxels", "Whole", "length_problems", "voxels_in"]
 
 _LONGEST_LINE = 1 << 20
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredVoxels:
     """How voxels are written into each of their files.
 
     Parameters
@@ -87,7 +87,7 @@ class Whole:
 
 
 def voxels_in(
-    files: Sequence[Path], stored: Stored, layout: Layout, finish: Callable[[Plane], Plane]
+    files: Sequence[Path], stored: StoredVoxels, layout: Layout, finish: Callable[[Plane], Plane]
 ) -> SliceSource:
     """Return the source of voxels that lie in one file, or in several of as many planes each.
 
@@ -110,7 +110,7 @@ def voxels_in(
     return parts[0] if len(parts) == 1 else Chain(parts)
 
 
-def length_problems(source: SliceSource, stored: Stored) -> tuple[Problem, ...]:
+def length_problems(source: SliceSource, stored: StoredVoxels) -> tuple[Problem, ...]:
     """Return the problem that a file is too short for its voxels, or too long, of the first that is."""
     parts = source.parts if isinstance(source, Chain) else (source,)
     raw = [part for part in parts if isinstance(part, RawSource)]
@@ -134,7 +134,7 @@ def _surplus(part: RawSource) -> tuple[Problem, ...]:
 
 
 def _raw(
-    file: Path, stored: Stored, layout: Layout, n_planes: int, finish: Callable[[Plane], Plane]
+    file: Path, stored: StoredVoxels, layout: Layout, n_planes: int, finish: Callable[[Plane], Plane]
 ) -> RawSource:
     packing: Compression = stored.packing  # type: ignore[assignment]
     source = RawSource(
@@ -153,7 +153,7 @@ def _raw(
     return replace(source, offset=max(0, end - source.plane_bytes * n_planes), skip=0)
 
 
-def _after_lines(file: Path, stored: Stored) -> int:
+def _after_lines(file: Path, stored: StoredVoxels) -> int:
     if not stored.lines:
         return stored.offset
     with file.open("rb") as opened:
@@ -164,7 +164,7 @@ def _after_lines(file: Path, stored: Stored) -> int:
         return opened.tell()
 
 
-def _typed_out(file: Path, stored: Stored, layout: Layout) -> Plane:
+def _typed_out(file: Path, stored: StoredVoxels, layout: Layout) -> Plane:
     """Read voxels that are written out, as numbers or as hexadecimal bytes."""
     with file.open("rb") as opened:
         opened.seek(_after_lines(file, stored) + stored.skip)

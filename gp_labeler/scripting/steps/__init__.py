@@ -10,16 +10,16 @@ from gp_labeler.scripting.steps.atlas import Check, Fit, UseAtlas
 from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
 from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
-from gp_labeler.scripting.steps.looking import Act, Key, Look, Screenshot, Undo
+from gp_labeler.scripting.steps.looking import Act, Look, PressKey, Screenshot, Undo
 from gp_labeler.scripting.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
-from gp_labeler.scripting.steps.pose import CarryPath, Estimate, Overlay, Report, Verdict
+from gp_labeler.scripting.steps.pose import CarryPath, EstimateStep, Overlay, ReportStep, VerdictStep
 from gp_labeler.scripting.steps.scan import Mesh, Open, Spacing, Threshold
 from gp_labeler.scripting.steps.touching import Register, Skull, Touches
 
 __all__ = ["STEPS"]
 
 _ALL: tuple[type[Step], ...] = (
-    *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, Key, Act, Undo),
+    *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, PressKey, Act, Undo),
     *(
         Details,
         Observer,
@@ -35,10 +35,10 @@ _ALL: tuple[type[Step], ...] = (
         Touches,
         Skull,
         Register,
-        Estimate,
+        EstimateStep,
         Overlay,
     ),
-    *(Verdict, Report, CarryPath, Check, Screenshot, Save, Expect),
+    *(VerdictStep, ReportStep, CarryPath, Check, Screenshot, Save, Expect),
 )
 
 STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

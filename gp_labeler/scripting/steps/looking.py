@@ -17,7 +17,7 @@ from gp_labeler.views.fonts import TEXT_SIZES
 from gp_labeler.views.pictures import PICTURES, picture, write_picture
 from gp_labeler.views.theme import THEMES
 
-__all__ = ["Act", "Key", "Look", "Screenshot", "Undo"]
+__all__ = ["Act", "Look", "PressKey", "Screenshot", "Undo"]
 
 _SMALLEST, _LARGEST = 16, 8192
 """Pixels; beyond, graphics memory and the PNG's reader give in."""
@@ -214,7 +214,7 @@ class Screenshot(Step):
 
 
 @dataclass(frozen=True)
-class Key(Step):
+class PressKey(Step):
     """Press keys while the pointer is in a view.
 
     Parameters

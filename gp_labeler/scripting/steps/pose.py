@@ -13,8 +13,7 @@ from gp_core.landmarks.anatomy import modiolar_axis
 from gp_core.landmarks.features import Side
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.validation import FloatArray
-from gp_labeler.models.estimate import Estimate as SideEstimate
-from gp_labeler.models.estimate import apart
+from gp_labeler.models.estimate import SideEstimate, apart
 from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.scene.pose_data import PARTS
 from gp_labeler.scripting.events import leave
@@ -23,7 +22,7 @@ from gp_labeler.scripting.steps.touching import Points, Touches, current_estimat
 from gp_labeler.scripting.window_driver import WindowDriver
 from gp_labeler.views.report_file import report_of, save_report
 
-__all__ = ["CarryPath", "Estimate", "Estimated", "Overlay", "Report", "Verdict"]
+__all__ = ["CarryPath", "EstimateStep", "Estimated", "Overlay", "ReportStep", "VerdictStep"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class Estimated:
 
     Parameters
     ----------
-    estimate : gp_labeler.models.estimate.Estimate
+    estimate : gp_labeler.models.estimate.SideEstimate
         With a pose.
     pose : CochleaPose
         That pose.
@@ -74,7 +73,7 @@ class Estimated:
 
 
 @dataclass(frozen=True)
-class Estimate(Step):
+class EstimateStep(Step):
     """Estimate the pose of a cochlea from touches.
 
     Parameters
@@ -284,7 +283,7 @@ class Overlay(Step):
 
 
 @dataclass(frozen=True)
-class Verdict(Step):
+class VerdictStep(Step):
     """Keep a verdict on an estimated cochlea in the specimen.
 
     Parameters
@@ -313,7 +312,7 @@ class Verdict(Step):
 
 
 @dataclass(frozen=True)
-class Report(Step):
+class ReportStep(Step):
     """Write a page about an estimated cochlea: what was touched, what came of it, who accepted it.
 
     Parameters

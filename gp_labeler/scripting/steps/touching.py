@@ -17,7 +17,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.document import touching
 from gp_labeler.document.touch_edits import RecordTouch, SetSkull, TakeTouches
 from gp_labeler.document.touches import Touch, TouchHow, touch_name
-from gp_labeler.models.estimate import Estimate, Registered
+from gp_labeler.models.estimate import Registered, SideEstimate
 from gp_labeler.scripting.step import Step, Triple
 from gp_labeler.scripting.window_driver import WindowDriver
 
@@ -235,7 +235,7 @@ class Register(Step):
         return _told(estimate, registered)
 
 
-def current_estimate(driver: WindowDriver, side: Side) -> Estimate:
+def current_estimate(driver: WindowDriver, side: Side) -> SideEstimate:
     """Return the estimate of a side as it stands; raises `GpError` where there is none."""
     driver.wait_until_idle()  # the atlas may still be loading
     driver.workspace.pose.choose(side=side)
@@ -246,12 +246,12 @@ def current_estimate(driver: WindowDriver, side: Side) -> Estimate:
     return estimate
 
 
-def _why_not(estimate: Estimate) -> str:
+def _why_not(estimate: SideEstimate) -> str:
     nothing = "nothing says where the touches lie in the scan: label three of the touched features"
     return estimate.problems.get("registration", nothing)
 
 
-def _told(estimate: Estimate, registered: Registered) -> str:
+def _told(estimate: SideEstimate, registered: Registered) -> str:
     if registered.fiducials is None:
         return "the touches were placed on the scan"
     text = f"by {len(registered.fiducials.names)} {registered.way} points, FRE {registered.fre_mm:.3f} mm"

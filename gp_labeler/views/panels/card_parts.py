@@ -24,7 +24,7 @@ from gp_labeler.views.theme import theme_of
 
 _CHIP = 14
 
-__all__ = ["Notices", "Segments", "Verdict", "link", "numbers"]
+__all__ = ["Notices", "QualityBadge", "Segments", "link", "numbers"]
 
 
 class Segments(QWidget):
@@ -92,7 +92,7 @@ class Notices(QWidget):
             self.setVisible(bool(notices))
 
 
-class Verdict(QWidget):
+class QualityBadge(QWidget):
     """A shape and a word in the colour of how good something is."""
 
     _CHIPS = {"good": "checked", "warning": "placed", "danger": "doubtful", "": "to do"}  # noqa: RUF012

@@ -17,11 +17,11 @@ from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.theme import theme_of
 
-__all__ = ["STEPS", "Rail", "Step"]
+__all__ = ["STEPS", "Rail", "WorkStep"]
 
 
 @dataclass(frozen=True)
-class Step:
+class WorkStep:
     """One step of the work."""
 
     id: str
@@ -31,15 +31,15 @@ class Step:
 
 
 STEPS = (
-    Step("scan", "Scan", "scan", "The scan: what it is, its grey window, where bone begins"),
-    Step("label", "Label", "label", "Place the 20 features on both sides"),
-    Step(
+    WorkStep("scan", "Scan", "scan", "The scan: what it is, its grey window, where bone begins"),
+    WorkStep("label", "Label", "label", "Place the 20 features on both sides"),
+    WorkStep(
         "atlas",
         "Atlas",
         "atlas",
         "What labels are compared with: the published atlas, or one fitted to your animals",
     ),
-    Step("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
+    WorkStep("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )
 _NEEDS_SCAN = ("label",)
 _PAD = 8
@@ -98,7 +98,7 @@ class Rail(QWidget):
             button.setChecked(True)
             self.step_chosen.emit(step)
 
-    def _button(self, number: int, step: Step) -> _RailButton:
+    def _button(self, number: int, step: WorkStep) -> _RailButton:
         button = _RailButton(step.id, step.title, str(number), step.icon, self)
         button.setCheckable(True)
         button.setToolTip(step.hint)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from gp_core import GpError, RigidTransform
 from gp_core.io.stl import read_stl
 from gp_core.registration.icp import icp
-from gp_core.registration.icp_targets import Cloud, Surface
+from gp_core.registration.icp_targets import Cloud, TriangleMesh
 
 Points = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ def test_noise_is_left_as_residual() -> None:
 def test_each_iteration_brings_points_nearer() -> None:
     rng = np.random.default_rng(1)
     vertices, triangles = bumpy(300, rng)
-    surface = Surface(vertices, triangles)
+    surface = TriangleMesh(vertices, triangles)
     start = motion(0.2, 2.0, rng)
     errors = [
         icp(vertices[:40], surface, start=start, dst="scan", src="tracker", max_iterations=n).rms
@@ -77,7 +77,7 @@ def test_points_on_bone_find_their_place() -> None:
     T_scan_tracker = motion(0.15, 1.5, rng)
     start = RigidTransform.identity(dst="scan", src="tracker")
     touched = T_scan_tracker.inverse().apply(on_bone)
-    found = icp(touched, Surface(vertices, triangles), start=start, dst="scan", src="tracker")
+    found = icp(touched, TriangleMesh(vertices, triangles), start=start, dst="scan", src="tracker")
     assert found.converged
     assert np.abs(found.transform.apply(touched) - on_bone).max() < 1e-3
 
@@ -88,7 +88,7 @@ def test_nearest_points_are_exact() -> None:
     triangles = np.array([rng.choice(40, 3, replace=False) for _ in range(60)])
     vertices[:3] *= 20  # sizes of all kinds
     points = np.vstack([rng.normal(size=(30, 3)) * 4, rng.normal(size=(5, 3)) * 100])
-    nearest = Surface(vertices, triangles).nearest(points)
+    nearest = TriangleMesh(vertices, triangles).nearest(points)
     corners = vertices[triangles]
     for point, found in zip(points, nearest, strict=True):
         distance = np.linalg.norm(found - point)
@@ -112,7 +112,7 @@ def test_mesh_of_points_equals_cloud_far_away() -> None:
     rng = np.random.default_rng(4)
     vertices, triangles = bumpy(500, rng)
     far = rng.normal(size=(20, 3)) * 1000
-    surface, cloud = (target.nearest(far) for target in (Surface(vertices, triangles), Cloud(vertices)))
+    surface, cloud = (target.nearest(far) for target in (TriangleMesh(vertices, triangles), Cloud(vertices)))
     distance, upper = (np.linalg.norm(near - far, axis=1) for near in (surface, cloud))
     assert (distance <= upper + 1e-9).all()
     np.testing.assert_allclose(distance, upper, atol=0.5)
@@ -120,10 +120,10 @@ def test_mesh_of_points_equals_cloud_far_away() -> None:
 
 def test_triangles_without_area_are_passed_over() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [5, 5, 5.0]])
-    surface = Surface(vertices, [[0, 1, 2], [3, 3, 3], [0, 1, 1]])
+    surface = TriangleMesh(vertices, [[0, 1, 2], [3, 3, 3], [0, 1, 1]])
     np.testing.assert_allclose(surface.nearest(np.array([[5.0, 5, 5]])), [[0.5, 0.5, 0]], atol=1e-12)
     with pytest.raises(GpError, match="no triangle with an area"):
-        Surface(vertices, [[3, 3, 3]])
+        TriangleMesh(vertices, [[3, 3, 3]])
 
 
 def test_what_has_no_answer_is_refused() -> None:
@@ -141,9 +141,9 @@ def test_what_has_no_answer_is_refused() -> None:
     with pytest.raises(GpError, match="must be finite"):
         icp([[0, 0, np.nan]] * 3, cloud, dst="scan", src="tracker")
     with pytest.raises(GpError, match="whole numbers in"):
-        Surface(np.eye(3), [[0.5, 1, 2]])
+        TriangleMesh(np.eye(3), [[0.5, 1, 2]])
     with pytest.raises(GpError, match="vertices from 0 to 2"):
-        Surface(np.eye(3), [[0, 1, 3]])
+        TriangleMesh(np.eye(3), [[0, 1, 3]])
 
 
 def test_stl_text_and_binary_are_the_same(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_stl_text_and_binary_are_the_same(tmp_path: Path) -> None:
     count = len(corners).to_bytes(4, "little")
     (tmp_path / "binary.stl").write_bytes(b"solid binary, though".ljust(80) + count + records)
     points = np.random.default_rng(6).normal(size=(10, 3)) * 12
-    expected = Surface(corners.astype(float).reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    expected = TriangleMesh(corners.astype(float).reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     for name in ("text.stl", "binary.stl"):
         found = read_stl(tmp_path / name).nearest(points)
         np.testing.assert_allclose(found, expected.nearest(points), atol=1e-6)

@@ -17,7 +17,7 @@ from gp_core.frames import mirror_x
 from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.registration.jrmpc import JrmpcSettings
-from gp_core.study.backward_elimination import Progress
+from gp_core.study.backward_elimination import SearchProgress
 from gp_core.study.nested_search import nested_search
 from gp_core.study.parallel import open_executor
 from gp_core.study.scoring import PoseErrors, angle_between_deg
@@ -117,16 +117,16 @@ def test_each_fold_is_a_search_without_the_animal() -> None:
 def test_stopped_search_goes_on_with_any_workers(tmp_path: Path) -> None:
     animals = cohort(4)
     expected = nested_search(animals, **OPTIONS)
-    seen: list[Progress] = []
+    seen: list[SearchProgress] = []
 
-    def stop(progress: Progress) -> None:
+    def stop(progress: SearchProgress) -> None:
         seen.append(progress)
         if len(seen) == 9:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
         nested_search(animals, checkpoint=tmp_path / "nested.json", progress=stop, **OPTIONS)
-    rest: list[Progress] = []
+    rest: list[SearchProgress] = []
     with open_executor(2) as executor:
         report = nested_search(
             animals,

@@ -13,7 +13,7 @@ from study_cases import cohort
 
 from gp_core import PROBE, GpError, RigidTransform
 from gp_core.landmarks.sets import LandmarkSet
-from gp_core.registration.icp_targets import Surface
+from gp_core.registration.icp_targets import TriangleMesh
 from gp_core.registration.skull import register_by_icp, register_by_names
 from gp_core.study import figures
 from gp_core.study.physical import PhysicalReport, PhysicalRow, physical_simulations, physical_test
@@ -101,7 +101,7 @@ def test_points_anywhere_on_the_bone_register_too() -> None:
     unit = rng.normal(size=(600, 3))
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     vertices = unit * (1 + 0.2 * np.sin(4 * unit[:, :1]) * np.cos(3 * unit[:, 1:2])) * SKULL_MM
-    bone = Surface(vertices, ConvexHull(unit).simplices)
+    bone = TriangleMesh(vertices, ConvexHull(unit).simplices)
     on_bone = T_scan_tracker.inverse().apply(vertices[:60])
     extra = {**touches.extra, **{f"bone {i}": point for i, point in enumerate(on_bone)}}
     touches = LandmarkSet(touches.points, touches.side, "tracker", extra=MappingProxyType(extra))

@@ -15,7 +15,7 @@ from study_cases import cohort
 
 from gp_core import CODES, EXTERNAL, PROBE, TRAINING, GpError, Specimen
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
-from gp_core.study.backward_elimination import Codes, Elimination, Progress, Ticker, probe_curve
+from gp_core.study.backward_elimination import Codes, Elimination, SearchProgress, Ticker, probe_curve
 from gp_core.study.checkpoint import Checkpoint
 from gp_core.study.leave_one_out import leave_one_out
 from gp_core.study.parallel import open_executor
@@ -136,9 +136,9 @@ class StopError(Exception):
 
 def test_stopped_search_goes_on_where_it_was(tmp_path: Path) -> None:
     animals, file = cohort(4), tmp_path / "search.json"
-    seen: list[Progress] = []
+    seen: list[SearchProgress] = []
 
-    def search(progress: Callable[[Progress], None]) -> SearchReport:
+    def search(progress: Callable[[SearchProgress], None]) -> SearchReport:
         return search_features(
             animals,
             training=SMALL,
@@ -148,14 +148,14 @@ def test_stopped_search_goes_on_where_it_was(tmp_path: Path) -> None:
             progress=progress,
         )
 
-    def stop_at_five(progress: Progress) -> None:
+    def stop_at_five(progress: SearchProgress) -> None:
         if len(seen) == 5:
             raise StopError
         seen.append(progress)
 
     with pytest.raises(StopError):
         search(stop_at_five)
-    resumed: list[Progress] = []
+    resumed: list[SearchProgress] = []
     report = search(resumed.append)
     expected = search_features(animals, training=SMALL, fewest_training=6, settings=QUICK)
     assert report.training == expected.training
@@ -167,7 +167,7 @@ def test_stopped_search_goes_on_where_it_was(tmp_path: Path) -> None:
 
 
 def test_progress_rises_to_the_whole() -> None:
-    seen: list[Progress] = []
+    seen: list[SearchProgress] = []
     search_features(cohort(3), training=SMALL, fewest_training=6, settings=QUICK, progress=seen.append)
     fractions = [progress.fraction for progress in seen]
     assert fractions == sorted(fractions)

@@ -10,7 +10,7 @@ from typing import Any
 import SimpleITK
 from window_cases import ball_volume
 
-from gp_labeler.scripting.report import Report
+from gp_labeler.scripting.report import RunReport
 from gp_labeler.scripting.runner import run_script
 from gp_labeler.scripting.script import make_script
 
@@ -27,7 +27,7 @@ def write_ball(path: Path) -> Path:
     return path
 
 
-def run(folder: Path, *tables: dict[str, Any]) -> Report:
+def run(folder: Path, *tables: dict[str, Any]) -> RunReport:
     """Run steps on the ball, which is opened first; files go to ``folder / "out"``."""
     ball = folder / "ball.nrrd"
     if not ball.exists():

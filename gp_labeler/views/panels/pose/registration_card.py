@@ -10,7 +10,7 @@ from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QWidget
 
 from gp_core.constants import METHOD_NAMES
 from gp_labeler.document import touching
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import NONE, attempt, follow, position_text
 from gp_labeler.views.fonts import HEADING, styled
@@ -146,7 +146,7 @@ _CAPTIONS = {
 }
 
 
-def _facts(estimate: Estimate | None) -> dict[str, str]:
+def _facts(estimate: SideEstimate | None) -> dict[str, str]:
     registered = None if estimate is None else estimate.registered
     if estimate is None or registered is None:
         return dict.fromkeys(_FACTS, NONE)
@@ -165,7 +165,7 @@ def _facts(estimate: Estimate | None) -> dict[str, str]:
     }
 
 
-def _errors(estimate: Estimate) -> str:
+def _errors(estimate: SideEstimate) -> str:
     if estimate.truth is None:
         return "CA, CB, RWA, RWP are not all labelled"
     lines = []
@@ -177,7 +177,7 @@ def _errors(estimate: Estimate) -> str:
     return "\n".join(lines) or NONE
 
 
-def _notices(estimate: Estimate, has_scan: bool) -> Iterator[tuple[str, ...]]:
+def _notices(estimate: SideEstimate, has_scan: bool) -> Iterator[tuple[str, ...]]:
     if (problem := estimate.problems.get("registration")) is not None:
         yield ("warning", sentence(problem))
     elif estimate.registered is None and has_scan:

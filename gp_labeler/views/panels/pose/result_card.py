@@ -11,11 +11,11 @@ from qtpy.QtWidgets import QGridLayout, QWidget
 from gp_core.constants import METHOD_NAMES
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.quality import pose_quality
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import attempt
 from gp_labeler.views.fonts import HEADING, TITLE, styled
-from gp_labeler.views.panels.card_parts import Notices, Verdict, link, numbers
+from gp_labeler.views.panels.card_parts import Notices, QualityBadge, link, numbers
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose.wording import (
@@ -46,7 +46,7 @@ class ResultCard(Card):
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Cochlea", parent)
         self._workspace = workspace
-        self.verdict, self.notices = Verdict(), Notices()
+        self.verdict, self.notices = QualityBadge(), Notices()
         self.waiting = text_label("", "title", wrap=True)
         self.one, self.two = _OnePose(), _TwoPoses()
         self.next = link("", "Make it the next to touch")
@@ -176,7 +176,7 @@ class _TwoPoses(QWidget):
                 self._grid.addWidget(cell, row, column)
         self._grid.addWidget(self.apart, len(self.cells), 0, 1, 4)
 
-    def show_poses(self, estimate: Estimate) -> None:
+    def show_poses(self, estimate: SideEstimate) -> None:
         methods = [method for method in estimate.settings.methods if method in estimate.poses]
         columns = [_column(METHOD_NAMES[method], estimate.poses[method]) for method in methods]
         names = ("", "CO x", "y", "z", "Axis x", "y", "z", "95 % within", "Cone")
@@ -202,7 +202,7 @@ def _likely(pose: CochleaPose | None, pair: tuple[str, str] | None) -> tuple[str
     return likely_text(side), likely_text(swap)
 
 
-def _heading(estimate: Estimate | None) -> str:
+def _heading(estimate: SideEstimate | None) -> str:
     if estimate is None or estimate.pose is None:
         return "Cochlea"
     return f"Cochlea  ·  {_FRAMES.get(estimate.touches.frame, estimate.touches.frame)}"
@@ -212,7 +212,7 @@ def _waiting(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
-def _notices(workspace: Workspace, estimate: Estimate) -> Iterator[tuple[str, ...]]:
+def _notices(workspace: Workspace, estimate: SideEstimate) -> Iterator[tuple[str, ...]]:
     for method in estimate.settings.methods:
         if method in estimate.problems:
             yield ("error", f"{METHOD_NAMES[method]}: {estimate.problems[method]}")

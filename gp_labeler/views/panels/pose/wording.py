@@ -11,7 +11,7 @@ from gp_core.landmarks.features import CODES, feature
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.next_touch import TouchGain
 from gp_labeler.document.touches import Touch, TouchHow
-from gp_labeler.models.estimate import Estimate
+from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.views.bind import NONE, degrees_text
 
 __all__ = [
@@ -128,7 +128,7 @@ def change_text(name: str, touch: Touch, change: tuple[float, float] | None) -> 
     return f"{word} {name}: CO {fine_mm(moved)}, axis {turned:.1f}°"
 
 
-def touch_text(name: str, touch: Touch | None, estimate: Estimate | None) -> str:
+def touch_text(name: str, touch: Touch | None, estimate: SideEstimate | None) -> str:
     """Return everything that is known of a touch, a line each."""
     lines = [f"{name}: {name_of(name)}"]
     if name in CODES:
