@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gp_core.landmarks.features import Side
 from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.document.state import Landmark, PointKey, SpecimenState
-from gp_labeler.models.workflow import Progress, progress
+from gp_labeler.models.workflow import LabellingProgress, progress
 
 __all__ = ["LabellingRow", "labelling_rows", "last_change"]
 
@@ -23,7 +23,7 @@ class LabellingRow:
         Who labelled.
     round : int
         Which of the observer's labellings, from 1.
-    progress : mapping of Side to Progress
+    progress : mapping of Side to LabellingProgress
         How far both sides are.
     blind : bool
         Whether it was begun blind, with the others hidden.
@@ -35,7 +35,7 @@ class LabellingRow:
 
     observer: str
     round: int
-    progress: Mapping[Side, Progress]
+    progress: Mapping[Side, LabellingProgress]
     blind: bool
     changed: str
     is_open: bool
