@@ -1,0 +1,58 @@
+"""The site's source: every page is in its navigation, every public name and command has its place."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+import gp_core
+from gp_labeler.cli.subcommands import SUBCOMMANDS
+
+_ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of pages that Sphinx makes HTML of."""
+    folder = tmp_path_factory.mktemp("site")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(_ROOT / "tools" / "site")
+        import generate
+
+        generate.assemble(folder)
+        sys.modules.pop("generate")
+    return folder
+
+
+def test_every_public_name_is_in_the_reference(source: Path) -> None:
+    text = "".join(path.read_text() for path in (source / "reference" / "python").iterdir())
+    named = re.findall(r"auto\w+:: gp_core\.(\w+)", text)
+    assert sorted(named) == sorted(set(gp_core.__all__) - {"__version__"})
+
+
+def test_every_command_has_a_page_with_its_options(source: Path) -> None:
+    pages = {path.stem: path.read_text() for path in (source / "reference" / "commands").iterdir()}
+    assert {f"gp-labeler-{name}" for name in SUBCOMMANDS} <= pages.keys()
+    assert {"gp-core", "gp-labeler", "gp-core-estimate", "gp-core-reliability"} <= pages.keys()
+    assert "| `--shared-error MM` |" in pages["gp-core-estimate"]
+    assert "gp-labeler mesh head.nrrd" in pages["gp-labeler-mesh"]
+
+
+def test_every_page_is_in_the_navigation(source: Path) -> None:
+    listed = (source / "index.md").read_text()
+    pages = {str(path.relative_to(source).with_suffix("")) for path in source.rglob("*.md")}
+    missing = {page for page in pages if not re.search(rf"^{re.escape(page)}$", listed, re.MULTILINE)}
+    generated = {"index"} | {page for page in pages if page.startswith("reference/") and "index" not in page}
+    assert missing - generated == set()
+
+
+def test_the_habits_of_a_project_are_there() -> None:
+    changes = (_ROOT / "CHANGELOG.md").read_text()
+    assert "## [Unreleased]" in changes
+    assert f"## [{gp_core.__version__}]" in changes
+    citation = (_ROOT / "CITATION.cff").read_text()
+    assert "cff-version: 1.2.0" in citation
+    assert "doi: 10.1097/MAO.0000000000003250" in citation

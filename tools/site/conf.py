@@ -1,0 +1,39 @@
+"""Configuration of the site for Sphinx, which tools/site/build runs."""
+
+import gp_core
+
+project = "gp-labeler"
+author = "gp-labeler developers"
+copyright = author
+release = version = gp_core.__version__
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx_copybutton",
+    "sphinxcontrib.mermaid",
+]
+source_suffix = {".md": "markdown"}
+nitpicky = False
+default_role = "code"
+myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
+myst_heading_anchors = 4
+myst_fence_as_directive = ["mermaid"]
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+napoleon_use_ivar = True
+napoleon_custom_sections = [("Yields", "returns_style")]
+autodoc_default_options = {"members": True, "member-order": "bysource", "show-inheritance": False}
+autodoc_typehints = "none"
+autodoc_class_signature = "mixed"
+copybutton_prompt_text = "$ "
+html_theme = "furo"
+html_title = "gp-labeler"
+html_logo = html_favicon = "../../resources/icons/gp-labeler.svg"
+html_static_path = []
+html_show_sphinx = False
+html_theme_options = {
+    "source_repository": "https://github.com/gp-labeler/gp-labeler",
+    "source_branch": "main",
+    "source_directory": "docs/",
+}

@@ -1,0 +1,155 @@
+"""The source of the site: the pages of docs/, and those that are made from the program.
+
+`assemble` writes all of them into one folder, for Sphinx; nothing is written into the tree.
+"""
+
+from __future__ import annotations
+
+import argparse
+import html
+import inspect
+import re
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import gp_core
+from gp_core.cli.entry import make_parser as core_parser
+from gp_labeler.cli.entry import make_parser as labeler_parser
+from gp_labeler.cli.subcommands import SUBCOMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+SOURCE = "https://github.com/gp-labeler/gp-labeler/blob/main"
+AT_TOP = ("CHANGELOG", "CONTRIBUTING", "CODE_OF_CONDUCT")
+NAVIGATION = ROOT / "tools" / "site" / "navigation.md"
+
+TITLES = {"positional arguments": "What it takes", "options": "Options"}
+ROOMS = {
+    "landmarks": "Landmarks",
+    "registration": "Registration",
+    "atlas": "Atlas",
+    "pose": "Pose",
+    "io": "Files",
+    "study": "Study",
+    "": "Frames, errors and constants",
+}
+"""Headings of the reference by the room of `gp_core` that a name is defined in."""
+
+
+def in_site(text: str) -> str:
+    """Return a page of the top of the repository with links as they are in the site."""
+    text = re.sub(r"\]\(docs/", "](", text)
+    for name in AT_TOP:
+        text = text.replace(f"]({name}.md", f"]({name.lower()}.md")
+    return text.replace("](CITATION.cff)", f"]({SOURCE}/CITATION.cff)")
+
+
+def first_pages() -> Iterator[tuple[str, str]]:
+    """Yield path and text of the pages at the top of the repository; the first has the navigation."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    yield "index.md", in_site(readme) + "\n" + NAVIGATION.read_text(encoding="utf-8")
+    for name in AT_TOP:
+        yield f"{name.lower()}.md", in_site((ROOT / f"{name}.md").read_text(encoding="utf-8"))
+
+
+def room_of(name: str) -> str:
+    """Return the room of `gp_core` that a public name is defined in."""
+    module = getattr(getattr(gp_core, name), "__module__", "") or ""
+    words = module.split(".")
+    return words[1] if len(words) > 2 and words[1] in ROOMS else ""
+
+
+def python_pages() -> Iterator[tuple[str, str]]:
+    """Yield path and text of a page for each room, with every public name."""
+    names = sorted(set(gp_core.__all__) - {"__version__"}, key=str.casefold)
+    for room, title in ROOMS.items():
+        here = [name for name in names if room_of(name) == room]
+        text = [f"# {title}\n", "Everything here is imported from `gp_core`.\n"]
+        text += [
+            python_entry(name) for name in sorted(here, key=lambda name: not callable(getattr(gp_core, name)))
+        ]
+        yield f"reference/python/{room or 'common'}.md", "\n".join(text)
+    yield "reference/python/index.md", index("Python", [f"{room or 'common'}" for room in ROOMS])
+
+
+def python_entry(name: str) -> str:
+    """Return the entry of a public name, whose docstring Sphinx reads."""
+    value = getattr(gp_core, name)
+    kind = "class" if inspect.isclass(value) else "function" if callable(value) else "data"
+    if inspect.isclass(value) and issubclass(value, BaseException):
+        kind = "exception"
+    lines = [f"## {name}\n", "```{eval-rst}", f".. auto{kind}:: gp_core.{name}"]
+    lines += ["   :no-value:"] if kind == "data" else []
+    return "\n".join([*lines, "```\n"])
+
+
+def index(title: str, pages: list[str]) -> str:
+    """Return a page that lists others."""
+    return "\n".join([f"# {title}\n", "```{toctree}", ":maxdepth: 1\n", *pages, "```\n"])
+
+
+def parsers() -> Iterator[argparse.ArgumentParser]:
+    """Yield the parser of every program and command."""
+    yield labeler_parser()
+    for command in SUBCOMMANDS.values():
+        yield command.parser()
+    core = core_parser()
+    yield core
+    (commands,) = (a for a in core._actions if isinstance(a, argparse._SubParsersAction))
+    yield from commands.choices.values()
+
+
+def command_page(parser: argparse.ArgumentParser) -> str:
+    """Return the page of one command."""
+    parts = [
+        f"# {parser.prog}\n",
+        f"{parser.description}\n",
+        "```text",
+        parser.format_usage().strip(),
+        "```\n",
+    ]
+    for group in parser._action_groups:
+        actions = [a for a in group._group_actions if a.help != argparse.SUPPRESS]
+        if actions:
+            title = {"positional arguments": "What it takes", "options": "Options"}.get(
+                group.title or "", group.title
+            )
+            parts += [f"## {(title or '')[:1].upper()}{(title or '')[1:]}\n"]
+            parts += [group.description + "\n"] if group.description else []
+            parts += ["| | |", "|---|---|", *(row(parser, action) for action in actions), ""]
+    if parser.epilog:
+        parts += ["## Examples\n", "```text", parser.epilog.strip(), "```\n"]
+    return "\n".join(parts)
+
+
+def row(parser: argparse.ArgumentParser, action: argparse.Action) -> str:
+    """Return an option as a row of a table."""
+    if isinstance(action, argparse._SubParsersAction):
+        told = "<br>".join(f"[`{name}`](gp-core-{name}.md)" for name in action.choices)
+        return f"| `{action.metavar}` | {told} |"
+    formatter = parser._get_formatter()
+    words = formatter._format_action_invocation(action)
+    told = formatter._expand_help(action) if action.help else ""
+    return f"| `{cell(words)}` | {cell(html.escape(told, quote=False))} |"
+
+
+def cell(text: str) -> str:
+    """Return text as a cell of a table holds it."""
+    return text.replace("|", "\\|").replace("\n", " ")
+
+
+def command_pages() -> Iterator[tuple[str, str]]:
+    """Yield path and text of the page of each command."""
+    names = []
+    for parser in parsers():
+        names.append(parser.prog.replace(" ", "-"))
+        yield f"reference/commands/{names[-1]}.md", command_page(parser)
+    yield "reference/commands/index.md", index("Commands", names)
+
+
+def assemble(folder: Path) -> None:
+    """Write the source of the site into a folder."""
+    shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
+    for path, text in [*first_pages(), *python_pages(), *command_pages()]:
+        (folder / path).parent.mkdir(parents=True, exist_ok=True)
+        (folder / path).write_text(text, encoding="utf-8")
