@@ -49,6 +49,7 @@ from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
 from gp_core.registration.result import RegistrationResult
 from gp_core.study.compare import ComparisonReport, compare
 from gp_core.study.conditions import ConditionsReport, conditions, touch_conditions
+from gp_core.study.distance_check import DistanceCheck, PairDistance, check_distances
 from gp_core.study.distances import DistanceTable, distances
 from gp_core.study.leave_one_out import LeaveOneOutReport, leave_one_out
 from gp_core.study.nested_search import NestedReport, nested_search
@@ -78,6 +79,7 @@ __all__ = [
     "ConditionsReport",
     "Departure",
     "Deviation",
+    "DistanceCheck",
     "DistanceTable",
     "Feature",
     "FiducialRegistration",
@@ -92,6 +94,7 @@ __all__ = [
     "LeaveOneOutReport",
     "Measurement",
     "NestedReport",
+    "PairDistance",
     "PhysicalReport",
     "PivotCalibration",
     "PoseGate",
@@ -111,6 +114,7 @@ __all__ = [
     "__version__",
     "calibrate_pivot",
     "carry_path",
+    "check_distances",
     "check_side",
     "check_specimen",
     "compare",

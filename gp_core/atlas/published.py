@@ -13,10 +13,10 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.resources import resource_path
 from gp_core.validation import FloatArray
 
-__all__ = ["PublishedShape", "published_distances", "published_shape"]
+__all__ = ["N_SIDES", "ROUNDING_MM", "PublishedShape", "published_distances", "published_shape"]
 
-_N_SIDES = 22
-_ROUNDING_MM = 0.1 / 12**0.5
+N_SIDES = 22
+ROUNDING_MM = 0.1 / 12**0.5
 """Standard deviation of what rounding the table's means to 0.1 mm adds."""
 
 
@@ -76,7 +76,7 @@ def published_shape() -> PublishedShape:
     positions = _refine(_classical_scaling(mean), mean, sd, variances)
     positions = _left_cochlea_frame(positions)
     placed = [i for i, code in enumerate(CODES) if code != "CO"]
-    return PublishedShape(tuple(CODES[i] for i in placed), positions[placed], variances[placed], _N_SIDES)
+    return PublishedShape(tuple(CODES[i] for i in placed), positions[placed], variances[placed], N_SIDES)
 
 
 def _classical_scaling(distances: FloatArray) -> FloatArray:
@@ -103,7 +103,7 @@ def _fit_variances(sd: FloatArray) -> FloatArray:
 def _refine(positions: FloatArray, mean: FloatArray, sd: FloatArray, variances: FloatArray) -> FloatArray:
     """Gauss-Newton on the distances; a mean distance exceeds the distance of the means by (v_i + v_j) / d."""
     i, j = np.triu_indices(len(mean), 1)
-    root_weight = 1 / np.hypot(sd[i, j] / _N_SIDES**0.5, _ROUNDING_MM)
+    root_weight = 1 / np.hypot(sd[i, j] / N_SIDES**0.5, ROUNDING_MM)
     rows = np.arange(len(i))
     for _ in range(30):
         offset = positions[i] - positions[j]

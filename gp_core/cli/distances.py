@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from gp_core.cli.options import (
     Subparsers,
@@ -18,6 +18,7 @@ from gp_core.cli.study_options import (
     add_figure,
     save_figure_of,
 )
+from gp_core.study.distance_check import DISAGREES_SD, DistanceCheck, check_distances
 from gp_core.study.distances import DistanceTable, distances
 
 __all__ = ["add"]
@@ -39,6 +40,11 @@ def add(commands: Subparsers) -> None:
         example="gp-core distances labelled/ --csv distances.csv --figure figure2.png",
     )
     add_specimens(parser)
+    parser.add_argument(
+        "--check",
+        action="store_true",
+        help="list the distances of each side that disagree with the published ones",
+    )
     parser.add_argument("--csv", metavar="FILE", help="write the table here")
     add_figure(parser)
     add_json(parser)
@@ -57,12 +63,19 @@ def run(args: argparse.Namespace) -> int:
     int
         Exit status; see `gp_core.cli.entry.main`.
     """
-    table = distances(labelled_specimens(args))
-    save_json(args.json, table.as_dict())
+    specimens = labelled_specimens(args)
+    table = distances(specimens)
+    checks = [(each.name, check_distances(side)) for each in specimens for side in each.sides.values()]
+    content = table.as_dict()
+    if args.check:
+        content["sides"] = [{"specimen": name} | check.as_dict() for name, check in checks]
+    save_json(args.json, content)
     if args.csv:
         table.save_csv(args.csv)
     save_figure_of(args.figure, "distance_matrix", table)
     for line in _distance_lines(table):
+        say(line)
+    for line in _check_lines(checks) if args.check else ():
         say(line)
     return 0
 
@@ -72,3 +85,11 @@ def _distance_lines(table: DistanceTable) -> Iterator[str]:
     yield "  feature   median SD of its distances to the others, mm"
     for code, spread in table.typical_sd().items():
         yield f"  {code:<9} {spread:5.2f}"
+
+
+def _check_lines(checks: Sequence[tuple[str, DistanceCheck]]) -> Iterator[str]:
+    yield f"Distances that differ by more than {DISAGREES_SD:g} SD from the published ones"
+    for name, check in checks:
+        lines = [pair.text for pair in check.disagreeing] or ["none"]
+        yield f"  {name} {check.side.value}"
+        yield from (f"    {line}" for line in lines)

@@ -38,6 +38,7 @@ def make_export_parser() -> argparse.ArgumentParser:
         help=".mrk.json (the default), .fcsv or .csv; may be given several times",
     )
     parser.add_argument("--suggested", action="store_true", help="write suggestions too, apart")
+    parser.add_argument("--measurements", action="store_true", help="write rulers and angles too")
     parser.add_argument("--replace", action="store_true", help="replace files of the same names")
     return parser
 
@@ -52,6 +53,7 @@ def run_export(arguments: Sequence[str]) -> int:
     """
     args = make_export_parser().parse_args(arguments)
     from gp_labeler.document.landmark_export import export_landmarks  # here: `--help` need not wait
+    from gp_labeler.document.measurement_export import export_measurements
     from gp_labeler.document.specimen_file import read_specimen
 
     states = [read_specimen(path) for path in args.specimens]
@@ -65,4 +67,7 @@ def run_export(arguments: Sequence[str]) -> int:
                 suggested=args.suggested,
             )
             sys.stdout.write(f"{report.text}\n")
+            if args.measurements and state.measurements:
+                files = export_measurements(state, args.output, overwrite=args.replace)
+                sys.stdout.write(f"Wrote {', '.join(file.name for file in files)}.\n")
     return 0

@@ -11,7 +11,7 @@ from gp_labeler.models.workspace import Workspace
 
 __all__ = ["MENUS", "Action", "Run", "Test", "Ui"]
 
-MENUS = ("File", "Edit", "View", "Landmarks", "Atlas", "Estimate", "Help")
+MENUS = ("File", "Edit", "View", "Landmarks", "Measure", "Atlas", "Estimate", "Help")
 
 
 class Ui(Protocol):
@@ -28,6 +28,9 @@ class Ui(Protocol):
     def ask_add_mesh(self) -> None: ...  # noqa: D102
     def ask_save_mesh(self) -> None: ...  # noqa: D102
     def ask_screenshot(self) -> None: ...  # noqa: D102
+    def show_measurements(self) -> None: ...  # noqa: D102
+    def ask_import_measurements(self) -> None: ...  # noqa: D102
+    def ask_export_measurements(self) -> None: ...  # noqa: D102
     def ask_swap(self) -> None: ...  # noqa: D102
     def show_labellings(self) -> None: ...  # noqa: D102
     def ask_open_touches(self) -> None: ...  # noqa: D102

@@ -9,6 +9,7 @@ from gp_core.errors import GpError
 from gp_labeler.commands.action import MENUS, Action, Ui
 from gp_labeler.commands.atlas_rows import atlas_rows
 from gp_labeler.commands.labelling_rows import labelling_rows
+from gp_labeler.commands.measure_rows import measure_rows
 from gp_labeler.commands.pose_rows import pose_rows
 from gp_labeler.commands.rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
 from gp_labeler.commands.view_rows import cut_rows
@@ -26,6 +27,7 @@ ACTIONS: Mapping[str, Action] = MappingProxyType(
             cut_rows,
             landmark_rows,
             labelling_rows,
+            measure_rows,
             atlas_rows,
             pose_rows,
             help_rows,
@@ -80,6 +82,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
                 ("Wheel, right drag", "zoom"),
                 ("Alt+wheel", "move the cut through bone"),
                 ("Shift+move", "move the crosshair"),
+                ("Drag an end of a ruler", "move it, on the bone"),
                 ("Arrow keys", "rotate"),
                 ("Right click on a point", "what else can be done"),
                 ("Double click", "maximise or restore"),
@@ -90,6 +93,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
             (
                 ("Click", "place the point that is to do"),
                 ("Drag a point", "move it, on bone if placed there (Alt: freely)"),
+                ("Drag an end of a ruler", "move it"),
                 ("Arrow keys", "move the point a voxel"),
                 ("Wheel, F and B", "next and previous slice"),
                 ("Right drag, Ctrl+wheel", "zoom"),

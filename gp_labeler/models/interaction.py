@@ -20,8 +20,8 @@ from gp_labeler.models.workflow import Active
 
 __all__ = ["TOOLS", "InteractionModel", "PointDrag", "VisibleArea"]
 
-TOOLS = ("place", "look", "grey", "touch")
-"""What a plain left click or drag over a slice does: place, move the crosshair, grey window, touch."""
+TOOLS = ("place", "look", "grey", "touch", "ruler", "angle")
+"""What a left click or drag over a slice does: place, move the crosshair, grey window, touch, measure."""
 
 
 class VisibleArea(Protocol):

@@ -16,7 +16,7 @@ class Messages:
     """Text, and ``info``, ``warning`` or ``error``."""
     wrote = Signal(str, object)
     """What was written, and its file: ``pose``, ``report``, ``path`` (to follow with the robot), ``atlas`` or
-    ``picture``; ``landmarks`` comes with the `ExportReport`."""
+    ``picture``; ``landmarks`` comes with the `ExportReport`, ``measurements`` with several files."""
 
     def say(self, text: str, level: str = "info") -> None:
         """Tell the user something."""

@@ -24,6 +24,7 @@ from gp_labeler.models.atlas import AtlasModel, is_atlas_file
 from gp_labeler.models.bone import BoneModel
 from gp_labeler.models.interaction import InteractionModel
 from gp_labeler.models.labels import LabelsModel
+from gp_labeler.models.measure import MeasureModel
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.pose import PoseModel
 from gp_labeler.models.reference_points import ReferencePointsModel
@@ -73,6 +74,7 @@ class Workspace:
         self.atlas = AtlasModel(document, jobs, messages, memory, atlas)
         self.labels = LabelsModel(document, self.view, self.scan, self.atlas, jobs, messages)
         self.interaction = InteractionModel(document, self.labels, self.view, messages)
+        self.measure = MeasureModel(document, self.interaction, self.labels, self.view, messages)
         self.bone = BoneModel(document, self.scan, self.labels, jobs, messages)
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
         self.tracker = TrackerModel(document, self.pose, messages)

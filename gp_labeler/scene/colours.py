@@ -39,6 +39,7 @@ _STATES = MappingProxyType(
         "unseen": "#8A929B",
         "reference": "#B4BCC4",
         "path": "#F0E442",
+        "measure": "#B9E34B",
     }
 )
 
@@ -122,6 +123,7 @@ LIGHT = SceneColours(
             "unseen": "#6B747E",
             "reference": "#5B646D",
             "path": "#F0E442",
+            "measure": "#5C7F00",
         }
     ),
 )

@@ -15,7 +15,18 @@ from gp_core.validation import near_matches
 if TYPE_CHECKING:
     from gp_labeler.scripting.window_driver import WindowDriver
 
-__all__ = ["Lengths", "Options", "Pair", "Positions", "Ranges", "Step", "Texts", "Triple", "make_step"]
+__all__ = [
+    "Lengths",
+    "Options",
+    "Pair",
+    "Places",
+    "Positions",
+    "Ranges",
+    "Step",
+    "Texts",
+    "Triple",
+    "make_step",
+]
 
 Pair = tuple[float, float]
 Triple = tuple[float, float, float]
@@ -23,6 +34,7 @@ Positions = dict[str, Triple]
 Lengths = dict[str, float]
 Texts = dict[str, str]
 Options = dict[str, Any]
+Places = tuple[str | Triple, ...]
 Ranges = tuple[tuple[int, int], tuple[int, int], tuple[int, int]]
 S = TypeVar("S", bound="Step")
 
@@ -171,6 +183,11 @@ def _sequence(value: Any) -> list[Any]:
     return value
 
 
+def _places(value: Any) -> tuple[str | Triple, ...]:
+    convert: Any = _numbers(3)
+    return tuple(each if isinstance(each, str) else convert(each) for each in _sequence(value))
+
+
 def _positions(value: Any) -> dict[str, Triple]:
     convert: Any = _numbers(3)
     return {_text(key): convert(each) for key, each in value.items()}
@@ -198,6 +215,7 @@ _KINDS: Mapping[Any, tuple[str, Callable[[Any], Any]]] = {
     Triple: ("three numbers", _numbers(3)),
     Ranges: ("three pairs of whole numbers", _ranges),
     tuple[str, ...]: ("texts", _texts),
+    Places: ("positions, or points such as CA L", _places),
     Positions: ("a table of positions", _positions),
     Lengths: ("a table of numbers", _lengths),
     Texts: ("a table of texts", _table_of_texts),

@@ -76,6 +76,7 @@ class Commands(QObject):
             workspace.tracker.changed,
             workspace.references.changed,
             workspace.meshes.changed,
+            workspace.measure.changed,
             workspace.jobs.started,
             workspace.jobs.done,
             workspace.jobs.failed,

@@ -27,6 +27,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
+from gp_labeler.views.painting.measure_layer import MeasureLayer
 from gp_labeler.views.painting.reference_layer import ReferenceLayer
 from gp_labeler.views.panels.atlas.panel import AtlasPanel
 from gp_labeler.views.panels.label.panel import LabelPanel
@@ -100,6 +101,7 @@ class MainWindow(QMainWindow):
         self.pose_display = PoseDisplay(workspace, self.grid)
         for view in self.grid.slice_views.values():
             ReferenceLayer(workspace, view)
+            MeasureLayer(workspace, view)
         self.tracker_display = TrackerDisplay(workspace, self.pose_display)
         self.tracker_display.audible = self.memory.get("audible", bool, False)
         self.commands = Commands(workspace, self.ui, self, self.grid)

@@ -13,7 +13,9 @@ from gp_labeler.document.touches import TouchHow
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.gestures import CLICK_PIXELS
 from gp_labeler.views.drawn import point_of
+from gp_labeler.views.drawn_measurements import handle_of, snapped
 from gp_labeler.views.panels.label.landmark_menu import landmark_menu
+from gp_labeler.views.panels.measure.menu import measurement_menu
 
 __all__ = ["PlacementTool", "nudge"]
 
@@ -32,8 +34,9 @@ class PlacementTool:
     def __init__(self, workspace: Workspace) -> None:
         self._workspace = workspace
         self._mark: str | None = None
+        self._under: str | None = None
         self._start = (0.0, 0.0)
-        self._placed = False
+        self._placed = self._measured = False
         self.is_click = True
 
     @property
@@ -44,7 +47,8 @@ class PlacementTool:
     def press(self, mark: str | None, x: float, y: float) -> None:
         """Take a press, on the mark of this key or on none."""
         self._mark = mark if mark is not None and self._can_drag(mark) else None
-        self._start, self.is_click, self._placed = (x, y), True, False
+        self._start, self._under = (x, y), mark
+        self.is_click, self._placed, self._measured = True, False, False
 
     def move(self, x: float, y: float) -> bool:
         """Take a movement; return whether a point is being dragged."""
@@ -52,8 +56,12 @@ class PlacementTool:
             return False
         if max(abs(x - self._start[0]), abs(y - self._start[1])) >= CLICK_PIXELS and self.is_click:
             self.is_click = False
-            self._workspace.interaction.begin_drag(*point_of(self._mark))
-        return self._workspace.interaction.drag is not None
+            handle = handle_of(self._mark)
+            if handle is None:
+                self._workspace.interaction.begin_drag(*point_of(self._mark))
+            else:
+                self._workspace.measure.begin_drag(*handle)
+        return self._workspace.interaction.drag is not None or self._workspace.measure.dragged is not None
 
     def release(self) -> str | None:
         """Take a release; return the mark it all began on."""
@@ -63,6 +71,8 @@ class PlacementTool:
                 self._workspace.interaction.end_drag()
             except GpError as error:
                 self._workspace.say(str(error), "warning")
+        if self._workspace.measure.dragged is not None:
+            self._workspace.measure.end_drag()
         return mark
 
     def cancel(self) -> None:
@@ -74,6 +84,14 @@ class PlacementTool:
             if where is not None:
                 self._workspace.view.set_crosshair(where)
 
+    def put_away(self) -> bool:
+        """Take back what is being measured, a step at a time; return whether there was anything."""
+        if self._workspace.measure.dragged is None:
+            return self._workspace.measure.take_back()
+        self._mark = None
+        self._workspace.measure.end_drag(keep=False)
+        return True
+
     def click(self, position: FloatArray | None, how: How, mark: str | None) -> None:
         """Take a click at a scan position (None: it missed) and on a mark (None: on none).
 
@@ -81,7 +99,11 @@ class PlacementTool:
         crosshair comes here. A click never moves a placed or suggested point just because its row is chosen.
         """
         effect, workspace = self._effect(mark), self._workspace
-        if effect == "choose" and mark is not None:
+        if effect == "measure":
+            self._measure(position)
+        elif effect == "choose" and (handle := handle_of(mark)) is not None:
+            workspace.measure.select(handle[0])
+        elif effect == "choose" and mark is not None:
             workspace.labels.go_to(*point_of(mark))
         elif position is not None and effect == "look":
             workspace.view.set_crosshair(position)
@@ -93,10 +115,12 @@ class PlacementTool:
             workspace.interaction.arm_replacing(False)
 
     def _effect(self, mark: str | None) -> str:
-        """Return what a click does: ``place``, ``touch``, ``choose`` or ``look``."""
+        """Return what a click does: ``place``, ``measure``, ``touch``, ``choose`` or ``look``."""
         interaction = self._workspace.interaction
         if interaction.replacing:
             return "place"
+        if self._workspace.measure.kind is not None:
+            return "measure"
         if interaction.tool == "touch":
             return "touch"
         places = interaction.tool == "place" and self._is_to_place()
@@ -120,13 +144,18 @@ class PlacementTool:
 
     def take_back(self) -> None:
         """Take back the point that the first click of a double click placed."""
+        if self._measured:
+            self._measured = False
+            self._workspace.measure.take_back()
         if self._placed:
             self._placed = False
             self._workspace.document.undo()
 
     def open_menu(self, view: QWidget, mark: str | None, where: QPoint) -> None:
         """Offer what can be done with the point of a mark, at a position on the screen."""
-        if mark is not None:
+        if (handle := handle_of(mark)) is not None:
+            measurement_menu(self._workspace, *handle, view).popup(where)
+        elif mark is not None:
             landmark_menu(self._workspace, *point_of(mark), view).popup(where)
 
     def cursor(self, on_target: bool, mark: str | None) -> Qt.CursorShape:
@@ -136,6 +165,9 @@ class PlacementTool:
         )
         if self._workspace.interaction.replacing:
             return Qt.CursorShape.CrossCursor if on_target else Qt.CursorShape.ForbiddenCursor
+        if self._workspace.measure.kind is not None:
+            aims = on_target or mark is not None
+            return Qt.CursorShape.CrossCursor if aims else Qt.CursorShape.ForbiddenCursor
         if mark is not None and self._can_drag(mark):
             return Qt.CursorShape.OpenHandCursor
         if self._workspace.interaction.tool == "grey":
@@ -157,7 +189,22 @@ class PlacementTool:
         self._workspace.pose.record(position, TouchHow.SCAN)
         self._placed = True
 
+    def _measure(self, position: FloatArray | None) -> None:
+        """Place the next point of a ruler or an angle, on the landmark or handle that was hit if any."""
+        where = snapped(self._workspace, self._under, position)
+        if where is None:
+            return
+        try:
+            self._placed = self._workspace.measure.click(where)
+            self._measured = not self._placed
+        except GpError as error:
+            self._workspace.say(str(error), "warning")
+
     def _can_drag(self, mark: str) -> bool:
+        if self._workspace.measure.kind is not None:
+            return False
+        if handle_of(mark) is not None:
+            return self._workspace.interaction.tool != "touch"
         return self._workspace.interaction.tool != "touch" and not feature(point_of(mark)[1]).computed
 
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 from qtpy.QtCore import QObject
 
 from gp_core.disk import write_text
+from gp_core.landmarks.features import Side
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_labeler.document.edit_tables import Table, script_table
 from gp_labeler.document.edits import Edit
@@ -81,6 +82,7 @@ class Recorder(QObject):
         self._starts: list[tuple[Table, SpecimenState]] = []
         self._replayed = History(workspace.document.state)
         self._meshes: dict[str, AddedMesh] = {}
+        self._pair = workspace.measure.pair
         self._begin()
         self._take_as_here()
         for signal, slot in (
@@ -94,6 +96,7 @@ class Recorder(QObject):
             (workspace.pose.path_changed, self._on_path),
             (workspace.references.changed, self._on_references),
             (workspace.meshes.changed, self._on_meshes),
+            (workspace.measure.changed, self._on_measure),
             (workspace.view.changed, self._on_view_changed),
             (workspace.interaction.tool_changed, self._on_tool),
             (workspace.pose.overlay_changed, self._on_overlay),
@@ -281,6 +284,9 @@ class Recorder(QObject):
         if what == "picture":
             self.tables.append(step("screenshot", path=file.name))
             return
+        if what == "measurements":
+            self.tables.append(step("export_measurements"))
+            return
         if what == "atlas":
             self.tables.append(step("action", id="atlas.save", files=[file.name]))
             return
@@ -323,6 +329,16 @@ class Recorder(QObject):
                 file = str(cast(Path, mesh.file).absolute())
                 self.tables.append(step("add_mesh", file=file, name=name, options=options or None))
         self._meshes = shown
+
+    def _on_measure(self) -> None:
+        """Record which distance between landmarks is drawn."""
+        pair = self._window.workspace.measure.pair
+        if pair != self._pair:
+            side = (pair or self._pair or (Side.LEFT,))[0]
+            self.tables.append(
+                step("show_distance", side=side.value, features=list(pair[1:]) if pair else [])
+            )
+            self._pair = pair
 
     def _on_job(self, task: Task[Any]) -> None:
         if isinstance(task.job, SaveMesh):

@@ -37,6 +37,7 @@ from gp_labeler.views.bind import follow
 from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
+from gp_labeler.views.drawn_measurements import kept_measurements, mark_or_handle, moving_measurements
 from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.scene_overlay import (
@@ -212,6 +213,8 @@ class SceneView(QWidget):
         for signal in (workspace.pose.overlay_changed, workspace.references.changed):
             follow(self, signal, self._show_points)
         follow(self, workspace.meshes.changed, self.redraw)
+        follow(self, workspace.measure.changed, self._show_points)
+        follow(self, workspace.measure.pointed, self._repaint_pointer)
         follow(self, workspace.view.crosshair_changed, self._on_crosshair)
         follow(self, workspace.view.planes_changed, self._show_slices)
         follow(self, workspace.view.point_shown, self.go_to)
@@ -275,6 +278,9 @@ class SceneView(QWidget):
         self._points_old = True
         self.redraw()
 
+    def _repaint_pointer(self, *_: object) -> None:
+        self.canvas.ask_over()
+
     def _take_points(self) -> None:
         if not self._points_old:
             return
@@ -284,11 +290,13 @@ class SceneView(QWidget):
         marks = drawn_references(self._workspace) + drawn_marks(self._workspace)
         self.scene.marks.show([mark for mark in marks if mark.key != dragged])
         self.scene.ghosts.show(drawn_ghosts(self._workspace))
+        self.overlay.measurements = kept_measurements(self._workspace.measure)
         self.scene.lines.show(drawn_segments(self._workspace, theme_of(self).scene))
 
     def _mark_at(self, x: float, y: float) -> str | None:
         self._take_points()
-        return self.scene.mark_at(x, y, _NEAR_PIXELS)
+        mark, within = self.scene.mark_at(x, y, _NEAR_PIXELS), _NEAR_PIXELS * self.scene.scale
+        return mark_or_handle(self._workspace, mark, self.scene.display_of, (x, y), within)
 
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if "mesh_opacity" in changed:
@@ -335,6 +343,7 @@ class SceneView(QWidget):
         if self._workspace.scan.volume is not None:
             view = self._workspace.view
             paint_crosshair(painter, self, self.scene, view.crosshair, view.planes)
+        self.overlay.paint_moving(painter, self.scene, moving_measurements(self._workspace.measure))
         paint_cut(painter, self, self._workspace.view)
         drag = self._workspace.interaction.drag
         paint_pointer(
@@ -453,6 +462,8 @@ class SceneView(QWidget):
             self._placement.cancel()
         elif event.key() == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
             self._workspace.interaction.arm_replacing(False)
+        elif event.key() == Qt.Key.Key_Escape and self._placement.put_away():
+            event.accept()
         elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
             self.scene.camera.rotate(*arrow)
             self.redraw(quick=True)
@@ -482,6 +493,7 @@ class SceneView(QWidget):
         drag = self._workspace.interaction.drag
         hit = self.scene.pick(x, y)
         if drag is None:
+            self._drag_measurement(x, y, None if hit is None else hit.point)
             return
         if hit is not None:
             self._workspace.interaction.drag_to(hit.point, How.MESH)
@@ -490,10 +502,22 @@ class SceneView(QWidget):
             depth = view.display(drag.position[None])[0, 2]
             self._workspace.interaction.drag_to(view.scan([[x, y, depth]])[0], drag.how)
 
+    def _drag_measurement(self, x: float, y: float, on_bone: FloatArray | None) -> None:
+        """Move the handle that is dragged, on bone where there is some, else in the plane of the screen."""
+        measure = self._workspace.measure
+        if measure.dragged is None:
+            return
+        if on_bone is None:
+            view = self.scene.camera.viewpoint()
+            depth = view.display(np.array([measure.dragged_position]))[0, 2]
+            on_bone = view.scan([[x, y, depth]])[0]
+        measure.drag_to(on_bone)
+
     def _look_at(self, x: float, y: float, held: Modifier) -> None:
         point = self._point_at(x, y)
         if point is not None and Modifier.SHIFT in held:
             self._workspace.view.set_crosshair(point)
+        self._workspace.measure.point_at(point)
         self._on_target = point is not None
         self._show_cursor()
 
@@ -511,6 +535,7 @@ class SceneView(QWidget):
 
     def _leave_pointer(self) -> None:
         self._pointer = None
+        self._workspace.measure.point_at(None)
         self._set_hover(None)
 
     def _set_hover(self, point: FloatArray | None) -> None:

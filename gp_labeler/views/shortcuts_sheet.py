@@ -24,7 +24,11 @@ __all__ = ["ShortcutsSheet", "keys_text"]
 _LONGEST_KEYS = "Middle drag, Shift+drag"
 """What the keys of all blocks are lined up to."""
 
-_COLUMNS = (("In the 3D view", "On a slice", "Estimate"), ("View",), ("Landmarks", "File", "Edit", "Help"))
+_COLUMNS = (
+    ("In the 3D view", "On a slice", "Estimate"),
+    ("View",),
+    ("Landmarks", "Measure", "File", "Edit", "Help"),
+)
 
 
 def keys_text(keys: str) -> str:

@@ -23,6 +23,7 @@ from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks, point_of
+from gp_labeler.views.drawn_measurements import handle_of, mark_or_handle
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.slice_layers import SliceLayer
 from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
@@ -41,6 +42,9 @@ _FREES = Modifier.ALT | Modifier.SHIFT
 """Held while a point is dragged, either lets it leave the bone."""
 
 _NEAR_EDGE_PIXELS = 48.0
+_NEAR_PIXELS = 8.0
+"""A mark is meant by a click within so many logical pixels."""
+
 _STEPS = {Qt.Key.Key_F: 1, Qt.Key.Key_PageUp: 1, Qt.Key.Key_B: -1, Qt.Key.Key_PageDown: -1}
 
 
@@ -271,6 +275,7 @@ class SliceView(QWidget):
         if event.buttons() == Qt.MouseButton.NoButton:
             if Modifier.SHIFT in modifiers_of(event):
                 self._workspace.view.set_crosshair(here)
+            self._workspace.measure.point_at(here if self._is_inside(here) else None)
             self._show_cursor()
             return
         view = self._control.move(self.shown, x, y)
@@ -327,6 +332,8 @@ class SliceView(QWidget):
             self._placement.cancel()
         elif key == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
             self._workspace.interaction.arm_replacing(False)
+        elif key == Qt.Key.Key_Escape and self._placement.put_away():
+            event.accept()
         elif key in _ARROWS and plain and self.source is not None:
             self._nudge(*_ARROWS[key])
         elif key in _STEPS and plain:
@@ -336,6 +343,7 @@ class SliceView(QWidget):
 
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         self._pointer = None
+        self._workspace.measure.point_at(None)
         self.hovered.emit(None)
         super().leaveEvent(event)
 
@@ -357,6 +365,8 @@ class SliceView(QWidget):
 
     def _edge_for(self, mark: str) -> BoneEdge | None:
         """Return the edge of bone, on which a point stays that was placed on bone; None for other points."""
+        if handle_of(mark) is not None:
+            return None
         provenance = self._workspace.document.state.landmark(*point_of(mark)).provenance
         on_bone = provenance is not None and provenance.how is How.MESH
         threshold = self._workspace.scan.threshold
@@ -366,10 +376,14 @@ class SliceView(QWidget):
 
     def _drag_to(self, here: FloatArray, *, free: bool) -> None:
         drag, to = self._workspace.interaction.drag, here + self._grip
-        if drag is not None:
-            to = self.slice_plane.moved_to(
-                to, self.slice_plane.position_of(drag.position)
-            )  # the slice follows it
+        measure = self._workspace.measure
+        moved = measure.dragged_position if drag is None else drag.position
+        if moved is not None:
+            to = self.slice_plane.moved_to(to, self.slice_plane.position_of(moved))  # the slice follows it
+        if measure.dragged is not None:
+            if self._is_inside(to):
+                measure.drag_to(to)
+            return
         if self._edge is not None and self.shown is not None and not free:
             within = _NEAR_EDGE_PIXELS * self.devicePixelRatioF() * self.shown.mm_per_pixel
             edge = self._edge.nearest(to, within)
@@ -394,11 +408,25 @@ class SliceView(QWidget):
         )
 
     def _position_of(self, key: str | None) -> FloatArray:
+        if (handle := handle_of(key)) is not None:
+            return np.array(self._workspace.document.state.measurement(handle[0]).points[handle[1]])
         marks = {mark.key: mark.position for mark in drawn_marks(self._workspace)}
         return marks[key or ""]
 
     def _mark_at(self, x: float, y: float) -> str | None:
-        """Return the key of the nearest mark that is drawn within 8 logical pixels."""
+        """Return the key of the nearest mark, or handle, that is drawn within 8 logical pixels."""
+        within = _NEAR_PIXELS * self.devicePixelRatioF()
+        return mark_or_handle(self._workspace, self._landmark_at(x, y), self._drawn_pixels, (x, y), within)
+
+    def _drawn_pixels(self, points: FloatArray) -> FloatArray:
+        """Return the (N, 2) pixels of (N, 3) scan positions, NaN where they are too far off the slice."""
+        if self.shown is None or self.source is None:
+            return np.full((len(points), 2), np.nan)
+        pixels = self.shown.scan_to_pixel(points)
+        pixels[np.abs(self.shown.off_slice(points)) > reach_of(self.source, self.slice_plane)] = np.nan
+        return pixels
+
+    def _landmark_at(self, x: float, y: float) -> str | None:
         if self.shown is None or self.source is None:
             return None
         marks = drawn_marks(self._workspace)
@@ -408,7 +436,7 @@ class SliceView(QWidget):
         away = np.linalg.norm(self.shown.scan_to_pixel(positions) - [x, y], axis=1)
         away[np.abs(self.shown.off_slice(positions)) > reach_of(self.source, self.slice_plane)] = np.inf
         nearest = int(away.argmin())
-        return marks[nearest].key if away[nearest] <= 8.0 * self.devicePixelRatioF() else None
+        return marks[nearest].key if away[nearest] <= _NEAR_PIXELS * self.devicePixelRatioF() else None
 
     def release(self) -> None:
         """Let go of the voxels."""

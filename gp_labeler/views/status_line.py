@@ -77,6 +77,7 @@ class StatusLine(QWidget):
             workspace.interaction.replacing_changed,
             workspace.interaction.dragged,
             workspace.pose.target_changed,
+            workspace.measure.changed,
         ):
             follow(self, signal, self._on_changed)
         follow(self, workspace.messages.said, self.say)
@@ -124,6 +125,11 @@ class StatusLine(QWidget):
         elif workspace.interaction.replacing and workspace.labels.active.code is not None:
             point = point_text(workspace.labels.active.side, workspace.labels.active.code)
             self._show(f"The next click moves {point} there · Esc leaves it where it is", "next")
+        elif workspace.measure.dragged is not None:
+            name = workspace.measure.dragged[0]
+            self._show(f"Let go to leave {name} so, or press Esc to take it back", "next")
+        elif workspace.measure.kind is not None:
+            self._show(workspace.measure.click_text, "next")
         elif workspace.interaction.tool == "touch":
             target = workspace.pose.target
             if target:

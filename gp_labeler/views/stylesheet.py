@@ -111,6 +111,7 @@ QHeaderView { background: transparent; }
 QHeaderView::section {
     background: transparent; color: $muted; border: none; border-bottom: 1px solid $border; padding: 4px 6px;
 }
+QTableCornerButton::section { background: $card; border: none; border-bottom: 1px solid $border; }
 QListView::item { padding: 5px 8px; border-radius: 4px; }
 QListView::item:hover { background: $hover; }
 QListView::item:selected { background: $selected; color: $text; }

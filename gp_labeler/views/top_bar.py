@@ -26,6 +26,8 @@ _TOOLS = (
     ("tool.place", "label", "Place"),
     ("tool.look", "pose", "Crosshair"),
     ("tool.grey", "sun", "Contrast"),
+    ("tool.ruler", "ruler", "Ruler"),
+    ("tool.angle", "angle", ""),
 )
 
 

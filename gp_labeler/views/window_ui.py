@@ -20,6 +20,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.canvas_ui import ask_canvas
 from gp_labeler.views.fonts import nearest_text_size
+from gp_labeler.views.measure_ui import MeasureUi
 from gp_labeler.views.panels.label.export_dialog import ExportDialog
 from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
@@ -46,7 +47,7 @@ _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp);;OBJ (*.obj);;glTF (*.glb *.gltf)"
 
 
-class WindowUi(AtlasUi, PoseUi):
+class WindowUi(AtlasUi, PoseUi, MeasureUi):
     """The answers that a main window gives to actions.
 
     Parameters

@@ -11,6 +11,13 @@ from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
 from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
 from gp_labeler.scripting.steps.looking import Act, Look, PressKey, Screenshot, Undo
+from gp_labeler.scripting.steps.measuring import (
+    Distances,
+    ExportMeasurements,
+    ImportMeasurements,
+    Measure,
+    ShowDistance,
+)
 from gp_labeler.scripting.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
 from gp_labeler.scripting.steps.pose import CarryPath, EstimateStep, Overlay, ReportStep, VerdictStep
 from gp_labeler.scripting.steps.scan import Mesh, Open, Spacing, Threshold
@@ -39,6 +46,7 @@ _ALL: tuple[type[Step], ...] = (
         Overlay,
     ),
     *(VerdictStep, ReportStep, CarryPath, Check, Screenshot, Save, Expect),
+    *(Measure, ImportMeasurements, ExportMeasurements, ShowDistance, Distances),
 )
 
 STEPS: Mapping[str, type[Step]] = MappingProxyType({kind.do: kind for kind in _ALL})

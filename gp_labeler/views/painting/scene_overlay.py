@@ -17,6 +17,7 @@ from gp_labeler.models.view import Cut, ViewModel
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.colours import DARK, SceneColours
 from gp_labeler.scene.ghosts import GhostEllipsoid, outline_in
+from gp_labeler.scene.measurements import DrawnMeasurement
 from gp_labeler.scene.pose_data import PoseScene
 from gp_labeler.scene.pose_names import written_in
 from gp_labeler.scene.pose_outlines import outlines_of
@@ -24,6 +25,12 @@ from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.views.fonts import TEXT, font_of
 from gp_labeler.views.mouse import painted
 from gp_labeler.views.painting.marks import PlacedMark, paint_mark, place_marks, tags_of
+from gp_labeler.views.painting.measurement_strokes import (
+    Strokes,
+    paint_strokes,
+    strokes_in_scene,
+    tags_of_strokes,
+)
 from gp_labeler.views.painting.name_tags import NameTag, PlacedWord, paint_words, place_names, pose_tags
 from gp_labeler.views.painting.pose_strokes import polygon
 from gp_labeler.views.painting.scale_bar import paint_scale_bar
@@ -56,6 +63,8 @@ class SceneOverlay:
     ----------
     names_visible, scale_bar_visible : bool
         What is painted.
+    measurements : sequence of DrawnMeasurement
+        Rulers and angles to place with the next frame.
     """
 
     def __init__(self) -> None:
@@ -64,6 +73,8 @@ class SceneOverlay:
         self._ratio, self._text, self._mm_per_pixel = 1.0, float(TEXT), 1.0
         self._size: tuple[int, int] | None = None  # before anything is placed
         self._marks: list[PlacedMark] = []
+        self.measurements: Sequence[DrawnMeasurement] = ()
+        self._strokes: list[Strokes] = []
         self._lines: list[_Line] = []
         self._words: list[PlacedWord] = []
 
@@ -84,9 +95,11 @@ class SceneOverlay:
         self._marks = place_marks(scene.marks, view, hidden, ratio=ratio, bone_opacity=scene.bone.opacity)
         rings = [outline_in(view, ghost.mean, ghost.covariance) for ghost in scene.ghosts.ghosts]
         self._lines = self._outlines(scene.ghosts.ghosts, rings) + self._pose_lines(pose, view)
+        self._strokes = [strokes_in_scene(each, view, scene) for each in self.measurements]
         tags: list[NameTag] = []
         if self.names_visible:
-            tags = tags_of(self._marks, colours, ratio) + _ghost_tags(scene.ghosts.ghosts, rings, colours)
+            tags = tags_of_strokes(self._strokes, colours)
+            tags += tags_of(self._marks, colours, ratio) + _ghost_tags(scene.ghosts.ghosts, rings, colours)
             written = written_in(pose)
             tags += pose_tags(written, view.display(written.places)[:, :2] + 0.5, colours)
         self._words = place_names(tags, view.size, ratio=ratio, text=text, halo=colours.halo)
@@ -111,6 +124,7 @@ class SceneOverlay:
             painter.setOpacity(line.opacity)
             painter.setPen(QPen(QColor(line.colour), line.width))
             painter.drawPolyline(line.points)
+        paint_strokes(painter, self._strokes, self._colours, self._ratio)
         for mark, pixel, radius, opacity, _ in self._marks:
             paint_mark(
                 painter, mark, pixel, radius, self._colours, ratio=self._ratio, opacity=opacity, lit=True
@@ -127,6 +141,21 @@ class SceneOverlay:
                 longest=_BAR_PIXELS,
                 share=_BAR_SHARE,
             )
+
+    def paint_moving(self, painter: QPainter, scene: Scene3D, moving: Sequence[DrawnMeasurement]) -> None:
+        """Paint rulers and angles that follow the pointer over the last frame, in logical pixels."""
+        if not moving or self._size is None:
+            return
+        view, ratio = scene.camera.viewpoint(), self._ratio
+        strokes = [strokes_in_scene(each, view, None) for each in moving]
+        painter.save()
+        painter.scale(1 / ratio, 1 / ratio)
+        paint_strokes(painter, strokes, self._colours, ratio)
+        tags = tags_of_strokes(strokes, self._colours)
+        paint_words(
+            painter, place_names(tags, view.size, ratio=ratio, text=self._text, halo=self._colours.halo)
+        )
+        painter.restore()
 
     def _outlines(self, ghosts: Sequence[GhostEllipsoid], rings: Sequence[FloatArray]) -> list[_Line]:
         colour = self._colours.states["ghost"]

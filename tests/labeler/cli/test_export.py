@@ -8,8 +8,10 @@ import numpy as np
 from document_cases import Editing
 
 from gp_core.cli import main as core
-from gp_core.io import load_specimens
+from gp_core.io import load_specimens, read_measurements
+from gp_core.landmarks.measurements import Measurement
 from gp_labeler.cli.entry import main
+from gp_labeler.document.measurement_edits import AddMeasurements
 from gp_labeler.document.specimen_file import read_specimen, write_specimen
 from gp_labeler.imaging.bone_distance import scan_evidence
 from gp_labeler.imaging.volume import Volume
@@ -32,6 +34,18 @@ def test_suggestions_are_left_out_unless_asked_for(tmp_path, capsys) -> None:
     (animal,) = load_specimens(tmp_path / "both")
     assert animal.side("L").placed == ("CA",)
     assert set(animal.side("L").suggested) == {"OS"}
+
+
+def test_rulers_are_written_where_asked_for(tmp_path) -> None:
+    editing = Editing()
+    editing.labels.place((1, 2, 3), side="L", code="CA")
+    ruler = Measurement("width", ((0, 0, 0), (1, 2, 2)))
+    editing.document.do(AddMeasurements((ruler,)))
+    file, out = tmp_path / "GP1.gpspecimen.json", tmp_path / "out"
+    write_specimen(file, editing.document.state)
+    assert main(["export", str(file), "-o", str(out), "--measurements"]) == 0
+    assert read_measurements(out / "unnamed_width.mrk.json") == (ruler,)
+    assert [animal.name for animal in load_specimens(out)] == ["unnamed"]
 
 
 def test_nothing_is_replaced_unasked(tmp_path, capsys) -> None:

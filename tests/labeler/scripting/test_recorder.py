@@ -75,6 +75,10 @@ ACTION_STEPS = {
     "atlas.save": "action",
     **dict.fromkeys(("atlas.published", "atlas.open", "atlas.fit_files", "atlas.fit_folder"), "atlas"),
     **dict.fromkeys(("pose.accept", "pose.reject"), "verdict"),
+    "measure.remove": "remove_measurements",
+    "measure.import": "add_measurements",
+    "measure.export": "export_measurements",
+    "measure.clear_pair": "show_distance",
 }
 """What a command is written as."""
 
@@ -88,6 +92,7 @@ NOT_WRITTEN = {
     **dict.fromkeys(("pose.skip", "pose.other_side"), CHOOSES),
     **dict.fromkeys(("pose.tracker", "pose.guide"), "shows settings, or asks for touches, which are written"),
     "point.replace": "arms a click: the move is written",
+    "measure.show": "tells only: what is done in it is written",
     "pose.physical": "tells only: its result is no part of the specimen",
     **dict.fromkeys(("atlas.show", "atlas.try"), "tells only: nothing of it is kept"),
     **dict.fromkeys(
@@ -229,6 +234,27 @@ def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
         *("place_point",) * 5,
         *("set_threshold", "set_notes", "save"),
     ]  # the three nudges are one step
+
+
+def test_rulers_and_angles_are_done_again(recording) -> None:
+    recording.begin()
+    axial, scene = recording.window.grid.slice_views[Plane.AXIAL], recording.window.grid.scene_view
+    recording.view.set_crosshair(INSIDE)
+    scene.view_from("A")
+    assert recording.run("tool.ruler") == ["action"]
+    click(axial, INSIDE)
+    click(scene, ON_BONE)
+    recording.run("tool.angle")
+    for offset in ((1, 0, 0), (0, 0, 0), (0, 1, 0)):
+        click(axial, INSIDE + offset)
+    recording.workspace.measure.rename("Ruler 1", "to the surface")
+    assert recording.run("measure.remove") == ["remove_measurements"]  # the angle, which is selected
+    recording.document.undo()
+    recording.window.ui.prompts.files = [recording.folder / "first"]
+    assert recording.run("measure.export") == ["export_measurements"]
+    lines = [f"ball_{name}.mrk.json" for name in ("to the surface", "Angle 1")]
+    place_three(recording)
+    recording.check(SAVED, *lines)
 
 
 def test_imports_of_every_kind_are_done_again(recording) -> None:

@@ -1,0 +1,59 @@
+"""The rows of the menu Measure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.models.workspace import Workspace
+
+__all__ = ["measure_rows"]
+
+
+def _has_scan(workspace: Workspace) -> bool:
+    return workspace.scan.volume is not None
+
+
+def _has_measurements(workspace: Workspace) -> bool:
+    return bool(workspace.document.state.measurements)
+
+
+def _toggle(tool: str) -> Run:
+    def change(workspace: Workspace, ui: Ui) -> None:
+        if workspace.interaction.tool == tool:
+            workspace.measure.put_away()
+        else:
+            workspace.interaction.set_tool(tool)
+
+    return change
+
+
+def _has_tool(tool: str) -> Test:
+    return lambda workspace: workspace.interaction.tool == tool
+
+
+# fmt: off
+def measure_rows() -> Iterator[Action]:
+    """Return the commands of the menu Measure."""
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _has_scan, *,
+            checked: Test | None = None, hint: str = "", group: str = "", icon: str = "") -> Action:
+        return Action(id, "Measure", title, keys, run, enabled, checked, hint, group, icon)
+
+    for title, tool, key, hint in (
+        ("Ruler", "ruler", "U", "Measure a distance: click its two ends on bone, a slice or a landmark"),
+        ("Angle", "angle", "Shift+U", "Measure an angle: click one arm, the vertex, the other arm"),
+    ):
+        yield row(f"tool.{tool}", title, (key,), _toggle(tool), checked=_has_tool(tool), hint=hint,
+                  group="measure", icon=tool)
+    yield row("measure.show", "Measurements and distances…", ("Ctrl+M",),
+              lambda w, ui: ui.show_measurements(), group="list",
+              hint="The list of rulers and angles; distances between landmarks beside the published ones")
+    yield row("measure.remove", "Remove the selected measurement", (), lambda w, ui: w.measure.remove(),
+              lambda w: w.measure.selected is not None, group="list")
+    yield row("measure.clear_pair", "Stop drawing the distance of two landmarks", (),
+              lambda w, ui: w.measure.clear_pair(), lambda w: w.measure.pair is not None, group="list")
+    yield row("measure.import", "Import rulers and angles…", (), lambda w, ui: ui.ask_import_measurements(),
+              hint="Lines and angles of 3D Slicer, .mrk.json", group="exchange")
+    yield row("measure.export", "Export rulers and angles…", (), lambda w, ui: ui.ask_export_measurements(),
+              _has_measurements, hint="As lines and angles of 3D Slicer, a file each", group="exchange")
+# fmt: on
