@@ -14,6 +14,7 @@ Examples
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.atlas.label_check import Deviation, Finding, SideCheck, check_side, check_specimen
+from gp_core.atlas.labelling_error import LabellingError
 from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -90,6 +91,7 @@ __all__ = [
     "JrmpcResult",
     "JrmpcSettings",
     "Labelling",
+    "LabellingError",
     "LandmarkSet",
     "LeaveOneOutReport",
     "Measurement",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from os import PathLike
 from typing import Any
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.argument_types import check_fields, checks_arguments
+from gp_core.atlas.labelling_error import LabellingError
 from gp_core.atlas.published import published_shape
 from gp_core.constants import DEFINING_FEATURES
 from gp_core.disk import read_head, read_json, write_text
@@ -59,6 +60,9 @@ class Atlas:
         Number of labelled sides behind it.
     specimens : tuple of str
         Their names, empty where they are not known.
+    labelling_error : LabellingError
+        Error of the labels that are compared with it, in checks and in the regions of expected features; by
+        default an assumed one.
 
     Raises
     ------
@@ -73,6 +77,7 @@ class Atlas:
     scatter: FloatArray
     n_samples: int
     specimens: tuple[str, ...] = field(default=())
+    labelling_error: LabellingError = field(default=LabellingError())
 
     def __post_init__(self) -> None:
         check_fields(self, leaving_out=("codes", "specimens"))
@@ -171,6 +176,7 @@ class Atlas:
                 scatter=content["scatter_mm2"],
                 n_samples=int(content["n_samples"]),
                 specimens=_names(content["specimens"]),
+                labelling_error=LabellingError.from_dict(content.get("labelling_error", {})),
             )
         except KeyError as error:
             raise FileFormatError(f"is a damaged atlas: it lacks {error}", file=path, remedy=remedy) from None
@@ -206,7 +212,26 @@ class Atlas:
             "covariance_mm2": self.covariance.tolist(),
             "scatter_mm2": self.scatter.tolist(),
         }
+        if self.labelling_error != LabellingError():
+            content["labelling_error"] = self.labelling_error.as_dict()
         write_text(path, json.dumps(content, indent=1) + "\n")
+
+    @checks_arguments
+    def with_labelling_error(self, error: LabellingError | None) -> Atlas:
+        """Return the atlas for labels with another error.
+
+        Parameters
+        ----------
+        error : LabellingError, optional
+            A measured one; by default the assumed one.
+
+        Returns
+        -------
+        Atlas
+            The same shape model.
+        """
+        wanted = error or LabellingError()
+        return self if wanted == self.labelling_error else replace(self, labelling_error=wanted)
 
     @checks_arguments
     def __getitem__(self, code: str) -> FloatArray:

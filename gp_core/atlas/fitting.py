@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.certainty_weights import checked_weights
 from gp_core.atlas.plain_fit import fit_plain_atlas, fit_weighted_atlas
 from gp_core.atlas.screening import Screened, screen_labels
 from gp_core.landmarks.sets import Specimen
@@ -20,6 +21,7 @@ def fit_atlas(
     features: Iterable[str] | None = None,
     name: str | None = None,
     keep_doubtful: bool = False,
+    certainty_weights: Mapping[str, float] | bool | None = None,
 ) -> Atlas:
     """Fit an atlas to labelled specimens; both sides are pooled by mirroring.
 
@@ -36,6 +38,9 @@ def fit_atlas(
         By default tells the number of specimens.
     keep_doubtful : bool
         Use all labels: `fit_plain_atlas`.
+    certainty_weights : mapping of str to float, or bool, optional
+        Weight of a label by its certainty, such as ``{"guess": 0.1}``; True for
+        `gp_core.atlas.certainty_weights.CERTAINTY_WEIGHTS`. By default all labels count alike.
 
     Returns
     -------
@@ -47,13 +52,19 @@ def fit_atlas(
     GpError
         As for `fit_plain_atlas`, applied to the remaining labels.
     """
+    by_certainty = checked_weights(certainty_weights)
     if keep_doubtful:
-        return fit_plain_atlas(specimens, features=features, name=name)
-    return fit_screened_atlas(screen_labels(specimens), features=features, name=name)
+        return fit_plain_atlas(specimens, features=features, name=name, by_certainty=by_certainty)
+    screened = screen_labels(specimens)
+    return fit_screened_atlas(screened, features=features, name=name, by_certainty=by_certainty)
 
 
 def fit_screened_atlas(
-    screened: Screened, *, features: Iterable[str] | None = None, name: str | None = None
+    screened: Screened,
+    *,
+    features: Iterable[str] | None = None,
+    name: str | None = None,
+    by_certainty: Mapping[str, float] | None = None,
 ) -> Atlas:
     """Fit an atlas to screened labels, each animal with its weight; see `fit_atlas`.
 
@@ -65,10 +76,12 @@ def fit_screened_atlas(
         As for `fit_atlas`.
     name : str, optional
         As for `fit_atlas`.
+    by_certainty : mapping of str to float, optional
+        Weight of a label by its certainty.
 
     Returns
     -------
     Atlas
         The fitted atlas.
     """
-    return fit_weighted_atlas(screened.specimens, screened.weights, features, name)
+    return fit_weighted_atlas(screened.specimens, screened.weights, features, name, by_certainty)

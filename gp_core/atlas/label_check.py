@@ -18,12 +18,12 @@ import numpy as np
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_likelihood import (
-    LABELLING_NOISE_MM,
     WRONG_MM,
     LabelHypothesis,
     LabelModel,
     best_hypothesis,
 )
+from gp_core.atlas.labelling_error import LABELLING_NOISE_MM
 from gp_core.errors import GpError
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import FEATURES, Side, feature
@@ -90,6 +90,8 @@ class Deviation:
         Of the predicted position, mm^2.
     n_sd : float
         The distance in standard deviations (Mahalanobis).
+    labelling_sd : float
+        Error of the label itself that these allow for, mm a coordinate.
     """
 
     code: str
@@ -97,6 +99,7 @@ class Deviation:
     expected: FloatArray
     covariance: FloatArray
     n_sd: float
+    labelling_sd: float = LABELLING_NOISE_MM
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
@@ -355,7 +358,13 @@ def _as_checked(finding: Finding, *sets: LandmarkSet) -> Finding:
     return replace(finding, checked_by=who)
 
 
-def deviation(code: str, position: FloatArray, expected: FloatArray, covariance: FloatArray) -> Deviation:
+def deviation(
+    code: str,
+    position: FloatArray,
+    expected: FloatArray,
+    covariance: FloatArray,
+    labelling_sd: float = LABELLING_NOISE_MM,
+) -> Deviation:
     """Compare a label with its predicted position.
 
     Parameters
@@ -368,6 +377,8 @@ def deviation(code: str, position: FloatArray, expected: FloatArray, covariance:
         Its predicted position.
     covariance : (3, 3) array, mm^2
         Of the predicted position.
+    labelling_sd : float
+        Standard deviation of the label itself, mm a coordinate.
 
     Returns
     -------
@@ -375,9 +386,9 @@ def deviation(code: str, position: FloatArray, expected: FloatArray, covariance:
         Distance in mm and in standard deviations.
     """
     off = position - expected
-    spread = covariance + LABELLING_NOISE_MM**2 * np.eye(3)
+    spread = covariance + labelling_sd**2 * np.eye(3)
     n_sd = float(np.sqrt(off @ np.linalg.solve(spread, off)))
-    return Deviation(code, float(np.linalg.norm(off)), expected, covariance, n_sd)
+    return Deviation(code, float(np.linalg.norm(off)), expected, covariance, n_sd, labelling_sd)
 
 
 def far_finding(side: Side, away: Deviation) -> Finding:
@@ -504,11 +515,12 @@ def _deviations(
     model: LabelModel, codes: tuple[str, ...], labels: FloatArray, hypothesis: LabelHypothesis, side: Side
 ) -> dict[str, Deviation]:
     """Compare each label (n, 3) with its prediction from the others, as labels of this side."""
-    own_variances = np.full(len(codes), LABELLING_NOISE_MM**2)
+    own_variances = model.labelling_sd**2
     own_variances[list(hypothesis.wrong)] += WRONG_MM**2
     rest = model.fit(hypothesis.points, hypothesis.wrong).leave_one_out(own_variances)
     flip = np.diag([-1.0, 1.0, 1.0]) if side is Side.RIGHT else np.eye(3)
-    places = zip(codes, labels, rest.expected @ flip, flip @ rest.covariance @ flip, strict=True)
+    covariances, errors = flip @ rest.covariance @ flip, model.labelling_sd.tolist()
+    places = zip(codes, labels, rest.expected @ flip, covariances, errors, strict=True)
     return {code: deviation(code, *place) for code, *place in places}
 
 

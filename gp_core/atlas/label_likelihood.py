@@ -23,10 +23,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.registration.named_points import motion_jacobian
 from gp_core.validation import FloatArray
 
-__all__ = ["LABELLING_NOISE_MM", "LabelHypothesis", "LabelModel", "LeaveOneOut", "best_hypothesis"]
-
-LABELLING_NOISE_MM = 0.1
-"""Scale of a placed label's error: about a voxel, mm a coordinate."""
+__all__ = ["LabelHypothesis", "LabelModel", "LeaveOneOut", "best_hypothesis"]
 
 WRONG_MM = 5.0
 """Scale of an outlier's error, mm a coordinate: the label lies elsewhere in the ear."""
@@ -127,7 +124,8 @@ class LabelModel:
 
     def __init__(self, atlas: Atlas, codes: tuple[str, ...]) -> None:
         self.mean = atlas.rows(codes)
-        noise = LABELLING_NOISE_MM**2 * np.eye(3 * len(codes))
+        self.labelling_sd = atlas.labelling_error.of(codes)
+        noise = np.diag(np.repeat(self.labelling_sd**2, 3))
         self.covariance = atlas.cross_covariance(codes, codes) + noise
         self.jacobian = motion_jacobian(self.mean)
 

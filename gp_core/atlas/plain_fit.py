@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
 from gp_core.atlas.atlas import PLACED, Atlas
+from gp_core.atlas.certainty_weights import certainty_weights
 from gp_core.atlas.generalised_procrustes import align_shapes, covariances, label_weights
 from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GpError
@@ -19,7 +20,11 @@ __all__ = ["as_left", "fit_consensus", "fit_plain_atlas", "fit_weighted_atlas", 
 
 
 def fit_plain_atlas(
-    specimens: Sequence[Specimen], *, features: Iterable[str] | None = None, name: str | None = None
+    specimens: Sequence[Specimen],
+    *,
+    features: Iterable[str] | None = None,
+    name: str | None = None,
+    by_certainty: Mapping[str, float] | None = None,
 ) -> Atlas:
     """Fit an atlas in which every label of every animal has the same weight, as the study of the paper needs.
 
@@ -27,6 +32,8 @@ def fit_plain_atlas(
     ----------
     specimens, features, name
         As for `fit_atlas`.
+    by_certainty : mapping of str to float, optional
+        As for `fit_weighted_atlas`.
 
     Returns
     -------
@@ -46,7 +53,7 @@ def fit_plain_atlas(
     Schäfer and Strimmer, "A shrinkage approach to large-scale covariance matrix estimation", 2005
     (target D). https://doi.org/10.2202/1544-6115.1175
     """
-    return fit_weighted_atlas(specimens, np.ones(len(specimens)), features, name)
+    return fit_weighted_atlas(specimens, np.ones(len(specimens)), features, name, by_certainty)
 
 
 def fit_consensus(specimens: Sequence[Specimen], *, name: str = "these animals") -> Atlas:
@@ -75,7 +82,11 @@ def fit_consensus(specimens: Sequence[Specimen], *, name: str = "these animals")
 
 
 def fit_weighted_atlas(
-    specimens: Sequence[Specimen], of_animals: FloatArray, features: Iterable[str] | None, name: str | None
+    specimens: Sequence[Specimen],
+    of_animals: FloatArray,
+    features: Iterable[str] | None,
+    name: str | None,
+    by_certainty: Mapping[str, float] | None = None,
 ) -> Atlas:
     """Fit an atlas to labels as they are, each animal with its weight.
 
@@ -85,6 +96,8 @@ def fit_weighted_atlas(
         As for `fit_plain_atlas`.
     of_animals : (n,) array
         Weight of each specimen; with ones, this is `fit_plain_atlas`.
+    by_certainty : mapping of str to float, optional
+        Weight of each label by its certainty; by default certainty does not count.
 
     Returns
     -------
@@ -101,6 +114,10 @@ def fit_weighted_atlas(
     if not (of_animals == 1).all():
         of_sides = np.repeat(of_animals, [len(specimen.sides) for specimen in specimens])
         weights = np.repeat(of_sides[:, None], len(codes), axis=1)
+    if by_certainty is not None:
+        of_labels = certainty_weights(specimens, codes, by_certainty)
+        if not (of_labels == 1).all():
+            weights = of_labels if weights is None else weights * of_labels
     return _fit_shapes(specimens, shapes, codes, owners, weights, name or f"{len(specimens)} specimens")
 
 

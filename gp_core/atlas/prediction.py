@@ -6,7 +6,6 @@ import numpy as np
 
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
 from gp_core.constants import DEFINING_FEATURES
 from gp_core.errors import FeatureError, GeometryError
 from gp_core.landmarks.anatomy import cochlea_origin, mirror_right
@@ -68,7 +67,10 @@ def _known(atlas: Atlas, landmarks: LandmarkSet) -> tuple[str, ...]:
 
 def _fit(atlas: Atlas, landmarks: LandmarkSet, known: tuple[str, ...]) -> NamedFit:
     points = landmarks.array(known)
-    model = TouchModel(known, atlas.rows(known), atlas.variances(known), LABELLING_NOISE_MM)
+    sd = atlas.labelling_error.of(known)
+    least = float(sd.min())
+    variances = atlas.variances(known) + (sd**2 - least**2)  # the fit takes one error for all
+    model = TouchModel(known, atlas.rows(known), variances, least)
     return fit_named_points(model, mirror_right(points, landmarks.side))
 
 
@@ -76,7 +78,7 @@ def _given(
     atlas: Atlas, known: tuple[str, ...], fit: NamedFit, wanted: tuple[str, ...]
 ) -> tuple[FloatArray, FloatArray]:
     """Return conditional mean (m, 3) and covariance (3 m, 3 m) of other features; atlas frame."""
-    noise = np.repeat(fit.noise**2 / fit.weights, 3)
+    noise = np.repeat(atlas.labelling_error.of(known) ** 2 / fit.weights, 3)
     precision = np.linalg.inv(atlas.cross_covariance(known, known) + np.diag(noise))
     jacobian = fit.jacobian
     information = jacobian.T @ precision @ jacobian

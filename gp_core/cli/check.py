@@ -13,8 +13,10 @@ from gp_core.cli.options import (
     Subparsers,
     add_command,
     add_json,
+    add_labelling_error,
     add_specimens,
     lab_names,
+    labelling_error,
     labellings,
     read_atlas,
     save_json,
@@ -49,6 +51,7 @@ def add(commands: Subparsers) -> None:
         "--side", choices=("L", "R"), help="side of a single file whose content and name do not give it"
     )
     parser.add_argument("--atlas", nargs="+", default=["published"], metavar="ATLAS", help="as for estimate")
+    add_labelling_error(parser)
     add_json(parser)
 
 
@@ -67,12 +70,17 @@ def run(args: argparse.Namespace) -> int:
     """
     found = labellings(args) if args.side is None else [Labelling(_one_side(args))]
     atlas, others = read_atlas(args.atlas)
+    error = labelling_error(args)
     n_of = Counter(each.specimen.name for each in found)
     report = {}
     for each in found:
         name = each.specimen.name if n_of[each.specimen.name] == 1 else f"{each.specimen.name} ({each.who})"
-        findings = check_specimen(each.specimen, _atlas_for(each.specimen, atlas, others))
+        expected = _atlas_for(each.specimen, atlas, others)
+        expected = expected if error is None else expected.with_labelling_error(error)
+        findings = check_specimen(each.specimen, expected)
         report[name] = [replace(finding, specimen=name) for finding in findings]
+    if error is not None:
+        say(f"Labelling error: {error.text}")
     save_json(args.json, {name: [f.as_dict() for f in findings] for name, findings in report.items()})
     for name, findings in report.items():
         say_findings(name, findings)

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from gp_core.atlas.atlas import Atlas, is_atlas_file
+from gp_core.atlas.labelling_error import LabellingError
 from gp_core.disk import is_protected, is_stream, protected_inputs, write_text
 from gp_core.errors import GpError
 from gp_core.extras import need_extra
@@ -24,12 +25,14 @@ __all__ = [
     "Subparsers",
     "add_command",
     "add_json",
+    "add_labelling_error",
     "add_names",
     "add_specimens",
     "check_ending",
     "keeping_inputs",
     "lab_names",
     "labelled_specimens",
+    "labelling_error",
     "labellings",
     "read_atlas",
     "save_json",
@@ -192,6 +195,37 @@ def labellings(args: argparse.Namespace) -> list[Labelling]:
 def _which(args: argparse.Namespace) -> dict[str, Any]:
     chosen = {name: getattr(args, name, None) for name in ("observer", "round")}
     return {"names": lab_names(args), **chosen}
+
+
+def add_labelling_error(parser: argparse.ArgumentParser) -> None:
+    """Add ``--labelling-error FILE``.
+
+    Parameters
+    ----------
+    parser : argparse.ArgumentParser
+        The parser of one command.
+    """
+    parser.add_argument(
+        "--labelling-error",
+        metavar="FILE",
+        help="take the error of labels from a report of gp-core reliability (--json) instead of 0.1 mm",
+    )
+
+
+def labelling_error(args: argparse.Namespace) -> LabellingError | None:
+    """Return the measured error of labels from ``--labelling-error``.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options.
+
+    Returns
+    -------
+    LabellingError or None
+        None without the option.
+    """
+    return None if args.labelling_error is None else LabellingError.read(args.labelling_error)
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:

@@ -20,6 +20,7 @@ from gp_core.landmarks.anatomy import with_cochlea_origin
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.plausible_size import check_plausible_size
+from gp_core.landmarks.provenance import Certainty, LabelProvenance
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 
 __all__ = ["Labelling", "landmark_files", "load_labellings", "load_specimens", "mean_labels"]
@@ -249,7 +250,8 @@ def mean_labels(labelled: Sequence[LandmarkSet], specimen: str) -> LandmarkSet:
     Returns
     -------
     LandmarkSet
-        Each feature is the mean of the labellings that have it; of one labelling, that itself.
+        Each feature is the mean of the labellings that have it, as certain as the least certain of them; of
+        one labelling, that itself.
 
     Raises
     ------
@@ -272,7 +274,20 @@ def mean_labels(labelled: Sequence[LandmarkSet], specimen: str) -> LandmarkSet:
     }
     unseen = frozenset.union(*(each.unseen for each in labelled))
     mean = LandmarkSet.from_mapping(points, first.side, frame=first.frame)
-    return with_cochlea_origin(replace(mean, unseen=unseen - set(points)))
+    mean = replace(mean, unseen=unseen - set(points)).with_provenance(_least_certain(labelled, points))
+    return with_cochlea_origin(mean)
+
+
+def _least_certain(labelled: Sequence[LandmarkSet], codes: Iterable[str]) -> dict[str, LabelProvenance]:
+    """Return the certainty of means: that of the least certain label, where anybody said one."""
+    order = list(Certainty)
+    found = {}
+    for code in codes:
+        known = [each.provenance[code] for each in labelled if code in each and code in each.provenance]
+        said = [about.certainty for about in known if about.certainty is not None]
+        if said:
+            found[code] = LabelProvenance(certainty=max(said, key=order.index))
+    return found
 
 
 def _together(known: LandmarkSet | None, read: LandmarkSet, file: Path) -> LandmarkSet:

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.label_likelihood import LABELLING_NOISE_MM
+from gp_core.atlas.labelling_error import LABELLING_NOISE_MM
 from gp_core.constants import CHI2_3_95, DEFINING_FEATURES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES

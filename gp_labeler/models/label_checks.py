@@ -106,7 +106,7 @@ def _moved(problem: Finding, code: str, landmarks: LandmarkSet) -> Finding | Non
         return problem
     if was is None:
         return None
-    away = deviation(code, landmarks[code], was.expected, was.covariance)
+    away = deviation(code, landmarks[code], was.expected, was.covariance, was.labelling_sd)
     return far_finding(landmarks.side, away) if away.is_outlier else None
 
 
