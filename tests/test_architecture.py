@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections import Counter
@@ -72,6 +73,18 @@ def test_no_module_imports_in_a_circle(package: str) -> None:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
         pytest.fail(f"import cycle: {' <- '.join(error.args[1])}")
+
+
+def test_the_glossary_and_the_page_of_typical_changes_name_what_exists() -> None:
+    modules = {".".join(path.relative_to(_ROOT).with_suffix("").parts[1:]): path for path in _SOURCES}
+    glossary = (_ROOT / "docs/glossary.md").read_text()
+    for name in re.findall(r"\| `([a-z_.]+\.[A-Za-z_]+)` \|$", glossary, re.MULTILINE):
+        module, _, member = name.rpartition(".")
+        defined = rf"^(class |def )?{member}\b"
+        assert name in modules or module in modules, name
+        assert name in modules or re.search(defined, modules[module].read_text(), re.MULTILINE), name
+    tests = {path.name for path in (_ROOT / "tests").rglob("test_*.py")}
+    assert set(re.findall(r"\btest_\w+\.py", (_ROOT / "docs/where.md").read_text())) <= tests
 
 
 def test_one_name_is_one_class() -> None:

@@ -42,6 +42,8 @@ class Coil:
 
     def radius(self, heights: FloatArray) -> FloatArray:
         """Return the outer radius of the capsule at heights (n,) above CB, mm."""
+        from scipy.interpolate import PchipInterpolator  # not before something is drawn: 0.1 s
+
         (cc_height, cc_radius), (cl_height, cl_radius), h = self.cc, self.cl, self.length
         knots = [
             (-1.4, 1.2),
@@ -52,7 +54,7 @@ class Coil:
             (h + CAP_MM, 0.0),
         ]
         s, r = np.array(knots).T
-        squared = _monotone(s, r**2, np.clip(heights, s[0], s[-1]))
+        squared = PchipInterpolator(s, r**2)(np.clip(heights, s[0], s[-1]))
         beyond = np.maximum(heights - s[-1], 0) + np.maximum(s[0] - heights, 0)
         return np.asarray(np.sqrt(np.maximum(squared, 0)) - beyond)
 
@@ -74,37 +76,3 @@ class Coil:
         thick = np.interp(turns, TURNS, _DUCT_MM)
         rho = np.maximum(self.radius(height) - _WALL_MM - thick, 0.1)
         return height, rho, 2 * np.pi * turns, thick
-
-
-def _monotone(x: FloatArray, y: FloatArray, at: FloatArray) -> FloatArray:
-    """Interpolate by cubic pieces that never overshoot (Fritsch and Butland 1984).
-
-    As SciPy's ``PchipInterpolator``, which takes a tenth of a second to import: too long before a drawing.
-
-    References
-    ----------
-    https://doi.org/10.1137/0905021
-    """
-    h, slope = np.diff(x), np.diff(y) / np.diff(x)
-    w1, w2 = 2 * h[1:] + h[:-1], h[1:] + 2 * h[:-1]
-    same = slope[:-1] * slope[1:] > 0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        middle = np.where(same, (w1 + w2) / (w1 / slope[:-1] + w2 / slope[1:]), 0.0)
-    ends = (_end(h[0], h[1], slope[0], slope[1]), _end(h[-1], h[-2], slope[-1], slope[-2]))
-    d = np.concatenate([ends[:1], middle, ends[1:]])
-    n = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(h) - 1)
-    t = at - x[n]
-    c = (3 * slope[n] - 2 * d[n] - d[n + 1]) / h[n]
-    b = (d[n] - 2 * slope[n] + d[n + 1]) / h[n] ** 2
-    found: FloatArray = y[n] + t * (d[n] + t * (c + t * b))
-    return found
-
-
-def _end(h0: float, h1: float, slope0: float, slope1: float) -> float:
-    """Return the slope at an end: of the parabola through three points, kept from overshooting."""
-    slope = ((2 * h0 + h1) * slope0 - h0 * slope1) / (h0 + h1)
-    if slope * slope0 <= 0:
-        return 0.0
-    if slope0 * slope1 <= 0 and abs(slope) > 3 * abs(slope0):
-        return float(3 * slope0)
-    return float(slope)

@@ -152,7 +152,7 @@ class Jobs:
     cancelled = Signal(Task)
 
     def __init__(self, dispatcher: Dispatcher | None = None, *, n_workers: int = 2) -> None:
-        self._dispatch = dispatcher or (lambda call: call())
+        self.dispatcher = dispatcher or (lambda call: call())
         self._pool = ThreadPoolExecutor(n_workers, thread_name_prefix="gp-job")
         self._tasks: list[Task[Any]] = []
         self._closed = False
@@ -215,7 +215,7 @@ class Jobs:
             if not isinstance(caught, GpError):
                 _log.exception("%s failed", task.job.title)
             state, error = TaskState.FAILED, _without_frames(caught)
-        self._dispatch(lambda: self._finish(task, state, result, error, done))
+        self.dispatcher(lambda: self._finish(task, state, result, error, done))
 
     def _finish(
         self,
@@ -241,7 +241,7 @@ class Jobs:
                 task.fraction, task.text = fraction, text or task.text
                 self.progressed.emit(task)
 
-        self._dispatch(tell)
+        self.dispatcher(tell)
 
 
 def _without_frames(error: Exception) -> Exception:

@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
             with protected_inputs(file for file in (args.touches, args.script) if file is not None):
                 write_text(args.truth, json.dumps({**truth, "port": simulator.port}, indent=2))
         _say(f"listening on 127.0.0.1:{simulator.port}")
-        return _serve(simulator, args, list(points))
+        return serve(simulator, args, list(points))
     except GpError as error:
         sys.stderr.write(f"simulator: {error}\n")
     except OSError as error:
@@ -94,7 +94,8 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
     return 2
 
 
-def _serve(simulator: Simulator, args: argparse.Namespace, names: list[str]) -> int:
+def serve(simulator: Simulator, args: argparse.Namespace, names: list[str]) -> int:
+    """Serve until the end is asked for, and return the status of the program."""
     commands: SimpleQueue[str | None] = SimpleQueue()
     loop: list[str] = []
     if args.live:

@@ -40,7 +40,7 @@ def workspace_with_scan(**options) -> Workspace:
 
 def deliver(workspace: Workspace) -> None:
     """Let the jobs of a workspace come to their end."""
-    dispatcher = workspace.jobs._dispatch
+    dispatcher = workspace.jobs.dispatcher
     assert isinstance(dispatcher, QueueDispatcher)
     dispatcher.deliver_until_idle(workspace.jobs, timeout=180)  # compiling may be part of it
 

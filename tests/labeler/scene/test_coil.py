@@ -7,7 +7,6 @@ import pytest
 from pose_cases import pose
 
 from gp_core import Atlas, Side
-from gp_labeler.imaging.coil import _monotone
 from gp_labeler.imaging.mean_cochlea import BASE_MM, COIL, cochlea_tubes, duct_curve
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.scene.coil import section
@@ -87,13 +86,3 @@ def _is_inside(point: np.ndarray, loop: np.ndarray) -> bool:
     turn = np.arctan2(*(loop - point).T)
     winding = np.angle(np.exp(1j * np.diff(np.append(turn, turn[0]))))
     return bool(abs(winding.sum()) > np.pi)
-
-
-def test_the_capsule_is_as_wide_as_scipy_has_it() -> None:
-    from scipy.interpolate import PchipInterpolator
-
-    rng = np.random.default_rng(0)
-    for _ in range(30):
-        x, y = np.cumsum(rng.uniform(0.1, 2.0, 7)), rng.normal(size=7)
-        at = np.concatenate([np.linspace(x[0], x[-1], 200), x])
-        np.testing.assert_allclose(_monotone(x, y, at), PchipInterpolator(x, y)(at), atol=1e-12)

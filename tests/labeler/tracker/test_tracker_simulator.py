@@ -69,7 +69,7 @@ def test_wrong_options_are_said_in_one_line(options, said, capsys) -> None:
 
 def test_the_truth_of_a_drawn_animal_is_an_animal(tmp_path, monkeypatch) -> None:
     truth = tmp_path / "truth.json"
-    monkeypatch.setattr("gp_labeler.tracker.simulator._serve", lambda simulator, *_: simulator.close() or 0)
+    monkeypatch.setattr("gp_labeler.tracker.simulator.serve", lambda simulator, *_: simulator.close() or 0)
     monkeypatch.setattr("gp_labeler.tracker.simulator.Simulator", _Silent)
     assert main(["--port", "0", "--seed", "3", "--side", "R", "--truth", str(truth)]) == 0
     told = json.loads(truth.read_text(encoding="utf-8"))

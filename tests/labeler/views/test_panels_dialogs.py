@@ -113,7 +113,7 @@ def test_nonsense_and_impossible_sizes_are_said(workspace, stack, parent, qtbot)
     qtbot.keyClicks(field, "500")
     assert not dialog.load.isEnabled()
     assert any(level == "error" and "25 m" in words for level, words in findings(dialog))
-    accept = dialog._accepts["extent"]
+    accept = dialog.accepts["extent"]
     accept.click()
     assert dialog.load.isEnabled()
     assert dialog.plan.options.accept == {"extent"}

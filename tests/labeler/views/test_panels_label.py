@@ -272,7 +272,8 @@ def test_an_error_is_told_and_nothing_else_happens(workspace, panel, qtbot):
     place(workspace, "CA")
     workspace.labels.lock(side=LEFT, code="CA")
     workspace.labels.go_to(LEFT, "CA")
-    panel.card._do(lambda: workspace.labels.clear())
+    assert panel.card.unseen.isEnabled()
+    qtbot.mouseClick(panel.card.unseen, CLICK)
     assert [level for _, level in told] == ["error"]
     assert "CA left is locked" in told[0][0]
     assert "CA" in workspace.document.landmarks(LEFT)

@@ -565,7 +565,7 @@ def test_a_verdict_is_kept_with_initials_and_note(workspace, panel, qtbot):
     check = workspace.document.state.pose_checks[-1]
     assert (check.side, check.verdict, check.by, check.note) == (LEFT, "accept", "CD", "seen on the mesh")
     assert check.pose["radius_95_mm"] == workspace.pose.estimate.pose.radius_95
-    said = panel.verdict._said.itemAt(0).widget()
+    said = panel.verdict.said.itemAt(0).widget()
     assert said.words.startswith("Accepted by CD")
     qtbot.mouseClick(panel.verdict.reject, CLICK)
     assert [c.verdict for c in workspace.document.state.pose_checks] == ["accept", "reject"]

@@ -43,8 +43,8 @@ class VerdictCard(Card):
         self.accept, self.reject = QPushButton("Accept"), QPushButton("Reject")
         self.accept.setToolTip("Keep in the specimen that this estimate was looked at and is good")
         self.reject.setToolTip("Keep in the specimen that this estimate is not to be used")
-        self._said = QVBoxLayout()
-        self._said.setSpacing(4)
+        self.said = QVBoxLayout()
+        self.said.setSpacing(4)
         self._shown: tuple[tuple[PoseCheck, ...], tuple[_Moved | None, ...]] | None = None
         who, what = QHBoxLayout(), QHBoxLayout()
         for row, widgets in ((who, (self.initials, self.note)), (what, (self.accept, self.reject))):
@@ -52,7 +52,7 @@ class VerdictCard(Card):
             for widget in widgets:
                 row.addWidget(widget, 1)
             self.add(row)
-        self.add(self._said)
+        self.add(self.said)
         self.accept.clicked.connect(lambda: self.judge("accept"))
         self.reject.clicked.connect(lambda: self.judge("reject"))
         follow(self, workspace.document.details_changed, self.refresh)
@@ -71,11 +71,11 @@ class VerdictCard(Card):
         if (checks, moved) == self._shown:
             return
         self._shown = checks, moved
-        emptied(self._said)
+        emptied(self.said)
         for check, since in zip(checks, moved, strict=False):  # no more than are shown
-            self._said.addWidget(_said(check, since))
+            self.said.addWidget(_said(check, since))
         if len(checks) > _N_SHOWN:
-            self._said.addWidget(text_label(f"and {len(checks) - _N_SHOWN} before", "hint"))
+            self.said.addWidget(text_label(f"and {len(checks) - _N_SHOWN} before", "hint"))
 
     def judge(self, verdict: str) -> bool:
         """Keep a verdict with the initials and the note that stand here."""

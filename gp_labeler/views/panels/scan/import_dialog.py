@@ -68,7 +68,7 @@ class ImportDialog(QDialog):
         super().__init__(parent)
         self._workspace = workspace
         self._plan = plan
-        self._accepts: dict[str, QCheckBox] = {}
+        self.accepts: dict[str, QCheckBox] = {}
         self.setWindowTitle("Open scan")
         self.setModal(True)
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
@@ -184,7 +184,7 @@ class ImportDialog(QDialog):
                 self.stride.addItem(f"{words}  ({bytes_ / MB:,.0f} MB of memory)", stride)
             self.stride.setCurrentIndex(max(0, self.stride.findData(plan.options.stride)))
             self.reverse.setChecked(plan.options.reverse)
-        self._accepts = {}
+        self.accepts = {}
         implausible = any("spacing" in p.resolved_by for p in bare(plan).errors)
         self.spacing.offer(
             plan.suggested_spacing if not implausible else plan.geometry.suggested, from_file=not implausible
@@ -199,7 +199,7 @@ class ImportDialog(QDialog):
             spacing=None if wrong else self.spacing.spacing(),
             stride=self.stride.currentData() or 1,
             reverse=self.reverse.isChecked(),
-            accept=[code for code, box in self._accepts.items() if box.isChecked()],
+            accept=[code for code, box in self.accepts.items() if box.isChecked()],
         )
         self.facts.show_facts(facts_of(self._plan))
         self._show_findings()
@@ -208,9 +208,9 @@ class ImportDialog(QDialog):
         self.why.setText(sentence(wrong) if wrong else why_not(self._plan.errors))
 
     def _show_findings(self) -> None:
-        accepted = {code for code, box in self._accepts.items() if box.isChecked()}
+        accepted = {code for code, box in self.accepts.items() if box.isChecked()}
         emptied(self._findings)
-        self._accepts = {}
+        self.accepts = {}
         original = {p.code: p for p in bare(self._plan).problems}
         for problem in self._plan.problems:
             if problem.code == "sides-unknown":
@@ -224,12 +224,12 @@ class ImportDialog(QDialog):
         box = QCheckBox("It is right all the same: go on")
         box.setChecked(checked)
         box.toggled.connect(self._update_later)
-        self._accepts[problem.code] = box
+        self.accepts[problem.code] = box
         return box
 
     def _update_later(self) -> None:
         self._update()
-        for box in self._accepts.values():
+        for box in self.accepts.values():
             box.setFocus()
 
     def _on_series(self, _: int) -> None:
