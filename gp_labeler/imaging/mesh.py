@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import mutable, vtkIdList
-from vtkmodules.vtkCommonDataModel import vtkPolyData, vtkStaticCellLocator
+from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData, vtkStaticCellLocator
 from vtkmodules.vtkFiltersCore import vtkProbeFilter
 
 from gp_core.errors import GeometryError
@@ -114,7 +114,7 @@ class Surface:
         return self._locator.GetDataSet() is not None
 
     def prepare(self) -> Surface:
-        """Build the search structure for picking; call it in a job, before the first click needs it.
+        """Build the search structure for picking, in a job, before the first click needs it.
 
         `vtkStaticCellLocator.BuildLocator` keeps the interpreter for itself (1.4 s at 5 million triangles),
         so a filter that lets go of it is made to call it: a probe of one point.
@@ -191,6 +191,37 @@ class Surface:
             poly_data(_subset(self.mesh, kept)), self.level, self.T_voxel_scan, self.region, self.stride
         )
 
+    def drop_parts(self, *, smallest_mm: float, largest: int | None = None) -> None:
+        """Drop small parts from the mesh itself, which nobody else may use yet: no copy is made of it.
+
+        Parameters
+        ----------
+        smallest_mm : float
+            Parts smaller than this across are dropped.
+        largest : int, optional
+            Keep only so many parts, those of the most triangles.
+        """
+        from gp_labeler.imaging.islands import compact, kept_points  # numba, as below
+
+        kept = kept_points(self.points, self.triangles, smallest_mm=smallest_mm, largest=largest)
+        if kept.all():
+            return
+        n_points, n_triangles = compact(*_arrays(self.mesh), kept)
+        corners = self.mesh.GetPolys().GetConnectivityArray()
+        for array, n in (
+            (self.mesh.GetPoints().GetData(), n_points),
+            (self.mesh.GetPointData().GetNormals(), n_points),
+            (corners, 3 * n_triangles),
+        ):
+            if array is not None:
+                array.SetNumberOfTuples(n)
+                array.Squeeze()  # gives the memory back
+                array.Modified()
+        cells = vtkCellArray()
+        cells.SetData(3, corners)
+        self.mesh.SetPolys(cells)
+        self.mesh.GetPoints().Modified()
+
     def save(self, path: str | Path) -> None:
         """Write the surface as ``.ply``, ``.stl``, ``.vtp``, ``.obj``, ``.gltf`` or ``.glb``.
 
@@ -225,17 +256,25 @@ class Surface:
 
 def _subset(mesh: vtkPolyData, kept: NDArray[np.bool_]) -> vtkPolyData:
     """Return a mesh of some triangles, and of the points they use."""
-    triangles = triangles_of(mesh)[kept]
-    used = np.zeros(mesh.GetNumberOfPoints(), dtype=bool)
-    used[triangles] = True
-    number = np.cumsum(used) - 1
+    from gp_labeler.imaging.islands import subset  # numba takes long to import: not at start-up
+
+    points, normals, triangles = subset(*_arrays(mesh), kept)
     part = vtkPolyData()
-    part.SetPoints(points_of(to_numpy(mesh.GetPoints().GetData())[used]))
-    part.SetPolys(cells_of(number[triangles]))
-    normals = mesh.GetPointData().GetNormals()
-    if normals is not None:
-        part.GetPointData().SetNormals(to_vtk(to_numpy(normals)[used], share=True))
+    part.SetPoints(points_of(points))
+    part.SetPolys(cells_of(triangles))
+    if mesh.GetPointData().GetNormals() is not None:
+        part.GetPointData().SetNormals(to_vtk(normals, share=True))
     return part
+
+
+def _arrays(mesh: vtkPolyData) -> tuple[NDArray[Any], NDArray[Any], NDArray[np.int64]]:
+    """Return (N, 3) points and normals, which may be missing, and (T, 3) triangles, as views."""
+    normals = mesh.GetPointData().GetNormals()
+    return (
+        to_numpy(mesh.GetPoints().GetData()),
+        np.empty((0, 3), np.float32) if normals is None else to_numpy(normals),
+        triangles_of(mesh),
+    )
 
 
 def _build_without_blocking(locator: vtkStaticCellLocator, mesh: vtkPolyData) -> None:

@@ -93,7 +93,7 @@ def extract_isosurface(
     Returns
     -------
     Surface
-        Ready for picking.
+        The search structure for picking is made by the first pick, or by `Surface.prepare`.
 
     Raises
     ------
@@ -107,8 +107,6 @@ def extract_isosurface(
     Lorensen and Cline 1987, Marching cubes, doi:10.1145/37402.37422.
     Schroeder, Maynard and Geveci 2015, Flying edges, doi:10.1109/LDAV.2015.7348069.
     """
-    from gp_labeler.imaging.islands import kept_triangles  # numba takes long to import: not at start-up
-
     check_option(method, "method", METHODS)
     report = Report(progress, cancel)
     report(0.0)
@@ -120,14 +118,11 @@ def extract_isosurface(
     surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
     report(0.6)
     if surface.n_triangles and (smallest_mm > 0 or largest is not None):
-        points, triangles = surface.points, surface.triangles
-        surface = surface.only(kept_triangles(points, triangles, smallest_mm=smallest_mm, largest=largest))
+        surface.drop_parts(smallest_mm=smallest_mm, largest=largest)
     volume.check()
     volume.check()
     if not surface.n_triangles:
         raise _no_surface(volume, threshold, box)
-    report(0.8)
-    surface.prepare()
     report(1.0)
     return surface
 

@@ -51,7 +51,7 @@ class MeshFirst:
     def run(self, progress: Progress) -> Meshes:
         """Mesh few voxels; nothing, where so coarse a look shows no bone."""
         stride = overview_stride(self.volume, FIRST_LOOK_VOXELS)
-        return Meshes(_mesh_if_any(self, progress, stride=stride))
+        return Meshes(tuple(part.prepare() for part in _mesh_if_any(self, progress, stride=stride)))
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ class MeshOverview:
     def run(self, progress: Progress) -> Meshes:
         """Mesh all of it, and a preview mesh of few triangles."""
         stride = overview_stride(self.volume)
-        whole = _mesh(self, progress, end=0.8, stride=stride)
+        whole = _mesh(self, progress, end=0.8, stride=stride).prepare()
         if whole.n_triangles <= QUICK_TRIANGLES:
             return Meshes((whole,))
         progress(0.9)

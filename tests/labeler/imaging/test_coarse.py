@@ -11,6 +11,15 @@ from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.volume import Volume
 
 
+def test_means_of_extreme_values_are_exact() -> None:
+    for dtype, value in (("uint16", 65535), ("int16", -32768), ("uint32", 4_000_000_000), ("float32", 1e9)):
+        values = np.full((12, 12, 12), value, dtype)
+        values[::2] = 0
+        for side in (4, 6):
+            means = means_of_cubes(values, side, value / 2)
+            assert np.abs(means).max() < 1e-7 * abs(value) + 1e-9
+
+
 @pytest.mark.parametrize("dtype", ["uint8", "int16", "uint16", "float32"])
 @pytest.mark.parametrize("side", [1, 2, 3])
 def test_cubes_have_their_mean(dtype, side) -> None:
