@@ -68,7 +68,7 @@ CASES = {
 
 
 def our_slices(path: str) -> Callable[[], Any]:
-    """Cut three slices at full resolution, as 8-bit greys."""
+    """Cut three slices at full resolution, as 8-bit pictures."""
     import gp_labeler.imaging.readers.probe  # noqa: F401
     from gp_labeler.imaging.map_guard import maps_can_be_guarded
     from gp_labeler.imaging.readers import read_volume
@@ -88,7 +88,7 @@ def our_slices(path: str) -> Callable[[], Any]:
 
 
 def plain_slices(path: str) -> Callable[[], Any]:
-    """Do the same as a short script would: SimpleITK reads, VTK cuts and maps to greys."""
+    """Do the same as a short script would: SimpleITK reads, VTK cuts and maps the grey values."""
     read = _plain_reader(path)
     from vtkmodules.vtkImagingColor import vtkImageMapToWindowLevelColors
     from vtkmodules.vtkImagingCore import vtkImageReslice
