@@ -119,7 +119,7 @@ def extract_isosurface(
     report(0.6)
     if surface.n_triangles and (smallest_mm > 0 or largest is not None):
         surface.drop_parts(smallest_mm=smallest_mm, largest=largest)
-    volume.check()
+    report(0.9)
     volume.check()
     if not surface.n_triangles:
         raise _no_surface(volume, threshold, box)

@@ -55,7 +55,6 @@ def propose_threshold(volume: Volume) -> float:
     """
     values = _block_means(volume.voxels, volume.fill)
     volume.check()
-    volume.check()
     values = values[np.isfinite(values)]
     low, high = np.percentile(values, _TAILS_PERCENT) if len(values) else (0.0, 0.0)
     if not low < high:
