@@ -37,7 +37,8 @@ from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.pose.cochlea_pose import CochleaPose
-from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.estimate import estimate_again, estimate_pose
+from gp_core.pose.estimate_inputs import EstimateInputs
 from gp_core.pose.gate import GateReason, PoseGate
 from gp_core.pose.hypothesis_check import read_as
 from gp_core.pose.insertion_path import carry_path, read_path
@@ -82,6 +83,7 @@ __all__ = [
     "Deviation",
     "DistanceCheck",
     "DistanceTable",
+    "EstimateInputs",
     "Feature",
     "FiducialRegistration",
     "Finding",
@@ -122,6 +124,7 @@ __all__ = [
     "compare",
     "conditions",
     "distances",
+    "estimate_again",
     "estimate_pose",
     "fit_atlas",
     "gains",

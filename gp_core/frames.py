@@ -14,7 +14,7 @@ from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import FrameError
 from gp_core.validation import FloatArray, as_points
 
-__all__ = ["FRAMES", "RigidTransform", "angle_between_deg", "cross_matrix", "mirror_x"]
+__all__ = ["FRAMES", "RigidTransform", "angle_between_deg", "cross_matrix", "mirror_x", "quaternion_xyzw"]
 
 FRAMES = ("scan", "head", "tracker", "cochlea", "window", "atlas")
 
@@ -233,3 +233,36 @@ def angle_between_deg(first: FloatArray, second: FloatArray) -> FloatArray:
     cosine = np.sum(first * second, axis=-1)
     angle: FloatArray = np.degrees(np.arctan2(sine, cosine))
     return angle
+
+
+def quaternion_xyzw(rotation: FloatArray) -> FloatArray:
+    """Return a rotation matrix as a unit quaternion, in the order of ROS and SciPy.
+
+    Parameters
+    ----------
+    rotation : (3, 3) array
+        With determinant +1.
+
+    Returns
+    -------
+    (4,) array
+        x, y, z, w with w >= 0.
+
+    Examples
+    --------
+    >>> quaternion_xyzw(np.eye(3)).tolist()
+    [0.0, 0.0, 0.0, 1.0]
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = rotation.tolist()
+    # each row is the quaternion times four times one of its elements; the longest is the best conditioned
+    rows = np.array(
+        [
+            [1 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
+            [xy + yx, 1 - xx + yy - zz, yz + zy, xz - zx],
+            [xz + zx, yz + zy, 1 - xx - yy + zz, yx - xy],
+            [zy - yz, xz - zx, yx - xy, 1 + xx + yy + zz],
+        ]
+    )
+    best = rows[int(np.argmax(np.diag(rows)))]
+    quaternion: FloatArray = best / np.linalg.norm(best) * (-1.0 if best[3] < 0 else 1.0)
+    return quaternion + 0.0  # no negative zeros

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from os import PathLike
@@ -201,6 +201,16 @@ class Atlas:
         GpError
             The file cannot be written.
         """
+        write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the atlas as its JSON file holds it, with full precision.
+
+        Returns
+        -------
+        dict
+            Plain values for JSON; lengths in mm.
+        """
         content = {
             "gpAtlas": SCHEMA_VERSION,
             "name": self.name,
@@ -214,7 +224,28 @@ class Atlas:
         }
         if self.labelling_error != LabellingError():
             content["labelling_error"] = self.labelling_error.as_dict()
-        write_text(path, json.dumps(content, indent=1) + "\n")
+        return content
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Atlas:
+        """Make an atlas of what `as_dict` returned.
+
+        Parameters
+        ----------
+        content : mapping
+            Plain values.
+
+        Returns
+        -------
+        Atlas
+            Equal to that one to the last bit.
+
+        Raises
+        ------
+        GpError
+            It is no atlas of this schema version.
+        """
+        return cls._from_content(content, "atlas", "Fit the atlas again.")
 
     @checks_arguments
     def with_labelling_error(self, error: LabellingError | None) -> Atlas:

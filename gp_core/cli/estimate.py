@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.cli.options import (
+    AtlasSource,
     Subparsers,
     add_command,
     add_json,
     add_names,
     lab_names,
     read_atlas,
-    save_json,
     say,
 )
 from gp_core.constants import METHODS, MM_PER_DEGREE
+from gp_core.disk import write_text
 from gp_core.errors import GpError, blaming
+from gp_core.frames import angle_between_deg
 from gp_core.io import read_touches
 from gp_core.io.file_names import named_side
+from gp_core.io.pose_export import pose_text
+from gp_core.io.pose_json import is_pose_file, read_pose
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.answer import WITHHELD, pose_answer
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.estimate import estimate_pose
-from gp_core.pose.gate import PoseGate, named_for_other_side, reasons_against_writing
+from gp_core.pose.gate import GateReason, PoseGate, named_for_other_side
 from gp_core.pose.hypothesis_check import read_as, with_names_exchanged
 from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_before_centre, write_path
 from gp_core.pose.mixture import Hypothesis
@@ -37,7 +44,7 @@ from gp_core.validation import FloatArray
 
 __all__ = ["HELD_BACK", "add", "pose_table"]
 
-HELD_BACK = 3
+HELD_BACK = WITHHELD
 """Exit status of a command that wrote no pose because names or side look wrong."""
 
 _FOR_ROBOTS = ("tfm", "csv", "landmarks", "path_out")
@@ -71,18 +78,18 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "touches",
         metavar="TOUCHES",
-        help=".dat, .csv, .mrk.json or .fcsv with three or more touches; a feature may have several",
+        help=".dat, .csv, .mrk.json or .fcsv with three or more touches, of which a feature may have "
+        "several; or a pose that --json wrote, to estimate it again as it was, but for the options given",
     )
     add_names(parser)
-    parser.add_argument("--side", required=True, choices=("L", "R"), help="side of the head")
+    parser.add_argument("--side", choices=("L", "R"), help="side of the head; needed with a file of touches")
     parser.add_argument(
         "--atlas",
         nargs="+",
-        default=["published"],
         metavar="ATLAS",
         help="published (default), an atlas file, or landmark files of labelled animals",
     )
-    parser.add_argument("--method", choices=METHODS, default="robust", help="default: robust")
+    parser.add_argument("--method", choices=METHODS, help="default: robust")
     parser.add_argument(
         "--probe-noise",
         type=float,
@@ -93,7 +100,6 @@ def add(commands: Subparsers) -> None:
     parser.add_argument(
         "--round-window",
         choices=ROUND_WINDOWS,
-        default="touched",
         help="what y of the written frame points to: the middle of the touched RWA and RWP, where both fit "
         "(default), or of the fitted atlas",
     )
@@ -115,7 +121,6 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--shared-error",
         type=float,
-        default=DEFAULT_SHARED_ERROR_MM,
         metavar="MM",
         help="RMS length of an offset that all touches share (tip calibration, tracker, soft tissue); it "
         f"widens the region; default: {DEFAULT_SHARED_ERROR_MM:g}",
@@ -173,25 +178,20 @@ def run(args: argparse.Namespace) -> int:
         Exit status; see `gp_core.cli.entry.main`.
     """
     path = _path_of(args)
-    touches = read_touches(args.touches, args.side, names=lab_names(args))
-    if args.exchange is not None:
-        with blaming(args.touches):
-            touches = with_names_exchanged(touches, args.exchange)
-    atlas, specimens = read_atlas(args.atlas)
-    if atlas is None and args.method == "robust":
-        with blaming(" ".join(args.atlas)):
-            atlas = fit_atlas(specimens or [])
-    own_atlas = "" if args.atlas == ["published"] else f" with atlas {' '.join(args.atlas)}"
+    given = _given(args)
+    own_atlas = f" with atlas {' '.join(args.atlas)}" if args.atlas not in (None, ["published"]) else ""
     with blaming(args.touches + own_atlas):
-        touches, pose, taken = _estimated(args, touches, atlas, specimens)
+        touches, pose, taken = _estimated(args, given)
         next_touches = (
             ()
-            if atlas is None
-            else gains(touches, atlas, probe_noise=args.probe_noise, shared_error=args.shared_error)
+            if given.atlas is None
+            else gains(touches, given.atlas, probe_noise=given.probe_noise, shared_error=given.shared_error)
         )
-    ambiguities = _ambiguities(args, pose, taken)
-    held_back = bool(ambiguities) and not args.accept_warnings
-    _write(args, pose, path, held_back=held_back)
+    others = _other_reasons(given.source, pose, taken)
+    answer = pose_answer(pose, others, accept_warnings=args.accept_warnings)
+    held_back = answer["status"] == WITHHELD
+    ambiguities = [reason["text"] for reason in answer["reasons"]]
+    _write(args, pose, answer, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
     if taken is not None:
@@ -203,7 +203,113 @@ def run(args: argparse.Namespace) -> int:
         say(f"  ! {_what_was_held_back(args, ambiguities)}")
     elif ambiguities:
         say("  ! written although side or names are ambiguous: --accept-warnings was given")
+    if given.pose is not None:
+        say(f"  {_compared(pose, given.pose, args.touches)}")
     return HELD_BACK if held_back else 0
+
+
+@dataclass(frozen=True)
+class _Given:
+    """What the command line gives to estimate from: touches, or a pose file with what it was made from."""
+
+    touches: LandmarkSet
+    atlas: Atlas | None
+    specimens: Sequence[Specimen] | None
+    method: str
+    round_window: str
+    probe_noise: float | None
+    shared_error: float
+    times: Mapping[str, float] | None = None
+    source: str = ""
+    pose: CochleaPose | None = None
+
+    def estimate(self, touches: LandmarkSet) -> CochleaPose:
+        """Estimate touches in this way."""
+        pose = estimate_pose(
+            touches,
+            touches.side,
+            self.atlas,
+            method=self.method,
+            specimens=self.specimens,
+            probe_noise=self.probe_noise,
+            round_window=self.round_window,
+            shared_error=self.shared_error,
+            times=self.times,
+        )
+        assert pose.inputs is not None
+        return replace(pose, inputs=replace(pose.inputs, source=self.source))
+
+
+def _given(args: argparse.Namespace) -> _Given:
+    """Return what the command line gives; a pose file's own settings hold unless an option overrules them."""
+    given = _given_pose(args) if is_pose_file(args.touches) else _given_touches(args)
+    if args.exchange is not None:
+        with blaming(args.touches):
+            given = replace(given, touches=with_names_exchanged(given.touches, args.exchange))
+    return given
+
+
+def _given_touches(args: argparse.Namespace) -> _Given:
+    if args.side is None:
+        raise GpError("--side L or --side R is needed with a file of touches", file=args.touches)
+    touches = read_touches(args.touches, args.side, names=lab_names(args))
+    method = args.method or "robust"
+    return _Given(
+        touches,
+        *_atlas_for(args.atlas or ["published"], method),
+        method=method,
+        round_window=args.round_window or ROUND_WINDOWS[0],
+        probe_noise=args.probe_noise,
+        shared_error=DEFAULT_SHARED_ERROR_MM if args.shared_error is None else args.shared_error,
+        source=Path(args.touches).name,
+    )
+
+
+def _given_pose(args: argparse.Namespace) -> _Given:
+    pose = read_pose(args.touches)
+    made = pose.inputs
+    if made is None:
+        raise GpError(
+            "does not hold the touches and the atlas that it was estimated from",
+            file=args.touches,
+            remedy="It is of an earlier version: estimate it from the file of touches.",
+        )
+    if args.side not in (None, made.touches.side.value):
+        raise GpError(f"is of the {made.touches.side.word} side", file=args.touches)
+    method = args.method or made.method
+    atlas: AtlasSource = (made.atlas, list(made.specimens) or None)
+    if args.atlas is not None:
+        atlas = _atlas_for(args.atlas, method)
+    return _Given(
+        made.touches,
+        *atlas,
+        method=method,
+        round_window=args.round_window or made.round_window,
+        probe_noise=made.probe_noise if args.probe_noise is None else args.probe_noise,
+        shared_error=made.shared_error if args.shared_error is None else args.shared_error,
+        times=made.times,
+        source=made.source,
+        pose=pose,
+    )
+
+
+def _atlas_for(words: list[str], method: str) -> AtlasSource:
+    """Return the atlas, or the animals; the robust method has one fitted to them."""
+    atlas, specimens = read_atlas(words)
+    if atlas is None and method == "robust":
+        with blaming(" ".join(words)):
+            return fit_atlas(specimens or []), None
+    return atlas, specimens
+
+
+def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:
+    """Say how an estimate differs from that of the file which it was made from."""
+    name = Path(file).name
+    if np.array_equal(pose.transform, stored.transform) and pose.as_dict() == stored.as_dict():
+        return f"the same as in {name}, to the last bit"
+    mm = float(np.linalg.norm(pose.origin - stored.origin))
+    degrees = float(angle_between_deg(pose.axis, stored.axis))
+    return f"CO lies {mm:.2g} mm from that of {name}, the axis {degrees:.2g} deg"
 
 
 def _two_names(text: str) -> tuple[str, str]:
@@ -213,42 +319,25 @@ def _two_names(text: str) -> tuple[str, str]:
     return names[0], names[1]
 
 
-def _estimated(
-    args: argparse.Namespace,
-    touches: LandmarkSet,
-    atlas: Atlas | None,
-    specimens: list[Specimen] | None,
-) -> tuple[LandmarkSet, CochleaPose, Hypothesis | None]:
+def _estimated(args: argparse.Namespace, given: _Given) -> tuple[LandmarkSet, CochleaPose, Hypothesis | None]:
     """Estimate the touches as they are named; with ``--take-best``, under the likeliest hypothesis."""
-
-    def estimate(read: LandmarkSet) -> CochleaPose:
-        return estimate_pose(
-            read,
-            read.side,
-            atlas,
-            method=args.method,
-            specimens=specimens,
-            probe_noise=args.probe_noise,
-            round_window=args.round_window,
-            shared_error=args.shared_error,
-        )
-
-    pose = estimate(touches)
+    pose = given.estimate(given.touches)
     best = pose.likelier_hypothesis
     if best is None or not args.take_best:
-        return touches, pose, None
-    touches = read_as(touches, best)
-    return touches, estimate(touches), best
+        return given.touches, pose, None
+    touches = read_as(given.touches, best)
+    return touches, given.estimate(touches), best
 
 
-def _ambiguities(args: argparse.Namespace, pose: CochleaPose, taken: Hypothesis | None) -> list[str]:
-    """Return why side or names are ambiguous."""
-    ambiguities = [reason.text for reason in reasons_against_writing(pose)]
+def _other_reasons(source: str, pose: CochleaPose, taken: Hypothesis | None) -> list[GateReason]:
+    """Return what speaks against side or names beside the pose itself."""
+    others = []
     if taken is not None and taken.probability < _CERTAIN_ENOUGH:
-        ambiguities.append("the hypothesis used is not certain enough")
-    if named_side(args.touches) is pose.side.other:
-        ambiguities.append(named_for_other_side(Path(args.touches).name, pose.side).text)
-    return ambiguities
+        code = "side undecided" if taken.exchanged is None else "names undecided"
+        others.append(GateReason(code, "the hypothesis used is not certain enough"))
+    if source and named_side(source) is pose.side.other:
+        others.append(named_for_other_side(source, pose.side))
+    return others
 
 
 def _what_was_held_back(args: argparse.Namespace, ambiguities: Sequence[str]) -> str:
@@ -260,12 +349,20 @@ def _what_was_held_back(args: argparse.Namespace, ambiguities: Sequence[str]) ->
     return f"{what}. Check side and names, or give --accept-warnings"
 
 
-def _write(args: argparse.Namespace, pose: CochleaPose, path: FloatArray | None, *, held_back: bool) -> None:
+def _write(
+    args: argparse.Namespace,
+    pose: CochleaPose,
+    answer: Mapping[str, Any],
+    path: FloatArray | None,
+    *,
+    held_back: bool,
+) -> None:
     """Write the requested files; for a pose that is held back, only the JSON, which holds its state."""
     if path is not None:
         with blaming(args.path):
             carried = carry_path(path, pose, path_side=args.path_side)
-    save_json(args.json, pose.as_dict())
+    if args.json:
+        write_text(args.json, pose_text(answer))
     if held_back:
         return
     if path is not None:

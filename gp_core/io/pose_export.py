@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Mapping
 from os import PathLike
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from gp_core.disk import write_text
 from gp_core.io.header import FileHeader
@@ -15,10 +17,31 @@ from gp_core.landmarks.sets import Status
 if TYPE_CHECKING:
     from gp_core.pose.cochlea_pose import CochleaPose
 
-__all__ = ["AXIS_POINT_MM", "write_csv", "write_landmarks"]
+__all__ = ["AXIS_POINT_MM", "pose_text", "write_csv", "write_landmarks"]
 
 AXIS_POINT_MM = 5.0
 """Distance of the point ``axis`` in a landmark file from CO, towards the apex: about a cochlea's height."""
+
+
+def pose_text(content: Mapping[str, Any]) -> str:
+    """Return the JSON text of a pose; what it was made from is kept short, a line for each entry.
+
+    Parameters
+    ----------
+    content : mapping
+        As `CochleaPose.content` returns it, perhaps with more entries.
+
+    Returns
+    -------
+    str
+        With a final line end. Numbers have full precision.
+    """
+    about = content.get("inputs")
+    told = json.dumps({key: value for key, value in content.items() if key != "inputs"}, indent=1)
+    if about is None:
+        return told + "\n"
+    lines = ",\n".join(f"  {json.dumps(key)}: {json.dumps(value)}" for key, value in about.items())
+    return told.removesuffix("\n}") + ',\n "inputs": {\n' + lines + "\n }\n}\n"
 
 
 def write_csv(path: str | PathLike[str], pose: CochleaPose) -> None:

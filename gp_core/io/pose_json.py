@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import datetime
 from os import PathLike
 from typing import Any
 
@@ -10,19 +11,23 @@ import numpy as np
 
 from gp_core.argument_types import checks_arguments
 from gp_core.constants import METHODS
+from gp_core.disk import read_head
 from gp_core.errors import FileFormatError, GpError
 from gp_core.frames import FRAMES, RigidTransform
+from gp_core.io.pose_inputs_json import inputs_from
 from gp_core.io.text import shown
 from gp_core.io.text_files import read_text
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.repeats import RepeatedTouches
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.mixture import Hypothesis
 from gp_core.validation import FloatArray
 
-__all__ = ["read_pose"]
+__all__ = ["is_pose_file", "read_pose"]
 
 _VERSION = 1
 _AGREE = 1e-6
+_HEAD_BYTES = 1000
 _REMEDY = "Estimate the pose again."
 
 
@@ -61,6 +66,22 @@ def read_pose(path: str | PathLike[str]) -> CochleaPose:
             "is a damaged pose: numbers or names are not where they should be", file=path, remedy=_REMEDY
         ) from None
     return pose
+
+
+def is_pose_file(path: str | PathLike[str]) -> bool:
+    """Whether a file identifies itself as a pose; it may still be damaged.
+
+    Parameters
+    ----------
+    path : path-like
+        Any path.
+
+    Returns
+    -------
+    bool
+        False for folders, and for files that do not exist or cannot be read.
+    """
+    return b'"gpPose"' in read_head(path, _HEAD_BYTES)
 
 
 def _load(path: str | PathLike[str]) -> dict[str, Any]:
@@ -117,7 +138,25 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         shared_error=None if content.get("shared_error_mm") is None else _number(content["shared_error_mm"]),
         probability=_probability(content.get("probability", 1.0)),
         hypotheses=tuple(_hypothesis(entry, frame) for entry in content.get("hypotheses", ())),
+        repeats={_text(name): _repeated(one) for name, one in content.get("repeated_touches", {}).items()},
+        stamp=_stamp(content.get("stamp", "")),
+        inputs=None if content.get("inputs") is None else inputs_from(content["inputs"]),
     )
+
+
+def _repeated(content: dict[str, Any]) -> RepeatedTouches:
+    used = content["used"]
+    points = _numbers(content, "points", (len(used), 3))
+    return RepeatedTouches(
+        points, np.array(used, dtype=bool), _numbers(content, "mean", (3,)), _number(content["spread_mm"])
+    )
+
+
+def _stamp(value: Any) -> str:
+    text = _text(value)
+    if text and datetime.fromisoformat(text).tzinfo is None:
+        raise GpError("its stamp says no time zone")
+    return text
 
 
 def _hypothesis(content: dict[str, Any], frame: str) -> Hypothesis:

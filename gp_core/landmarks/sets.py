@@ -165,6 +165,7 @@ class LandmarkSet:
         return cls(np.full((len(CODES), 3), np.nan), Side.parse(side), frame)
 
     @classmethod
+    @checks_arguments
     def from_touches(
         cls,
         touches: Mapping[str, ArrayLike],

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from functools import cached_property
 from os import PathLike
 from typing import Any
@@ -14,12 +14,13 @@ import numpy as np
 from gp_core.argument_types import checks_arguments
 from gp_core.disk import write_text
 from gp_core.errors import GpError
-from gp_core.frames import RigidTransform
-from gp_core.io.pose_export import write_csv, write_landmarks
+from gp_core.frames import RigidTransform, quaternion_xyzw
+from gp_core.io.pose_export import pose_text, write_csv, write_landmarks
 from gp_core.io.tfm import write_tfm
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.repeats import RepeatedTouches
 from gp_core.pose.covariance import cone_95, radius_95
+from gp_core.pose.estimate_inputs import EstimateInputs
 from gp_core.pose.mixture import UNDECIDED, Hypothesis, axis_part, mixture_radius_95, origin_part
 from gp_core.validation import FloatArray, check_option, freeze_arrays
 
@@ -75,6 +76,10 @@ class CochleaPose:
         Other hypotheses that are not ruled out, the likeliest first.
     repeats : mapping of str to RepeatedTouches
         The touches of each feature that was touched more than once.
+    stamp : str
+        When it was estimated, ISO 8601 in UTC; empty where that is not known.
+    inputs : EstimateInputs or None
+        All that it was estimated from; `gp_core.estimate_again` runs it again.
     """
 
     side: Side
@@ -95,6 +100,8 @@ class CochleaPose:
     probability: float = 1.0
     hypotheses: tuple[Hypothesis, ...] = ()
     repeats: Mapping[str, RepeatedTouches] = field(default_factory=dict)
+    stamp: str = field(default="", compare=False)
+    inputs: EstimateInputs | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not isinstance(self.covariance, np.ndarray) or self.covariance.shape != (6, 6):
@@ -117,6 +124,11 @@ class CochleaPose:
     def transform(self) -> FloatArray:
         """(4, 4) homogeneous matrix ``T_tracker_cochlea``, mm."""
         return self.transform_to_touches.matrix
+
+    @property
+    def quaternion(self) -> FloatArray:
+        """(4,) rotation of ``T_tracker_cochlea`` as a unit quaternion x, y, z, w, with w >= 0."""
+        return quaternion_xyzw(self.transform_to_touches.rotation)
 
     @property
     def state(self) -> str:
@@ -170,7 +182,7 @@ class CochleaPose:
             yield h.probability, h.origin, h.axis, h.covariance
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the pose as the JSON file holds it.
+        """Return the pose itself as the JSON file holds it; `content` adds what it was made from.
 
         Returns
         -------
@@ -186,6 +198,7 @@ class CochleaPose:
             "cochlea_origin_mm": self.origin.tolist(),
             "modiolar_axis": self.axis.tolist(),
             "transform": self.transform.tolist(),
+            "quaternion_xyzw": self.quaternion.tolist(),
             "covariance": self.covariance.tolist(),
             "radius_95_mm": self.radius_95,
             "cone_95_deg": float(np.degrees(self.cone_95)),
@@ -211,9 +224,24 @@ class CochleaPose:
             content["repeated_touches"] = {code: one.as_dict() for code, one in self.repeats.items()}
         return content
 
+    def content(self) -> dict[str, Any]:
+        """Return all that the JSON file holds: the pose, when it was estimated, and what from.
+
+        Returns
+        -------
+        dict
+            `as_dict`, ``stamp`` (ISO 8601, UTC), ``stamp_unix_s`` and ``inputs``, where these are known.
+        """
+        about: dict[str, Any] = {}
+        if self.stamp:
+            about = {"stamp": self.stamp, "stamp_unix_s": datetime.fromisoformat(self.stamp).timestamp()}
+        if self.inputs is not None:
+            about["inputs"] = self.inputs.as_dict()
+        return {**self.as_dict(), **about}
+
     @checks_arguments
     def save(self, path: str | PathLike[str]) -> None:
-        """Write the pose as JSON.
+        """Write the pose as JSON, with all that is needed to estimate it again.
 
         Parameters
         ----------
@@ -225,7 +253,7 @@ class CochleaPose:
         GpError
             The file cannot be written.
         """
-        write_text(path, json.dumps(self.as_dict(), indent=1) + "\n")
+        write_text(path, pose_text(self.content()))
 
     def save_tfm(self, path: str | PathLike[str]) -> None:
         """Write the pose as an ITK transform file; see `gp_core.io.tfm.write_tfm`.

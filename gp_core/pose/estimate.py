@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from gp_core.argument_types import checks_arguments_but
+from gp_core.argument_types import checks_arguments, checks_arguments_but
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.constants import METHODS
@@ -18,6 +18,7 @@ from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.repeats import repeat_warnings
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
+from gp_core.pose.estimate_inputs import EstimateInputs, utc_now, versions_now
 from gp_core.pose.hypothesis_check import hypothesis_warnings
 from gp_core.pose.jrmpc_estimator import estimate_jrmpc
 from gp_core.pose.robust import estimate_robust
@@ -25,7 +26,7 @@ from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.pose.touched_window import towards_touched_window
 from gp_core.validation import check_option
 
-__all__ = ["estimate_pose"]
+__all__ = ["estimate_again", "estimate_pose"]
 
 
 @checks_arguments_but("touches")
@@ -100,9 +101,10 @@ def estimate_pose(
     if method == "jrmpc":
         pose = _with_hypotheses(estimate_jrmpc(landmarks, specimens), landmarks, atlas, specimens)
     else:
+        atlas, specimens = atlas or _default_atlas(specimens), None
         pose = estimate_robust(
             landmarks,
-            atlas or _default_atlas(specimens),
+            atlas,
             probe_noise=probe_noise,
             shared_error=shared_error,
             times=times,
@@ -110,9 +112,66 @@ def estimate_pose(
     repeats = {name: one for name, one in landmarks.repeats.items() if name in pose.residuals}
     if repeats:
         pose = replace(pose, repeats=repeats, warnings=(*pose.warnings, *repeat_warnings(repeats)))
-    if round_window == "expected":
-        return pose
-    return towards_touched_window(pose, landmarks)
+    inputs = EstimateInputs(
+        touches=landmarks,
+        method=method,
+        round_window=round_window,
+        probe_noise=probe_noise,
+        shared_error=shared_error,
+        times=times,
+        atlas=atlas,
+        specimens=tuple(specimens or ()),
+        versions=dict(versions_now()),
+    )
+    pose = replace(pose, stamp=utc_now(), inputs=inputs)
+    return pose if round_window == "expected" else towards_touched_window(pose, landmarks)
+
+
+@checks_arguments
+def estimate_again(pose: CochleaPose) -> CochleaPose:
+    """Estimate a pose again from all that it was made from, as its file holds it.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        Of this session, or from `gp_core.read_pose`.
+
+    Returns
+    -------
+    CochleaPose
+        Equal to the last bit on the same machine, and to 1e-9 on another; its stamp is the time now.
+
+    Raises
+    ------
+    GpError
+        The pose does not hold what it was made from: its file is of an earlier version.
+
+    Examples
+    --------
+    >>> atlas = Atlas.published()
+    >>> pose = estimate_pose({code: atlas[code] for code in ("CL", "MN", "OS", "RWA", "RWP")}, "L")
+    >>> bool((estimate_again(pose).transform == pose.transform).all())
+    True
+    """
+    made = pose.inputs
+    if made is None:
+        raise GpError(
+            "the pose does not hold the touches and the atlas that it was estimated from",
+            remedy="Its file is of an earlier version: estimate it from the file of touches.",
+        )
+    again = estimate_pose(
+        made.touches,
+        made.touches.side,
+        made.atlas,
+        method=made.method,
+        specimens=made.specimens or None,
+        probe_noise=made.probe_noise,
+        round_window=made.round_window,
+        shared_error=made.shared_error,
+        times=made.times,
+    )
+    assert again.inputs is not None
+    return replace(again, inputs=replace(again.inputs, source=made.source))
 
 
 def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:

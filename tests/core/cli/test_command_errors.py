@@ -188,8 +188,8 @@ def test_check_takes_the_side_of_one_odd_file(tmp_path: Path, capsys: pytest.Cap
     [
         ([], "gp-core: the following arguments are required: COMMAND. See gp-core --help."),
         (
-            ["estimate", "a.csv"],
-            "gp-core: the following arguments are required: --side. See gp-core estimate --help.",
+            ["physical", "--touches", "t.csv", "--ct-landmarks", "m.csv"],
+            "gp-core: the following arguments are required: --side. See gp-core physical --help.",
         ),
         (["estimate", "a.csv", "--side", "X"], "gp-core: argument --side: invalid choice: 'X'"),
         (
