@@ -6,10 +6,13 @@ import argparse
 import importlib
 import logging
 import platform
+import re
 import sys
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any, NoReturn
 
+from gp_core.disk import read_head
 from gp_core.errors import GpError
 from gp_core.extras import missing_package
 from gp_core.settings import check_settings, setting
@@ -19,6 +22,8 @@ __all__ = ["CommandParser", "add_completion", "start_messages"]
 
 _PACKAGES = ("gp_core", "gp_labeler")
 _LOG_FILE = "gp-labeler log file"
+_LOG_HEAD = 30
+_LOG_LINE = re.compile(rb"\d{4}-\d\d-\d\d \d\d:\d\d:\d\d,\d{3} ")
 _FILE_FORMAT = "%(asctime)s %(levelname)s %(name)s: %(message)s"
 
 
@@ -167,11 +172,27 @@ def start_messages(prog: str, words: Sequence[str], verbose: bool | None, log_fi
         )
 
 
+class _LogFile(logging.FileHandler):
+    """A log that ends with one line on stderr where it cannot be written any more, as on a full disk."""
+
+    def handleError(self, record: logging.LogRecord) -> None:  # noqa: N802 - overrides logging's
+        """Say why once; the command goes on without the log."""
+        if self.level <= logging.CRITICAL:
+            self.setLevel(logging.CRITICAL + 1)
+            reason = getattr(sys.exc_info()[1], "strerror", None) or "an error"
+            sys.stderr.write(f"{printable(self.baseFilename)}: the log is cut off here ({reason})\n")
+
+
 def _file_handler(path: str) -> logging.Handler:
     if not path.endswith(".log") and not path.startswith("/dev/"):  # nothing that is data is appended to
         raise GpError("the name of a log ends in .log", file=path, remedy="Name another file.")
+    if Path(path).is_fifo():  # it would wait for a reader
+        raise GpError("the log cannot be a pipe", file=path, remedy="Name another file.")
+    head = read_head(path, _LOG_HEAD)
+    if head and not _LOG_LINE.match(head):  # such as the log of a scanner, which belongs to its scan
+        raise GpError("is no log of this program", file=path, remedy="Name another file.")
     try:
-        handler = logging.FileHandler(path, encoding="utf-8", errors="backslashreplace")
+        handler = _LogFile(path, encoding="utf-8", errors="backslashreplace")
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise GpError(f"the log cannot be written ({reason})", file=path) from None

@@ -133,7 +133,7 @@ def _read(file: Path) -> Mapping[str, Any]:
         if file.stat().st_size > _MAX_BYTES:
             raise GpError("is no file of settings: it is too large", file=file)
         values: Mapping[str, Any] = _toml_loader()(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         remedy = "Correct it, or delete it: it holds settings only."
         raise GpError(f"the settings cannot be read ({error})", file=file, remedy=remedy) from None
     unknown = sorted(values.keys() - _BY_NAME.keys())

@@ -142,7 +142,7 @@ def _to_lps(mesh: pv.PolyData, head: bytes) -> pv.PolyData:
 def _is_json(file: Path) -> bool:
     try:
         json.loads(file.read_bytes())
-    except ValueError:
+    except (ValueError, RecursionError):
         return False
     return True
 

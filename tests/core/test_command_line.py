@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -41,3 +42,18 @@ def test_a_log_is_never_appended_to_data(tmp_path: Path, name: str) -> None:
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert (tmp_path / "touches.csv").read_text() == "CL,1,2,3\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="other systems have no such files")
+def test_a_log_that_cannot_be_written_is_one_line(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe.log")
+    refused = _estimate("--log-file", "pipe.log", cwd=tmp_path)
+    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
+    scanner = b"\xff\xfe[\0S\0y\0s\0t\0e\0m\0]\0"
+    (tmp_path / "head_rec.log").write_bytes(scanner)
+    assert "is no log of this program" in _estimate("--log-file", "head_rec.log", cwd=tmp_path).stderr
+    assert (tmp_path / "head_rec.log").read_bytes() == scanner
+    if Path("/dev/full").exists():
+        full = _estimate("--log-file", "/dev/full", "--json", "pose.json", cwd=tmp_path)
+        assert full.stderr == "/dev/full: the log is cut off here (No space left on device)\n"
+        assert (full.returncode, (tmp_path / "pose.json").exists()) == (0, True)

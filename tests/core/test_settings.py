@@ -46,6 +46,7 @@ def test_the_file_says_and_the_variable_overrules(file: Path, monkeypatch: pytes
         ("state = 3", "state must be a path"),
         ("workers = ", "the settings cannot be read"),
         ("\x00", "the settings cannot be read"),
+        ("a = " + "[" * 60_000, "the settings cannot be read"),
     ],
 )
 def test_what_is_wrong_is_one_line_of_any_command(

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import shutil
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
 
@@ -13,11 +15,23 @@ import numpy as np
 from gp_core import CODES, PROBE, Atlas, estimate_pose, read_touches
 from gp_core.atlas.sampling import draw_animal
 from gp_core.io import write_csv, write_fcsv, write_markups
+from gp_core.io.file_names import landmark_file_name
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["make_samples"]
 
 SIDE = "L"
+REMEMBERED = {
+    "host": "localhost",
+    "port": 18944,
+    "probe": "StylusToTracker",
+    "reference": "",
+    "button": "",
+    "tip": "0 0 1",
+    "may stand still": True,
+    "largest region sent": [1.0, 10.0],
+}
 
 
 def make_samples(folder: Path) -> dict[str, list[Path]]:
@@ -28,6 +42,7 @@ def make_samples(folder: Path) -> dict[str, list[Path]]:
     samples |= _tables(folder / "tables", rng)
     samples |= _sessions(folder / "sessions")
     samples["scan"] = _scans(folder / "scans", rng)
+    samples["mesh"] = _meshes(folder / "meshes")
     return samples
 
 
@@ -39,6 +54,14 @@ def _landmarks(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
         animal = draw_animal(atlas, rng=rng)
         for side in "LR":
             write_markups(animals / f"{name}_{side}.mrk.json", animal.side(side), specimen=name)
+    labellings = folder / "labellings"
+    labellings.mkdir()
+    for name, observer, round_ in itertools.product("EF", ("AB", "CD"), (1, 2)):
+        side = draw_animal(atlas, rng=rng).side(SIDE)
+        known = {"CA": LabelProvenance("mesh", observer, certainty="fair", note="-1+2")}
+        told = replace(side, provenance=known, observer=observer, round=round_)
+        file = landmark_file_name(name, told.side, observer=observer, round_=round_)
+        write_markups(labellings / file, told, specimen=name)
     one = draw_animal(atlas, rng=rng).side(SIDE)
     skull = {f"S{i}": rng.normal(scale=15, size=3) for i in range(1, 9)}
     with_skull = LandmarkSet(one.points, one.side, one.frame, extra=MappingProxyType(skull))
@@ -49,7 +72,9 @@ def _landmarks(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
     touched += [f"{name},{','.join(repr(float(x)) for x in p + 0.1)}" for name, p in skull.items()]
     (folder / "touches.csv").write_text("name,x,y,z\n" + "\n".join(touched) + "\n")
     (folder / "touches.tsv").write_text("name\tx\ty\tz\n" + "\n".join(touched).replace(",", "\t") + "\n")
-    np.savetxt(folder / "touches.dat", rng.normal(scale=10, size=(16, 3)), delimiter="\t")
+    unseen = np.full(3, -1000.0)
+    rows = [one[code] if code else unseen for code in ("CL", "MN", "OS", "", "RWA", "RWP", "LLI", "")]
+    np.savetxt(folder / "touches.dat", [*rows, *(place + 0.1 for place in skull.values())], delimiter="\t")
     marks = [folder / f"one_L{suffix}" for suffix in (".mrk.json", ".fcsv", ".csv")]
     touches = [folder / f"touches{suffix}" for suffix in (".csv", ".tsv", ".dat")]
     atlas.save(folder / "atlas.json")
@@ -58,6 +83,7 @@ def _landmarks(folder: Path, rng: np.random.Generator) -> dict[str, list[Path]]:
         "landmarks": marks,
         "touches": touches,
         "animals": [animals],
+        "labellings": [labellings],
         "atlas": [folder / "atlas.json"],
         "pose": [folder / "pose.json"],
     }
@@ -156,12 +182,16 @@ def _sessions(folder: Path) -> dict[str, list[Path]]:
         'feature = "CA"\nside = "L"\nat = [1.0, 2, 3]\n[[step]]\ndo = "save"\n'
     )
     (folder / "script.json").write_text(json.dumps([{"do": "open", "phantom": 0}, {"do": "export"}]))
+    (folder / "window.json").write_text(json.dumps({"tracker": REMEMBERED}))
+    (folder / "settings.toml").write_text('workers = 2\nverbose = false\ncanvas = "painted"\n')
     (folder / "recent.json").write_text(json.dumps({"files": ["/a", "/b"]}))
     return {
         "specimen": [saved],
         "journal": [folder / "journal.jsonl"],
         "script": [folder / "script.toml", folder / "script.json"],
         "state": [folder / "recent.json"],
+        "tracker": [folder / "window.json"],
+        "settings": [folder / "settings.toml"],
     }
 
 
@@ -210,3 +240,16 @@ def _scans(folder: Path, rng: np.random.Generator) -> list[Path]:
     head[44:68] = np.array([14, 12, 10, 1400, 1200, 2000], "<i4").tobytes()
     (folder / "a.isq").write_bytes(bytes(head) + voxels.astype("<i2").tobytes())
     return found
+
+
+def _meshes(folder: Path) -> list[Path]:
+    import pyvista
+
+    folder.mkdir()
+    made = []
+    for name in ("a.ply", "a.stl", "a.vtp"):
+        pyvista.Sphere(theta_resolution=8, phi_resolution=8).save(folder / name)
+        made.append(folder / name)
+    corners = "".join(f"v {x} {y} {z}\n" for x, y, z in ((0, 0, 0), (1, 0, 0), (0, 1, 0)))
+    (folder / "a.obj").write_text(f"{corners}f 1 2 3\n")
+    return [*made, folder / "a.obj"]

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import io
+import itertools
 import json
 import logging
+import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +18,14 @@ import gp_core
 from gp_core.atlas.atlas import Atlas
 from gp_core.cli import main as gp_core_main
 from gp_core.errors import GpError
-from gp_core.io import import_mat, load_specimens, read_authors_mat, read_lab_names, read_points
+from gp_core.io import (
+    import_mat,
+    load_labellings,
+    load_specimens,
+    read_authors_mat,
+    read_lab_names,
+    read_points,
+)
 from gp_core.io.pose_json import read_pose
 from gp_core.io.stl import read_stl
 from gp_core.io.tracker_recordings import read_marker_poses, read_recording
@@ -34,6 +43,7 @@ from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.touching import load_skull, load_touches
+from gp_labeler.imaging.mesh_files import read_mesh
 from gp_labeler.imaging.readers import inspect_volume, read_volume
 from gp_labeler.scripting.script import read_script
 from gp_labeler.views.window_state import WindowState
@@ -80,6 +90,9 @@ COMMANDS = (
         "--n 3 --json {out}",
     ),
     ("mat", "import-mat {in} {in} -o {dir}"),
+    ("animals", "reliability {in} --json {out} --csv {dir}.csv"),
+    ("labellings", "reliability {in} --json {out} --csv {dir}.csv"),
+    ("labellings", "check {in} --json {out}"),
 )
 
 STEPS: tuple[tuple[str, dict[str, object]], ...] = (
@@ -172,6 +185,36 @@ def _in_window(table: dict[str, object]) -> Callable[[Path, Path], Outcome]:
     return run
 
 
+def _with_settings(run: Callable[[Path, Path], Outcome]) -> Callable[[Path, Path], Outcome]:
+    """Run a command with the bad file as the user's settings, under a name that no other run has."""
+
+    def with_settings(path: Path, folder: Path) -> Outcome:
+        named = folder / f"settings-{next(_NUMBERS)}.toml"
+        named.symlink_to(path)
+        os.environ["GP_LABELER_SETTINGS"] = str(named)
+        try:
+            return run(path, folder)
+        finally:
+            del os.environ["GP_LABELER_SETTINGS"]
+
+    return with_settings
+
+
+def _tracker_dialog(path: Path, folder: Path) -> Outcome:
+    return Outcome(0, WINDOW.tracker_fault(path, folder))
+
+
+def _physical_dialog(kind: str) -> Callable[[Path, Path], Outcome]:
+    def run(path: Path, folder: Path) -> Outcome:
+        marks = GOOD["folder"] / "landmarks"
+        skull, touches = marks / "one_L.csv", marks / "touches.csv"
+        given = {"touches": (skull, path), "landmarks": (path, touches)}[kind]
+        return Outcome(0, WINDOW.physical_fault(*given, skull, folder))
+
+    return run
+
+
+_NUMBERS = itertools.count()
 WINDOW = Window()
 
 
@@ -264,6 +307,8 @@ def _all() -> Iterator[Target]:
         ("mat", lambda p: read_authors_mat(p, p)),
         ("mat", lambda p: import_mat(p, p, p.parent / "made")),
         ("stl", read_stl),
+        ("mesh", read_mesh),
+        ("labellings", load_labellings),
         ("checkpoint", lambda p: Checkpoint(p, "0" * 32)),
         ("specimen", read_specimen),
         ("specimen", lambda p: read_animals([p])),
@@ -279,6 +324,15 @@ def _all() -> Iterator[Target]:
         yield Target(f"gp-core {line.split()[0]} ({kind})", kind, _command(gp_core_main, *line.split()))
     mesh = "mesh {in} -o {dir}.ply --spacing 0.1 --threshold 100"
     yield Target("gp-labeler mesh", "scan", _command(gp_labeler_main, *mesh.split()))
+    straighten = "straighten {in} --spacing 0.1 --threshold 100 --json {out}"
+    yield Target("gp-labeler straighten", "scan", _command(gp_labeler_main, *straighten.split()))
+    export = "export {in} -o {dir} --suggested"
+    yield Target("gp-labeler export", "specimen", _command(gp_labeler_main, *export.split()))
+    estimate = f"estimate {MARKS}/touches.dat --side L --json {{out}}"
+    yield Target("settings", "settings", _with_settings(_command(gp_core_main, *estimate.split())))
+    yield Target("dialog of the tracker", "tracker", _tracker_dialog)
+    for kind in ("touches", "landmarks"):
+        yield Target(f"dialog of the physical test ({kind})", kind, _physical_dialog(kind))
     for kind, table in STEPS:
         yield Target(f"window {table['do']} ({kind})", kind, _in_window(table))
     offscreen = ("--offscreen", "{in}", "--output", "{dir}")
