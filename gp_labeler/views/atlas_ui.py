@@ -6,7 +6,7 @@ from pathlib import Path
 
 from gp_core.atlas.label_check import Finding
 from gp_core.landmarks.features import feature
-from gp_labeler.views.bind import attempt
+from gp_labeler.views.signals import attempt
 from gp_labeler.views.ui_part import UiPart
 
 __all__ = ["AtlasUi"]

@@ -12,8 +12,8 @@ from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
 from gp_labeler.commands.actions import ACTIONS, MENUS, Action, Ui, run
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.shortcuts_sheet import keys_text
+from gp_labeler.views.signals import follow
 
 __all__ = ["Commands"]
 

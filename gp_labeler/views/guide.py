@@ -19,13 +19,15 @@ from gp_core.landmarks.features import CODES, RECOMMENDED, Side, feature
 from gp_core.pose.quality import pose_quality
 from gp_labeler.models.pose import ORDER
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, degrees_text, follow, set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels, styled, text_scale
+from gp_labeler.views.formatting import degrees_text
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import scrolled, text_label
 from gp_labeler.views.panels.pose.wording import sentence
 from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
+from gp_labeler.views.signals import attempt, follow
+from gp_labeler.views.stylesheet import set_role
 
 __all__ = ["GuideWindow"]
 

@@ -24,7 +24,6 @@ from gp_labeler.document.animals import may_hold_labels
 from gp_labeler.models.view import ViewModel as SessionView
 from gp_labeler.models.view import ViewState
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.commands import Commands
 from gp_labeler.views.fonts import desktop_scale, nearest_text_size
 from gp_labeler.views.painting.measure_layer import MeasureLayer
@@ -39,6 +38,7 @@ from gp_labeler.views.panels.scan.welcome import Welcome
 from gp_labeler.views.panels.tracker.card import TrackerCard
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.signals import follow
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.top_bar import TopBar

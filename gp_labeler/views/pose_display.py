@@ -9,9 +9,9 @@ from qtpy.QtCore import QObject
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.pose_data import DrawnTip, PoseScene
-from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn_pose import pose_scene
 from gp_labeler.views.painting.pose_layer import PoseLayer
+from gp_labeler.views.signals import follow
 from gp_labeler.views.view_grid import ViewGrid
 
 __all__ = ["PoseDisplay"]

@@ -31,7 +31,7 @@ from gp_labeler.models.pose import OverlayOptions
 from gp_labeler.models.pose_exports import InsertionPath
 from gp_labeler.models.view import ViewState
 from gp_labeler.scene.pose_data import PARTS
-from gp_labeler.views.bind import follow
+from gp_labeler.views.signals import follow
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow

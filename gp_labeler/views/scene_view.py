@@ -33,7 +33,6 @@ from gp_labeler.scene.marks import GlyphSize
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.slices import VolumeSlicer
-from gp_labeler.views.bind import follow
 from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
@@ -47,6 +46,7 @@ from gp_labeler.views.painting.scene_overlay import (
     paint_pointer,
 )
 from gp_labeler.views.placement_tool import PlacementTool
+from gp_labeler.views.signals import follow
 from gp_labeler.views.slice_window_level import window_level_of
 from gp_labeler.views.theme import theme_of
 

@@ -6,7 +6,7 @@ from qtpy.QtCore import Qt
 from qtpy.QtGui import QWheelEvent
 from qtpy.QtWidgets import QSlider, QWidget
 
-from gp_labeler.views.bind import blocked
+from gp_labeler.views.signals import blocked
 from gp_labeler.views.slice_view import SliceView
 
 __all__ = ["SliceSlider"]

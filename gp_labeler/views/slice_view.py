@@ -21,13 +21,13 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.window_level import WindowLevel
-from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.drawn_measurements import handle_of, mark_or_handle
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.slice_layers import SliceLayer
 from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
 from gp_labeler.views.placement_tool import PlacementTool, nudge
+from gp_labeler.views.signals import follow
 from gp_labeler.views.slice_window_level import drag_window_level, window_level_of
 
 __all__ = ["SliceView"]

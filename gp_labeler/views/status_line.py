@@ -14,10 +14,10 @@ from gp_labeler.document.edits import point_text
 from gp_labeler.imaging.anatomical_frame import LETTERS
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import breakable
+from gp_labeler.views.signals import follow
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["StatusLine", "where_text"]

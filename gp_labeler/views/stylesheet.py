@@ -5,13 +5,15 @@ from __future__ import annotations
 from string import Template
 from typing import TYPE_CHECKING
 
+from qtpy.QtWidgets import QWidget
+
 from gp_core.resources import resource_path
 from gp_labeler.views.fonts import BIG, CAPTION, HEADING, TEXT, TITLE, families
 
 if TYPE_CHECKING:
     from gp_labeler.views.theme import Theme
 
-__all__ = ["stylesheet"]
+__all__ = ["set_role", "stylesheet"]
 
 _TEMPLATE = Template("""
 QMainWindow, QDialog { background: $panel; }
@@ -172,6 +174,14 @@ def stylesheet(theme: Theme, text_scale: float = 1.0) -> str:
     return _TEMPLATE.substitute(
         colours | _sizes(text_scale), ghost=theme.states["ghost"], icons=icons, families=quoted
     )
+
+
+def set_role(widget: QWidget, role: str) -> None:
+    """Give a widget one of the looks of the style sheet, also after it was shown."""
+    if widget.property("role") != role:
+        widget.setProperty("role", role)
+        widget.style().unpolish(widget)
+        widget.style().polish(widget)
 
 
 def _sizes(scale: float) -> dict[str, str]:

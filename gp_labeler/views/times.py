@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from gp_labeler.views.bind import NONE
+from gp_labeler.views.formatting import NONE
 
 __all__ = ["time_text"]
 

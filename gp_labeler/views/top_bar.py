@@ -9,10 +9,12 @@ from qtpy.QtGui import QAction, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QToolButton, QWidget
 
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow, set_role, size_text, spacing_text
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
+from gp_labeler.views.formatting import size_text, spacing_text
 from gp_labeler.views.icons import icon
 from gp_labeler.views.panels.parts import ElidedLabel
+from gp_labeler.views.signals import follow
+from gp_labeler.views.stylesheet import set_role
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["TopBar"]

@@ -7,8 +7,8 @@ from qtpy.QtWidgets import QApplication
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.pose_data import DrawnTip
-from gp_labeler.views.bind import follow
 from gp_labeler.views.pose_display import PoseDisplay
+from gp_labeler.views.signals import follow
 
 __all__ = ["TrackerDisplay"]
 

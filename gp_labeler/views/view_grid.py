@@ -9,10 +9,11 @@ from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolBut
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
-from gp_labeler.views.bind import follow, value_text
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
+from gp_labeler.views.formatting import value_text
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
+from gp_labeler.views.signals import follow
 from gp_labeler.views.slice_slider import SliceSlider
 from gp_labeler.views.slice_view import SliceView
 from gp_labeler.views.theme import theme_of

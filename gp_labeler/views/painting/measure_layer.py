@@ -10,7 +10,6 @@ from qtpy.QtGui import QPainter
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.slice_viewport import SliceViewport
-from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn_measurements import kept_measurements, moving_measurements
 from gp_labeler.views.painting.measurement_strokes import (
     Strokes,
@@ -20,6 +19,7 @@ from gp_labeler.views.painting.measurement_strokes import (
 )
 from gp_labeler.views.painting.name_tags import NameTag
 from gp_labeler.views.painting.slice_painter import reach_of
+from gp_labeler.views.signals import follow
 
 if TYPE_CHECKING:
     from gp_labeler.views.slice_view import SliceView

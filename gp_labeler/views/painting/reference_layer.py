@@ -13,11 +13,11 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.slice_viewport import SliceViewport
-from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_references
 from gp_labeler.views.painting.marks import paint_mark
 from gp_labeler.views.painting.name_tags import NameTag
 from gp_labeler.views.painting.slice_painter import reach_of
+from gp_labeler.views.signals import follow
 
 if TYPE_CHECKING:
     from gp_labeler.views.slice_view import SliceView

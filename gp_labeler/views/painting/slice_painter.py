@@ -18,7 +18,6 @@ from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.segments import Segment
 from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.scene.slices import SliceImage, VolumeSlicer
-from gp_labeler.views.bind import follow
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.painting.marks import ACTIVE_GROWTH, paint_mark
@@ -27,6 +26,7 @@ from gp_labeler.views.painting.qt_paths import segments_path
 from gp_labeler.views.painting.scale_bar import paint_scale_bar
 from gp_labeler.views.painting.slice_lines import paint_lines
 from gp_labeler.views.painting.word_pictures import word_picture
+from gp_labeler.views.signals import follow
 from gp_labeler.views.theme import Theme, theme_of
 
 if TYPE_CHECKING:

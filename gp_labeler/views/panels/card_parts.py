@@ -16,10 +16,10 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
-from gp_labeler.views.bind import blocked
 from gp_labeler.views.chips import chip_pixmap
 from gp_labeler.views.fonts import TEXT, fit, pixels, styled
 from gp_labeler.views.panels.parts import Notice, emptied, text_label
+from gp_labeler.views.signals import blocked
 from gp_labeler.views.theme import theme_of
 
 _CHIP = 14

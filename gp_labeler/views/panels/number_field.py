@@ -6,8 +6,8 @@ from qtpy.QtCore import QRegularExpression, QSize, Qt, Signal
 from qtpy.QtGui import QKeyEvent, QRegularExpressionValidator, QWheelEvent
 from qtpy.QtWidgets import QLineEdit, QWidget
 
-from gp_labeler.views.bind import value_text
 from gp_labeler.views.fonts import field_width, fit
+from gp_labeler.views.formatting import value_text
 
 __all__ = ["NumberField"]
 

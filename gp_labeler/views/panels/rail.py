@@ -10,11 +10,11 @@ from qtpy.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayo
 
 from gp_core.landmarks.features import Side
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.panels.action_button import Actions, do_action
+from gp_labeler.views.signals import follow
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["STEPS", "Rail", "WorkStep"]

@@ -25,7 +25,6 @@ from gp_core.landmarks.features import CODES, FEATURES, Side, index_of
 from gp_labeler.document.edits import CheckPoint, SwapPoints
 from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import feature_picture
 from gp_labeler.views.panels.label.feature_card import FeatureCard
@@ -33,6 +32,7 @@ from gp_labeler.views.panels.label.landmark_menu import landmark_menu
 from gp_labeler.views.panels.label.landmark_table import LandmarkTable
 from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.rail import Rail
+from gp_labeler.views.signals import attempt
 from gp_labeler.views.theme import DARK, LIGHT, apply_theme, contrast
 
 pytestmark = [

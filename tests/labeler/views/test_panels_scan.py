@@ -16,7 +16,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import SetThreshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import mm_text, position_text, spacing_text, value_text, voxel_text
+from gp_labeler.views.formatting import mm_text, position_text, spacing_text, value_text, voxel_text
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.panels.scan.notes_card import NotesCard

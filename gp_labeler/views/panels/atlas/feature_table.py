@@ -23,9 +23,10 @@ from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import NONE, attempt, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
+from gp_labeler.views.formatting import NONE
+from gp_labeler.views.signals import attempt, follow
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["FeatureTable", "FeatureTableModel"]

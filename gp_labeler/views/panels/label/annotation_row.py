@@ -6,8 +6,8 @@ from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QToolButton, QWidget
 
 from gp_core.landmarks.provenance import Certainty
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, blocked
 from gp_labeler.views.panels.label.certainty import CERTAINTY_HINTS
+from gp_labeler.views.signals import attempt, blocked
 
 __all__ = ["AnnotationRow"]
 

@@ -9,7 +9,7 @@ from gp_labeler.document.edits import point_text
 from gp_labeler.document.state import Landmark
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.workflow import OPENING, PointState
-from gp_labeler.views.bind import mm_text, suggestion_text
+from gp_labeler.views.formatting import mm_text, suggestion_text
 from gp_labeler.views.panels.parts import breakable
 from gp_labeler.views.times import time_text
 

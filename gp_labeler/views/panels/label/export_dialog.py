@@ -24,7 +24,6 @@ from gp_core.landmarks.sets import Status
 from gp_labeler.document.landmark_export import CO_IS_COMPUTED, FORMATS, export_landmarks, export_names
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
     Notice,
@@ -34,6 +33,7 @@ from gp_labeler.views.panels.parts import (
     scrolled,
     text_label,
 )
+from gp_labeler.views.signals import follow
 
 __all__ = ["ExportDialog"]
 

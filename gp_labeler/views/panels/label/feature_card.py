@@ -22,7 +22,6 @@ from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.document.edits import CheckPoint, SwapSides
 from gp_labeler.document.state import How
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
@@ -31,6 +30,8 @@ from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.label.annotation_row import AnnotationRow
 from gp_labeler.views.panels.label.card_content import CardContent, content_of
 from gp_labeler.views.shortcuts_sheet import keys_text
+from gp_labeler.views.signals import attempt, blocked, follow
+from gp_labeler.views.stylesheet import set_role
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["FeatureCard"]

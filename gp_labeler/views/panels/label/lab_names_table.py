@@ -17,8 +17,8 @@ from qtpy.QtWidgets import (
 
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import LabelNames, parse_label
-from gp_labeler.views.bind import blocked
 from gp_labeler.views.panels.parts import ElidedLabel, emptied, text_label
+from gp_labeler.views.signals import blocked
 
 __all__ = ["LabNamesTable"]
 

@@ -19,8 +19,8 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.labelling_edits import labelling_text, next_round
 from gp_labeler.models.labellings import LabellingRow, labelling_rows
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.parts import open_at, text_label
+from gp_labeler.views.signals import attempt, follow
 from gp_labeler.views.times import time_text
 
 __all__ = ["LabellingsDialog"]

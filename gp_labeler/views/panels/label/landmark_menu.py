@@ -12,7 +12,7 @@ from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.document.edits import CheckPoint, ClearPoint, MarkUnseen, point_text
 from gp_labeler.document.state import How, Landmark
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt
+from gp_labeler.views.signals import attempt
 
 __all__ = ["landmark_menu"]
 

@@ -19,7 +19,6 @@ from gp_core.landmarks.features import CODES, FEATURES, Side, feature, index_of
 from gp_labeler.document.edits import ClearPoint
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
 from gp_labeler.views.panels.label.landmark_menu import landmark_menu
@@ -31,6 +30,7 @@ from gp_labeler.views.panels.label.landmark_table_model import (
     STATE_ROLE,
     LandmarkTableModel,
 )
+from gp_labeler.views.signals import attempt, blocked, follow
 from gp_labeler.views.theme import Theme, theme_of
 
 __all__ = ["LandmarkTable"]

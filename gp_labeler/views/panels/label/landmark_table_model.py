@@ -9,7 +9,8 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentMo
 from gp_core.landmarks.features import CODES, Side, feature, index_of
 from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow, mm_text, suggestion_text
+from gp_labeler.views.formatting import mm_text, suggestion_text
+from gp_labeler.views.signals import follow
 
 __all__ = ["ACTIVE_ROLE", "CODE_ROLE", "LOCKED_ROLE", "SIDES", "STATE_ROLE", "LandmarkTableModel"]
 

@@ -6,9 +6,10 @@ from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWi
 
 from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow, set_role
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.parts import ElidedLabel, text_label
+from gp_labeler.views.signals import attempt, follow
+from gp_labeler.views.stylesheet import set_role
 
 __all__ = ["ObserverRow"]
 

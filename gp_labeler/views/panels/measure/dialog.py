@@ -8,13 +8,13 @@ from qtpy.QtWidgets import QComboBox, QDialog, QHBoxLayout, QPushButton, QVBoxLa
 from gp_core.landmarks.features import Side
 from gp_core.study.distance_check import DISAGREES_SD, PairDistance
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.finding_list import FindingList, FindingRow
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.measure.distance_table import DistanceMatrixView
 from gp_labeler.views.panels.measure.measurement_table import MeasurementTable
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
+from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["MeasureDialog"]
 

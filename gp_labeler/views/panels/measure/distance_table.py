@@ -28,9 +28,10 @@ from qtpy.QtWidgets import (
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.study.distance_check import DistanceCheck, PairDistance
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import NONE, follow
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels, text_width
+from gp_labeler.views.formatting import NONE
+from gp_labeler.views.signals import follow
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["DistanceMatrixModel", "DistanceMatrixView"]

@@ -8,8 +8,8 @@ from qtpy.QtWidgets import QAbstractItemView, QHeaderView, QTableWidget, QTableW
 
 from gp_core.landmarks.measurements import LINE
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.fonts import fit, line_height, pixels, text_width
+from gp_labeler.views.signals import attempt, blocked, follow
 
 __all__ = ["MeasurementTable"]
 

@@ -8,7 +8,7 @@ from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QInputDialog, QMenu, QWidget
 
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt
+from gp_labeler.views.signals import attempt
 
 __all__ = ["measurement_menu"]
 

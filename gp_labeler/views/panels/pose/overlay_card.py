@@ -6,12 +6,12 @@ from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QCheckBox, QGridLayout, QHBoxLayout, QSlider, QWidget
 
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import link
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.signals import blocked, follow
 
 __all__ = ["OverlayCard"]
 

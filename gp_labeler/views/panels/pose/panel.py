@@ -16,7 +16,6 @@ from qtpy.QtGui import (
 from qtpy.QtWidgets import QBoxLayout, QHBoxLayout, QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.parts import Card, scrolled
@@ -27,6 +26,7 @@ from gp_labeler.views.panels.pose.settings_card import EstimateSettingsCard
 from gp_labeler.views.panels.pose.touches_card import TouchesCard
 from gp_labeler.views.panels.pose.verdict_card import VerdictCard
 from gp_labeler.views.panels.scan.welcome import dropped_path
+from gp_labeler.views.signals import follow
 
 __all__ = ["PosePanel", "holds_touches"]
 

@@ -23,9 +23,9 @@ from gp_core.disk import write_bytes, write_text
 from gp_labeler.jobs.physical import PhysicalResult, PhysicalTest
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt
 from gp_labeler.views.panels.parts import ElidedLabel, Notice, open_at, scrolled, text_label
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.signals import attempt
 
 __all__ = ["PhysicalDialog"]
 

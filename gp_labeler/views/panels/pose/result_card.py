@@ -13,7 +13,6 @@ from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.quality import pose_quality
 from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt
 from gp_labeler.views.fonts import HEADING, TITLE, styled
 from gp_labeler.views.panels.card_parts import Notices, QualityBadge, link, numbers
 from gp_labeler.views.panels.flow import FlowLayout
@@ -28,6 +27,7 @@ from gp_labeler.views.panels.pose.wording import (
     triple,
     unit_triple,
 )
+from gp_labeler.views.signals import attempt
 
 __all__ = ["ResultCard"]
 

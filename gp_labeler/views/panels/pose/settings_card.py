@@ -8,12 +8,12 @@ from gp_core.constants import METHOD_NAMES
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import RenameSpecimen
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import fit, text_width
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Segments, link
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, ElidedLabel, breakable, text_label
+from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["EstimateSettingsCard"]
 

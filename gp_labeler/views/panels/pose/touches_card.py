@@ -12,13 +12,14 @@ from gp_core.errors import GpError
 from gp_labeler.document import touching
 from gp_labeler.document.touches import Touch
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import blocked, follow, set_role
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.card_parts import Notices, link
 from gp_labeler.views.panels.parts import Card, ElidedLabel
 from gp_labeler.views.panels.pose.touch_table import TouchTable
 from gp_labeler.views.panels.pose.touch_table_model import TouchTableModel
 from gp_labeler.views.panels.pose.wording import change_text
+from gp_labeler.views.signals import blocked, follow
+from gp_labeler.views.stylesheet import set_role
 
 __all__ = ["TouchesCard"]
 

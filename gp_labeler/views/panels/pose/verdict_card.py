@@ -6,9 +6,9 @@ from qtpy.QtWidgets import QHBoxLayout, QLineEdit, QPushButton, QVBoxLayout, QWi
 
 from gp_labeler.document.state import PoseCheck
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
+from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["VerdictCard"]
 

@@ -12,7 +12,7 @@ from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.next_touch import TouchGain
 from gp_labeler.document.touches import Touch, TouchHow
 from gp_labeler.models.estimate import SideEstimate
-from gp_labeler.views.bind import NONE, degrees_text
+from gp_labeler.views.formatting import NONE, degrees_text
 
 __all__ = [
     "allowance_text",

@@ -7,10 +7,10 @@ from qtpy.QtWidgets import QHBoxLayout, QPushButton, QWidget
 from gp_labeler.imaging.histogram import histogram_of
 from gp_labeler.jobs.scan import ProposeThreshold
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.scan.histogram_slider import HistogramSlider
+from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["BoneCard"]
 

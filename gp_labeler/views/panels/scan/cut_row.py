@@ -7,10 +7,10 @@ from qtpy.QtWidgets import QHBoxLayout, QSizePolicy, QToolButton, QVBoxLayout, Q
 
 from gp_labeler.models.view import CUTS
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import follow
 from gp_labeler.views.painting.scene_overlay import cut_text
 from gp_labeler.views.panels.action_button import Actions, action_button, do_action
 from gp_labeler.views.panels.parts import text_label
+from gp_labeler.views.signals import follow
 
 __all__ = ["CutRow"]
 

@@ -7,8 +7,8 @@ from qtpy.QtGui import QColor, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QP
 from qtpy.QtWidgets import QSizePolicy, QWidget
 
 from gp_labeler.imaging.histogram import Histogram
-from gp_labeler.views.bind import value_text
 from gp_labeler.views.fonts import fit, font_of, line_height, pixels
+from gp_labeler.views.formatting import value_text
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["HistogramSlider"]

@@ -22,7 +22,6 @@ from gp_labeler.imaging.readers import ImportPlan, Problem
 from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import blocked, follow
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
     Facts,
@@ -45,6 +44,7 @@ from gp_labeler.views.panels.scan.import_wording import (
 )
 from gp_labeler.views.panels.scan.preview_picture import PreviewPicture
 from gp_labeler.views.panels.scan.spacing_fields import SpacingFields
+from gp_labeler.views.signals import blocked, follow
 
 __all__ = ["ImportDialog"]
 

@@ -9,7 +9,7 @@ from gp_labeler.imaging.preview import PreviewPlane, preview_planes
 from gp_labeler.imaging.readers import ImportPlan, Problem, read_preview
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.jobs.runner import Progress
-from gp_labeler.views.bind import TIMES, size_text, spacing_text
+from gp_labeler.views.formatting import TIMES, size_text, spacing_text
 
 __all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "sentence", "why_not"]
 

@@ -9,12 +9,13 @@ from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QS
 
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import blocked, follow, mm_text
 from gp_labeler.views.fonts import fit, pixels, text_width
+from gp_labeler.views.formatting import mm_text
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.scan.cut_row import CutRow
+from gp_labeler.views.signals import blocked, follow
 
 __all__ = ["MeshCard"]
 

@@ -7,8 +7,8 @@ from qtpy.QtWidgets import QPlainTextEdit, QWidget
 
 from gp_labeler.document.specimen_edits import SetNotes
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, blocked, follow
 from gp_labeler.views.panels.parts import Card
+from gp_labeler.views.signals import attempt, blocked, follow
 
 __all__ = ["NotesCard"]
 

@@ -7,13 +7,14 @@ from qtpy.QtWidgets import QVBoxLayout, QWidget
 
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import TIMES, follow, size_text, spacing_text
+from gp_labeler.views.formatting import TIMES, size_text, spacing_text
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.views.panels.scan.bone_card import BoneCard
 from gp_labeler.views.panels.scan.mesh_card import MeshCard
 from gp_labeler.views.panels.scan.notes_card import NotesCard
 from gp_labeler.views.panels.scan.window_level_card import WindowLevelCard
+from gp_labeler.views.signals import follow
 
 __all__ = ["ScanPanel", "facts_of"]
 

@@ -8,10 +8,11 @@ from qtpy.QtWidgets import QCheckBox, QComboBox, QHBoxLayout, QLineEdit, QPushBu
 from gp_core.errors import GpError
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.imaging.typed_spacing import UNITS, spacing_in, typed_spacing
-from gp_labeler.views.bind import blocked, spacing_text
 from gp_labeler.views.fonts import field_width, fit
+from gp_labeler.views.formatting import spacing_text
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import text_label
+from gp_labeler.views.signals import blocked
 
 __all__ = ["SpacingFields"]
 

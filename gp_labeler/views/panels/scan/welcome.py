@@ -18,13 +18,13 @@ from qtpy.QtWidgets import (
 
 from gp_core.landmarks.features import Side
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import set_role
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import elided, fit, font_of, pixels, text_width
 from gp_labeler.views.icons import icon, icon_pixmap
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import emptied, scrolled
+from gp_labeler.views.stylesheet import set_role
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["Welcome", "dropped_path"]

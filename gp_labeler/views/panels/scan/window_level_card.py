@@ -6,9 +6,9 @@ from qtpy.QtWidgets import QGridLayout, QHBoxLayout, QSizePolicy, QToolButton, Q
 
 from gp_labeler.imaging.histogram import window_presets
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.bind import attempt, follow
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.signals import attempt, follow
 
 __all__ = ["WindowLevelCard"]
 

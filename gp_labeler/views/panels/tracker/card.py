@@ -6,9 +6,10 @@ from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QProgressBar, QPushButton, QW
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import LinkPhase
-from gp_labeler.views.bind import attempt, blocked, follow, set_role
 from gp_labeler.views.panels.action_button import Actions, do_action
 from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.signals import attempt, blocked, follow
+from gp_labeler.views.stylesheet import set_role
 
 __all__ = ["TrackerCard", "tracker_role", "tracker_words"]
 

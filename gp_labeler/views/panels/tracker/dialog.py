@@ -26,11 +26,12 @@ from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.tracker import TrackerAddress
 from gp_labeler.tracker.address import DEFAULT_PORT
-from gp_labeler.views.bind import follow, set_role
 from gp_labeler.views.fonts import field_width, fit
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.parts import Card, open_at, scrolled, text_label
 from gp_labeler.views.panels.tracker.card import tracker_role, tracker_words
+from gp_labeler.views.signals import follow
+from gp_labeler.views.stylesheet import set_role
 from gp_labeler.views.window_state import WindowState
 
 __all__ = ["TrackerDialog"]
