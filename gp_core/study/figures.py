@@ -21,9 +21,10 @@ from gp_core.landmarks.features import CODES, PROBE
 from gp_core.study.compare import PROBES, ComparisonReport, ComparisonRow
 from gp_core.study.distances import DistanceTable
 from gp_core.study.leave_one_out import LeaveOneOutReport
+from gp_core.study.limits_of_agreement import AgreementKind, agreement_panels
 from gp_core.study.nested_search import NestedReport
 from gp_core.study.physical import PhysicalReport
-from gp_core.study.reliability import PairedDifference, ReliabilityReport
+from gp_core.study.reliability import ReliabilityReport
 from gp_core.study.simulation import SimulationReport
 from gp_core.study.subset_search import SearchReport
 from gp_core.validation import FloatArray
@@ -474,9 +475,6 @@ def _tick(noise: float, mistouch: float) -> str:
     return f"one off\n{mistouch:g}" if mistouch else f"noise\n{noise:g}"
 
 
-_DIRECTIONS = ("forwards", "outwards", "upwards")
-
-
 def label_agreement(report: ReliabilityReport) -> Figure:
     """Draw differences of repeated labels against their mean (Bland and Altman), for each direction.
 
@@ -497,30 +495,24 @@ def label_agreement(report: ReliabilityReport) -> Figure:
     https://doi.org/10.1016/S0140-6736(86)90837-8
     """
     figure, axes = new_figure(1, 3, (10.0, 3.6))
-    kinds = (("rounds of one observer", False, RIGHT, "--"), ("two observers", True, LEFT, "-"))
-    shown = [(name, _those(report.differences, inter), c, s) for name, inter, c, s in kinds]
-    largest = max((abs(x) for row in report.differences for x in row.difference), default=0.0) or 1.0
-    for i, (ax, letter) in enumerate(zip(axes, "ABC", strict=True)):
-        for name, rows, colour, style in shown:
-            if rows:
-                points = np.array([(row.mean[i], row.difference[i]) for row in rows])
-                _draw_agreement(ax, points, name, colour, style)
-        label(ax, letter, f"Mean, mm {_DIRECTIONS[i]} of the atlas", f"Difference, mm {_DIRECTIONS[i]}")
+    for ax, letter, panel in zip(axes, "ABC", agreement_panels(report.differences), strict=False):
+        for kind in panel.kinds:
+            _draw_agreement(ax, kind)
+        way = panel.direction
+        label(ax, letter, f"Mean, mm {way} of the atlas", f"Difference, mm {way}")
         ax.axhline(0.0, color=_FAINT, linewidth=0.8, zorder=0)
-        ax.set_ylim(-1.08 * largest, 1.08 * largest)
+        ax.set_ylim(-1.08 * panel.largest, 1.08 * panel.largest)
     named = axes[0].get_legend_handles_labels()
     figure.legend(*named, fontsize=8, frameon=False, ncols=2, loc="outside upper center")
     return figure
 
 
-def _those(differences: Sequence[PairedDifference], inter: bool) -> list[PairedDifference]:
-    return [row for row in differences if row.is_inter is inter]
+_KINDS = {False: ("rounds of one observer", RIGHT, "--"), True: ("two observers", LEFT, "-")}
 
 
-def _draw_agreement(ax: Axes, points: FloatArray, name: str, colour: str, style: str) -> None:
-    ax.scatter(points[:, 0], points[:, 1], s=7, color=colour, alpha=0.55, linewidths=0, label=name)
-    if len(points) < 2:
-        return
-    mean, spread = points[:, 1].mean(), points[:, 1].std(ddof=1)
-    for height, width in ((mean, 1.2), (mean - 1.96 * spread, 0.8), (mean + 1.96 * spread, 0.8)):
+def _draw_agreement(ax: Axes, kind: AgreementKind) -> None:
+    name, colour, style = _KINDS[kind.is_inter]
+    means, differences = kind.points.T
+    ax.scatter(means, differences, s=7, color=colour, alpha=0.55, linewidths=0, label=name)
+    for height, width in zip(kind.limits, (1.2, 0.8, 0.8), strict=False):
         ax.axhline(height, color=colour, linewidth=width, linestyle=style)

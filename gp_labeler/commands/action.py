@@ -47,6 +47,8 @@ class Ui(Protocol):
     def show_physical(self) -> None: ...  # noqa: D102
     def ask_open_atlas(self) -> None: ...  # noqa: D102
     def ask_fit_atlas(self, *, folder: bool = False) -> None: ...  # noqa: D102
+    def ask_reliability(self, *, folder: bool = False) -> None: ...  # noqa: D102
+    def ask_save_reliability(self) -> None: ...  # noqa: D102
     def ask_save_atlas(self) -> None: ...  # noqa: D102
     def show_step(self, step: str) -> None: ...  # noqa: D102
     def open_demo(self) -> None: ...  # noqa: D102

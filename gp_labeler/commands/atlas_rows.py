@@ -42,6 +42,14 @@ def atlas_rows() -> Iterator[Action]:
     yield row("fit_folder", "Fit from a folder…", lambda w, ui: ui.ask_fit_atlas(folder=True), group="fit",
               hint="All labelled animals in a folder", icon="folder")
     yield row("save", "Save atlas…", lambda w, ui: ui.ask_save_atlas(), _is_loaded, group="fit", icon="save")
+    yield row("reliability_files", "Repeatability of labels, from files…", lambda w, ui: ui.ask_reliability(),
+              group="repeat", hint="Animals labelled more than once: specimens or landmarks", icon="file")
+    yield row("reliability_folder", "Repeatability of labels, from a folder…",
+              lambda w, ui: ui.ask_reliability(folder=True), group="repeat", icon="folder",
+              hint="It is searched, and the folders in it")
+    yield row("save_reliability", "Save repeatability…", lambda w, ui: ui.ask_save_reliability(),
+              lambda w: w.reliability.report is not None, group="repeat", icon="save",
+              hint="The table (.csv), everything (.json), or the picture (.png, .pdf, .svg)")
     yield row("try", "Leave-one-out", lambda w, ui: w.atlas.try_out(), _can_try, group="try", icon="play",
               hint="How well each animal's cochlea is found from the others")
 # fmt: on

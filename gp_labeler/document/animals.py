@@ -18,8 +18,17 @@ from gp_core.io.markups import has_point_list
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_labeler.document.specimen_file import SUFFIX, read_specimen
+from gp_labeler.document.state import SpecimenState
 
-__all__ = ["Animals", "Skipped", "labelled_files", "may_hold_labels", "read_animals"]
+__all__ = [
+    "Animals",
+    "Skipped",
+    "are_same_labels",
+    "files_at",
+    "labelled_files",
+    "may_hold_labels",
+    "read_animals",
+]
 
 FEWEST_PLACED = 4
 """A side with fewer says nothing that an atlas could learn from."""
@@ -119,7 +128,7 @@ def read_animals(
         A folder holds no labelled animals.
     """
     reading = _Reading()
-    files = list(dict.fromkeys(file for path in paths for file in _files_at(Path(path))))
+    files = list(dict.fromkeys(file for path in paths for file in files_at(Path(path))))
     for n, file in enumerate(files):
         tell(0.3 * n / max(len(files), 1))
         reading.read(file)
@@ -185,17 +194,21 @@ class _Reading:
     def _specimens_in(self, file: Path) -> list[Specimen]:
         if not file.name.endswith(SUFFIX):
             return load_specimens(file)
-        state = read_specimen(file)
-        sides = {side: landmarks for side in Side if _has_own_labels(landmarks := state.side(side))}
-        if not sides:
+        specimens = [specimen for state in read_specimen(file).labellings if (specimen := self._of(state))]
+        if not specimens:
             raise GpError("nothing is placed in it", file=file)
+        return specimens
+
+    def _of(self, state: SpecimenState) -> Specimen | None:
+        """Return one labelling of a specimen file, and take down what was checked; None for an empty one."""
+        sides = {side: marks for side in Side if _has_own_labels(marks := state.described_side(side))}
         self.confirmed |= {
             (state.specimen, side, code)
             for side, landmarks in sides.items()
             for code in landmarks.placed
             if not feature(code).computed and state.landmark(side, code).checked
         }
-        return [Specimen(state.specimen, sides)]
+        return Specimen(state.specimen, sides) if sides else None
 
     def _take(self, name: str, landmarks: LandmarkSet, file: Path) -> None:
         side, what = landmarks.side, f"{name} {landmarks.side.word} ({file.name})"
@@ -207,7 +220,7 @@ class _Reading:
         elif side not in self.sides.get(name, {}):
             self.sides.setdefault(name, {})[side] = landmarks
             self.sources[name, side] = file
-        elif _are_same(self.sides[name][side], landmarks):
+        elif any(are_same_labels(known, landmarks) for known in self._labelled(name, side)):
             return
         elif self._is_another_labelling(name, landmarks):
             self._repeats.setdefault((name, side), []).append(landmarks)
@@ -217,9 +230,13 @@ class _Reading:
 
     def _is_another_labelling(self, name: str, landmarks: LandmarkSet) -> bool:
         """Whether it is by another observer, or of another round, in the same frame."""
-        known = [self.sides[name][landmarks.side], *self._repeats.get((name, landmarks.side), ())]
+        known = self._labelled(name, landmarks.side)
         sittings = {(each.observer, each.round) for each in known}
         return (landmarks.observer, landmarks.round) not in sittings and landmarks.frame == known[0].frame
+
+    def _labelled(self, name: str, side: Side) -> list[LandmarkSet]:
+        """Return the labellings of a side that were read so far."""
+        return [self.sides[name][side], *self._repeats.get((name, side), ())]
 
 
 def _has_own_labels(landmarks: LandmarkSet) -> bool:
@@ -228,14 +245,15 @@ def _has_own_labels(landmarks: LandmarkSet) -> bool:
     return any(not (row.shared or row.computed) for row in rows)
 
 
-def _are_same(one: LandmarkSet, other: LandmarkSet) -> bool:
+def are_same_labels(one: LandmarkSet, other: LandmarkSet) -> bool:
     """Whether two files hold the same labels, such as a specimen and what was exported from it."""
     return one.placed == other.placed and bool(
-        np.abs(one.array(one.placed) - other.array(one.placed)).max() < _SAME_MM
+        np.abs(one.array(one.placed) - other.array(one.placed)).max(initial=0.0) < _SAME_MM
     )
 
 
-def _files_at(path: Path) -> list[Path]:
+def files_at(path: Path) -> list[Path]:
+    """Return the labelled files of a folder, else of the folders in it; a file itself."""
     if not path.is_dir():
         return [path]
     here = list(labelled_files(path))

@@ -31,6 +31,7 @@ class AtlasSource:
     file: Path | None = None
     animals: tuple[Path, ...] = ()
     keep_doubtful: bool = False
+    weigh_certainty: bool = False
 
     @property
     def text(self) -> str:
@@ -65,8 +66,8 @@ class AtlasMemory:
         if isinstance(file, str) and file:
             return AtlasSource(Path(file))
         if isinstance(animals, list) and animals and all(isinstance(path, str) and path for path in animals):
-            keep = content.get("keep_doubtful") is True
-            return AtlasSource(animals=tuple(map(Path, animals)), keep_doubtful=keep)
+            keep, weigh = (content.get(key) is True for key in ("keep_doubtful", "weigh_certainty"))
+            return AtlasSource(None, tuple(map(Path, animals)), keep, weigh)
         return None
 
     def remember(self, source: AtlasSource | None) -> None:
@@ -77,7 +78,8 @@ class AtlasMemory:
                 content = {"file": str(absolute_path(source.file))}
             elif source is not None:
                 content = {"animals": [str(absolute_path(path)) for path in source.animals]}
-                content |= {"keep_doubtful": True} if source.keep_doubtful else {}
+                how = {key: getattr(source, key) for key in ("keep_doubtful", "weigh_certainty")}
+                content |= {key: True for key, is_so in how.items() if is_so}
             self._path.parent.mkdir(parents=True, exist_ok=True)
             write_text(self._path, json.dumps(content, indent=1))
         except (OSError, GpError):

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.certainty_weights import checked_weights
 from gp_core.atlas.fitting import fit_screened_atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.atlas.screening import screen_labels
@@ -90,6 +91,7 @@ class FitAtlas:
 
     paths: tuple[Path, ...]
     keep_doubtful: bool = False
+    weigh_certainty: bool = False
     title = "Fitting the atlas"
 
     def run(self, progress: Progress) -> FittedAtlas:
@@ -104,15 +106,16 @@ class FitAtlas:
         animals = read_animals(self.paths, lambda fraction: progress(0.9 * fraction))
         progress(0.9)
         try:
-            return FittedAtlas(_fitted(animals, keep_doubtful=self.keep_doubtful), animals)
+            return FittedAtlas(_fitted(animals, self), animals)
         except GpError as error:
             raise _with_reasons(error, animals) from None
 
 
-def _fitted(animals: Animals, *, keep_doubtful: bool) -> Atlas:
-    if keep_doubtful or animals.screened is None:
-        return fit_plain_atlas(animals.specimens, name=animals.text)
-    return fit_screened_atlas(animals.screened, name=animals.text)
+def _fitted(animals: Animals, how: FitAtlas) -> Atlas:
+    weights = checked_weights(how.weigh_certainty)
+    if how.keep_doubtful or animals.screened is None:
+        return fit_plain_atlas(animals.specimens, name=animals.text, by_certainty=weights)
+    return fit_screened_atlas(animals.screened, name=animals.text, by_certainty=weights)
 
 
 @dataclass(frozen=True)
@@ -143,7 +146,9 @@ class RecallAtlas:
         file = self.source.file
         try:
             if file is None:
-                return Recalled(FitAtlas(self.source.animals, self.source.keep_doubtful).run(progress))
+                source = self.source
+                job = FitAtlas(source.animals, source.keep_doubtful, source.weigh_certainty)
+                return Recalled(job.run(progress))
             return Recalled(FittedAtlas(ReadAtlas(file).run(progress), Animals(())))
         except (GpError, OSError) as error:
             problem = f"{str(error).rstrip('.')}."
@@ -157,14 +162,17 @@ class RefitAtlas:
     specimens: tuple[Specimen, ...]
     keep_doubtful: bool = False
     confirmed: frozenset[tuple[str, Side, str]] = frozenset()
+    weigh_certainty: bool = False
     title = "Fitting the atlas to the other animals"
 
     def run(self, progress: Progress) -> Atlas:
         """Fit."""
         progress(0.0)
+        weights = checked_weights(self.weigh_certainty)
         if self.keep_doubtful:
-            return fit_plain_atlas(self.specimens)
-        return fit_screened_atlas(screen_labels(self.specimens, confirmed=self.confirmed))
+            return fit_plain_atlas(self.specimens, by_certainty=weights)
+        screened = screen_labels(self.specimens, confirmed=self.confirmed)
+        return fit_screened_atlas(screened, by_certainty=weights)
 
 
 @dataclass(frozen=True)

@@ -13,11 +13,13 @@ from psygnal import Signal
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
+from gp_core.atlas.labelling_error import LabellingError
 from gp_core.atlas.prediction import predict
 from gp_core.errors import GpError
 from gp_core.landmarks.sets import Specimen
 from gp_labeler.document.animals import Animals
 from gp_labeler.document.atlas_memory import AtlasMemory, AtlasSource
+from gp_labeler.document.labelling_error_memory import LabellingErrorMemory
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.jobs.atlas import (
     FEWEST_ANIMALS,
@@ -58,6 +60,8 @@ class AtlasModel:
         Remembers which one was chosen last.
     atlas : Atlas, optional
         To begin with; by default none, until `load` or `use`.
+    errors : LabellingErrorMemory, optional
+        Remembers the measured error of labels.
     """
 
     changed = Signal()
@@ -74,7 +78,11 @@ class AtlasModel:
         messages: Messages,
         memory: AtlasMemory | None = None,
         atlas: Atlas | None = None,
+        errors: LabellingErrorMemory | None = None,
     ) -> None:
+        self._errors = errors
+        self.labelling_error = None if errors is None else errors.recall()
+        """The measured error of labels that checks and regions use; None for the one of the atlas."""
         self._document, self._jobs, self._messages, self._memory = document, jobs, messages, memory
         self._atlas = self._expected_by = atlas
         self._specimens: tuple[Specimen, ...] = ()
@@ -83,6 +91,7 @@ class AtlasModel:
         self.problem = ""  # why the one chosen last is not in use
         self.animals: Animals | None = None
         self.keep_doubtful = False  # in the fits to come
+        self.weigh_certainty = False  # likewise
         self.trial: AtlasTrial | None = None
         self.is_refitting = False
         """Whether an atlas without the open specimen is being fitted, by which it will be checked."""
@@ -103,12 +112,36 @@ class AtlasModel:
     @property
     def predict(self) -> Predict | None:
         """Where features are expected, given some: by the atlas, or by one that lacks the open specimen."""
-        return None if self._expected_by is None else partial(predict, self._expected_by)
+        return None if self._expected_by is None else partial(predict, self.allowing(self._expected_by))
 
     @property
     def check(self) -> Check | None:
         """What checks labels: by the same atlas as `predict`."""
-        return None if self._expected_by is None else partial(check_side, atlas=self._expected_by)
+        expected_by = self._expected_by
+        return None if expected_by is None else partial(check_side, atlas=self.allowing(expected_by))
+
+    def allowing(self, atlas: Atlas) -> Atlas:
+        """Return an atlas that allows for the measured error of labels, if that is in use."""
+        error = self.labelling_error
+        return atlas if error is None else atlas.with_labelling_error(error)
+
+    @property
+    def labelling_error_text(self) -> str:
+        """Which error of labels checks and regions allow for, in words."""
+        error = self.labelling_error
+        if error is None:
+            error = LabellingError() if self._atlas is None else self._atlas.labelling_error
+        return error.text
+
+    def set_labelling_error(self, error: LabellingError | None) -> None:
+        """Let checks and regions allow for a measured error of labels, or again for the one of the atlas."""
+        if error == self.labelling_error:
+            return
+        self.labelling_error = error
+        if self._errors is not None:
+            self._errors.remember(error)
+        self.details_changed.emit()
+        self.expectations_changed.emit()
 
     @property
     def is_published(self) -> bool:
@@ -154,6 +187,7 @@ class AtlasModel:
             return
         source = None if self._memory is None else self._memory.recall()
         self.keep_doubtful = source is not None and source.keep_doubtful
+        self.weigh_certainty = source is not None and source.weigh_certainty
         if source is None:
             self._begin_with_published()
         else:
@@ -188,7 +222,23 @@ class AtlasModel:
             self.fit(source.animals)
         self.details_changed.emit()
 
-    def fit(self, paths: Iterable[str | PathLike[str]], *, keep_doubtful: bool | None = None) -> None:
+    def set_weigh_certainty(self, weigh: bool) -> None:
+        """Weigh labels by their certainty in the fits to come, or not; a fit in use is made again."""
+        if weigh == self.weigh_certainty:
+            return
+        self.weigh_certainty = weigh
+        source = self.source
+        if source is not None and source.animals and source.weigh_certainty != weigh:
+            self.fit(source.animals)
+        self.details_changed.emit()
+
+    def fit(
+        self,
+        paths: Iterable[str | PathLike[str]],
+        *,
+        keep_doubtful: bool | None = None,
+        weigh_certainty: bool | None = None,
+    ) -> None:
         """Read labelled animals in the background, fit an atlas to them, and take it.
 
         Parameters
@@ -198,18 +248,22 @@ class AtlasModel:
         keep_doubtful : bool, optional
             Believe labels that `screening.screen_labels` would leave out; by default as set by
             `set_keep_doubtful`.
+        weigh_certainty : bool, optional
+            Weigh labels by their certainty; by default as set by `set_weigh_certainty`.
         """
         animals = tuple(map(Path, paths))
         if keep_doubtful is not None:
             self.keep_doubtful = keep_doubtful
-        keep_doubtful = self.keep_doubtful
+        if weigh_certainty is not None:
+            self.weigh_certainty = weigh_certainty
+        keep, weigh = self.keep_doubtful, self.weigh_certainty
 
         def take(fitted: FittedAtlas) -> None:
-            source = AtlasSource(animals=animals, keep_doubtful=keep_doubtful)
+            source = AtlasSource(None, animals, keep, weigh)
             self._take_fitted(fitted, source)
             self._remember_source(source)
 
-        self._jobs.submit(FitAtlas(animals, keep_doubtful), take, key="atlas")
+        self._jobs.submit(FitAtlas(animals, keep, weigh), take, key="atlas")
 
     def save(self, path: str | PathLike[str]) -> None:
         """Write the atlas in use; raises `GpError` where there is none, or it cannot be written."""
@@ -323,7 +377,8 @@ class AtlasModel:
         self._expected_by = self._without_earlier_labels(atlas)
         if self.is_refitting:
             confirmed = frozenset() if self.animals is None else self.animals.confirmed
-            job = RefitAtlas(others, keep_doubtful=self.keeps_doubtful, confirmed=confirmed)
+            weighs = self.source is not None and self.source.weigh_certainty
+            job = RefitAtlas(others, self.keeps_doubtful, confirmed, weighs)
             self._jobs.submit(job, self._hold_out, key="atlas without")
         if before is not self._expected_by:
             self.expectations_changed.emit()

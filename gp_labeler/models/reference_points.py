@@ -81,6 +81,11 @@ class ReferencePointsModel:
         self.changed.emit()
         self._report()
 
+    def show_points(self, points: tuple[ReferencePoint, ...]) -> None:
+        """Show points that are not from a file, in place of those shown before."""
+        self._points, self._files = points, ()
+        self.changed.emit()
+
     def clear(self) -> None:
         """Show none."""
         if self._points:

@@ -14,6 +14,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
 from gp_labeler.document.atlas_memory import AtlasMemory
 from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
+from gp_labeler.document.labelling_error_memory import LabellingErrorMemory
 from gp_labeler.document.observer_memory import ObserverMemory
 from gp_labeler.document.recent_files import RecentFiles
 from gp_labeler.document.specimen_document import SpecimenDocument
@@ -28,6 +29,7 @@ from gp_labeler.models.measure import MeasureModel
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.pose import PoseModel
 from gp_labeler.models.reference_points import ReferencePointsModel
+from gp_labeler.models.reliability import ReliabilityModel
 from gp_labeler.models.scan import ScanModel
 from gp_labeler.models.tracker import TrackerModel
 from gp_labeler.models.view import ViewModel
@@ -71,7 +73,8 @@ class Workspace:
         self.view = ViewModel(document)
         self.scan = ScanModel(document, self.view, jobs, messages, self.recent)
         memory = AtlasMemory(directory) if directory else None
-        self.atlas = AtlasModel(document, jobs, messages, memory, atlas)
+        errors = LabellingErrorMemory(directory) if directory else None
+        self.atlas = AtlasModel(document, jobs, messages, memory, atlas, errors)
         self.labels = LabelsModel(document, self.view, self.scan, self.atlas, jobs, messages)
         self.interaction = InteractionModel(document, self.labels, self.view, messages)
         self.measure = MeasureModel(document, self.interaction, self.labels, self.view, messages)
@@ -79,6 +82,7 @@ class Workspace:
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
         self.tracker = TrackerModel(document, self.pose, messages)
         self.references = ReferencePointsModel(document, self.scan, messages)
+        self.reliability = ReliabilityModel(document, self.atlas, self.references, jobs, messages)
         self.meshes = AddedMeshesModel(document, self.scan, jobs, messages)
 
     def open(self, path: str | PathLike[str], **options: Any) -> None:

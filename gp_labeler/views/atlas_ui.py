@@ -5,13 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from gp_core.atlas.label_check import Finding
+from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
+from gp_core.study.reliability import Disagreement
 from gp_labeler.views.signals import attempt
 from gp_labeler.views.ui_part import UiPart
 
 __all__ = ["AtlasUi"]
 
 _ATLASES = "Atlases (*.json);;All files (*)"
+_REPORTS = "Tables (*.csv);;JSON (*.json);;Pictures (*.png *.pdf *.svg)"
 _LABELLED = "Labelled animals (*.mrk.json *.fcsv *.gpspecimen.json);;All files (*)"
 
 
@@ -60,6 +63,47 @@ class AtlasUi(UiPart):
         code = next((code for code in finding.landmarks if not feature(code).computed), None)
         if code is not None:
             attempt(workspace, lambda: workspace.labels.go_to(side, code))
+
+    def ask_reliability(self, *, folder: bool = False) -> None:
+        """Ask for animals that were labelled more than once, and compare their labels."""
+        title = "Compare the labels of these animals"
+        if folder:
+            chosen = self.prompts.folder(title, self._folder)
+            paths = [] if chosen is None else [chosen]
+        else:
+            paths = self.prompts.open_files(title, self._folder, _LABELLED, many=True)
+        if paths:
+            self._remember_folder(paths[0])
+            self._window.set_step("atlas")
+            self._workspace.reliability.measure(paths)
+
+    def ask_save_reliability(self) -> None:
+        """Ask where, and write what was found on repeated labels."""
+        where = str(Path(self._folder) / "reliability.csv")
+        path = self.prompts.save_file("Save how repeatable labels are", where, _REPORTS)
+        if path is not None:
+            self._workspace.reliability.save(path)
+            self._remember_folder(path)
+            self._workspace.say(f"Wrote {path.name}")
+
+    def show_disagreement(self, row: Disagreement) -> None:
+        """Open the animal of two labels that lie apart, one of its labellings, and go to the point.
+
+        The other label is shown as a grey reference point.
+        """
+        workspace = self._workspace
+        try:
+            file = workspace.reliability.file_of(row)
+            if workspace.document.path != file:
+                self.open_path(file)
+            if workspace.document.state.specimen != row.specimen:
+                return
+            self._window.set_step("label")
+            workspace.reliability.show(row)
+        except GpError as error:
+            workspace.say(str(error), "warning")
+            return
+        attempt(workspace, lambda: workspace.labels.go_to(row.side, row.code))
 
     def ask_save_atlas(self) -> None:
         """Ask where, and write the atlas in use."""

@@ -193,6 +193,7 @@ class MainWindow(QMainWindow):
         for id in ("point.accept_ghost", "point.confirm"):
             self._label.addAction(self.commands.actions[id])  # Enter means it there too
         self._atlas.animal_asked.connect(self.ui.show_finding)
+        self._atlas.repeatability.disagreement_asked.connect(self.ui.show_disagreement)
         follow(self, workspace.scan.opened, self._show_page)
         follow(self, workspace.document.reset, self._show_page)
         follow(self, workspace.scan.import_asked, self._on_import_asked)

@@ -287,6 +287,10 @@ class Recorder(QObject):
         if what == "measurements":
             self.tables.append(step("export_measurements"))
             return
+        if what == "reliability":
+            specimens = [str(path.absolute()) for path in self._window.workspace.reliability.paths]
+            self.tables.append(step("reliability", specimens=specimens, path=[file.name]))
+            return
         if what == "atlas":
             self.tables.append(step("action", id="atlas.save", files=[file.name]))
             return
@@ -305,9 +309,9 @@ class Recorder(QObject):
         elif source is not None and source.file is not None:
             self.tables.append(step("atlas", path=str(source.file.absolute())))
         elif source is not None:
-            kept = {"keep_doubtful": True} if source.keep_doubtful else {}
+            how = {key: getattr(source, key) for key in ("keep_doubtful", "weigh_certainty")}
             specimens = [str(path.absolute()) for path in source.animals]
-            self.tables.append(step("atlas", specimens=specimens, **kept))
+            self.tables.append(step("atlas", specimens=specimens, **how))
 
     def _on_path(self, path: InsertionPath | None) -> None:
         if path is not None:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from gp_labeler.scripting.step import Step
-from gp_labeler.scripting.steps.atlas import Check, Fit, UseAtlas
+from gp_labeler.scripting.steps.atlas import Check, Fit, Reliability, UseAtlas
 from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
 from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
@@ -39,6 +39,7 @@ _ALL: tuple[type[Step], ...] = (
         Export,
         Fit,
         UseAtlas,
+        Reliability,
         Touches,
         Skull,
         Register,

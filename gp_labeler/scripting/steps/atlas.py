@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from gp_core import Atlas, Specimen, check_specimen, load_specimens
+from gp_core.atlas.certainty_weights import checked_weights
 from gp_core.atlas.fitting import fit_screened_atlas
 from gp_core.atlas.plain_fit import fit_plain_atlas
 from gp_core.atlas.screening import screen_labels
@@ -16,7 +17,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.window_driver import WindowDriver
 
-__all__ = ["Check", "Fit", "UseAtlas"]
+__all__ = ["Check", "Fit", "Reliability", "UseAtlas"]
 
 
 @dataclass(frozen=True)
@@ -31,17 +32,24 @@ class Fit(Step):
         The atlas file.
     keep_doubtful : bool
         Use labels that the check finds doubtful, too; by default they are left out, and named.
+    weigh_certainty : bool
+        Let labels count by their certainty.
     """
 
     do: ClassVar[str] = "fit"
     specimens: tuple[str, ...]
     path: str = "atlas.json"
     keep_doubtful: bool = False
+    weigh_certainty: bool = False
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
+        weights = checked_weights(self.weigh_certainty)
         specimens = load_specimens([driver.to_read(each) for each in self.specimens])
         screened, file = screen_labels(specimens), driver.to_write(self.path)
-        atlas = fit_plain_atlas(specimens) if self.keep_doubtful else fit_screened_atlas(screened)
+        if self.keep_doubtful:
+            atlas = fit_plain_atlas(specimens, by_certainty=weights)
+        else:
+            atlas = fit_screened_atlas(screened, by_certainty=weights)
         atlas.save(file)
         kept = "believed" if self.keep_doubtful else "left out"
         left_out = [f"{f.specimen} {f.side.word}: {f.text}, {kept}" for f in screened.left_out]
@@ -60,12 +68,15 @@ class UseAtlas(Step):
         Instead: labelled animals, files or folders of them, to fit one to.
     keep_doubtful : bool
         Fit it to labels that the check finds doubtful, too.
+    weigh_certainty : bool
+        Let labels count by their certainty.
     """
 
     do: ClassVar[str] = "atlas"
     path: str | None = None
     specimens: tuple[str, ...] = ()
     keep_doubtful: bool = False
+    weigh_certainty: bool = False
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         workspace = driver.workspace
@@ -73,7 +84,9 @@ class UseAtlas(Step):
             raise GpError("atlas needs path or specimens, one of them")
         if self.specimens:
             workspace.atlas.fit(
-                [driver.to_read(each) for each in self.specimens], keep_doubtful=self.keep_doubtful
+                [driver.to_read(each) for each in self.specimens],
+                keep_doubtful=self.keep_doubtful,
+                weigh_certainty=self.weigh_certainty,
             )
         elif self.path == "published":
             workspace.atlas.use_published()
@@ -81,6 +94,44 @@ class UseAtlas(Step):
             workspace.atlas.open(driver.to_read(self.path or ""))
         driver.wait_until_idle()
         return f"{len(workspace.atlas.specimens)} animals" if workspace.atlas.specimens else self.path or ""
+
+
+@dataclass(frozen=True)
+class Reliability(Step):
+    """Measure how repeatable labels are, of animals that were labelled more than once.
+
+    Parameters
+    ----------
+    specimens : text or texts
+        Landmark files, specimen files, or folders of them.
+    path : text or texts
+        Where to write what was found: ``.json``, ``.csv``, or a picture.
+    use : bool, optional
+        Whether checks and regions shall use the measured error from now on; by default that stays as it is.
+    """
+
+    do: ClassVar[str] = "reliability"
+    specimens: tuple[str, ...]
+    path: tuple[str, ...] = ()
+    use: bool | None = None
+
+    def run(self, driver: WindowDriver) -> str:  # noqa: D102
+        model = driver.workspace.reliability
+        model.measure([driver.to_read(each) for each in self.specimens])
+        driver.wait_until_idle()
+        report = model.report
+        if report is None:
+            return ""  # the job's problem is told as every step's is
+        for name in self.path:
+            file = driver.to_write(name)
+            model.save(file)
+            driver.wrote(file)
+        if self.use is not None:
+            model.use_error(self.use)
+            driver.wait_until_idle()
+        kinds = {"within": report.overall.intra, "between": report.overall.inter}
+        told = [f"{kind} observers {found.mean_mm:.2f} mm" for kind, found in kinds.items() if found]
+        return f"{report.n_labellings} labellings of {report.n_sides} sides: {', '.join(told)}"
 
 
 @dataclass(frozen=True)
@@ -104,7 +155,7 @@ class Check(Step):
         sides = {side: state.side(side) for side in Side if state.side(side).placed}
         measure = driver.workspace.scan.evidence
         scan = None if measure is None else {side: measure(landmarks) for side, landmarks in sides.items()}
-        atlas = driver.workspace.atlas.current or Atlas.published()
+        atlas = driver.workspace.atlas.allowing(driver.workspace.atlas.current or Atlas.published())
         findings = check_specimen(Specimen(state.specimen, sides), atlas, scan=scan)
         doubtful = [finding for finding in findings if finding.is_problem]
         if self.path is not None:

@@ -26,6 +26,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.atlas.feature_table import FeatureTable
+from gp_labeler.views.panels.atlas.repeatability_card import RepeatabilityCard
 from gp_labeler.views.panels.card_parts import Notices
 from gp_labeler.views.panels.finding_list import FindingList, FindingRow
 from gp_labeler.views.panels.parts import Card, ElidedLabel, Facts, emptied, scrolled, text_label
@@ -59,6 +60,7 @@ class AtlasPanel(QWidget):
         self.setProperty("role", "panel")
         self.which, self.own = AtlasCard(workspace, actions), AtlasFittingCard(workspace, actions)
         self.trial, self.labels = LeaveOneOutCard(workspace, actions), LabelsCard(workspace)
+        self.repeatability = RepeatabilityCard(workspace, actions)
         self.own.animal_asked.connect(self.animal_asked)
         content = QWidget()
         content.setProperty("role", "panel")
@@ -91,7 +93,7 @@ class AtlasPanel(QWidget):
         ways = QBoxLayout.Direction
         self._columns.setDirection(ways.LeftToRight if wide else ways.TopToBottom)
         column = self._left if wide else self._right
-        for card in (self.own, self.trial):
+        for card in (self.own, self.trial, self.repeatability):
             for other in (self._left, self._right):
                 other.removeWidget(card)
             column.insertWidget(column.count() - 1, card)  # before the stretch
@@ -154,6 +156,7 @@ class AtlasCard(Card):
         if _made_from(workspace) != atlas.name:
             facts["Made from"] = _made_from(workspace)
         facts["Features"] = f"{len(atlas.codes)} of 19"
+        facts["Labels"] = f"Error {workspace.atlas.labelling_error_text}"
         if workspace.atlas.file is not None:
             facts["File"] = workspace.atlas.file.name
         if workspace.atlas.is_held_out:
@@ -220,6 +223,10 @@ class AtlasFittingCard(Card):
         )
         self.keep_doubtful.toggled.connect(self._keep_doubtful)
         self.add(self.keep_doubtful)
+        self.weigh_certainty = QCheckBox("Weigh labels by certainty")
+        self.weigh_certainty.setToolTip("A fair label counts half, a guess a fifth; all others count fully")
+        self.weigh_certainty.toggled.connect(workspace.atlas.set_weigh_certainty)
+        self.add(self.weigh_certainty)
         self._add_progress()
         self.findings = FindingList()
         self.findings.chosen.connect(self.animal_asked)
@@ -235,8 +242,9 @@ class AtlasFittingCard(Card):
     def refresh(self, *_: object) -> None:
         """Show what was read."""
         animals = self._workspace.atlas.animals
-        with blocked(self.keep_doubtful):
+        with blocked(self.keep_doubtful, self.weigh_certainty):
             self.keep_doubtful.setChecked(self._workspace.atlas.keep_doubtful)
+            self.weigh_certainty.setChecked(self._workspace.atlas.weigh_certainty)
         self.findings.show_rows(
             [] if animals is None else _findings(animals, self._workspace.atlas.keeps_doubtful)
         )
