@@ -13,6 +13,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.mesh_files import read_mesh
 from gp_labeler.imaging.preview_mesh import coarse_surface
 from gp_labeler.imaging.progress import Progress as Told
+from gp_labeler.imaging.seam import shaded_like
 from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, extract_isosurface, overview_stride
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
@@ -97,12 +98,13 @@ class MeshEars:
         """Mesh the boxes."""
         rest, ears = list(self.overview.parts), []
         for n, box in enumerate(self.boxes.values()):
-            start, end = n / len(self.boxes), (n + 1) / len(self.boxes)
+            start, end = 0.9 * n / len(self.boxes), 0.9 * (n + 1) / len(self.boxes)
             ear = _mesh(self, progress, start=start, end=end, box=box)
             rest = [part.outside(ear.region) for part in rest]
-            ears.append(ear)
+            ears.append(shaded_like(ear, self.overview.parts))
         parts = tuple(part.prepare() for part in (*rest, *ears) if part.n_triangles)
-        return Meshes(parts, self.overview.quick)
+        progress(0.95)
+        return Meshes(parts, (coarse_surface(parts, QUICK_TRIANGLES, detailed=tuple(self.boxes.values())),))
 
 
 @dataclass(frozen=True, eq=False)
