@@ -24,7 +24,7 @@ from gp_core.cli import (
     simulate,
     touches,
 )
-from gp_core.cli.options import keeping_inputs
+from gp_core.cli.options import keeping_inputs, streams_of
 from gp_core.command_line import CommandParser, add_completion
 from gp_core.errors import GpError
 from gp_core.extras import missing_package
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _run(arguments: Sequence[str] | None) -> int:
     args = make_parser().parse_args(arguments)
     try:
-        with keeping_inputs(args):
+        with streams_of(args), keeping_inputs(args):
             status: int = args.run(args)
         sys.stdout.flush()
     except GpError as error:

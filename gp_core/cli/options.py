@@ -7,7 +7,7 @@ import json
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from gp_core.extras import need_extra
 from gp_core.io import Labelling, landmark_files, load_labellings, load_specimens, read_lab_names
 from gp_core.landmarks.labels import LabelNames
 from gp_core.landmarks.sets import Specimen
+from gp_core.standard_streams import standard_streams
 
 __all__ = [
     "AtlasSource",
@@ -37,6 +38,7 @@ __all__ = [
     "read_atlas",
     "save_json",
     "say",
+    "streams_of",
 ]
 
 Subparsers = Any
@@ -53,6 +55,15 @@ _ENDINGS = {
     "path_out": (".csv", ".txt"),
 }
 """Permitted suffixes of these files, by which other programs recognise them."""
+
+_READ = (
+    *("touches", "specimens", "atlas", "recording", "poses", "ct_landmarks", "bone", "path", "names", "tip"),
+    *("left", "right", "labelling_error"),
+)
+"""Options and arguments whose files are read."""
+
+_OUTPUT_ENDINGS = {"fit": ".json", "touches": ".csv"}
+"""Commands whose ``--output`` is a file, and its ending; that of the others is a folder."""
 
 _ANOTHER = "Name another file."
 
@@ -276,6 +287,27 @@ def keeping_inputs(args: argparse.Namespace) -> Iterator[None]:
             check_ending(word, _ENDINGS.get(name, ()), option)
             written[path] = option
         yield
+
+
+def streams_of(args: argparse.Namespace) -> AbstractContextManager[None]:
+    """Take ``-`` for standard input where a command reads a file, for standard output where it writes one.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        The parsed options; changed while the command runs.
+
+    Returns
+    -------
+    context manager
+        See `gp_core.standard_streams.standard_streams`.
+    """
+    written = {name: endings[0] for name, endings in _ENDINGS.items()} | {"figure": ".png"}
+    into_file = _OUTPUT_ENDINGS.get(args.command)
+    if into_file is not None:
+        written["output"] = into_file
+    folders = ("checkpoint",) if into_file is not None else ("checkpoint", "output")
+    return standard_streams(args, written, _READ, folders=folders)
 
 
 def check_ending(word: str, endings: tuple[str, ...], option: str) -> None:

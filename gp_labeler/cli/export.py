@@ -9,6 +9,7 @@ from pathlib import Path
 
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
+from gp_core.standard_streams import standard_streams
 
 __all__ = ["make_export_parser", "run_export"]
 
@@ -52,6 +53,11 @@ def run_export(arguments: Sequence[str]) -> int:
         A specimen cannot be read, nothing is placed in it, or a file is there already or cannot be written.
     """
     args = make_export_parser().parse_args(arguments)
+    with standard_streams(args, {}, ("specimens",), folders=("output",)):
+        return _export(args)
+
+
+def _export(args: argparse.Namespace) -> int:
     from gp_labeler.document.landmark_export import export_landmarks  # here: `--help` need not wait
     from gp_labeler.document.measurement_export import export_measurements
     from gp_labeler.document.specimen_file import read_specimen

@@ -11,6 +11,7 @@ from typing import Any
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
+from gp_core.standard_streams import standard_streams
 
 __all__ = ["add_import_options", "import_options", "make_mesh_parser", "run_mesh"]
 
@@ -18,6 +19,7 @@ _EXAMPLE = """examples:
   gp-labeler mesh head.nrrd -o head.ply
   gp-labeler mesh head.nrrd -o head.ply --method skimage
   gp-labeler mesh slices_tif/ -o head.stl --spacing 0.035 --reverse
+  gp-labeler mesh - -o - < head.nrrd > head.ply
   gp-labeler mesh dicom/ -o head.vtp --series bone --accept gap --threshold 1200
 
 Where a scan does not say all that is needed, the error names the option that states it.
@@ -33,7 +35,7 @@ def make_mesh_parser() -> argparse.ArgumentParser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("volume", type=Path, metavar="VOLUME", help="file, or folder of slices")
-    formats = ".ply, .stl, .vtp, .obj, .glb or .gltf"
+    formats = ".ply, .stl, .vtp, .obj, .glb or .gltf; - writes PLY to standard output"
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MESH", help=formats)
     _add_surface(parser.add_argument_group("the surface"))
     add_import_options(parser.add_argument_group("how the scan is read"))
@@ -105,6 +107,11 @@ def run_mesh(arguments: Sequence[str]) -> int:
         if value is not None
     }
     _check_surface(args)
+    with standard_streams(args, {"output": ".ply"}, ("volume",)):
+        return _mesh(args, options, surface_options)
+
+
+def _mesh(args: argparse.Namespace, options: dict[str, Any], surface_options: dict[str, Any]) -> int:
     from gp_labeler.imaging.readers import read_volume  # here: `--help` need not wait for VTK
     from gp_labeler.imaging.surface import extract_isosurface
     from gp_labeler.imaging.surface_files import check_mesh_name

@@ -11,6 +11,7 @@ from typing import Any
 
 from gp_core.command_line import CommandParser
 from gp_core.errors import GpError
+from gp_core.standard_streams import standard_streams
 from gp_labeler.phantom.variation import SWITCHES, USUAL, HeadVariation
 
 __all__ = ["make_phantom_parser", "run_phantom"]
@@ -83,6 +84,12 @@ def run_phantom(arguments: Sequence[str]) -> int:
     if not 0 <= args.noise < 1e5:
         raise GpError(f"--noise must be 0 to 100000, got {args.noise:g}")
     variations = [_variation(args, seed) for seed in seeds]
+    files = {} if args.seeds else {"output": ".nrrd"}
+    with standard_streams(args, files, (), folders=("output",) if args.seeds else ()):
+        return _make(args, seeds, variations)
+
+
+def _make(args: argparse.Namespace, seeds: Sequence[int], variations: Sequence[HeadVariation]) -> int:
     from gp_labeler.phantom import make_phantom, save_phantom  # here: `--help` need not wait for scipy
     from gp_labeler.phantom.files import scan_name
 

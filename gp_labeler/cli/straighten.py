@@ -14,6 +14,7 @@ import numpy as np
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, write_text
 from gp_core.errors import GpError
+from gp_core.standard_streams import standard_streams
 from gp_labeler.cli.mesh import add_import_options, import_options
 
 if TYPE_CHECKING:
@@ -72,6 +73,11 @@ def run_straighten(arguments: Sequence[str]) -> int:
     """
     args = make_straighten_parser().parse_args(arguments)
     _check_points(args)
+    with standard_streams(args, {"json": ".json"}, ("volume", "landmarks")):
+        return _straighten(args)
+
+
+def _straighten(args: argparse.Namespace) -> int:
     from gp_labeler.imaging.readers import read_volume  # here: `--help` need not wait for it
 
     slices = args.volume.iterdir() if args.volume.is_dir() else ()

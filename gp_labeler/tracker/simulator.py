@@ -26,6 +26,7 @@ from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.io import read_touches
 from gp_core.landmarks.features import EXTERNAL, PROBE, Side
+from gp_core.standard_streams import STANDARD, standard_streams
 from gp_core.validation import FloatArray
 from gp_labeler.tracker.address import DEFAULT_PORT, check_device
 from gp_labeler.tracker.rigid import rotation_of
@@ -77,13 +78,8 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
     if threading.current_thread() is threading.main_thread():
         signal.signal(signal.SIGINT, signal.default_int_handler)  # it ends in good order
     try:
-        points, truth = _points(args)
-        simulator = _simulator(args, points)
-        if args.truth is not None:
-            with protected_inputs(file for file in (args.touches, args.script) if file is not None):
-                write_text(args.truth, json.dumps({**truth, "port": simulator.port}, indent=2))
-        _say(f"listening on 127.0.0.1:{simulator.port}")
-        return serve(simulator, args, list(points))
+        with standard_streams(args, {}, ("touches", "script")):
+            return _simulate(args)
     except GpError as error:
         sys.stderr.write(f"simulator: {error}\n")
     except OSError as error:
@@ -92,6 +88,19 @@ def main(arguments: Sequence[str] | None = None, *, prog: str = _PROG) -> int:
             f"simulator: cannot listen at port {args.port} ({why}). Choose another with --port.\n"
         )
     return 2
+
+
+def _simulate(args: argparse.Namespace) -> int:
+    points, truth = _points(args)
+    simulator = _simulator(args, points)
+    told = json.dumps({**truth, "port": simulator.port}, indent=2)
+    if str(args.truth) == STANDARD:
+        _say(told)
+    elif args.truth is not None:
+        with protected_inputs(file for file in (args.touches, args.script) if file is not None):
+            write_text(args.truth, told)
+    _say(f"listening on 127.0.0.1:{simulator.port}")
+    return serve(simulator, args, list(points))
 
 
 def serve(simulator: Simulator, args: argparse.Namespace, names: list[str]) -> int:
