@@ -67,7 +67,7 @@ def old_window(atlas: Atlas) -> Check:
     from functools import partial
 
     from gp_core.atlas.prediction import predict
-    from gp_labeler.models.ghosts import Expectations, Judging  # type: ignore[attr-defined]
+    from gp_labeler.session.ghosts import Expectations, Judging  # type: ignore[import-not-found]
 
     def check(landmarks: LandmarkSet) -> tuple[bool, set[frozenset[str]], set[str]]:
         expectations = Expectations(partial(predict, atlas))
