@@ -22,7 +22,11 @@ from pathlib import Path
 import numpy as np
 
 from gp_core import Atlas, LandmarkSet, Side
-from gp_core.atlas.sampling import draw_animal
+
+try:
+    from gp_core.atlas.sampling import draw_animal
+except ModuleNotFoundError:  # at commit 8da40c9, see above
+    from gp_core.atlas.draw import draw_animal  # type: ignore[import-not-found, no-redef]
 
 N_LABELS = (4, 5, 6, 8, 12, 19)
 NOISE_MM = 0.1
@@ -66,7 +70,7 @@ def old_window(atlas: Atlas) -> Check:
     """Return what the labelling window asked."""
     from functools import partial
 
-    from gp_core.atlas.prediction import predict
+    from gp_core.atlas.shape import predict  # type: ignore[import-not-found]
     from gp_labeler.session.ghosts import Expectations, Judging  # type: ignore[import-not-found]
 
     def check(landmarks: LandmarkSet) -> tuple[bool, set[frozenset[str]], set[str]]:
