@@ -12,7 +12,20 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.features import CODES, Side, feature
 from gp_core.validation import FloatArray
 
-__all__ = ["FAR", "Schematic", "schematic_of"]
+__all__ = [
+    "AXIS",
+    "EDGE",
+    "FAR",
+    "GROUNDS",
+    "HEAD",
+    "ORBITAL",
+    "OUTLINE",
+    "SKULL",
+    "WINDOW",
+    "Schematic",
+    "ground_of",
+    "ground_schematic",
+]
 
 FAR = ("IN", "ZL")
 """Features so far from the ear that the picture must show the head."""
@@ -22,6 +35,14 @@ _LEVEL_RAD = np.deg2rad(-19.0)
 
 _TURNS, _BASE_RADIUS, _TOP_RADIUS, _FIRST, _LAST = 3.6, 1.75, 0.35, 0.55, 3.95
 """The cochlear tube around the axis CB-CA: turns, and mm; drawn, not measured."""
+
+HEAD = "head"
+GROUNDS = ("coronal", "axial", "sagittal", "3D", HEAD)
+"""What pictures of features show: the ear from a direction, or the head from the side."""
+
+WINDOW, AXIS, EDGE, SKULL, OUTLINE, ORBITAL = "#56b4e9", "#e69f00", "#50472f", "#d9cfb9", "#8a7f68", "#101010"
+"""Colours in the files that a theme replaces: of round window, modiolar axis, the coil's edge, skull, its
+outline and orbit. Other bone is ``currentColor``."""
 
 _PLANES: Mapping[str, tuple[tuple[float, ...], tuple[float, ...], str]] = {
     "coronal": ((0, 1, 0), (0, 0, 1), "RLIS"),
@@ -49,44 +70,52 @@ turns; drawn by hand, not measured."""
 
 @dataclass(frozen=True, eq=False)
 class Schematic:
-    """What is to be drawn, in mm of the picture: x to the right, y upwards.
+    """Ear and head as one direction of view shows them, in mm of the picture: x to the right, y upwards.
 
     Parameters
     ----------
-    code : str
-        The feature it is about.
-    view : str
-        From where it is seen: ``coronal``, ``axial``, ``sagittal`` or ``3D``.
+    ground : str
+        One of `GROUNDS`: the file in ``resources/pictures`` that shows the ear (and the head) alone.
+    axes : (3, 3) array
+        What points right, up and at the beholder, in the frame of the atlas.
     points : mapping of str to (2,) array
         The features.
     depths : mapping of str to float
         How near the beholder each of them is, mm.
-    spiral : (n, 2) array
+    coil : (n, 2) array
         The cochlear tube, from the round window to the apex.
     head : tuple of (n, 2) arrays
         Outlines of the skull and what is on it; empty where the picture is of the ear alone.
     letters : str
         Left, right, below and above on the picture, as on slices.
-    box : (2, 2) array
-        Lower left and upper right corner of what the picture should show.
     """
 
-    code: str
-    view: str
+    ground: str
+    axes: FloatArray
     points: Mapping[str, FloatArray]
     depths: Mapping[str, float]
-    spiral: FloatArray
+    coil: FloatArray
     head: tuple[FloatArray, ...]
     letters: str
-    box: FloatArray
+
+    def box_around(self, code: str) -> FloatArray:
+        """Return the lower left and upper right corner of what the picture of a feature shows, (2, 2)."""
+        far = self.ground == HEAD
+        codes = [c for c in CODES if far or c == code or c not in (*FAR, "MN")]
+        corners = np.vstack([np.array([self.points[c] for c in codes]), self.coil, *self.head])
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+
+def ground_of(code: str) -> str:
+    """Return which of the `GROUNDS` the picture of a feature has."""
+    return HEAD if code in FAR else feature(code).view
 
 
 @cache
-def schematic_of(code: str, side: Side) -> Schematic:
-    """Return the schematic that shows a feature best, of the left or the right ear."""
-    row, atlas = feature(code), Atlas.published()
-    far = row.code in FAR
-    view = "sagittal" if far else row.view
+def ground_schematic(ground: str, side: Side) -> Schematic:
+    """Return one of the `GROUNDS`, of the left or the right ear."""
+    far, atlas = ground == HEAD, Atlas.published()
+    view = "sagittal" if far else ground
     right, up, letters = _PLANES[view]
     axes = np.array([right, up, np.cross(right, up)], dtype=np.float64)
     if far:
@@ -94,21 +123,15 @@ def schematic_of(code: str, side: Side) -> Schematic:
     if side is Side.RIGHT:
         axes, letters = _mirrored(axes, view, letters)
     shown = {c: axes @ atlas[c] for c in CODES}
-    points = {c: xyz[:2] for c, xyz in shown.items()}
     forwards = np.array([1.0 if side is Side.RIGHT else -1.0, 1.0])
-    head = tuple(outline * forwards for outline in _HEAD) if far else ()
-    spiral = (_spiral() @ axes.T)[:, :2]
-    inside = [points[c] for c in CODES if far or c == row.code or c not in (*FAR, "MN")]
-    corners = np.vstack([np.array(inside), spiral, *head])
     return Schematic(
-        row.code,
-        row.view,
-        points,
+        ground,
+        axes,
+        {c: xyz[:2] for c, xyz in shown.items()},
         {c: float(xyz[2]) for c, xyz in shown.items()},
-        spiral,
-        head,
+        (_coil() @ axes.T)[:, :2],
+        tuple(outline * forwards for outline in _HEAD) if far else (),
         letters,
-        np.stack([corners.min(axis=0), corners.max(axis=0)]),
     )
 
 
@@ -132,7 +155,7 @@ def _mirrored(axes: FloatArray, view: str, letters: str) -> tuple[FloatArray, st
     return flipped, letters[1] + letters[0] + letters[2:]
 
 
-def _spiral() -> FloatArray:
+def _coil() -> FloatArray:
     """Return the (n, 3) middle line of the cochlear tube in the atlas frame of a left ear."""
     t = np.linspace(0.0, 1.0, 120)
     angle = 2 * np.pi * _TURNS * t

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 
 from qtpy.QtCore import QPointF, QRectF, Qt
-from qtpy.QtGui import QColor, QPainterPath, QPen
+from qtpy.QtGui import QColor, QPen
 
-__all__ = ["beside", "round_pen", "smooth"]
+__all__ = ["beside", "round_pen"]
 
 
 def beside(where: QPointF, width: float, height: float, gap: float) -> Iterator[QRectF]:
@@ -24,12 +24,3 @@ def beside(where: QPointF, width: float, height: float, gap: float) -> Iterator[
 def round_pen(colour: QColor, width: float) -> QPen:
     """Return a pen with round ends and corners."""
     return QPen(colour, width, Qt.PenStyle.SolidLine, Qt.PenCapStyle.RoundCap, Qt.PenJoinStyle.RoundJoin)
-
-
-def smooth(corners: Sequence[QPointF]) -> QPainterPath:
-    """Return a closed curve through points (Catmull and Rom's spline as cubic pieces)."""
-    n, path = len(corners), QPainterPath(corners[0])
-    for i in range(n):
-        before, a, b, after = (corners[(i + k) % n] for k in (-1, 0, 1, 2))
-        path.cubicTo(a + (b - before) / 6, b - (after - a) / 6, b)
-    return path

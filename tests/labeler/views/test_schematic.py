@@ -2,20 +2,30 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from gp_core.landmarks.features import CODES, Side
-from gp_labeler.views.schematic import FAR, schematic_of
+from gp_labeler.views.schematic import FAR, Schematic, ground_of, ground_schematic
 
 LEFT, RIGHT = Side.LEFT, Side.RIGHT
+_ROOT = Path(__file__).resolve().parents[3]
+
+
+def schematic_of(code: str, side: Side) -> Schematic:
+    return ground_schematic(ground_of(code), side)
 
 
 @pytest.mark.parametrize("code", CODES)
 def test_the_feature_lies_inside_the_frame_of_its_own_picture(code):
     for side in Side:
         picture = schematic_of(code, side)
-        low, high = picture.box
+        low, high = picture.box_around(code)
         assert (picture.points[code] >= low).all()
         assert (picture.points[code] <= high).all()
         assert bool(picture.head) == (code in FAR)
@@ -51,3 +61,18 @@ def test_up_is_superior_from_the_side_and_anterior_from_below():
     axial = schematic_of("FPA", LEFT)
     assert axial.points["FPA"][1] > axial.points["FPP"][1]
     assert axial.letters[3] == "A"
+
+
+def test_the_files_are_what_the_tool_draws_from_the_atlas(tmp_path):
+    command = [sys.executable, "tools/feature-pictures", "--write", "--folder", str(tmp_path)]
+    subprocess.run(command, cwd=_ROOT, check=True, capture_output=True)
+    shipped = sorted((_ROOT / "resources" / "pictures").glob("*.svg"))
+    assert [file.name for file in shipped] == sorted(file.name for file in tmp_path.iterdir())
+    for file in shipped:
+        now, then = (f.read_text(encoding="utf-8") for f in (tmp_path / file.name, file))
+        numbers = r"-?\d+\.?\d*"
+        assert re.sub(numbers, "", now) == re.sub(numbers, "", then), (
+            f"{file}: tools/feature-pictures --write"
+        )
+        values = [np.array(re.findall(numbers, text), float) for text in (now, then)]
+        np.testing.assert_allclose(*values, atol=0.011)
