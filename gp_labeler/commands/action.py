@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["MENUS", "Action", "Run", "Test", "Ui"]
@@ -56,6 +57,8 @@ class Ui(Protocol):
     def close_window(self) -> None: ...  # noqa: D102
     def reset_views(self) -> None: ...  # noqa: D102
     def zoom_to_point(self) -> None: ...  # noqa: D102
+    def look_closely(self, position: FloatArray | None) -> None: ...  # noqa: D102
+    def ask_reopen_mirrored(self) -> None: ...  # noqa: D102
     def look_from(self, letter: str) -> None: ...  # noqa: D102
     def cut(self, plane: str) -> None: ...  # noqa: D102
     def toggle_theme(self) -> None: ...  # noqa: D102

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from gp_core.errors import GpError
 from gp_labeler.commands.action import MENUS, Action, Ui
 from gp_labeler.commands.atlas_rows import atlas_rows
+from gp_labeler.commands.frame_rows import frame_rows
 from gp_labeler.commands.labelling_rows import labelling_rows
 from gp_labeler.commands.measure_rows import measure_rows
 from gp_labeler.commands.pose_rows import pose_rows
@@ -25,6 +26,7 @@ ACTIONS: Mapping[str, Action] = MappingProxyType(
             edit_rows,
             view_rows,
             cut_rows,
+            frame_rows,
             landmark_rows,
             labelling_rows,
             measure_rows,

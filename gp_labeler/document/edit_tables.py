@@ -31,6 +31,7 @@ from gp_labeler.document.edits import (
     SwapPoints,
     SwapSides,
 )
+from gp_labeler.document.head_edits import ClearHeadFrame, ConfirmLeft, SetHeadFrame
 from gp_labeler.document.import_edit import ImportLandmarks
 from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
 from gp_labeler.document.measurement_edits import (
@@ -67,6 +68,7 @@ EDITS: Mapping[str, type[Any]] = MappingProxyType(
             *(AnnotatePoint, BeginLabelling, OpenLabelling, NameObserver),
             *(SwapPoints, SwapSides, SetThreshold, SetNotes, RenameSpecimen),
             *(RecordTouch, TakeTouches, RemoveTouches, LeaveOutTouch, SwapTouches, MoveTouches, SetSkull),
+            *(SetHeadFrame, ClearHeadFrame, ConfirmLeft),
             *(AddMeasurements, MoveMeasurement, RenameMeasurement, RemoveMeasurements),
         )
     }

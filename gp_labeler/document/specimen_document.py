@@ -91,6 +91,8 @@ class SpecimenDocument:
     """Another labelling of the specimen is in work, or it is by another observer; after its landmarks."""
     author_changed = Signal(str)
     """Who labels from now on."""
+    head_frame_changed = Signal()
+    """How the head lies in its scan, or whether that is shown."""
     details_changed = Signal()
     """Specimen name, notes, the reference to the scan, import choices or pose checks."""
     history_changed = Signal()
@@ -288,6 +290,14 @@ class SpecimenDocument:
         """Do again what was undone last; False where there is nothing."""
         return self._step("redo")
 
+    def show_head_frame(self, shown: bool) -> None:
+        """Keep whether the views are turned into the head's frame: no edit, but saved with the next."""
+        self._check_thread()
+        head = self.state.head_frame
+        if head is not None and head.shown != shown:
+            self.history.change_all(lambda state: _with_head_shown(state, shown))
+            self.head_frame_changed.emit()
+
     def provenance(self, how: How, *, source: str = "") -> Provenance:
         """Return what is to be remembered of a point that is placed now."""
         volume = self.state.volume
@@ -316,6 +326,8 @@ class SpecimenDocument:
             self.touches_changed.emit()
         if new.measurements != old.measurements:
             self.measurements_changed.emit()
+        if new.head_frame != old.head_frame:
+            self.head_frame_changed.emit()
         if new.threshold != old.threshold:
             self.threshold_changed.emit(new.threshold)
         if _details(new) != _details(old):
@@ -466,6 +478,11 @@ class SpecimenDocument:
 
 def _loaded(specimen: SpecimenState | LoadedSpecimen) -> LoadedSpecimen:
     return LoadedSpecimen(History(specimen)) if isinstance(specimen, SpecimenState) else specimen
+
+
+def _with_head_shown(state: SpecimenState, shown: bool) -> SpecimenState:
+    head = state.head_frame
+    return state if head is None else replace(state, head_frame=head.seen(shown))
 
 
 def _labelling(state: SpecimenState) -> tuple[object, ...]:

@@ -4,8 +4,9 @@ Layout (version 4): ``format``, ``version``, ``application``, ``specimen``, ``vo
 checksum, path, and path relative to the file), ``landmarks`` (by ``L``, ``R`` and ``both``, then by feature
 code: position in scan mm, LPS, or suggestion; unseen, locked, checked; provenance, certainty, note),
 ``observer``, ``round`` and ``blind`` of that labelling, ``other_labellings`` (each with the same entries),
-``threshold``, ``import_choices``, ``notes`` and ``pose_checks``. A file without certainties, notes, observer
-and other labellings says version 3, which earlier programs read.
+``threshold``, ``import_choices``, ``headFrame`` (how the head lies in the scan, and whether that is shown),
+``notes`` and ``pose_checks``. A file without certainties, notes, observer and other labellings says version
+3, which earlier programs read.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from gp_core.landmarks.provenance import Certainty
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document.frozen_json import thaw
+from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.document.state import (
     How,
     Landmark,
@@ -62,12 +63,39 @@ def document_of(state: SpecimenState) -> Document:
         document["volume"] = volume_document(state.volume)
     if state.threshold is not None:
         document["threshold"] = state.threshold
-    document |= _measurements_out(state.measurements)
+    document |= _measurements_out(state.measurements) | _head_out(state.head_frame)
     if evidence := {
         side.value: found.as_json() for side in Side if (found := state.side(side).scan_evidence)
     }:
         document["bone_distance_mm"] = evidence
     return document | _labelling_out(state.observer, state.round, state.blind) | _others_out(state.others)
+
+
+def _head_out(head: HeadFrame | None) -> Document:
+    if head is None:
+        return {}
+    rows = [list(row) for row in head.matrix]
+    out: Document = {"T_head_scan": rows, "foundBy": head.found_by, "pitch": head.pitch, "left": head.left}
+    return {"headFrame": out | {"leftConfirmed": head.left_confirmed, "shown": head.shown}}
+
+
+def _head_in(document: Mapping[str, Any]) -> HeadFrame | None:
+    if document.get("headFrame") is None:
+        return None
+    content = _typed(document["headFrame"], dict, "headFrame")
+    rows = _typed(content.get("T_head_scan"), list, "headFrame.T_head_scan")
+    matrix = [_typed(row, list, "headFrame.T_head_scan") for row in rows]
+    if [len(row) for row in matrix] != [4, 4, 4, 4]:
+        raise FileFormatError("headFrame.T_head_scan must be four rows of four numbers")
+    numbers = tuple(tuple(_number(x, "headFrame.T_head_scan") for x in row) for row in matrix)
+    return HeadFrame(
+        numbers,  # type: ignore[arg-type]
+        _typed(content.get("foundBy", "hand"), str, "headFrame.foundBy"),
+        _typed(content.get("pitch", ""), str, "headFrame.pitch"),
+        _typed(content.get("left", ""), str, "headFrame.left"),
+        _typed(content.get("leftConfirmed", False), bool, "headFrame.leftConfirmed"),
+        _typed(content.get("shown", True), bool, "headFrame.shown"),
+    )
 
 
 def _labelling_out(observer: str, number: int, blind: bool) -> Document:
@@ -118,6 +146,7 @@ def state_of(document: Mapping[str, Any]) -> SpecimenState:
             pose_checks=tuple(_pose_check_in(c, f"pose_checks[{i}]") for i, c in enumerate(checks)),
             touches=_touches_in(_typed(document.get("touches", {}), dict, "touches")),
             skull=_skull_in(_typed(document.get("skull", {}), dict, "skull")),
+            head_frame=_head_in(document),
             scan_evidence=_scan_evidence_in(
                 _typed(document.get("bone_distance_mm", {}), dict, "bone_distance_mm")
             ),

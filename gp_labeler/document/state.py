@@ -27,6 +27,7 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import check_option, near_matches
 from gp_labeler.document.frozen_json import freeze
+from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.document.touches import Touch, TouchKey, touched_set
 from gp_labeler.document.volume_reference import VolumeReference
 
@@ -254,6 +255,8 @@ class SpecimenState:
         What was touched with the probe; all touches of a side are in one frame.
     skull : mapping of str to (3,) tuple
         Skull features on the scan by which touches are registered to it, scan frame, mm.
+    head_frame : HeadFrame, optional
+        How the head lies in its scan; None before it was straightened.
     scan_evidence : mapping of Side to ScanEvidence
         How far the points were from bone when that was last measured in the scan; see `measured`.
     measurements : tuple of Measurement
@@ -284,6 +287,7 @@ class SpecimenState:
     pose_checks: tuple[PoseCheck, ...] = ()
     touches: Mapping[TouchKey, Touch] = field(default_factory=dict)
     skull: Mapping[str, Position] = field(default_factory=dict)
+    head_frame: HeadFrame | None = None
     scan_evidence: Mapping[Side, ScanEvidence] = field(default_factory=dict, compare=False)
     measurements: tuple[Measurement, ...] = ()
     observer: str = ""

@@ -20,8 +20,9 @@ from gp_labeler.models.workflow import Active
 
 __all__ = ["TOOLS", "InteractionModel", "PointDrag", "VisibleArea"]
 
-TOOLS = ("place", "look", "grey", "touch", "ruler", "angle")
-"""What a left click or drag over a slice does: place, move the crosshair, grey window, touch, measure."""
+TOOLS = ("place", "look", "grey", "touch", "ruler", "angle", "turn")
+"""What a left click or drag over a slice does: place, move the crosshair, grey window, touch, measure, turn
+the head by hand."""
 
 
 class VisibleArea(Protocol):
@@ -89,6 +90,11 @@ class InteractionModel:
         if tool != self.tool:
             self.tool = tool
             self.tool_changed.emit(tool)
+
+    def leave_turning(self) -> None:
+        """Go back to the tool that the step begins with, once the head is turned."""
+        if self.tool == "turn":
+            self.set_tool("place" if self.is_labelling else "look")
 
     def begin_labelling(self) -> None:
         """Let a click place points."""

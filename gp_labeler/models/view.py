@@ -14,6 +14,7 @@ from psygnal import Signal
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray, check_option
 from gp_labeler.document.edits import as_position
+from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame
 from gp_labeler.imaging.slice_plane import SlicePlane
@@ -133,7 +134,7 @@ class ViewModel:
     Parameters
     ----------
     document : SpecimenDocument
-        Another specimen begins with its own grey window, cut, camera and crosshair.
+        Another specimen begins with its own frame, grey window, cut, camera and crosshair.
     """
 
     changed = Signal(frozenset)
@@ -142,6 +143,8 @@ class ViewModel:
     """The crosshair, (3,) mm in the scan frame."""
     planes_changed = Signal()
     """The slice views show other planes, or name directions in another frame."""
+    planes_turned = Signal(str, float)
+    """(view, angle): a hand has turned the planes of the two other views, by `rotate_planes`."""
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into view, mm."""
 
@@ -150,9 +153,12 @@ class ViewModel:
 
     def __init__(self, document: SpecimenDocument) -> None:
         self.state = ViewState()
-        self._frame, self._planes = SCAN_FRAME, MappingProxyType(SCAN_FRAME.planes())
         self._crosshair = _read_only([0.0, 0.0, 0.0])
+        self._document = document
+        self._frame, self._planes = SCAN_FRAME, MappingProxyType(SCAN_FRAME.planes())
+        self._titles: Mapping[str, str] = MappingProxyType({})
         document.reset.connect(self._on_reset)
+        document.head_frame_changed.connect(self._on_head_frame)
 
     def update(self, **changes: Any) -> None:
         """Change some fields of the state.
@@ -192,18 +198,42 @@ class ViewModel:
         """What the ``axial``, ``sagittal`` and ``coronal`` views show; the crosshair lies on all three."""
         return self._planes
 
+    def is_turned(self, name: str) -> bool:
+        """Whether a view shows another plane than the one of its name in the frame."""
+        return not self._planes[name].same_as(self._frame.plane(name))
+
     @property
     def planes_are_turned(self) -> bool:
-        """Whether a view shows another plane than the one of its name in the frame."""
-        return not all(self._planes[name].same_as(plane) for name, plane in self._frame.planes().items())
+        """Whether any view does."""
+        return any(self.is_turned(name) for name in self._planes)
 
     def set_frame(self, frame: AnatomicalFrame) -> None:
         """Name directions in a frame, and show its planes."""
         self._frame = frame
         self.set_planes(frame.planes())
 
-    def set_planes(self, planes: Mapping[str, SlicePlane]) -> None:
+    def title(self, name: str) -> str:
+        """Say what a view shows: ``Axial``, the title its plane was given, or that it is oblique."""
+        if name in self._titles:
+            return self._titles[name]
+        return f"{name.capitalize()}, oblique" if self.is_turned(name) else name.capitalize()
+
+    @property
+    def frame_text(self) -> str:
+        """Say in which frame the views are, and whether they are turned out of it."""
+        return f"{self._frame.name.capitalize()} frame" + (", turned" if self.planes_are_turned else "")
+
+    def set_planes(
+        self, planes: Mapping[str, SlicePlane], titles: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
         """Show other planes in some of the slice views.
+
+        Parameters
+        ----------
+        planes : mapping of str to SlicePlane
+            By the name of the view.
+        titles : mapping of str to str
+            What they are called, where they have a name of their own.
 
         Raises
         ------
@@ -213,6 +243,8 @@ class ViewModel:
         for name in planes:
             check_option(name, "view", tuple(self._planes))
         self._planes = MappingProxyType({**self._planes, **planes})
+        kept = {name: title for name, title in self._titles.items() if name not in planes}
+        self._titles = MappingProxyType({**kept, **titles})
         self.planes_changed.emit()
 
     def rotate_planes(self, about: str, angle: float) -> None:
@@ -238,8 +270,18 @@ class ViewModel:
     def _on_reset(self) -> None:
         """Keep how the user likes to look at things; whoever listens to `reset` reads the rest again."""
         self.state = replace(self.state, **{name: getattr(ViewState, name) for name in _OF_ONE_SPECIMEN})
-        self._frame, self._planes = SCAN_FRAME, MappingProxyType(SCAN_FRAME.planes())
+        self._frame = _frame_of(self._document.state.head_frame)
+        self._planes = MappingProxyType(self._frame.planes())
+        self._titles = MappingProxyType({})
         self._crosshair = _read_only([0.0, 0.0, 0.0])
+
+    def _on_head_frame(self) -> None:
+        self.set_frame(_frame_of(self._document.state.head_frame))
+
+
+def _frame_of(head: HeadFrame | None) -> AnatomicalFrame:
+    """Return the frame in which the views are shown."""
+    return AnatomicalFrame("head", head.T_head_scan) if head is not None and head.shown else SCAN_FRAME
 
 
 def _read_only(position: ArrayLike) -> FloatArray:

@@ -21,8 +21,10 @@ from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.jobs.runner import Dispatcher, Jobs, Task
 from gp_labeler.models.added_meshes import AddedMeshesModel
+from gp_labeler.models.anatomical_planes import AnatomicalPlanesModel
 from gp_labeler.models.atlas import AtlasModel, is_atlas_file
 from gp_labeler.models.bone import BoneModel
+from gp_labeler.models.head import HeadModel
 from gp_labeler.models.interaction import InteractionModel
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.measure import MeasureModel
@@ -79,7 +81,9 @@ class Workspace:
         self.interaction = InteractionModel(document, self.labels, self.view, messages)
         self.measure = MeasureModel(document, self.interaction, self.labels, self.view, messages)
         self.bone = BoneModel(document, self.scan, self.labels, jobs, messages)
+        self.head = HeadModel(document, self.view, self.scan, jobs, messages)
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
+        self.planes = AnatomicalPlanesModel(self.labels, self.pose, self.view)
         self.tracker = TrackerModel(document, self.pose, messages)
         self.references = ReferencePointsModel(document, self.scan, messages)
         self.reliability = ReliabilityModel(document, self.atlas, self.references, jobs, messages)

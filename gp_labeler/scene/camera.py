@@ -24,6 +24,7 @@ _DEGREES_PER_VIEW = 200.0
 """Turn of a drag across the whole view."""
 
 _FIT = 1.08
+_SCAN_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _SMALLEST_MM, _LARGEST_MM = 0.02, 5000.0
 
 
@@ -147,8 +148,15 @@ class SceneCamera:
             (width, height),
         )
 
-    def view_from(self, letter: str) -> None:
+    def view_from(self, letter: str, axes: ArrayLike = _SCAN_AXES) -> None:
         """Look from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I`` at what is in the middle now.
+
+        Parameters
+        ----------
+        letter : str
+            See `VIEWPOINTS`.
+        axes : (3, 3) array_like
+            Columns: left, posterior and superior; by default those of the scan.
 
         Raises
         ------
@@ -156,7 +164,8 @@ class SceneCamera:
             Another letter.
         """
         check_option(letter, "viewpoint", VIEWPOINTS)
-        self.look(np.negative(VIEWPOINTS[letter].eye), VIEWPOINTS[letter].up)
+        frame = np.asarray(axes, dtype=np.float64)
+        self.look(-frame @ VIEWPOINTS[letter].eye, frame @ VIEWPOINTS[letter].up)
 
     def look(self, direction: ArrayLike, up: ArrayLike) -> None:
         """Look along a direction at what is in the middle now, with `up` upwards."""

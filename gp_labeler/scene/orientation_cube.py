@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import numpy as np
 from vtkmodules.vtkRenderingAnnotation import vtkAnnotatedCubeActor
 from vtkmodules.vtkRenderingCore import vtkRenderer
 
+from gp_core.validation import FloatArray
 from gp_labeler.imaging.vtk_arrays import triple
 from gp_labeler.scene.camera import SceneCamera, Viewpoint
 from gp_labeler.scene.colours import rgb
@@ -21,6 +23,11 @@ _CUBE_SHARE = 0.35
 class OrientationCube:
     """A cube with the letters R L A P S I, at the lower left, turning with the camera.
 
+    Attributes
+    ----------
+    axes : (3, 3) float array
+        Columns: left, posterior and superior, in the scan.
+
     Parameters
     ----------
     layers : RenderLayers
@@ -30,6 +37,7 @@ class OrientationCube:
     def __init__(self, layers: RenderLayers) -> None:
         self._layers = layers
         self.visible = True
+        self.axes: FloatArray = np.eye(3)
         self.renderer = vtkRenderer()
         self.renderer.SetLayer(1)
         self.renderer.InteractiveOff()
@@ -79,8 +87,10 @@ class OrientationCube:
         )
         eye = self.renderer.GetActiveCamera()
         eye.SetFocalPoint(0, 0, 0)
-        eye.SetPosition(triple(-4 * camera.direction))
-        eye.SetViewUp(triple(camera.up))
+        eye.SetPosition(
+            triple(-4 * camera.direction @ self.axes)
+        )  # the cube stands still, the eye goes round
+        eye.SetViewUp(triple(camera.up @ self.axes))
         eye.SetParallelScale(0.95)
         self.renderer.ResetCameraClippingRange()
 

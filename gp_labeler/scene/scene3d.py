@@ -219,7 +219,13 @@ class Scene3D:
         self.target.draw(self.layers.base, *over, self.layers.overlay)
 
     def _render_key(self) -> RenderKey:
-        look = (*self.bone.look, self.added.look, self.cube.visible, self.layers.scale)
+        look = (
+            *self.bone.look,
+            self.added.look,
+            self.cube.visible,
+            self.cube.axes.tobytes(),
+            self.layers.scale,
+        )
         matrix = self.camera.viewpoint().matrix
         return RenderKey(matrix.tobytes(), self.target.size, look, self.bone.version)
 

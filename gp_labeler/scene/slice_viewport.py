@@ -49,11 +49,11 @@ class SliceViewport:
 
     @classmethod
     def fitted(cls, source: VolumeSlicer, plane: SlicePlane, size: tuple[int, int]) -> SliceViewport:
-        """Make the view that shows a whole volume, at its middle slice."""
-        corners = plane.flat(source.corners)
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        zoom = float(((high - low) / np.maximum(size, 1)).max()) * _MARGIN
+        """Make the view that shows the whole of the middle slice of a volume."""
         position = source.snap(plane, plane.position_of(source.corners.mean(axis=0)))
+        outline = source.section(plane, position)
+        low, high = outline.min(axis=0), outline.max(axis=0)
+        zoom = float(((high - low) / np.maximum(size, 1)).max()) * _MARGIN
         return cls(plane, position, (low + high) / 2, zoom, size)
 
     def scan_to_pixel(self, points: ArrayLike) -> FloatArray:

@@ -187,7 +187,7 @@ class VolumeSlicer:
     def _resampled(self, plane: SlicePlane, position: float) -> SliceImage:
         """Interpolate on a square grid over the part of the plane that lies in the volume."""
         step = min(self.volume.spacing)
-        section = self._section(plane, position)
+        section = self.section(plane, position)
         first = np.floor(section.min(axis=0) / step + 0.5)  # the same grid for all slices: nothing trembles
         width, height = (int(n) for n in np.maximum(np.ceil(section.max(axis=0) / step - 0.5) - first + 1, 1))
         low = first * step
@@ -209,7 +209,7 @@ class VolumeSlicer:
         values = to_numpy(scalars).reshape(height, width).copy()
         return SliceImage(values, plane, position, low, np.array([step, step]))
 
-    def _section(self, plane: SlicePlane, position: float) -> FloatArray:
+    def section(self, plane: SlicePlane, position: float) -> FloatArray:
         """Return the (N, 2) coordinates right and down of where a plane meets the edges of the volume, mm."""
         start, end = self.corners[_EDGES[:, 0]], self.corners[_EDGES[:, 1]]
         before, after = plane.depth(start) - position, plane.depth(end) - position

@@ -51,6 +51,11 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "screenshot", "path": "mesh.png", "what": "3d", "size": [1200, 900]}
     yield {"do": "view", "zoom": 3.0, "go_to": "CO L"}
     yield {"do": "screenshot", "path": "slices.png", "what": "slices", "size": [1800, 600]}
+    yield {"do": "straighten", "by": "landmarks", "left_confirmed": True}
+    yield {"do": "choose", "feature": "CA", "side": "L"}
+    yield {"do": "view", "plane": "along"}
+    yield {"do": "screenshot", "path": "modiolus.png", "what": "views", "size": [1400, 1000]}
+    yield {"do": "view", "plane": "straight", "frame": "scan"}
     for side in (Side.RIGHT, Side.LEFT):
         files = [f"pose_{side.value}.json", *(["pose.json"] if side is Side.LEFT else [])]
         yield {"do": "estimate", "side": side.value, "noise": 0.1, "seed": seed, "path": files}

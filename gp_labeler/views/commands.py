@@ -31,6 +31,8 @@ _FOLDED = {
     "text": "Text size",
     "references": "Compare with",
     "cut": "Cut bone",
+    "head": "Straighten the head",
+    "planes": "Planes of the slices",
     "estimate": "Method",
     "out": "Export and report",
 }
@@ -65,6 +67,8 @@ class Commands(QObject):
             workspace.labels.ghosts_changed,
             workspace.document.history_changed,  # after every edit
             workspace.view.changed,
+            workspace.view.planes_changed,
+            workspace.head.changed,
             workspace.scan.opened,
             workspace.bone.surfaces_changed,
             workspace.interaction.tool_changed,

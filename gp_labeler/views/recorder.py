@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
 from qtpy.QtCore import QObject
 
 from gp_core.disk import write_text
@@ -44,6 +45,7 @@ _PLAIN = (str, int, float, bool, list, tuple)
 
 LOOKS = (
     *("view.reset", "view.projection", "view.from_", "view.cut_", "view.slices_visible"),
+    *("view.frame", "view.straight_planes"),
     *("pose.along_axis", "pose.through_window"),
 )
 """Commands, or beginnings of their names, that change only what is seen: taken down as they are."""
@@ -98,6 +100,7 @@ class Recorder(QObject):
             (workspace.meshes.changed, self._on_meshes),
             (workspace.measure.changed, self._on_measure),
             (workspace.view.changed, self._on_view_changed),
+            (workspace.view.planes_turned, self._on_planes_turned),
             (workspace.interaction.tool_changed, self._on_tool),
             (workspace.pose.overlay_changed, self._on_overlay),
         ):
@@ -226,7 +229,7 @@ class Recorder(QObject):
             self._begin()
         elif id.startswith(LOOKS):
             self.tables.append(step("action", id=id))
-        elif id == "view.zoom_to_point":
+        elif id == "view.zoom_to_point" or id.startswith("view.plane_"):  # they look at the active feature
             active = self._window.workspace.labels.active
             if active.code is not None:
                 self.tables.append(step("choose", feature=active.code, side=active.side.value))
@@ -236,8 +239,13 @@ class Recorder(QObject):
         elif id.startswith("view.text_"):
             self.tables.append(step("view", text_size=self._window.text_size))
 
+    def _on_planes_turned(self, view: str, angle: float) -> None:
+        where = [float(x) for x in self._window.workspace.view.crosshair]
+        self.tables.append(step("view", go_to=where, turn={view: float(np.degrees(angle))}))
+
     def _on_tool(self, tool: str) -> None:
-        self.tables.append(step("action", id="pose.touch" if tool == "touch" else f"tool.{tool}"))
+        id = {"touch": "pose.touch", "turn": "head.by_hand"}.get(tool, f"tool.{tool}")
+        self.tables.append(step("action", id=id))
 
     def _on_overlay(self, options: OverlayOptions) -> None:
         estimate = self._window.workspace.pose.estimate

@@ -145,8 +145,8 @@ class SceneView(QWidget):
         self.redraw()
 
     def view_from(self, letter: str) -> None:
-        """Look from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""
-        self.scene.camera.view_from(letter)
+        """Look from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``, as the frame of the views names them."""
+        self.scene.camera.view_from(letter, self._workspace.view.frame.axes)
         self.redraw()
 
     def go_to(self, position: FloatArray) -> None:
@@ -216,10 +216,24 @@ class SceneView(QWidget):
         follow(self, workspace.measure.changed, self._show_points)
         follow(self, workspace.measure.pointed, self._repaint_pointer)
         follow(self, workspace.view.crosshair_changed, self._on_crosshair)
-        follow(self, workspace.view.planes_changed, self._show_slices)
+        follow(self, workspace.view.planes_changed, self._on_planes)
         follow(self, workspace.view.point_shown, self.go_to)
         follow(self, workspace.interaction.dragged, self._on_dragged)
         follow(self, workspace.view.changed, self._on_view_changed)
+
+    def _on_planes(self) -> None:
+        self._take_frame()
+        self._show_slices()
+        self.canvas.ask_over()
+
+    def _take_frame(self) -> None:
+        """Turn with the frame of the views: what was seen from the front is seen from the front."""
+        axes = self._workspace.view.frame.axes
+        if not np.array_equal(axes, self.scene.cube.axes):
+            turn, camera = axes @ self.scene.cube.axes.T, self.scene.camera
+            camera.look(turn @ camera.direction, turn @ camera.up)
+            self.scene.cube.axes = axes
+            self.redraw()
 
     def _show_slices(self, *_: object) -> None:
         """Show the slices through the crosshair, or none, when the next frame is drawn."""
@@ -259,6 +273,7 @@ class SceneView(QWidget):
     def _on_reset(self) -> None:
         self._fitted = False
         self._source = None
+        self._take_frame()
         self._on_view_changed(frozenset({"mesh_opacity", "cut", "slices_visible"}))
         self._show_points()
 

@@ -27,6 +27,7 @@ from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted,
 from gp_labeler.views.painting.slice_layers import SliceLayer
 from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
 from gp_labeler.views.placement_tool import PlacementTool, nudge
+from gp_labeler.views.plane_turning import PlaneTurning
 from gp_labeler.views.signals import follow
 from gp_labeler.views.slice_window_level import drag_window_level, window_level_of
 
@@ -81,6 +82,7 @@ class SliceView(QWidget):
         self._painted: SliceViewport | None = None  # what is on the screen, if all of it is up to date
         self.layers: list[SliceLayer] = []
         self._control, self._placement = SliceControl(), PlacementTool(workspace)
+        self.turning = PlaneTurning(workspace, plane.value)
         self.slice_painter = SlicePainter(workspace, self)
         self._level_drag: tuple[float, float] | None = None
         self._pointer: tuple[float, float] | None = None
@@ -261,6 +263,8 @@ class SliceView(QWidget):
         if mark is not None and self._placement.holds:
             self._edge = self._edge_for(mark)
             self._grip = self._position_of(mark) - self.shown.pixel_to_scan([[x, y]])[0]
+        elif mark is None and self.turning.press(self.shown, x, y, self.devicePixelRatioF()):
+            return
         elif self._workspace.interaction.tool == "grey":
             self._level_drag = (x, y)
         elif self._workspace.interaction.tool == "look":
@@ -281,18 +285,24 @@ class SliceView(QWidget):
         view = self._control.move(self.shown, x, y)
         if view is not self.shown:
             self._take(view)
+        elif self.turning.move(self.shown, x, y, self.devicePixelRatioF()):
+            return
         elif self._placement.move(x, y):
             self._drag_to(here, free=bool(modifiers_of(event) & _FREES))
         elif self._level_drag is not None:
             self._change_window_level(x, y)
-        elif self._workspace.interaction.tool == "look" and event.buttons() == Qt.MouseButton.LeftButton:
+        elif (
+            self._workspace.interaction.tool in ("look", "turn")
+            and event.buttons() == Qt.MouseButton.LeftButton
+        ):
             self._workspace.view.set_crosshair(here)
 
     def mouseReleaseEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if self.shown is None:
             return
         x, y = pixel_of(self, event.position())
-        clicked = self._control.release(x, y)
+        turned = self.turning.release()
+        clicked = self._control.release(x, y) and not turned
         self._level_drag = None
         dragged = self._placement.holds and not self._placement.is_click
         mark = self._placement.release()
@@ -334,6 +344,8 @@ class SliceView(QWidget):
             self._workspace.interaction.arm_replacing(False)
         elif key == Qt.Key.Key_Escape and self._placement.put_away():
             event.accept()
+        elif key == Qt.Key.Key_Escape and self._workspace.interaction.tool == "turn":
+            self._workspace.interaction.leave_turning()
         elif key in _ARROWS and plain and self.source is not None:
             self._nudge(*_ARROWS[key])
         elif key in _STEPS and plain:
@@ -344,18 +356,29 @@ class SliceView(QWidget):
     def leaveEvent(self, event: QEvent) -> None:  # noqa: D102, N802
         self._pointer = None
         self._workspace.measure.point_at(None)
+        self.update()
         self.hovered.emit(None)
         super().leaveEvent(event)
 
     def enterEvent(self, event: QEnterEvent) -> None:  # noqa: D102, N802
         self._placement.take_focus(self)
+        self.update()
         super().enterEvent(event)
+
+    @property
+    def handles_visible(self) -> bool:
+        """Whether the handles are painted by which the crosshair's arms can be taken."""
+        return self._pointer is not None or self._workspace.interaction.tool == "turn"
 
     def _show_cursor(self, *_: object) -> None:
         """Show the pointer that says what a click here does."""
         if self.shown is not None and self._pointer is not None:
-            here = self.shown.pixel_to_scan([self._pointer])[0]
-            self.setCursor(self._placement.cursor(self._is_inside(here), self._mark_at(*self._pointer)))
+            here, mark = self.shown.pixel_to_scan([self._pointer])[0], self._mark_at(*self._pointer)
+            ratio = self.devicePixelRatioF()
+            if mark is None and self.turning.is_on_handle(self.shown, *self._pointer, ratio):
+                self.setCursor(Qt.CursorShape.PointingHandCursor)
+            else:
+                self.setCursor(self._placement.cursor(self._is_inside(here), mark))
 
     def _nudge(self, right: float, down: float) -> None:
         """Move the chosen point, or the one placed last, by a voxel; without one, the crosshair."""

@@ -32,6 +32,7 @@ _MARGIN, _ROOM = 12, 8
 """Beside the words, and above and below them, logical pixels."""
 
 _WIDEST_PLACE = "L 00.00  P 00.00  S 00.00 mm  ·  voxel 0000, 0000, 0000  ·  -32768"
+_WIDEST_FRAME = "Head frame, turned"
 _MESSAGE_MS = {"info": 5000, "warning": 12000, "error": 0}
 
 
@@ -54,7 +55,9 @@ class StatusLine(QWidget):
         super().__init__(parent)
         self._workspace = workspace
         self._role = "hint"
-        self.where, self.next_click = QLabel(), QLabel()
+        self.where, self.next_click, self.frame = QLabel(), QLabel(), QLabel()
+        self.frame.setProperty("role", "hint")
+        self.frame.setToolTip("Which frame the views are in; positions are always those of the scan (LPS)")
         self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.work = _Work(workspace)
@@ -62,6 +65,7 @@ class StatusLine(QWidget):
         row = QHBoxLayout(self)
         row.setContentsMargins(_MARGIN, 0, _MARGIN, 0)
         row.setSpacing(_MARGIN)
+        row.addWidget(self.frame)
         row.addWidget(self.where)
         row.addWidget(self.next_click, 1)
         row.addWidget(self.work)
@@ -81,6 +85,8 @@ class StatusLine(QWidget):
         ):
             follow(self, signal, self._on_changed)
         follow(self, workspace.messages.said, self.say)
+        for changed in (workspace.view.planes_changed, workspace.scan.opened, workspace.document.reset):
+            follow(self, changed, self._say_frame)
         fit(self, self._make_room)
         self._say_next()
 
@@ -94,6 +100,11 @@ class StatusLine(QWidget):
         value = volume.value_at(position)
         grey = "outside" if value is None else f"{value:.6g}"
         self.where.setText(f"{where_text(position)}  ·  voxel {i}, {j}, {k}  ·  {grey}")
+
+    def _say_frame(self, *_: object) -> None:
+        if self.frame.text() != self._workspace.view.frame_text:
+            self.frame.setText(self._workspace.view.frame_text)
+            self._make_room()
 
     def set_without_scan(self, text: str) -> None:
         """Say what comes next where there is no scan and none is needed; empty where one is."""
@@ -139,6 +150,8 @@ class StatusLine(QWidget):
                 self._show("All features are touched", "next")
         elif workspace.interaction.tool == "look":
             self._show("Drag over a slice to move the crosshair", "hint")
+        elif workspace.interaction.tool == "turn":
+            self._show("Drag over a slice to turn the head about the crosshair · Esc ends it", "hint")
         elif workspace.interaction.tool == "grey":
             self._show("Drag over a slice: sideways for contrast, up and down for brightness", "hint")
         else:
@@ -170,6 +183,10 @@ class StatusLine(QWidget):
         has_place = self._workspace.scan.volume is not None and whole - beside - place - _MARGIN >= need
         self.where.setVisible(has_place)
         self.where.setFixedWidth(place)
+        frame = text_width(self, _WIDEST_FRAME) + _MARGIN
+        has_frame = has_place and whole - beside - place - _MARGIN - frame >= need
+        self.frame.setVisible(has_frame)
+        self.frame.setFixedWidth(frame - _MARGIN)
         if self.work.is_busy and whole - beside < min(need, pixels(self, _LEAST_WORDS)):
             beside = 0
         self.work.setVisible(beside > 0)

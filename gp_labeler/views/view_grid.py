@@ -71,6 +71,11 @@ class ViewHeader(QWidget):
         self._slider = slider
         self._row.insertWidget(self._row.count() - 1, slider)
 
+    def say_title(self, words: str) -> None:
+        """Say what the view shows."""
+        self.title.setText(words)
+        self._leave_out()
+
     def say_where(self, words: str) -> None:
         """Say beside the name where the view is."""
         self.where.setText(words)
@@ -248,6 +253,7 @@ class ViewGrid(QWidget):
             view.moved.connect(lambda mm, p=plane: self._say_where(p, mm))
         follow(self, self._workspace.view.changed, self._on_view_changed)
         follow(self, self._workspace.view.reset_asked, self.reset)
+        follow(self, self._workspace.view.planes_changed, self._say_titles)
         follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
         follow(self, self._workspace.document.reset, self._on_reset)
 
@@ -261,8 +267,16 @@ class ViewGrid(QWidget):
 
     def _on_reset(self) -> None:
         self._lay_out()
+        self._say_titles()
         for frame in self.frames.values():
             frame.header.say_where("")
+
+    def _say_titles(self) -> None:
+        for plane in Plane:
+            header, title = self.frames[plane.value].header, self._workspace.view.title(plane.value)
+            if header.title.text() != title:
+                header.say_title(title)
+                self._ask_for_room()
 
     def _ask_for_room(self) -> None:
         """Ask for the width of one view, in which no word of a header is cut."""
@@ -294,6 +308,10 @@ class ViewGrid(QWidget):
     def _say_where(self, plane: Plane, position: float) -> None:
         view = self._workspace.view
         words = view.frame.position_text(view.planes[plane.value], position)
+        if view.is_turned(plane.value):
+            words = f"{position + 0.0:+.1f} mm"
+        elif view.frame.name == "head":
+            words += " in the head"
         self.frames[plane.value].header.say_where(words)
 
     def _say_threshold(self, threshold: float | None) -> None:

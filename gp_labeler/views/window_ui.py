@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES, feature
+from gp_core.validation import FloatArray
 from gp_labeler.document.lock import InUseError
 from gp_labeler.document.opening import UnsavedEditsError
 from gp_labeler.document.recovery import Recovery
@@ -275,6 +276,29 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi):
             workspace.labels.go_to(active.side, active.code)
         for view in self._window.grid.views:
             view.zoom_to(workspace.view.crosshair, CLOSE_MM)
+
+    def look_closely(self, position: FloatArray | None) -> None:
+        """Look closely at a (3,) scan position in the slices; at nothing where it is None."""
+        if position is not None:
+            for view in self._window.grid.slice_views.values():
+                view.zoom_to(position, CLOSE_MM)
+
+    def ask_reopen_mirrored(self) -> None:
+        """Ask whether to read the scan again with its slices in reverse order, as a new specimen."""
+        volume = self._workspace.scan.volume
+        if volume is None or volume.path is None:
+            raise GpError("only a scan in a file can be read again", remedy="Mirror it where it was made.")
+        reverse = not volume.choices.get("reverse", False)
+        text = "Read the scan again, mirrored?"
+        detail = (
+            "Its slices are taken in reverse order, which exchanges left and right. It is opened as a new "
+            "specimen: labels that were placed on the mirrored head do not fit it. Positions are then those "
+            "of the mirrored scan."
+        )
+        if self.prompts.choose("Left and right", text, ["Read it mirrored"], detail=detail) and (
+            self.resolve_unsaved()
+        ):
+            self._workspace.scan.open(volume.path, **{**volume.choices, "reverse": reverse})
 
     def look_from(self, letter: str) -> None:
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""

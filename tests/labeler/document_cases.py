@@ -10,9 +10,11 @@ from pathlib import Path
 import numpy as np
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
 
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import CODES, FEATURES, Side
 from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.sets import LandmarkSet
@@ -29,6 +31,8 @@ from gp_labeler.document.edits import (
     SwapPoints,
     SwapSides,
 )
+from gp_labeler.document.head_edits import ClearHeadFrame, ConfirmLeft, SetHeadFrame
+from gp_labeler.document.head_frame import FOUND_BY, HeadFrame
 from gp_labeler.document.labelling_edits import BeginLabelling, NameObserver, OpenLabelling
 from gp_labeler.document.landmark_import import ImportLandmarks
 from gp_labeler.document.measurement_edits import (
@@ -161,6 +165,13 @@ def are_apart(points) -> bool:
     return bool((np.linalg.norm(np.diff(np.array(points), axis=0), axis=1) > 1e-6).all())
 
 
+def head_frame(turn=(10.0, -20.0, 35.0), origin=(1.0, 2.0, 3.0), found_by="symmetry", confirmed=False):
+    """A head that is turned by three angles (x, y, z; degrees) about a place in its scan."""
+    R = Rotation.from_euler("xyz", turn, degrees=True).as_matrix()
+    pose = RigidTransform.from_parts(R.T, -R.T @ np.array(origin), dst="head", src="scan")
+    return HeadFrame(HeadFrame.of(pose).matrix, found_by, left_confirmed=confirmed)
+
+
 coordinates = st.floats(-1e4, 1e4, allow_nan=False, width=64)
 positions = st.tuples(coordinates, coordinates, coordinates)
 sides = st.sampled_from(Side)
@@ -233,6 +244,10 @@ measurements = st.builds(Measurement, measurement_names, measured_points)
 observers = st.sampled_from(("AB", "CD"))
 certainties = st.none() | st.sampled_from(("sure", "fair", "guess", ""))
 
+head_frames = st.builds(
+    head_frame, st.tuples(*[st.floats(-180, 180)] * 3), positions, st.sampled_from(FOUND_BY), st.booleans()
+)
+
 edits = st.one_of(
     st.builds(PlacePoint, sides, few_codes, positions, provenances),
     st.builds(PlacePoint, sides, few_codes, positions, provenances, st.just("nudge")),
@@ -260,6 +275,9 @@ edits = st.one_of(
     st.builds(SetThreshold, st.floats(-1e5, 1e5)),
     st.builds(SetNotes, st.text(max_size=20)),
     st.builds(RenameSpecimen, names),
+    st.builds(SetHeadFrame, head_frames),
+    st.builds(ClearHeadFrame),
+    st.builds(ConfirmLeft),
     st.builds(RecordPoseCheck, pose_checks),
     st.builds(RecordTouch, sides, touched_names, touches | tracked),
     st.builds(TakeTouches, sides, st.dictionaries(touched_names, touches, max_size=3)),

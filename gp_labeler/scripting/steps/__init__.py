@@ -9,6 +9,7 @@ from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.steps.atlas import Check, Fit, Reliability, UseAtlas
 from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
+from gp_labeler.scripting.steps.head import StraightenHead, TurnHead
 from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
 from gp_labeler.scripting.steps.looking import Act, Look, PressKey, Screenshot, Undo
 from gp_labeler.scripting.steps.measuring import (
@@ -29,6 +30,8 @@ _ALL: tuple[type[Step], ...] = (
     *(Open, Spacing, Threshold, Mesh, Look, Choose, Place, Suggest, Confirm, Put, Drag, PressKey, Act, Undo),
     *(
         Details,
+        StraightenHead,
+        TurnHead,
         Observer,
         LabelAgain,
         OpenOther,

@@ -10,8 +10,11 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import action
+from gp_labeler.imaging.anatomical_frame import FRAMES
+from gp_labeler.models.anatomical_planes import ANATOMICAL_PLANES
+from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.events import leave, press_keys
-from gp_labeler.scripting.step import Pair, Step, Triple
+from gp_labeler.scripting.step import Lengths, Pair, Step, Triple
 from gp_labeler.scripting.window_driver import WindowDriver
 from gp_labeler.views.fonts import TEXT_SIZES
 from gp_labeler.views.pictures import PICTURES, picture, write_picture
@@ -57,8 +60,16 @@ class Look(Step):
         Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``, or in a direction.
     go_to : three numbers or str, optional
         A scan position, mm, or a point such as ``CA L``, to bring into view in every view.
+    frame : str, optional
+        ``head`` or ``scan``: how the views lie, and what letters mean.
+    plane : str, optional
+        Planes along the anatomy of the active side: ``along`` or ``across`` the modiolar axis, ``round
+        window``, ``footplate``, or ``feature``: where the active feature is defined; ``straight`` ends them.
+    turn : table of numbers, optional
+        Degrees, from right to down on the screen of a view, by which the planes of the two other views turn
+        about the crosshair: ``{axial = 15}``, as by dragging an arm of the crosshair there.
     axial, sagittal, coronal : float, optional
-        Positions of the slices, mm.
+        Positions of the slices, mm, in the frame that is shown.
     zoom : float, optional
         Magnify the 3D view, and the slices with the crosshair in their middle.
     opacity : float, optional
@@ -83,6 +94,9 @@ class Look(Step):
     reset: bool = False
     camera: str | Triple | None = None
     go_to: Triple | str | None = None
+    frame: str | None = None
+    plane: str | None = None
+    turn: Lengths | None = None
     axial: float | None = None
     sagittal: float | None = None
     coronal: float | None = None
@@ -104,6 +118,12 @@ class Look(Step):
             _check(self.theme, "theme", tuple(THEMES))
         if self.text_size is not None:
             _check(str(self.text_size), "text_size", tuple(map(str, TEXT_SIZES)))
+        if self.frame is not None:
+            _check(self.frame, "frame", FRAMES)
+        if self.plane is not None:
+            _check(self.plane, "plane", (*ANATOMICAL_PLANES, "feature", "straight"))
+        for view in self.turn or ():
+            _check(view, "turn", tuple(plane.value for plane in Plane))
         if isinstance(self.greys, str):
             _check(self.greys, "greys", ("auto",))
         if isinstance(self.glyphs, str):
@@ -160,12 +180,27 @@ class Look(Step):
             driver.workspace.labels.go_to(Side.parse(side or "L"), code)
         elif self.go_to is not None:
             driver.bring(np.array(self.go_to))
+        self._turn_planes(driver)
         crosshair = np.array(driver.workspace.view.crosshair)
         for name, plane in driver.workspace.view.planes.items():
             position = getattr(self, name)
             if position is not None:
                 crosshair = plane.moved_to(crosshair, position)
         driver.workspace.view.set_crosshair(crosshair)
+
+    def _turn_planes(self, driver: WindowDriver) -> None:
+        workspace = driver.workspace
+        if self.frame is not None and workspace.view.frame.name != self.frame:
+            workspace.head.show(self.frame == "head")
+        if self.plane == "straight":
+            workspace.planes.straighten()
+        elif self.plane is not None:
+            code = workspace.labels.active.code or ""
+            shown = workspace.planes.show_for(code) if self.plane == "feature" else None
+            shown = workspace.planes.show(self.plane) if self.plane != "feature" else shown
+            driver.window.ui.look_closely(shown)
+        for view, degrees in (self.turn or {}).items():
+            workspace.view.rotate_planes(view, np.radians(degrees))
 
     def _magnify(self, driver: WindowDriver, factor: float) -> None:
         if factor <= 0:

@@ -12,6 +12,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
+from gp_labeler.scene.crosshair_arms import HANDLE_PIXELS
 from gp_labeler.scene.ghosts import GhostEllipsoid, ellipse
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.planes import Plane
@@ -197,17 +198,25 @@ class SlicePainter:
         painter.restore()
 
     def _paint_crosshair(self, painter: QPainter, shown: SliceViewport, theme: Theme, ratio: float) -> None:
-        """Paint the other two slices as dashed lines in their colours."""
-        middle = shown.scan_to_pixel(self._workspace.view.crosshair[None])[0] + 0.5
+        """Paint the other two slices as dashed lines in their colours, and the handles that turn them."""
+        arms = self._view.turning.arms(shown, ratio)
+        middle = arms.middle + 0.5
         reach = float(np.linalg.norm(shown.size) + np.abs(middle).max())
-        for plane in Plane:
-            if plane is self._view.plane:
-                continue
-            pen = QPen(QColor(theme.views[plane.value] if theme.is_dark else plane.colour), 1.0 * ratio)
+        colours = {
+            plane.value: QColor(theme.views[plane.value] if theme.is_dark else plane.colour)
+            for plane in Plane
+        }
+        for name, along in arms.directions.items():
+            pen = QPen(colours[name], 1.0 * ratio)
             pen.setDashPattern([4, 3])
             painter.setPen(pen)
-            along = shown.line_of(self._workspace.view.planes[plane.value])
             painter.drawLine(QPointF(*(middle - reach * along)), QPointF(*(middle + reach * along)))
+        if not self._view.handles_visible:
+            return
+        painter.setBrush(QColor("#000000"))
+        for name, pixel in arms.handles:
+            painter.setPen(QPen(colours[name], 1.5 * ratio))
+            painter.drawEllipse(QPointF(*(pixel + 0.5)), HANDLE_PIXELS * ratio, HANDLE_PIXELS * ratio)
 
     def _paint_letters(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         width, height = shown.size

@@ -13,6 +13,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.document import edits as edits_module
 from gp_labeler.document import (
+    head_edits,
     import_edit,
     labelling_edits,
     measurement_edits,
@@ -47,7 +48,7 @@ def test_every_kind_of_edit_has_a_name_of_its_own():
     kinds = {
         kind
         for module in (
-            *(edits_module, labelling_edits, specimen_edits),
+            *(edits_module, head_edits, labelling_edits, specimen_edits),
             *(touch_edits, import_edit, measurement_edits),
         )
         for kind in vars(module).values()

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
 from gp_labeler.document.state import Landmark
+from gp_labeler.models.anatomical_planes import FEATURE_PLANES
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.workflow import OPENING, PointState
 from gp_labeler.views.formatting import mm_text, suggestion_text
@@ -39,6 +40,9 @@ class CardContent:
         State for the chip beside it.
     action, action_text : str
         Id and words of the one next action.
+    plane, plane_text : str
+        The plane in which the feature is defined, one of `ANATOMICAL_PLANES` or ``straight``, and the words
+        of the button that shows it; empty where that says no more than `where`.
     skip_text : str
         What the button says that goes on to the next feature.
     can_skip, can_unsee : bool
@@ -57,12 +61,16 @@ class CardContent:
     state: str = "to do"
     action: str = ""
     action_text: str = ""
+    plane: str = ""
+    plane_text: str = ""
     skip_text: str = "Skip"
     can_skip: bool = True
     can_unsee: bool = True
 
 
-def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardContent:
+def content_of(
+    labels: LabelsModel, *, has_scan: bool, atlas: str = "", in_head: bool = False, turned: bool = False
+) -> CardContent:
     """Return what the card says now.
 
     Parameters
@@ -74,6 +82,10 @@ def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardC
     atlas : str
         Which atlas is behind ghosts and problems, such as ``the atlas of 8 animals``; empty for the published
         one.
+    in_head : bool
+        Whether the slices lie in the frame of the head.
+    turned : bool
+        Whether they are turned out of their frame.
     """
     active = labels.active
     if not has_scan:
@@ -89,6 +101,8 @@ def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardC
     if atlas and role in ("ghost", "danger"):
         status = f"{status} By {atlas}."
     action, words = ("unlock", "Unlock") if mark.locked else _next_action(labels, side, row.code, state)
+    plane = FEATURE_PLANES.get(row.code, "straight" if turned else "")
+    of_head = " of the head" if in_head and row.view != "3D" else ""
     aside, hint = _SHARED if row.shared else _EXTERNAL if row.external else ("", "")
     return CardContent(
         eyebrow=f"{_VERBS[state]} · {side.word} · {labels.progress(side).text}",
@@ -97,7 +111,9 @@ def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardC
         aside=aside,
         aside_hint=hint,
         definition=row.definition,
-        where=f"{row.where} Best seen in {_VIEWS[row.view]}.",
+        where=f"{row.where} Best seen in {_VIEWS[row.view]}{of_head}.",
+        plane=plane,
+        plane_text=_PLANES.get(plane, ""),
         status=f"{_status_words(labels, side, row.code)} Locked against change." if mark.locked else status,
         status_role="hint" if mark.locked else role,
         state="locked" if mark.locked else state.value,
@@ -109,6 +125,12 @@ def content_of(labels: LabelsModel, *, has_scan: bool, atlas: str = "") -> CardC
     )
 
 
+_PLANES = {
+    "along": "Slices along the axis",
+    "round window": "Slice through the round window",
+    "footplate": "Slice through the footplate",
+    "straight": "Straight slices",
+}
 _SHARED = ("both sides", "One point, shared by both sides")
 _EXTERNAL = ("touchable", "The probe can touch it on an opened animal: it serves to estimate the pose")
 _VERBS = {

@@ -25,7 +25,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import SHAPES, chip_pixmap
 from gp_labeler.views.feature_picture import FeaturePicture
 from gp_labeler.views.fonts import fit, pixels
-from gp_labeler.views.panels.action_button import Actions
+from gp_labeler.views.panels.action_button import Actions, action_button
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.label.annotation_row import AnnotationRow
 from gp_labeler.views.panels.label.card_content import CardContent, content_of
@@ -80,7 +80,11 @@ class FeatureCard(QWidget):
         """Show the active feature as it stands."""
         labels = self._workspace.labels
         self._content = now = content_of(
-            labels, has_scan=self._workspace.scan.volume is not None, atlas=self._workspace.atlas.text
+            labels,
+            has_scan=self._workspace.scan.volume is not None,
+            atlas=self._workspace.atlas.text,
+            in_head=self._workspace.head.is_shown,
+            turned=self._workspace.view.planes_are_turned,
         )
         self._eyebrow.setText(now.eyebrow)
         self._title.setText(f"{now.code}  {now.name}" if now.code else now.name)
@@ -115,6 +119,7 @@ class FeatureCard(QWidget):
         self.unseen.setAccessibleName("Unseen")
         self.unseen.setToolTip("It was looked for and cannot be seen in this scan")
         self.unseen.clicked.connect(lambda: self._do(lambda: self._workspace.labels.mark_unseen()))
+        self.plane = action_button(self._actions["view.plane_of_feature"], "")
         self.sides = {side: self._side_button(side) for side in Side}
         fit(self, self._fit)
 
@@ -150,6 +155,7 @@ class FeatureCard(QWidget):
         words.setSpacing(4)
         for label in (self._definition, self._where):
             words.addWidget(label)
+        words.addWidget(self.plane, 0, Qt.AlignmentFlag.AlignLeft)
         words.addStretch(1)
         self._body = QBoxLayout(QBoxLayout.Direction.LeftToRight)
         self._body.setSpacing(10)
@@ -182,6 +188,7 @@ class FeatureCard(QWidget):
             workspace.labels.ghosts_changed,
             workspace.labels.problems_changed,
             workspace.scan.opened,
+            workspace.view.planes_changed,
         ):
             follow(self, signal, self.refresh)
 
@@ -191,6 +198,9 @@ class FeatureCard(QWidget):
         self.skip.setText(_with_key(now.skip_text, "point.skip"))
         self.skip.setAccessibleName(now.skip_text)
         self.skip.setVisible(bool(now.code) and now.can_skip)
+        self.plane.setVisible(bool(now.plane_text))
+        self.plane.setText(_with_key(now.plane_text, "view.plane_of_feature"))
+        self.plane.setAccessibleName(now.plane_text)
         self.unseen.setVisible(bool(now.code))
         self.unseen.setEnabled(now.can_unsee)
         active = self._workspace.labels.active

@@ -11,6 +11,7 @@ from gp_labeler.views.formatting import TIMES, size_text, spacing_text
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.parts import Card, Facts, Notice, emptied, scrolled, text_label
 from gp_labeler.views.panels.scan.bone_card import BoneCard
+from gp_labeler.views.panels.scan.head_card import HeadCard
 from gp_labeler.views.panels.scan.mesh_card import MeshCard
 from gp_labeler.views.panels.scan.notes_card import NotesCard
 from gp_labeler.views.panels.scan.window_level_card import WindowLevelCard
@@ -56,8 +57,8 @@ class ScanPanel(QWidget):
         column = QVBoxLayout(content)
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
-        self.notes = NotesCard(workspace)
-        for card in (about, self.bone, self.grey, self.mesh, self.notes):
+        self.notes, self.head = NotesCard(workspace), HeadCard(workspace, actions)
+        for card in (about, self.bone, self.head, self.grey, self.mesh, self.notes):
             column.addWidget(card)
         column.addStretch(1)
         layout = QVBoxLayout(self)

@@ -1,0 +1,89 @@
+"""Jobs that find how a head lies in its scan."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import LandmarkSet
+from gp_labeler.head_pose import HeadPose
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.loading import load_modules
+from gp_labeler.jobs.runner import Progress
+
+__all__ = ["Straighten", "StraightenByLandmarks", "StraightenByPoints"]
+
+_MODULES = ("scipy.ndimage", "scipy.optimize", "scipy.spatial", "SimpleITK", "gp_labeler.phantom")
+
+
+@dataclass(frozen=True, eq=False)
+class Straighten:
+    """Find the head by the symmetry of its bone."""
+
+    volume: Volume
+    threshold: float | None = None
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Straightening the head"
+
+    def run(self, progress: Progress) -> HeadPose:
+        """Search the mid-plane, then front and up."""
+        load_modules(*_MODULES)
+        from gp_labeler.head_pose import straighten
+
+        return straighten(self.volume, threshold=self.threshold, progress=progress, cancel=progress.cancelled)
+
+
+@dataclass(frozen=True, eq=False)
+class StraightenByLandmarks:
+    """Find the head by placed landmarks, and refine it by the symmetry of its bone."""
+
+    volume: Volume
+    sides: Mapping[Side, LandmarkSet]
+    threshold: float | None = None
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Straightening the head by its landmarks"
+
+    def run(self, progress: Progress) -> HeadPose:
+        """Lay the mean head onto the points, then ask the bone."""
+        load_modules(*_MODULES)
+        from gp_labeler.head_pose import straighten_by_landmarks
+
+        progress(0.1)
+        return straighten_by_landmarks(self.volume, self.sides, threshold=self.threshold)
+
+
+@dataclass(frozen=True, eq=False)
+class StraightenByPoints:
+    """Find the head by a point of its midline and a pair, and refine it by the symmetry of its bone."""
+
+    volume: Volume
+    midline: tuple[float, float, float]
+    left: tuple[float, float, float]
+    right: tuple[float, float, float]
+    threshold: float | None = None
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return "Straightening the head by three points"
+
+    def run(self, progress: Progress) -> HeadPose:
+        """Begin with the plane halfway between the pair, then ask the bone."""
+        load_modules(*_MODULES)
+        from gp_labeler.head_pose import straighten_by_points
+
+        progress(0.1)
+        return straighten_by_points(
+            self.volume,
+            midline=self.midline,
+            left=self.left,
+            right=self.right,
+            threshold=self.threshold,
+        )

@@ -1,0 +1,327 @@
+"""How the head lies in its scan: finding it, turning the views into its frame, and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+from psygnal import Signal
+
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
+from gp_core.landmarks.features import Side, feature
+from gp_core.validation import FloatArray, check_option
+from gp_labeler.document.edits import as_position, point_text
+from gp_labeler.document.head_edits import ClearHeadFrame, ConfirmLeft, SetHeadFrame
+from gp_labeler.document.head_frame import HeadFrame
+from gp_labeler.document.specimen_document import SpecimenDocument
+from gp_labeler.document.state import Position
+from gp_labeler.head_pose import HeadPose
+from gp_labeler.imaging.anatomical_frame import letter_of
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.head import Straighten, StraightenByLandmarks, StraightenByPoints
+from gp_labeler.jobs.runner import Job, Jobs, Task
+from gp_labeler.models.messages import Messages
+from gp_labeler.models.scan import ScanModel
+from gp_labeler.models.view import ViewModel
+
+__all__ = ["FREE_POINTS", "HeadModel"]
+
+FREE_POINTS = ("midline", "left", "right")
+"""Three points that need be no landmarks: one of the midline, and the same place on both sides."""
+
+_KEY = "straighten"
+_WRONG_SIDE_MM = 1.0
+"""A point that lies farther on the other side of the mid-plane is said to be there."""
+
+
+class HeadModel:
+    """Straightens the head: by itself, by points, by landmarks or by hand. Nothing of the scan changes.
+
+    Parameters
+    ----------
+    document : SpecimenDocument
+        Keeps the head frame.
+    view : ViewModel
+        Whose views are turned.
+    scan : ScanModel
+        Its bone is asked.
+    jobs : Jobs
+        Where the search runs.
+    messages : Messages
+        What the user is told by.
+    """
+
+    changed = Signal()
+    """The head frame, what is running, the free points, or why the last attempt was refused."""
+
+    def __init__(
+        self,
+        document: SpecimenDocument,
+        view: ViewModel,
+        scan: ScanModel,
+        jobs: Jobs,
+        messages: Messages,
+    ) -> None:
+        self._document, self._view, self._scan = document, view, scan
+        self._jobs, self._messages = jobs, messages
+        self._points: dict[str, Position] = {}
+        self.refusal = ""
+        """Why the last attempt found nothing, and what to do; empty where it did."""
+        document.reset.connect(self._on_reset)
+        document.head_frame_changed.connect(self.changed.emit)
+        document.landmarks_changed.connect(self._on_landmarks)
+        for signal in (jobs.started, jobs.done, jobs.cancelled):
+            signal.connect(self._on_task)
+        jobs.failed.connect(self._on_failed)
+
+    # What is known
+
+    @property
+    def frame(self) -> HeadFrame | None:
+        """How the head lies; None before it was straightened."""
+        return self._document.state.head_frame
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the views are in the head's frame."""
+        return self._view.frame.name == "head"
+
+    @property
+    def is_running(self) -> bool:
+        """Whether it is being straightened."""
+        return any(task.key == _KEY and not task.progress.cancelled() for task in self._jobs.running)
+
+    @property
+    def asks_left(self) -> bool:
+        """Whether it is still to be confirmed which side is left."""
+        return self.frame is not None and not self.frame.left_confirmed
+
+    @property
+    def points(self) -> Mapping[str, Position]:
+        """The free points marked so far, scan mm."""
+        return MappingProxyType(self._points)
+
+    @property
+    def left_text(self) -> str:
+        """Say which way left is, and that a person must know."""
+        if self.frame is None:
+            return ""
+        towards = letter_of(self.frame.T_head_scan.rotation[0])
+        return (
+            f"The file says left is towards {towards} of the scan; nothing in the scan can prove it, for a "
+            "head and its mirror image look alike. Check it against a mark on the animal."
+        )
+
+    def wrong_sides(self, points: frozenset[tuple[Side, str]] | None = None) -> list[str]:
+        """Return a sentence for each placed point that lies on the other side of the mid-plane.
+
+        Parameters
+        ----------
+        points : set of (Side, str), optional
+            Which are looked at; by default all.
+        """
+        if self.frame is None:
+            return []
+        found = []
+        for side in Side:
+            landmarks = self._document.landmarks(side)
+            for code in landmarks.placed:
+                wanted = points is None or (side, code) in points
+                if not wanted or feature(code).shared or feature(code).computed:
+                    continue
+                left = float(self.frame.heights(landmarks[code][None])[0])
+                beyond = -left if side is Side.LEFT else left
+                if beyond > _WRONG_SIDE_MM:
+                    other = side.other.word
+                    found.append(
+                        f"{point_text(side, code)} lies {beyond:.1f} mm on the {other} of the mid-plane"
+                    )
+        return found
+
+    # Straightening
+
+    def straighten(self) -> None:
+        """Find the head by the symmetry of its bone, in the background."""
+        self._submit(Straighten(self._volume(), self._document.state.threshold))
+
+    def straighten_by_landmarks(self) -> None:
+        """Find the head by the landmarks of both sides: IN and a pair, or two pairs."""
+        sides = {side: self._document.landmarks(side) for side in Side}
+        self._submit(StraightenByLandmarks(self._volume(), sides, self._scan.threshold))
+
+    def mark_point(self, name: str, position: ArrayLike | None = None) -> None:
+        """Mark one of `FREE_POINTS`, by default at the crosshair; once all three are there, straighten.
+
+        Raises
+        ------
+        GpError
+            There is no such point, or it is no position.
+        """
+        check_option(name, "point", FREE_POINTS)
+        where = self._view.crosshair if position is None else position
+        self._points[name] = as_position(where, name)
+        self.changed.emit()
+        if set(self._points) == set(FREE_POINTS):
+            self.straighten_by_points()
+
+    def straighten_by_points(self) -> None:
+        """Find the head by the three free points; raises `GpError` where one is missing."""
+        missing = [name for name in FREE_POINTS if name not in self._points]
+        if missing:
+            raise GpError(
+                f"no point is marked for {' and '.join(missing)}", remedy="Mark it at the crosshair."
+            )
+        self._submit(StraightenByPoints(self._volume(), **self._points, threshold=self._scan.threshold))
+
+    def forget_points(self) -> None:
+        """Take the free points away."""
+        self._points.clear()
+        self.changed.emit()
+
+    def cancel(self) -> None:
+        """Stop straightening."""
+        for task in self._jobs.running:
+            if task.key == _KEY:
+                task.cancel()
+        self.changed.emit()
+
+    def take_planes(self, *, merge: bool = False) -> None:
+        """Take the planes of the views, as they were turned by hand, for those of the head.
+
+        The mid-plane turns with them; before there is one, it is the sagittal slice through the crosshair.
+
+        Raises
+        ------
+        GpError
+            The views do not show three planes at right angles.
+        """
+        sagittal, coronal, axial = (self._view.planes[n] for n in ("sagittal", "coronal", "axial"))
+        axes = np.stack([sagittal.normal, coronal.normal, axial.normal])
+        if np.linalg.det(axes) < 1 - 1e-6:
+            raise GpError("the three views are not at right angles", remedy="Straighten them first.")
+        origin = sagittal.origin if self.is_shown else self._view.crosshair
+        self._take_by_hand(axes, origin, merge=merge)
+
+    def take_mid_plane(self) -> None:
+        """Let the mid-plane go through the crosshair, in the directions of the views.
+
+        Raises
+        ------
+        GpError
+            The head is not straightened yet.
+        """
+        if self.frame is None:
+            raise GpError("the head is not straightened yet", remedy="View > Straighten the head.")
+        axes = self.frame.T_head_scan.rotation
+        away = float(self.frame.heights(self._view.crosshair[None])[0])
+        origin = self.frame.T_head_scan.inverse().translation + away * axes[0]
+        self._take_by_hand(axes, origin, merge=False)
+
+    def turn(self, axis: str, angle: float) -> None:
+        """Turn the head's frame about one of its own axes, through the crosshair.
+
+        Parameters
+        ----------
+        axis : str
+            ``pitch`` (about left), ``roll`` (about posterior) or ``yaw`` (about superior).
+        angle : float
+            Right-handed about that axis, rad.
+        """
+        check_option(axis, "axis", ("pitch", "roll", "yaw"))
+        view = {"pitch": "sagittal", "roll": "coronal", "yaw": "axial"}[axis]
+        if not self.is_shown and self.frame is not None:
+            self.show(True)
+        plane = self._view.planes[view]
+        turned = -float(plane.towards_viewer @ plane.normal) * angle
+        self._view.rotate_planes(view, turned)
+        self.take_planes()
+
+    def confirm_left(self) -> None:
+        """Keep that a person knows left to be left."""
+        self._document.do(ConfirmLeft())
+
+    def forget(self) -> None:
+        """Forget how the head lies."""
+        self._document.do(ClearHeadFrame())
+
+    # The views
+
+    def show(self, on: bool | None = None) -> None:
+        """Turn the views into the head's frame, or back into the scan's; by default the other one.
+
+        Raises
+        ------
+        GpError
+            The head is not straightened yet.
+        """
+        if self.frame is None:
+            raise GpError("the head is not straightened yet", remedy="View > Straighten the head.")
+        self._document.show_head_frame(not self.is_shown if on is None else on)
+
+    # Inside
+
+    def _volume(self) -> Volume:
+        volume = self._scan.volume
+        if volume is None:
+            raise GpError("there is no scan to straighten", remedy="Open one first.")
+        return volume
+
+    def _submit(self, job: Job[HeadPose]) -> None:
+        self.refusal = ""
+        self._jobs.submit(job, self._take, key=_KEY)
+
+    def _take(self, pose: HeadPose) -> None:
+        known = self.frame
+        self._document.do(
+            SetHeadFrame(
+                HeadFrame(
+                    HeadFrame.of(pose.T_head_scan).matrix,
+                    pose.found_by,
+                    pose.pitch,
+                    pose.left,
+                    known is not None and known.left_confirmed,
+                )
+            )
+        )
+        self._points.clear()
+        words = f"The head lies {pose.tilt_deg:.0f}° off the axes of its scan; the views are straight now"
+        self._messages.say("; ".join((words, *pose.warnings)), "warning" if pose.warnings else "info")
+        self._say_wrong_sides(None)
+        self.changed.emit()
+
+    def _take_by_hand(self, axes: FloatArray, origin: FloatArray, *, merge: bool) -> None:
+        T_head_scan = RigidTransform.from_parts(axes, -axes @ origin, dst="head", src="scan")
+        known = self.frame
+        rest: dict[str, Any] = (
+            {} if known is None else {"left": known.left, "left_confirmed": known.left_confirmed}
+        )
+        self._document.do(
+            SetHeadFrame(HeadFrame.of(T_head_scan, found_by="hand", pitch="by hand", **rest)), merge=merge
+        )
+
+    def _on_reset(self) -> None:
+        self._points.clear()
+        self.refusal = ""
+        self.changed.emit()
+
+    def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
+        self._say_wrong_sides(changed)
+
+    def _say_wrong_sides(self, points: frozenset[tuple[Side, str]] | None) -> None:
+        wrong = self.wrong_sides(points)
+        if wrong:
+            more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+            self._messages.say(f"{wrong[0]}{more}. Are left and right exchanged?", "warning")
+
+    def _on_task(self, task: Task[Any]) -> None:
+        if task.key == _KEY:
+            self.changed.emit()
+
+    def _on_failed(self, task: Task[Any]) -> None:
+        if task.key == _KEY:
+            self.refusal = task.message
+            self.changed.emit()

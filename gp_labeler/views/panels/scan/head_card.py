@@ -1,0 +1,125 @@
+"""How the head lies in its scan: straightening it, by itself or with a hand, and which side is left."""
+
+from __future__ import annotations
+
+from qtpy.QtWidgets import QCheckBox, QPushButton, QToolButton, QVBoxLayout, QWidget
+
+from gp_labeler.models.head import FREE_POINTS
+from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.panels.action_button import Actions, action_button, do_action
+from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
+from gp_labeler.views.signals import follow
+
+__all__ = ["HeadCard", "head_text"]
+
+_TICK = "\N{CHECK MARK}"
+
+
+class HeadCard(Card):
+    """The head frame.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Whose head is straightened.
+    actions : mapping of str to QAction
+        What its buttons do.
+    """
+
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
+        super().__init__("Head", parent)
+        self._workspace = workspace
+        self.state = text_label("", "hint", wrap=True)
+        self.add(self.state)
+        self._notices = QVBoxLayout()
+        self._notices.setSpacing(6)
+        self.add(self._notices)
+        self.confirm = action_button(actions["head.confirm_left"], "Left is left")
+        self.exchanged = action_button(actions["head.left_is_right"], "They are exchanged…")
+        self._answers = _row(self.confirm, self.exchanged)
+        self.add(self._answers)
+        self.shown = QCheckBox("Views in the frame of the head")
+        do_action(self.shown, actions["view.frame"])
+        self.add(self.shown)
+        self.straighten = action_button(actions["head.straighten"], "Straighten")
+        self.by_landmarks = action_button(actions["head.by_landmarks"], "By landmarks")
+        self.by_hand = QToolButton()
+        self.by_hand.setText("By hand")
+        do_action(self.by_hand, actions["head.by_hand"])
+        self.stop = QPushButton("Stop")
+        self.stop.clicked.connect(workspace.head.cancel)
+        self.add(_row(self.straighten, self.stop, self.by_landmarks, self.by_hand))
+        self._lay_out_points(actions)
+        self.take_planes = action_button(actions["head.take_planes"], "Take these planes")
+        self.mid_plane = action_button(actions["head.take_mid_plane"], "Mid-plane to crosshair")
+        self._hand = _row(self.take_planes, self.mid_plane)
+        self.add(self._hand)
+        for signal in (
+            workspace.head.changed,
+            workspace.view.planes_changed,
+            workspace.document.landmarks_changed,
+            workspace.interaction.tool_changed,
+            workspace.scan.opened,
+            workspace.document.reset,
+        ):
+            follow(self, signal, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show how the head lies now."""
+        workspace, head = self._workspace, self._workspace.head
+        self.setVisible(workspace.scan.volume is not None)
+        self.state.setText(head_text(workspace))
+        emptied(self._notices)
+        if head.refusal:
+            self._notices.addWidget(Notice("warning", head.refusal))
+        wrong = head.wrong_sides()
+        if wrong:
+            rest = f", and {len(wrong) - 1} more on the other side too" if len(wrong) > 1 else ""
+            self._notices.addWidget(Notice("warning", f"{wrong[0]}{rest}. Are left and right exchanged?"))
+        if head.asks_left:
+            self._notices.addWidget(Notice("info", head.left_text))
+        self._answers.setVisible(head.asks_left)
+        self.shown.setVisible(head.frame is not None)
+        self.stop.setVisible(head.is_running)
+        self.straighten.setVisible(not head.is_running)
+        self.straighten.setText("Straighten again" if head.frame is not None else "Straighten")
+        turned = workspace.view.planes_are_turned or workspace.interaction.tool == "turn"
+        self._hand.setVisible(turned)
+        self.mid_plane.setVisible(head.frame is not None)
+        for name, button in self.points.items():
+            button.setText(f"{name.capitalize()} {_TICK}" if name in head.points else name.capitalize())
+
+    def _lay_out_points(self, actions: Actions) -> None:
+        self.points = {n: action_button(actions[f"head.{n}"], n.capitalize()) for n in FREE_POINTS}
+        words = "By three points: move the crosshair to each, then say which it is."
+        self.add(text_label(words, "hint", wrap=True))
+        self.add(_row(*self.points.values()))
+
+
+def head_text(workspace: Workspace) -> str:
+    """Say how the head was straightened, and what of it is only a proposal."""
+    head = workspace.head
+    if head.is_running:
+        return "The symmetry of the bone is searched…"
+    if workspace.interaction.tool == "turn":
+        return (
+            "Drag over a slice to turn the head about the crosshair: in the sagittal slice its pitch, in the "
+            "coronal its roll, in the axial its yaw. Esc ends it."
+        )
+    frame = head.frame
+    if frame is None:
+        return "The views lie along the axes of the scan. Straighten them if the head is tilted."
+    pitch = f" Pitch: {frame.pitch}." if frame.pitch and frame.found_by != "hand" else ""
+    check = " Turn it by hand where it is off." if frame.pitch.startswith("proposed") else ""
+    return f"Straightened by {frame.found_by}.{pitch}{check}"
+
+
+def _row(*buttons: QWidget) -> QWidget:
+    holder = QWidget()
+    row = FlowLayout(spacing=6)
+    holder.setLayout(row)
+    for button in buttons:
+        row.addWidget(button)
+    return holder
