@@ -61,6 +61,8 @@ KEYS = (
     Key("state", "a path", "Folder where the window keeps unsaved edits and what it remembers."),
     Key("canvas", "a word", "How the 3D view is drawn.", choices=("automatic", "painted", "native")),
     Key("theme", "a word", "Colours of the window, until they are chosen in it.", choices=("dark", "light")),
+    Key("cache", "a path", "Folder where large packed scans are unpacked while they are open."),
+    Key("cache_gb", "a whole number", "Most that is unpacked there, GB; by default 100.", most=100_000),
     Key("text_size", "a whole number", "Text size in percent, until chosen in it.", least=50, most=300),
 )
 """All settings."""

@@ -96,6 +96,11 @@ class GuardedMap:
         """Whether some of what was read was not there any more, and came as zeros."""
         return bool(_table[self._row, _BROKEN])
 
+    def close(self) -> None:
+        """Let go of the file; raises no error where arrays still hold it."""
+        with suppress(BufferError):
+            self._map.close()
+
     def __del__(self) -> None:
         if hasattr(self, "_row"):
             _table[self._row, _START] = 0

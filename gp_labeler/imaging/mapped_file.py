@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +31,8 @@ class MappedFile:
         The file.
     n_bytes : int
         Bytes that are needed, from its beginning.
+    thrown_away : bool
+        Whether the file is removed with this object, where its name does not go before.
 
     Raises
     ------
@@ -38,8 +42,9 @@ class MappedFile:
         It is shorter.
     """
 
-    def __init__(self, path: Path, n_bytes: int) -> None:
+    def __init__(self, path: Path, n_bytes: int, *, thrown_away: bool = False) -> None:
         self._n_bytes = n_bytes
+        self._thrown_away = path if thrown_away else None
         self._file = path.open("rb")
         self._map = GuardedMap(self._file.fileno(), n_bytes)
         self._written = os.fstat(self._file.fileno()).st_mtime_ns
@@ -86,3 +91,7 @@ class MappedFile:
     def __del__(self) -> None:
         if hasattr(self, "_file"):
             self._file.close()
+        if self._thrown_away is not None and sys.platform == "win32":
+            self._map.close()
+            with contextlib.suppress(OSError):
+                self._thrown_away.unlink()

@@ -191,7 +191,8 @@ class ScanModel:
     # Inside
 
     def _take_plan(self, plan: ImportPlan, ask: bool) -> None:
-        if plan.errors or (ask and not plan.sides_known) or (ask and len(plan.choices) > 1):
+        unsure = not plan.sides_known or len(plan.choices) > 1 or plan.is_unpacked_to_disk
+        if plan.errors or (ask and unsure):
             self.import_asked.emit(plan)
         else:
             self.read(plan)

@@ -6,7 +6,6 @@ loading it and what can be chosen. `read_volume` loads what was looked into, or 
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from os import PathLike
 from pathlib import Path
@@ -14,15 +13,16 @@ from typing import Any
 
 import numpy as np
 
+from gp_labeler.imaging.disk_cache import available_memory, cache_folder, space_problem, unpacked
 from gp_labeler.imaging.fill import Fill, Replacement, find_fill, lowest, replace_fill, replacement_of
 from gp_labeler.imaging.progress import Progress, Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.formats import READABLE, is_readable_name
 from gp_labeler.imaging.readers.grey import needs_float64
 from gp_labeler.imaging.readers.options import ImportOptions
-from gp_labeler.imaging.readers.plan import ImportPlan
+from gp_labeler.imaging.readers.plan import MORE_ROOM, ImportPlan
 from gp_labeler.imaging.readers.problems import Problem, VolumeError, failing_as_volume_error, quiet
-from gp_labeler.imaging.readers.source import Mapped, assemble, mapped_part
+from gp_labeler.imaging.readers.source import Mapped, assemble, mapped_part, wanted_planes
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.voxels import ArrayVoxels, MappedVoxels, Voxels
 
@@ -157,8 +157,13 @@ def _inspect(path: str | PathLike[str], options: ImportOptions, report: Report) 
 
 def _load(plan: ImportPlan, report: Report, mapped: bool | None) -> Volume:
     with quiet(), failing_as_volume_error(plan.path):
-        held = _map_of(plan, mapped)
-        voxels, fill, notes = _in_memory(plan, report) if held is None else _in_file(plan, held, report)
+        if (held := _map_of(plan, mapped)) is not None:
+            voxels, fill, notes = _in_file(plan, held, report, "its voxels stay in the file")
+        elif (held := _unpacked_of(plan, mapped, report.part(0.0, 0.9))) is not None:
+            words = f"its voxels were unpacked into a file in {cache_folder()}"
+            voxels, fill, notes = _in_file(plan, held, report.part(0.9, 1.0), words)
+        else:
+            voxels, fill, notes = _in_memory(plan, report)
         volume = Volume(
             voxels,
             plan.T_scan_voxel(),
@@ -188,7 +193,9 @@ def _in_memory(plan: ImportPlan, report: Report) -> tuple[Voxels, float | None, 
     return ArrayVoxels(array), replacement.fill, notes
 
 
-def _in_file(plan: ImportPlan, held: Mapped, report: Report) -> tuple[Voxels, float | None, tuple[str, ...]]:
+def _in_file(
+    plan: ImportPlan, held: Mapped, report: Report, words: str
+) -> tuple[Voxels, float | None, tuple[str, ...]]:
     """Leave the voxels in their file; what stands for nothing is replaced whenever some are read.
 
     All of them are read here only where some were not measured: their value has to be below all others.
@@ -200,7 +207,8 @@ def _in_file(plan: ImportPlan, held: Mapped, report: Report) -> tuple[Voxels, fl
     if not fills and stored.dtype.kind == "f":  # there may be some all the same, in slices not looked at
         fills, replacement = (Fill(np.nan),), Replacement(below=lowest(stored))
     report(1.0)
-    notes = (*plan.all_notes(narrowed=False), *replacement.notes, "its voxels stay in the file")
+    narrowed = stored.dtype.name == plan.dtype.name
+    notes = (*plan.all_notes(narrowed=narrowed), *replacement.notes, words)
     return MappedVoxels(stored, fills, replacement.below, file), replacement.fill, notes
 
 
@@ -224,20 +232,33 @@ def _map_of(plan: ImportPlan, mapped: bool | None) -> Mapped | None:
     return held
 
 
-def _memory() -> float:
-    """Return the bytes of memory that this machine has; infinity where the system does not say."""
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (AttributeError, ValueError, OSError):
-        return float("inf")
+def _unpacked_of(plan: ImportPlan, mapped: bool | None, report: Report) -> Mapped | None:
+    """Return a large packed scan as it was unpacked into a file; None where the memory holds it.
+
+    Raises
+    ------
+    GpError
+        There is no room for it.
+    """
+    if mapped is False or not plan.is_unpacked_to_disk:
+        return None
+    if (problem := space_problem(plan.n_bytes)) is not None:
+        raise VolumeError(problem, remedy=MORE_ROOM)
+    nx, ny, nz = plan.loaded_size
+    planes = wanted_planes(plan.source, plan.size, plan.options, report)
+    array, file = unpacked(planes, (nz, ny, nx), plan.dtype)
+    if needs_float64(plan.stored_dtype, array):
+        planes = wanted_planes(plan.source, plan.size, plan.options, report)
+        array, file = unpacked(planes, (nz, ny, nx), np.dtype(np.float64))
+    return array[:: -1 if plan.options.reverse else 1], file
 
 
 def _check_memory(plan: ImportPlan) -> None:
-    """Refuse what no memory of this machine can hold."""
-    there = _memory()
+    """Refuse what the memory of this machine cannot hold."""
+    there = available_memory()
     if plan.n_bytes > there:
         need, have = (f"{n / (1 << 30):.0f} GB" for n in (plan.n_bytes, there))
         raise VolumeError(
-            f"it takes {need} of memory, and this machine has {have}",
+            f"it takes {need} of memory, and this machine has {have} free",
             remedy="Load every second voxel (--stride 2), or a region.",
         )

@@ -11,16 +11,22 @@ import numpy as np
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.disk_cache import cache_folder, needs_cache, space_problem
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.grey import loaded_dtype, narrowing
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
 from gp_labeler.imaging.readers.problems import Problem, warning
-from gp_labeler.imaging.readers.source import SliceSource, window
+from gp_labeler.imaging.readers.source import RawSource, SliceSource, window
 from gp_labeler.imaging.readers.spacing import shown, spacing_problems
 
-__all__ = ["Geometry", "ImportPlan"]
+__all__ = ["MORE_ROOM", "Geometry", "ImportPlan"]
+
+MORE_ROOM = "Free space, set another folder or limit (the settings cache and cache_gb), or use --stride 2."
 
 _LARGE_BYTES = 2 << 30
+_UNPACKED_A_SECOND = 60e6
+"""Bytes; a slow computer's gzip."""
+
 _PREVIEW_VOXELS = 160
 _ORTHOGONAL = 1e-4
 
@@ -151,6 +157,17 @@ class ImportPlan:
         return math.prod(self.loaded_size) * self.dtype.itemsize
 
     @property
+    def is_unpacked_to_disk(self) -> bool:
+        """Whether loading unpacks it into a file of the cache: it cannot stay in its own, nor in memory."""
+        return not self.stays_in_file and needs_cache(self.n_bytes)
+
+    @property
+    def stays_in_file(self) -> bool:
+        """Whether its voxels can be shown as they are stored."""
+        is_kept = self.stored_dtype.name == self.dtype.name
+        return is_kept and isinstance(self.source, RawSource) and self.source.is_mappable
+
+    @property
     def preview_stride(self) -> int:
         """A stride that shows the whole within a moment."""
         return max(1, math.ceil(max(self.size) / _PREVIEW_VOXELS))
@@ -209,10 +226,23 @@ class ImportPlan:
         if min(self.size) < 2:
             text = f"it holds {' x '.join(map(str, self.size))} voxels, which is no volume"
             found.append(Problem("flat", text, remedy="Give the whole scan, not one slice of it."))
-        if self.n_bytes > _LARGE_BYTES:
+        if self.is_unpacked_to_disk:
+            found.append(self._unpacking())
+        elif self.n_bytes > _LARGE_BYTES and not self.stays_in_file:
             text = f"it takes {self.n_bytes / (1 << 30):.1f} GB of memory; every second voxel takes an eighth"
             found.append(warning("large", text))
         return tuple(found)
+
+    def _unpacking(self) -> Problem:
+        """Say that it is unpacked into a file, or why it cannot be."""
+        if (why := space_problem(self.n_bytes)) is not None:
+            return Problem("no-room", why, remedy=MORE_ROOM)
+        minutes = math.ceil(self.n_bytes / _UNPACKED_A_SECOND / 60)
+        text = (
+            f"it is unpacked into a file of {self.n_bytes / 1e9:.1f} GB in {cache_folder()}, in about "
+            f"{minutes} min; that can be cancelled, and the file goes when the scan is closed"
+        )
+        return warning("unpacked", text)
 
     def _side_problems(self) -> tuple[Problem, ...]:
         if self.sides_known:
@@ -242,7 +272,7 @@ class ImportPlan:
             notes.append(f"only every {options.stride}th voxel along each axis was kept")
         if options.region is not None:
             notes.append(f"only the region {options.region} (voxels along x, y, z) was kept")
-        notes += [problem.text for problem in self.warnings if problem.code != "large"]
+        notes += [problem.text for problem in self.warnings if problem.code not in ("large", "unpacked")]
         return tuple(note for note in notes if note)
 
 

@@ -33,6 +33,7 @@ __all__ = [
     "mapped_part",
     "nearest_there",
     "open_stream",
+    "wanted_planes",
     "window",
 ]
 
@@ -123,10 +124,15 @@ class RawSource:
         text = f"{self.path.name} holds {have:,} bytes, but {need:,} are needed: it is incomplete"
         return (Problem("short-file", text, remedy="Copy it again."),)
 
+    @property
+    def is_mappable(self) -> bool:
+        """Whether its values can be shown as they are stored, and files can be mapped at all."""
+        as_stored = self.compression == "none" and self.finish is to_grey and len(self.plane_shape) == 2
+        return as_stored and can_map()
+
     def mapped(self) -> Mapped | None:
         """Return the (z, y, x) file as a map, if its values can be shown as they are stored."""
-        as_stored = self.compression == "none" and self.finish is to_grey and len(self.plane_shape) == 2
-        if not as_stored or not can_map():
+        if not self.is_mappable:
             return None
         file = MappedFile(self.path, self.bytes_needed)
         shape = (self.n_planes, *self.plane_shape)
@@ -216,9 +222,20 @@ def assemble(
 ) -> Plane:
     """Read the wanted part of a volume of `size` (x, y, z) into one (z, y, x) array of `dtype`."""
     i, j, k = window(size, options)
+    volume = np.empty((len(k), len(j), len(i)), dtype)
+    for n, plane in enumerate(wanted_planes(source, size, options, report)):
+        volume[len(k) - 1 - n if options.reverse else n] = plane
+    report(1.0)
+    return volume
+
+
+def wanted_planes(
+    source: SliceSource, size: tuple[int, int, int], options: ImportOptions, report: Report
+) -> Iterator[Plane]:
+    """Yield the wanted part of each wanted plane in the order of the files: the last first, if reversed."""
+    i, j, k = window(size, options)
     nz = size[2]
     wanted = [nz - 1 - n for n in reversed(k)] if options.reverse else list(k)
-    volume = np.empty((len(k), len(j), len(i)), dtype)
     ys, xs = slice(j.start, j.stop, j.step), slice(i.start, i.stop, i.step)
     for n, plane in enumerate(source.planes(wanted)):
         report(n / len(wanted))
@@ -226,9 +243,7 @@ def assemble(
             raise VolumeError(
                 f"slice {wanted[n] + 1} is {_times(plane.shape)}, not {size[0]} x {size[1]} pixels"
             )
-        volume[len(k) - 1 - n if options.reverse else n] = plane[ys, xs]
-    report(1.0)
-    return volume
+        yield plane[ys, xs]
 
 
 def mapped_part(source: SliceSource, size: tuple[int, int, int], options: ImportOptions) -> Mapped | None:

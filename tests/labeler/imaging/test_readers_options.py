@@ -12,6 +12,7 @@ import tifffile
 from scan_makers import Scan, load_mouse, write_nifti, write_sitk, write_tiff_stack
 
 from gp_core.errors import GpError
+from gp_labeler.imaging import disk_cache
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.readers import ImportOptions, inspect_volume, is_readable_name, read_volume
 
@@ -102,7 +103,8 @@ def test_choices_read_the_same_again(tmp_path: Path) -> None:
     assert (plan.options.spacing, plan.options.reverse) == ((0.14,) * 3, True)
 
 
-def test_a_large_volume_is_announced_with_its_memory(tmp_path: Path) -> None:
+def test_a_large_volume_is_announced_with_its_memory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(disk_cache, "available_memory", lambda: 1e12)
     header = bytearray(write_nifti(load_mouse(), tmp_path / "a.nii").read_bytes()[:352])
     header[40:48] = np.array([3, 1500, 1500, 2000], "<i2").tobytes()
     header[70:74] = np.array([512, 16], "<i2").tobytes()

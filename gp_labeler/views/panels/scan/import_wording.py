@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 
 from gp_labeler.imaging.preview import PreviewPlane, preview_planes
-from gp_labeler.imaging.readers import ImportPlan, Problem, read_preview
+from gp_labeler.imaging.readers import MAPPED_FROM, ImportPlan, Problem, read_preview
 from gp_labeler.imaging.readers.options import Spacing
 from gp_labeler.jobs.runner import Progress
 from gp_labeler.views.formatting import TIMES, size_text, spacing_text
@@ -47,9 +47,16 @@ def facts_of(plan: ImportPlan) -> dict[str, str]:
         "Voxels": f"{size_text(plan.size)}, {plan.stored_dtype}"
         + (f", {spacing_text(spacing)} each" if spacing else ", of unknown size"),
         "Size": size or "not known before the voxel size is",
-        "Memory": f"{plan.n_bytes / MB:,.0f} MB",
+        "Memory": _memory(plan),
         "Where": str(plan.path),
     }
+
+
+def _memory(plan: ImportPlan) -> str:
+    taken = f"{plan.n_bytes / MB:,.0f} MB"
+    if plan.is_unpacked_to_disk:
+        return f"unpacked on disk, {taken}"
+    return f"stays in its file, {taken}" if plan.stays_in_file and plan.n_bytes >= MAPPED_FROM else taken
 
 
 def remedy(problem: Problem) -> str:

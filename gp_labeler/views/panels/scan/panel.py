@@ -91,11 +91,12 @@ class ScanPanel(QWidget):
 def facts_of(volume: Volume) -> dict[str, str]:
     """Return what there is to know about a scan, as names and words."""
     lengths = TIMES.join(f"{n * s:.1f}" for n, s in zip(volume.size, volume.spacing, strict=True))
+    place = "its file" if volume.voxels.in_file else "memory"
     facts = {
         "Name": volume.name,
         "Voxels": f"{size_text(volume.size)} of {spacing_text(volume.spacing)}",
         "Size": f"{lengths} mm",
-        "Values": f"{volume.dtype}, {_memory(volume.voxels.nbytes)}",
+        "Values": f"{volume.dtype}, {_memory(volume.voxels.nbytes)} in {place}",
         "Axes": _axes(volume),
     }
     if volume.path is not None:
@@ -106,8 +107,8 @@ def facts_of(volume: Volume) -> dict[str, str]:
 def _memory(n_bytes: int) -> str:
     for unit, size in (("GB", 2**30), ("MB", 2**20)):
         if n_bytes >= size:
-            return f"{n_bytes / size:.3g} {unit} in memory"
-    return f"{n_bytes / 2**10:.0f} kB in memory"
+            return f"{n_bytes / size:.3g} {unit}"
+    return f"{n_bytes / 2**10:.0f} kB"
 
 
 def _axes(volume: Volume) -> str:
