@@ -81,8 +81,8 @@ def our_slices(path: str) -> Callable[[], Any]:
     def work() -> Any:
         volume = read_volume(path)
         window, slicer = WindowLevel.of(volume), VolumeSlicer(volume)
-        middle = volume.extent.mean(axis=0)
-        return volume, [slicer.image(plane, float(middle[plane.axis])).grey(window) for plane in Plane]
+        middle, planes = volume.extent.mean(axis=0), [plane.in_scan for plane in Plane]
+        return volume, [slicer.image(plane, plane.position_of(middle)).grey(window) for plane in planes]
 
     return work
 

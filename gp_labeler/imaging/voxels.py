@@ -64,6 +64,10 @@ class Voxels(ABC):
         """
         return None
 
+    def uncopied(self) -> GreyArray | None:
+        """Return all of them as one C-contiguous (z, y, x) array, or None where that would need a copy."""
+        return None
+
     def whole(self) -> GreyArray:
         """Return all of them as one (z, y, x) array."""
         return self.read(slice(None), slice(None), slice(None))
@@ -130,6 +134,10 @@ class ArrayVoxels(Voxels):
         values: GreyArray = self._array[k, j, i]
         return values
 
+    def uncopied(self) -> GreyArray:
+        """Return the array."""
+        return self._array
+
 
 class MappedVoxels(Voxels):
     """Voxels that stay in their file, which the system reads page by page where they are asked for.
@@ -165,6 +173,11 @@ class MappedVoxels(Voxels):
     def problem(self) -> str | None:
         """What happened to the file since it was opened."""
         return None if self._file is None else self._file.problem
+
+    def uncopied(self) -> GreyArray | None:
+        """Return the map, where its values are shown as they are stored, but for some that are not finite."""
+        as_they_are = all(np.isnan(fill.value) for fill in self._fills) and self._stored.dtype.isnative
+        return self._stored if as_they_are and self._stored.flags.c_contiguous else None
 
     def read(self, k: slice, j: slice, i: slice) -> GreyArray:
         """Return the values of a box: a view of the map where nothing has to be changed."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,7 +19,7 @@ from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
-__all__ = ["MeshEars", "MeshFirst", "MeshOverview", "Meshes", "ReadMesh", "SaveMesh"]
+__all__ = ["Ear", "MeshEars", "MeshFirst", "MeshOverview", "Meshes", "ReadMesh", "SaveMesh"]
 
 FIRST_LOOK_VOXELS = 96**3
 """A mesh of so many voxels is there in a moment, and turns smoothly without a graphics card."""
@@ -28,12 +28,24 @@ FIRST_LOOK_VOXELS = 96**3
 QUICK_TRIANGLES = 45_000
 
 
+@dataclass(frozen=True, eq=False)
+class Ear:
+    """The surface of a box around an ear, and where the box is, (2, 3) mm."""
+
+    box: FloatArray
+    surface: Surface
+
+
 @dataclass(frozen=True)
 class Meshes:
-    """The bone as it is drawn: parts that do not overlap, and a preview mesh while the camera moves."""
+    """The bone as it is drawn: parts that do not overlap, and a preview mesh while the camera moves.
+
+    `ears` are those of the parts that are at full resolution.
+    """
 
     parts: tuple[Surface, ...] = ()
     quick: tuple[Surface, ...] = ()
+    ears: Mapping[Side, Ear] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -80,13 +92,17 @@ class MeshOverview:
 
 @dataclass(frozen=True, eq=False)
 class MeshEars:
-    """Mesh boxes around the ears at full resolution, and cut them out of the overview."""
+    """Mesh boxes around the ears at full resolution, and cut them out of the overview.
+
+    `kept` are ears that are meshed already, and stay as they are.
+    """
 
     volume: Volume
     threshold: float
     overview: Meshes
     boxes: Mapping[Side, FloatArray]
     smallest_mm: float
+    kept: Mapping[Side, Ear] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -96,15 +112,18 @@ class MeshEars:
 
     def run(self, progress: Progress) -> Meshes:
         """Mesh the boxes."""
-        rest, ears = list(self.overview.parts), []
-        for n, box in enumerate(self.boxes.values()):
+        ears, rest = dict(self.kept), list(self.overview.parts)
+        for n, (side, box) in enumerate(self.boxes.items()):
             start, end = 0.9 * n / len(self.boxes), 0.9 * (n + 1) / len(self.boxes)
             ear = _mesh(self, progress, start=start, end=end, box=box)
-            rest = [part.outside(ear.region) for part in rest]
-            ears.append(shaded_like(ear, self.overview.parts))
-        parts = tuple(part.prepare() for part in (*rest, *ears) if part.n_triangles)
+            ears[side] = Ear(box, shaded_like(ear, self.overview.parts))
+        for made in ears.values():
+            rest = [part.outside(made.surface.region) for part in rest]
+        fine = [made.surface for made in ears.values()]
+        parts = tuple(part.prepare() for part in (*rest, *fine) if part.n_triangles)
         progress(0.95)
-        return Meshes(parts, (coarse_surface(parts, QUICK_TRIANGLES, detailed=tuple(self.boxes.values())),))
+        detailed = tuple(made.box for made in ears.values())
+        return Meshes(parts, (coarse_surface(parts, QUICK_TRIANGLES, detailed=detailed),), ears)
 
 
 @dataclass(frozen=True, eq=False)

@@ -29,7 +29,8 @@ CUT_PART_MM = 0.3
 """Parts that the walls of an ear's box cut off are kept from this size on."""
 
 _NEAR = ("CA", "CB", "RWA", "RWP", "RWL", "RWM", "FPA", "FPP", "OS", "OI", "LLI", "MH", "CC", "CO")
-_MOVED_MM = 2.0
+_MARGIN_MM = 2.0
+"""An ear is not meshed again before its middle has moved by more."""
 
 
 class BoneModel:
@@ -63,6 +64,7 @@ class BoneModel:
         self._smallest_mm = SMALLEST_PART_MM
         self._meshes = self._overview = Meshes()
         self._ears: Mapping[Side, FloatArray] = {}
+        """The (2, 3) box of each ear that is meshed, or about to be, mm."""
         self._half = EAR_HALF_MM
         document.reset.connect(self._on_reset)
         document.landmarks_changed.connect(self._on_landmarks)
@@ -149,16 +151,25 @@ class BoneModel:
             return
         self._half = half_mm or self._half
         middles = {side: place for side in Side if (place := self._ear(side)) is not None}
-        if not again and not any(self._is_news(side, place) for side, place in middles.items()):
+        wanted = {
+            side: box_around(place, self._half)
+            for side, place in middles.items()
+            if again or self._has_moved(side, place)
+        }
+        if not wanted:
             return
-        self._ears = middles
-        boxes = {side: box_around(place, self._half) for side, place in middles.items()}
-        job = MeshEars(volume, threshold, self._overview, boxes, min(self._smallest_mm, CUT_PART_MM))
+        self._ears = {**self._ears, **wanted}
+        there = {} if again else self._meshes.ears
+        kept = {s: ear for s, ear in there.items() if ear.box is self._ears[s]}
+        boxes = {side: box for side, box in self._ears.items() if side not in kept}
+        smallest = min(self._smallest_mm, CUT_PART_MM)
+        job = MeshEars(volume, threshold, self._overview, boxes, smallest, kept)
         self._jobs.submit(job, self._show, key="mesh ears")
 
-    def _is_news(self, side: Side, place: FloatArray) -> bool:
-        before = self._ears.get(side)
-        return before is None or float(np.linalg.norm(before - place)) > _MOVED_MM
+    def _has_moved(self, side: Side, place: FloatArray) -> bool:
+        """Whether the middle of an ear left the middle of its box by more than the margin, or has none."""
+        box = self._ears.get(side)
+        return box is None or float(np.linalg.norm(box.mean(axis=0) - place)) > _MARGIN_MM
 
     def _ear(self, side: Side) -> FloatArray | None:
         """Return about where the middle of an ear is, (3,) mm: from its labels, suggestions and ghosts."""
@@ -166,7 +177,7 @@ class BoneModel:
         known = [place for place in places if place is not None]
         if not known:
             return None
-        middle: FloatArray = np.array(known).mean(axis=0)
+        middle: FloatArray = np.median(known, axis=0)  # one point in the wrong place does not move it far
         return middle
 
     def _take_first(self, meshes: Meshes) -> None:

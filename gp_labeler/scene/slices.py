@@ -16,7 +16,6 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.imaging.voxels import ArrayVoxels
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
 from gp_labeler.scene.window_level import WindowLevel
 
@@ -192,11 +191,11 @@ class VolumeSlicer:
         width, height = (int(n) for n in np.maximum(np.ceil(section.max(axis=0) / step - 0.5) - first + 1, 1))
         low = first * step
         origin = plane.scan(low[None], position)[0]
-        if not isinstance(self.volume.voxels, ArrayVoxels):
+        if (array := self.volume.voxels.uncopied()) is None:
             values = _interpolated(self.volume, origin, plane, step, (height, width))
             return SliceImage(values, plane, position, low, np.array([step, step]))
         if self._reslice is None:
-            self._reslice = _reslice(self.volume)
+            self._reslice = _reslice(self.volume, array)
         T_scan_screen = np.eye(4)
         T_scan_screen[:3, :3], T_scan_screen[:3, 3] = plane.axes, origin
         to_voxel = vtkMatrixToLinearTransform()
@@ -239,10 +238,10 @@ def _interpolated(
     return values.reshape(shape)
 
 
-def _reslice(volume: Volume) -> vtkImageReslice:
+def _reslice(volume: Volume, array: NDArray[Any]) -> vtkImageReslice:
     image = vtkImageData()
     image.SetDimensions(volume.size)
-    image.GetPointData().SetScalars(to_vtk(vtk_ready(volume.array).reshape(-1), share=True))
+    image.GetPointData().SetScalars(to_vtk(vtk_ready(array).reshape(-1), share=True))
     reslice = vtkImageReslice()
     reslice.SetInputData(image)
     reslice.SetInterpolationModeToLinear()

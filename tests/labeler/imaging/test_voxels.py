@@ -179,7 +179,7 @@ held = volume.voxels.read(slice(None), slice(None), slice(None))
 os.truncate(sys.argv[1], int(sys.argv[2]))
 print(held.sum(), "still runs")
 for plane in Plane:
-    VolumeSlicer(volume).image(plane, 3.0).values.sum()
+    VolumeSlicer(volume).image(plane.in_scan, 3.0).values.sum()
 volume.value_at(volume.voxel_to_scan([[10, 10, 30]])[0])
 for work in (volume.check, lambda: extract_isosurface(volume, 500.0), lambda: volume.checksum):
     try:

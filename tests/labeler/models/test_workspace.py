@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from gp_labeler.commands.actions import ACTIONS, run
 from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.document.state import How
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.mesh import MeshEars
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
@@ -99,6 +101,40 @@ def test_ears_are_meshed_finely_once_their_place_is_known(workspace) -> None:
     workspace.bone.mesh_ears(half_mm=1.0)
     workspace.wait()
     assert {part.stride for part in workspace.bone.surfaces} == {1, 2}
+
+
+def test_an_ear_is_meshed_again_only_where_it_moved(workspace) -> None:
+    ball = ball_volume()
+    large = np.kron(ball.array, np.ones((5, 5, 5), dtype=np.uint8)).astype(np.uint16)
+    workspace.scan.begin(Volume.from_parts(large, [VOXEL_MM / 5] * 3, ball.origin, name="large"))
+    near = ["CA", "CB", "RWA", "RWP", "RWL", "RWM", "FPA", "FPP", "OS", "OI", "LLI", "MH", "CC"]
+
+    def place(side: Side, x: float, y: float, codes: Sequence[str]) -> None:
+        for code in codes:
+            apart = 0.05 * np.array([near.index(code), near.index(code) ** 2 / 9, 0])
+            workspace.labels.place(MIDDLE + np.array([x, y, 0]) + apart, side=side, code=code)
+        workspace.wait()
+
+    place(Side.LEFT, 5.0, 0.0, near)
+    place(Side.RIGHT, -5.0, 0.0, near)
+    workspace.bone.mesh_ears(half_mm=1.5)
+    workspace.wait()
+    fine = [part for part in workspace.bone.surfaces if part.stride == 1]
+    assert len(fine) == 2
+    jobs: list[MeshEars] = []
+    workspace.jobs.started.connect(
+        lambda task: jobs.append(task.job) if isinstance(task.job, MeshEars) else None
+    )
+    for y in (5.0, -5.0, 5.0, -5.0):  # clicks that contradict each other
+        place(Side.LEFT, 5.0, y, near[:3])
+    place(Side.LEFT, 5.0, 1.5, near)
+    assert jobs == []
+    place(Side.RIGHT, -5.0, 2.5, near)
+    (job,) = jobs
+    assert set(job.boxes) == {Side.RIGHT}
+    still_fine = [part for part in workspace.bone.surfaces if part.stride == 1]
+    assert len(still_fine) == 2
+    assert len(set(map(id, fine)) & set(map(id, still_fine))) == 1  # the left ear is the one it was
 
 
 def test_a_drag_shows_at_once_and_is_one_edit(on_ball) -> None:
