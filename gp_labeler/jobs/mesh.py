@@ -19,7 +19,7 @@ from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
-__all__ = ["Ear", "MeshEars", "MeshFirst", "MeshOverview", "Meshes", "ReadMesh", "SaveMesh"]
+__all__ = ["EarMesh", "MeshEars", "MeshFirst", "MeshOverview", "Meshes", "ReadMesh", "SaveMesh"]
 
 FIRST_LOOK_VOXELS = 96**3
 """A mesh of so many voxels is there in a moment, and turns smoothly without a graphics card."""
@@ -29,7 +29,7 @@ QUICK_TRIANGLES = 45_000
 
 
 @dataclass(frozen=True, eq=False)
-class Ear:
+class EarMesh:
     """The surface of a box around an ear, and where the box is, (2, 3) mm."""
 
     box: FloatArray
@@ -45,7 +45,7 @@ class Meshes:
 
     parts: tuple[Surface, ...] = ()
     quick: tuple[Surface, ...] = ()
-    ears: Mapping[Side, Ear] = field(default_factory=dict)
+    ears: Mapping[Side, EarMesh] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -102,7 +102,7 @@ class MeshEars:
     overview: Meshes
     boxes: Mapping[Side, FloatArray]
     smallest_mm: float
-    kept: Mapping[Side, Ear] = field(default_factory=dict)
+    kept: Mapping[Side, EarMesh] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -116,7 +116,7 @@ class MeshEars:
         for n, (side, box) in enumerate(self.boxes.items()):
             start, end = 0.9 * n / len(self.boxes), 0.9 * (n + 1) / len(self.boxes)
             ear = _mesh(self, progress, start=start, end=end, box=box)
-            ears[side] = Ear(box, shaded_like(ear, self.overview.parts))
+            ears[side] = EarMesh(box, shaded_like(ear, self.overview.parts))
         for made in ears.values():
             rest = [part.outside(made.surface.region) for part in rest]
         fine = [made.surface for made in ears.values()]
