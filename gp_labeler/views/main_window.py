@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import TypeVar
 
 from qtpy.QtCore import QByteArray, QEvent, QSize
-from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent
+from qtpy.QtGui import QCloseEvent, QDragEnterEvent, QDropEvent, QResizeEvent
 from qtpy.QtWidgets import (
     QApplication,
     QBoxLayout,
@@ -279,6 +279,10 @@ class MainWindow(QMainWindow):
         if event.type() == QEvent.Type.ShortcutOverride:  # comes before a key is looked up
             self.commands.flush()
         return super().event(event)
+
+    def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
+        super().resizeEvent(event)
+        self.panels.updateGeometry()  # what they ask for depends on the width of the window
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if not self.ui.resolve_unsaved():

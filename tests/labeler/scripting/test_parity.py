@@ -42,7 +42,6 @@ def folder(tmp_path_factory):
         for side, code, view, pixel in CLICKS
     ]
     look = {"do": "view", "size": list(SIZE), "camera": "A"}
-    run(tmp_path_factory.mktemp("first"), look)  # the panel of a process's first window is some 80 px wider
     report = run(folder, look, {"do": "view", "reset": True}, *clicks, {"do": "export"})
     assert report.ok, report.error
     return folder

@@ -452,3 +452,12 @@ def test_another_volume_replaces_the_first(qtbot, window) -> None:
     assert not window.grid.scene_view.scene.marks.marks
     for view in window.grid.slice_views.values():
         assert view.source.volume is other
+
+
+def test_the_panels_follow_the_width_of_the_window(qtbot, window):
+    """What they ask for is a share of it, which a layout keeps until it is told."""
+    for width in (1600, 1150, 1500, 1100):
+        window.resize(width, 760)
+        wait_until_idle(qtbot, window)
+        expected = min(window.panels.preferred_width, max(round(0.37 * width), window.panels.needed_width))
+        qtbot.waitUntil(lambda: window.panels.width() == expected)  # noqa: B023
