@@ -283,6 +283,9 @@ class MainWindow(QMainWindow):
     def resizeEvent(self, event: QResizeEvent) -> None:  # noqa: D102, N802
         super().resizeEvent(event)
         self.panels.updateGeometry()  # what they ask for depends on the width of the window
+        beside = self.panels.parentWidget()
+        if beside is not None and (layout := beside.layout()) is not None:
+            layout.activate()  # now, so that views are seen at their size by whoever resized the window
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
         if not self.ui.resolve_unsaved():

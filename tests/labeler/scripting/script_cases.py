@@ -52,4 +52,4 @@ def untimed(path: Path) -> str:
     marks = found["gpLabeler"]["provenance"]
     for mark in marks.values():
         mark.pop("time")
-    return re.sub(r"; time: [^]]*", "", json.dumps(found, indent=1))
+    return re.sub(r" \[time: [^]]*\]|; time: [^]]*", "", json.dumps(found, indent=1))
