@@ -49,11 +49,14 @@ class SurfaceHit:
         Unit normal of the triangle there, pointing out of the bone.
     triangle : int
         Row of the triangle.
+    stride : int
+        Of the surface: 1 where it is at full resolution.
     """
 
     point: FloatArray
     normal: FloatArray
     triangle: int
+    stride: int = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +254,7 @@ class Surface:
         self.mesh.GetCellPoints(triangle, corners)
         a, b, c = (np.array(self.mesh.GetPoint(corners.GetId(i))) for i in range(3))
         normal = np.cross(b - a, c - a)
-        return SurfaceHit(np.array(point), normal / (np.linalg.norm(normal) or 1.0), triangle)
+        return SurfaceHit(np.array(point), normal / (np.linalg.norm(normal) or 1.0), triangle, self.stride)
 
 
 def _subset(mesh: vtkPolyData, kept: NDArray[np.bool_]) -> vtkPolyData:

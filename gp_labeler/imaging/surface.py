@@ -18,7 +18,7 @@ from gp_core.errors import GpError
 from gp_core.validation import FloatArray, as_points, check_option
 from gp_labeler.imaging.mesh import Surface, SurfaceHit
 from gp_labeler.imaging.progress import Progress, Report
-from gp_labeler.imaging.threshold import LEVEL_SAMPLES, surface_level
+from gp_labeler.imaging.threshold import volume_level
 from gp_labeler.imaging.volume import GreyArray, Volume
 from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk, triangles_of
 
@@ -111,7 +111,7 @@ def extract_isosurface(
     report = Report(progress, cancel)
     report(0.0)
     region = _region(volume, box)
-    level = surface_level(threshold, volume.voxels.sample(LEVEL_SAMPLES))
+    level = volume_level(volume, threshold)
     mesh = METHODS[method](*_image(volume, region, stride, level))
     if volume.is_mirrored:
         _turn_over(mesh)

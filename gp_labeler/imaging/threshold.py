@@ -12,7 +12,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.voxels import Voxels
 
-__all__ = ["LEVEL_SAMPLES", "holds_integers", "propose_threshold", "surface_level"]
+__all__ = ["LEVEL_SAMPLES", "holds_integers", "propose_threshold", "surface_level", "volume_level"]
 
 _BINS = 256
 _SAMPLES = 500_000
@@ -107,6 +107,22 @@ def holds_integers(array: NDArray[Any]) -> bool:
     sample = array[::stride, ::stride, ::stride]
     sample = sample[np.isfinite(sample)]
     return bool(np.array_equal(sample, np.rint(sample)))
+
+
+def volume_level(volume: Volume, threshold: float) -> float:
+    """Return the level at which the isosurface of a scan is cut; see `surface_level`.
+
+    Parameters
+    ----------
+    volume : Volume
+        The scan.
+    threshold : float
+        Voxels of this value and above are bone.
+    """
+    is_whole = abs(threshold - round(threshold)) < _INTEGER_TOLERANCE
+    if not is_whole or volume.dtype.kind in "iub":  # its type says it all: nothing has to be read
+        return surface_level(threshold, np.zeros((1, 1, 1), volume.dtype))
+    return surface_level(threshold, volume.voxels.sample(LEVEL_SAMPLES))
 
 
 def surface_level(threshold: float, array: NDArray[Any]) -> float:

@@ -250,6 +250,10 @@ class Scene3D:
         hit = self.bone.pick(*ray)
         return None if hit is not None and self.slices.blocks(ray[0], hit.point) else hit
 
+    def ray(self, x: float, y: float) -> tuple[FloatArray, FloatArray]:
+        """Return where the ray through a pixel begins, (3,) mm, and its (3,) direction."""
+        return self._viewpoint_ray(x, y)
+
     def pick_slice(self, x: float, y: float) -> FloatArray | None:
         """Return the (3,) point of a slice's picture seen at a pixel, or None where there is none."""
         self._set_clipping()

@@ -24,6 +24,7 @@ from qtpy.QtWidgets import QWidget
 
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import How
+from gp_labeler.imaging.mesh import SurfaceHit
 from gp_labeler.models.interaction import PointDrag
 from gp_labeler.models.view import Cut
 from gp_labeler.models.workspace import Workspace
@@ -499,14 +500,19 @@ class SceneView(QWidget):
 
     def _aim(self, x: float, y: float) -> tuple[FloatArray | None, How]:
         """Return what a pixel shows, bone or a slice's picture: the (3,) scan position, and which it is."""
-        hit = self.scene.pick(x, y)
+        hit = self._hit(x, y)
         if hit is not None:
             return hit.point, How.MESH
         return self.scene.pick_slice(x, y), How.SLICE
 
+    def _hit(self, x: float, y: float) -> SurfaceHit | None:
+        """Return the point of the bone at full resolution that is seen at a pixel."""
+        hit = self.scene.pick(x, y)
+        return None if hit is None else self._workspace.bone.refine(hit, self.scene.ray(x, y)[1])
+
     def _drag_to(self, x: float, y: float) -> None:
         drag = self._workspace.interaction.drag
-        hit = self.scene.pick(x, y)
+        hit = self._hit(x, y)
         if drag is None:
             self._drag_measurement(x, y, None if hit is None else hit.point)
             return
