@@ -59,6 +59,7 @@ CASES = {
     "mesh": Case("surface for mesh and save", HEAD, "our_mesh", "flying_edges", 1.15),
     "islands": Case("islands dropped", HEAD, "our_islands", "flying_edges", 1.3),
     "pick": Case("islands dropped, search structure", HEAD, "our_first_pick", "flying_edges", 1.3),
+    "clicks": Case("100 clicks refined, of 30 ms each", HEAD, "our_clicks", "waiting", 1.0),
     "skimage": Case("scikit-image's marching cubes", HEAD, "skimage", "our_mesh", 5.0, True),
     "pyvista": Case("pyvista's default contour", HEAD, "pyvista", "our_mesh", 3.0, True),
 }
@@ -261,6 +262,35 @@ def pyvista(path: str) -> Callable[[], Any]:
     """`pyvista.ImageData.contour` as it is by default."""
     image = _volume(path).to_pyvista()
     return lambda: image.contour([HEAD_THRESHOLD - 0.5])
+
+
+def our_clicks(path: str) -> Callable[[], Any]:
+    """Bring 100 clicks on the overview to the surface of the full data."""
+    from gp_labeler.imaging.refined_pick import refined_hit
+    from gp_labeler.imaging.surface import extract_isosurface, overview_stride
+
+    volume, rng = _volume(path), np.random.default_rng(0)
+    overview = extract_isosurface(volume, HEAD_THRESHOLD, stride=overview_stride(volume)).prepare()
+    rays: list[Any] = []
+    while len(rays) < 100:
+        towards = rng.normal(size=3)
+        towards /= np.linalg.norm(towards)
+        start = volume.extent.mean(axis=0) - 200 * towards + rng.uniform(-8, 8, 3)
+        if (hit := overview.pick(start, towards)) is not None:
+            rays.append((hit, towards))
+    refined_hit(volume, HEAD_THRESHOLD, *rays[0])
+    return lambda: [refined_hit(volume, HEAD_THRESHOLD, *ray) for ray in rays]
+
+
+def waiting(path: str) -> Callable[[], Any]:
+    """Use 3 s of CPU: what 100 clicks may take, at 30 ms each."""
+
+    def work() -> Any:
+        end = time.process_time() + 3.0
+        while time.process_time() < end:
+            pass
+
+    return work
 
 
 # Measuring

@@ -46,5 +46,5 @@ def test_without_bone_near_it_a_click_stays_where_it_is() -> None:
 def test_a_surface_at_full_resolution_needs_nothing() -> None:
     volume = ball_volume()
     fine = extract_isosurface(volume, 1000.0)
-    hit = fine.pick(MIDDLE + [0, 0, EYE], [0, 0, -1])
+    hit = fine.pick(MIDDLE + np.array([0, 0, EYE]), [0, 0, -1])
     assert refined_hit(volume, 1000.0, hit, [0, 0, -1]) is hit
