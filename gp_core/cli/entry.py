@@ -12,6 +12,7 @@ from gp_core.cli import (
     compare,
     conditions,
     distances,
+    draw,
     estimate,
     fit,
     import_mat,
@@ -48,6 +49,7 @@ _COMMANDS = (
     compare,
     physical,
     conditions,
+    draw,
 )
 
 

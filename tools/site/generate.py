@@ -47,9 +47,17 @@ def in_site(text: str) -> str:
 def first_pages() -> Iterator[tuple[str, str]]:
     """Yield path and text of the pages at the top of the repository; the first has the navigation."""
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    yield "index.md", in_site(readme) + "\n" + NAVIGATION.read_text(encoding="utf-8")
+    yield "index.md", in_site(readme) + "\n" + navigation()
     for name in AT_TOP:
         yield f"{name.lower()}.md", in_site((ROOT / f"{name}.md").read_text(encoding="utf-8"))
+
+
+def navigation() -> str:
+    """Return the navigation; pages of docs/ that it does not name go where it says so."""
+    text = NAVIGATION.read_text(encoding="utf-8")
+    docs = ROOT / "docs"
+    pages = sorted(str(path.relative_to(docs).with_suffix("")) for path in docs.rglob("*.md"))
+    return text.replace("{others}", "\n".join(page for page in pages if page not in text.split()))
 
 
 def room_of(name: str) -> str:

@@ -1,0 +1,72 @@
+"""Run the code blocks of a page as a reader would, one after the other, in an empty folder.
+
+``console``: what follows ``$`` is run, and must print what stands below it (``...`` is anything). ``python``
+with prompts is a doctest. A block whose first line is ``# name.ext`` is saved as that file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import doctest
+import io
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import gp_core.cli
+
+_BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_FLAGS = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
+
+
+def run_page(page: Path) -> int:
+    """Run all blocks of a page in the present folder; return how many commands and examples there were."""
+    names: dict[str, object] = {}
+    count = 0
+    for language, block in _BLOCK.findall(page.read_text(encoding="utf-8")):
+        if language == "console":
+            for command, expected in _commands(block):
+                _check(page, command, expected, _run(command))
+                count += 1
+        elif language == "python":
+            test = doctest.DocTestParser().get_doctest(block, names, page.name, str(page), 0)
+            told = io.StringIO()
+            assert test.examples, f"{page.name}: a python block without prompts is not run"
+            result = doctest.DocTestRunner(optionflags=_FLAGS).run(test, out=told.write, clear_globs=False)
+            assert result.failed == 0, told.getvalue()
+            names.update(test.globs)
+            count += len(test.examples)
+        elif named := re.match(r"# (\S+\.\w+)\n", block):
+            Path(named[1]).write_text(block[named.end() :], encoding="utf-8")
+    return count
+
+
+def _commands(block: str) -> Iterator[tuple[str, str]]:
+    for part in re.split(r"^\$ ", block, flags=re.MULTILINE)[1:]:
+        command, _, expected = part.partition("\n")
+        yield command, expected
+
+
+def _run(command: str) -> str:
+    """Run a command, that of the core in this process, and return what it prints."""
+    program, *words = shlex.split(command)
+    if program == "gp-labeler":  # the window has a process of its own
+        command_line = [sys.executable, "-m", "gp_labeler", *words]
+        done = subprocess.run(command_line, capture_output=True, text=True, check=False)
+        assert done.returncode == 0, f"{command}: {done.stderr}{done.stdout}"
+        return done.stdout
+    assert program == "gp-core", f"{command}: no program of ours"
+    told = io.StringIO()
+    with contextlib.redirect_stdout(told):
+        status = gp_core.cli.main(words)
+    assert status == 0, f"{command}: status {status}"
+    return told.getvalue()
+
+
+def _check(page: Path, command: str, expected: str, printed: str) -> None:
+    wanted = expected or "...\n"
+    if not doctest.OutputChecker().check_output(wanted, printed, _FLAGS):
+        raise AssertionError(f"{page.name}: {command}\nsays:\n{printed}\nnot:\n{expected}")
