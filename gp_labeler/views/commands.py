@@ -33,6 +33,11 @@ _FOLDED = {
     "cut": "Cut bone",
     "head": "Straighten the head",
     "planes": "Planes of the slices",
+    "bone": "Bone in 3D",
+    "go": "Go to",
+    "how": "While placing",
+    "certainty": "Certainty",
+    "labelling": "Observers and labellings",
     "estimate": "Method",
     "out": "Export and report",
 }
