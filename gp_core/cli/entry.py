@@ -22,6 +22,7 @@ from gp_core.cli import (
     register,
     reliability,
     search,
+    serve,
     simulate,
     touches,
 )
@@ -35,6 +36,7 @@ __all__ = ["main", "make_parser"]
 
 _COMMANDS = (
     estimate,
+    serve,
     register,
     pivot,
     touches,
