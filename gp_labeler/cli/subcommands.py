@@ -50,6 +50,8 @@ SUBCOMMANDS = {
     "phantom": Subcommand("phantom", "phantom", "make a synthetic head with its truth"),
     "straighten": Subcommand("straighten", "straighten", "find how the head lies in its scan"),
     "export": Subcommand("export", "export", "write the landmark files of a specimen"),
+    "list": Subcommand("specimens", "list", "list the specimens of folders, and how far each is"),
+    "contact-sheet": Subcommand("specimens", "contact_sheet", "make contact sheets of specimens, PDF"),
     "simulate-tracker": Subcommand("simulate_tracker", "simulator", "serve a simulated probe"),
     "doctor": Subcommand("doctor", "doctor", "print what this machine has and what it lacks"),
 }

@@ -33,6 +33,8 @@ class Ui(Protocol):
     def ask_import_measurements(self) -> None: ...  # noqa: D102
     def ask_export_measurements(self) -> None: ...  # noqa: D102
     def ask_swap(self) -> None: ...  # noqa: D102
+    def show_specimens(self) -> None: ...  # noqa: D102
+    def open_next_specimen(self) -> None: ...  # noqa: D102
     def show_labellings(self) -> None: ...  # noqa: D102
     def ask_open_touches(self) -> None: ...  # noqa: D102
     def ask_open_skull(self) -> None: ...  # noqa: D102

@@ -231,6 +231,10 @@ def file_rows() -> Iterator[Action]:
               hint="A DICOM series or a stack of slices", group="open", icon="folder")
     yield row("demo", "Open the demo", (), lambda w, ui: ui.open_demo(),
               hint="A synthetic guinea-pig head to try everything on", group="open", icon="play")
+    yield row("specimens", "Specimens…", ("Ctrl+Shift+L",), lambda w, ui: ui.show_specimens(),
+              hint="Those of your folders: progress, the next unfinished, contact sheets", group="open")
+    yield row("next_specimen", "Next unfinished specimen", (), lambda w, ui: ui.open_next_specimen(),
+              lambda w: bool(w.specimens.every), group="open")
     yield row("find_scan", "Find scan…", (), lambda w, ui: ui.ask_find_scan(), _lacks_scan, group="open")
     yield row("save", "Save", ("Ctrl+S",), lambda w, ui: ui.save(), _in_use, group="save", icon="save")
     yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda w, ui: ui.save(ask=True), _in_use,

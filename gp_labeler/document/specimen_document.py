@@ -123,6 +123,8 @@ class SpecimenDocument:
         """What the user works on, remembered with every edit."""
         self.measure: Callable[[LandmarkSet], ScanEvidence] | None = None
         """Tells how far the points of a side lie from the bone of the scan; None without a scan."""
+        self.picture: Callable[[], bytes | None] | None = None
+        """Draws the small picture that is saved with the specimen, PNG."""
         self.history: History[SpecimenState]
         """What can be undone and redone."""
         self.store: SpecimenStore
@@ -460,7 +462,8 @@ class SpecimenDocument:
     def save(self, path: str | PathLike[str] | None = None, *, overwrite: bool = False) -> Path:
         """Save the specimen; see `SpecimenStore.save` for arguments and errors."""
         self._check_thread()
-        file = self.store.save(self.measured_state, path, overwrite=overwrite)
+        picture = None if self.picture is None else self.picture()
+        file = self.store.save(self.measured_state, path, overwrite=overwrite, thumbnail=picture)
         self._clean = self.state
         self.saved.emit(file)
         self._announce_dirty()

@@ -5,12 +5,14 @@ checksum, path, and path relative to the file), ``landmarks`` (by ``L``, ``R`` a
 code: position in scan mm, LPS, or suggestion; unseen, locked, checked; provenance, certainty, note),
 ``observer``, ``round`` and ``blind`` of that labelling, ``other_labellings`` (each with the same entries),
 ``threshold``, ``import_choices``, ``headFrame`` (how the head lies in the scan, and whether that is shown),
-``notes`` and ``pose_checks``. A file without certainties, notes, observer and other labellings says version
-3, which earlier programs read.
+``notes``, ``pose_checks`` and ``thumbnail`` (PNG, base64). A file without certainties, notes, observer and
+other labellings says version 3, which earlier programs read.
 """
 
 from __future__ import annotations
 
+import base64
+import binascii
 import hashlib
 import json
 import os
@@ -32,6 +34,7 @@ __all__ = [
     "read_document",
     "read_specimen",
     "state_in",
+    "thumbnail_in",
     "write_specimen",
 ]
 
@@ -48,8 +51,19 @@ def application() -> str:
         return "gp-labeler (from source)"
 
 
-def write_specimen(path: str | PathLike[str], state: SpecimenState) -> None:
+def write_specimen(
+    path: str | PathLike[str], state: SpecimenState, *, thumbnail: bytes | None = None
+) -> None:
     """Write a specimen file, all of it or nothing.
+
+    Parameters
+    ----------
+    path : path
+        The file.
+    state : SpecimenState
+        What to write.
+    thumbnail : bytes, optional
+        A small picture for lists of specimens, PNG.
 
     Raises
     ------
@@ -60,6 +74,8 @@ def write_specimen(path: str | PathLike[str], state: SpecimenState) -> None:
     document = document_of(state)
     document = {"format": FORMAT, "version": _version(document), "application": application(), **document}
     document = _with_relative_path(document, target.absolute().parent)
+    if thumbnail:
+        document["thumbnail"] = base64.b64encode(thumbnail).decode()
     text = json.dumps(document, indent=1, allow_nan=False) + "\n"
     write_text(target, text)
 
@@ -84,6 +100,15 @@ def read_document(path: str | PathLike[str]) -> Mapping[str, Any]:
     content = read_json(source, what="specimen file", remedy=f"Choose a *{SUFFIX} file.")
     _check_header(content, source)
     return _with_found_volume(content, source.absolute().parent)
+
+
+def thumbnail_in(document: Mapping[str, Any]) -> bytes:
+    """Return the picture in the document of a specimen file, PNG; empty where there is none."""
+    text = document.get("thumbnail")
+    try:
+        return base64.b64decode(text, validate=True) if isinstance(text, str) else b""
+    except (binascii.Error, ValueError):
+        return b""
 
 
 def state_in(document: Mapping[str, Any], path: str | PathLike[str]) -> SpecimenState:

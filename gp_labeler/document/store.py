@@ -22,7 +22,7 @@ from gp_labeler.document.paths import (
     volume_lock_path,
 )
 from gp_labeler.document.recovery import Recovery
-from gp_labeler.document.specimen_file import SUFFIX, digest, write_specimen
+from gp_labeler.document.specimen_file import SUFFIX, digest, read_document, thumbnail_in, write_specimen
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import SpecimenState
 
@@ -103,7 +103,12 @@ class SpecimenStore:
             self._journal.append(kind, text, document_of(state), time=time, edit=table)
 
     def save(
-        self, state: SpecimenState, path: str | PathLike[str] | None = None, *, overwrite: bool = False
+        self,
+        state: SpecimenState,
+        path: str | PathLike[str] | None = None,
+        *,
+        overwrite: bool = False,
+        thumbnail: bytes | None = None,
     ) -> Path:
         """Write the specimen file and begin the journal again.
 
@@ -115,6 +120,8 @@ class SpecimenStore:
             Where; by default where it was last. The suffix is added where it lacks.
         overwrite : bool
             Whether a file may be replaced that is not the one this document wrote or read last.
+        thumbnail : bytes, optional
+            A small picture, PNG; by default the file keeps the one that it has.
 
         Returns
         -------
@@ -135,7 +142,7 @@ class SpecimenStore:
             self._locked(journal_path(self.directory, target), target) if moves and self.directory else None
         )
         try:
-            write_specimen(target, state)
+            write_specimen(target, state, thumbnail=thumbnail or self._kept_thumbnail())
         except GpError:
             if lock is not None:
                 lock.release()
@@ -143,6 +150,15 @@ class SpecimenStore:
         self._saved = digest(target)
         self._rebase(target, state, lock)
         return target
+
+    def _kept_thumbnail(self) -> bytes | None:
+        """Return the picture in the file that the specimen was last saved in."""
+        if self.specimen_file is None:
+            return None
+        try:
+            return thumbnail_in(read_document(self.specimen_file))
+        except GpError:
+            return None
 
     def claim_volume(self, path: str | PathLike[str] | None) -> str | None:
         """Note that this window labels a scan; return a warning where another window does too."""

@@ -19,6 +19,7 @@ from gp_labeler.document.observer_memory import ObserverMemory
 from gp_labeler.document.recent_files import RecentFiles
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_file import SUFFIX
+from gp_labeler.imaging.thumbnail import thumbnail
 from gp_labeler.jobs.runner import Dispatcher, Jobs, Task
 from gp_labeler.models.added_meshes import AddedMeshesModel
 from gp_labeler.models.anatomical_planes import AnatomicalPlanesModel
@@ -33,6 +34,7 @@ from gp_labeler.models.pose import PoseModel
 from gp_labeler.models.reference_points import ReferencePointsModel
 from gp_labeler.models.reliability import ReliabilityModel
 from gp_labeler.models.scan import ScanModel
+from gp_labeler.models.specimen_list import SpecimenListModel
 from gp_labeler.models.tracker import TrackerModel
 from gp_labeler.models.view import ViewModel
 
@@ -82,11 +84,13 @@ class Workspace:
         self.measure = MeasureModel(document, self.interaction, self.labels, self.view, messages)
         self.bone = BoneModel(document, self.scan, self.labels, jobs, messages)
         self.head = HeadModel(document, self.view, self.scan, jobs, messages)
+        document.picture = self._thumbnail
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
         self.planes = AnatomicalPlanesModel(self.labels, self.pose, self.view)
         self.tracker = TrackerModel(document, self.pose, messages)
         self.references = ReferencePointsModel(document, self.scan, messages)
         self.reliability = ReliabilityModel(document, self.atlas, self.references, jobs, messages)
+        self.specimens = SpecimenListModel(document, self.atlas, jobs, messages, directory)
         self.meshes = AddedMeshesModel(document, self.scan, jobs, messages)
 
     def open(self, path: str | PathLike[str], **options: Any) -> None:
@@ -146,6 +150,10 @@ class Workspace:
         if volume is not None:
             self.view.set_crosshair(volume.extent.mean(axis=0))
         self.view.reset_asked.emit()
+
+    def _thumbnail(self) -> bytes | None:
+        """Draw the small picture for lists of specimens; none before bone is there."""
+        return thumbnail(self.bone.surfaces)
 
     def begin_labelling(self) -> None:
         """Let a click place points; who labels shall not see where an estimate wants the cochlea."""

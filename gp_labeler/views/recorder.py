@@ -295,6 +295,9 @@ class Recorder(QObject):
         if what == "measurements":
             self.tables.append(step("export_measurements"))
             return
+        if what == "contact sheet":
+            self.tables.append(step("contact_sheet", path=file.name))
+            return
         if what == "reliability":
             specimens = [str(path.absolute()) for path in self._window.workspace.reliability.paths]
             self.tables.append(step("reliability", specimens=specimens, path=[file.name]))

@@ -27,6 +27,7 @@ from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.panels.label.landmark_import_dialog import LandmarkImportDialog
 from gp_labeler.views.panels.scan.import_dialog import ImportDialog
 from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
+from gp_labeler.views.panels.scan.specimen_list_dialog import SpecimenListDialog
 from gp_labeler.views.pictures import grab, write_picture
 from gp_labeler.views.pose_ui import PoseUi
 from gp_labeler.views.prompts import Prompts
@@ -183,6 +184,19 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi):
         folder = self.prompts.folder("Export landmarks into this folder", self._folder)
         if folder is not None:
             export_asking(self._workspace, folder, self.prompts)
+
+    def show_specimens(self) -> None:
+        """Show the list of specimens, beside the window, where it can stay open."""
+        dialog = self._window.findChild(SpecimenListDialog)
+        if dialog is None:
+            dialog = SpecimenListDialog(self._workspace, self.prompts, self._folder, self._window)
+            dialog.open_asked.connect(self.open_path)
+        dialog.show()
+        dialog.raise_()
+
+    def open_next_specimen(self) -> None:
+        """Open the next specimen of the list with something left to do."""
+        self.open_path(self._workspace.specimens.next_unfinished().path)
 
     def show_labellings(self) -> None:
         """Show who labels, and all labellings of the specimen."""

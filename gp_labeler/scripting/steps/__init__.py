@@ -22,6 +22,7 @@ from gp_labeler.scripting.steps.measuring import (
 from gp_labeler.scripting.steps.placing import Choose, Confirm, Drag, Place, Put, Suggest
 from gp_labeler.scripting.steps.pose import CarryPath, EstimateStep, Overlay, ReportStep, VerdictStep
 from gp_labeler.scripting.steps.scan import Mesh, Open, Spacing, Threshold
+from gp_labeler.scripting.steps.specimens import ContactSheet, ListFolders
 from gp_labeler.scripting.steps.touching import Register, Skull, Touches
 
 __all__ = ["STEPS"]
@@ -43,6 +44,8 @@ _ALL: tuple[type[Step], ...] = (
         Fit,
         UseAtlas,
         Reliability,
+        ListFolders,
+        ContactSheet,
         Touches,
         Skull,
         Register,

@@ -1,0 +1,239 @@
+"""The list of specimens in the folders of a lab: progress of each, which comes next, work on all of them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from os import PathLike
+from pathlib import Path
+
+from psygnal import Signal
+
+from gp_core.disk import read_json, write_text
+from gp_core.errors import GpError
+from gp_core.validation import check_option
+from gp_labeler.document.paths import absolute_path
+from gp_labeler.document.specimen_document import SpecimenDocument
+from gp_labeler.document.specimen_list import ListedSpecimen
+from gp_labeler.jobs.contact_sheet import MakeContactSheets, SheetsMade
+from gp_labeler.jobs.runner import Jobs
+from gp_labeler.jobs.specimen_list import CountProblems, ExportSpecimens, ListSpecimens
+from gp_labeler.models.atlas import AtlasModel
+from gp_labeler.models.messages import Messages
+
+__all__ = ["FILTERS", "SpecimenListModel"]
+
+FILTERS = ("all", "unfinished", "finished", "in doubt", "repeated", "with notes")
+"""Which specimens are shown."""
+
+_LISTING = "list specimens"
+_MOST_FOLDERS = 20
+
+
+class SpecimenListModel:
+    """Keeps the list, and remembers its folders.
+
+    Parameters
+    ----------
+    document : SpecimenDocument
+        The open specimen: its row is read again when it is saved.
+    atlas : AtlasModel
+        By which labels are checked.
+    jobs : Jobs
+        Where files are read.
+    messages : Messages
+        What the user is told by.
+    directory : Path, optional
+        State directory, where the folders are remembered.
+    """
+
+    changed = Signal()
+    """Other rows, another filter, or problems were counted."""
+
+    def __init__(
+        self,
+        document: SpecimenDocument,
+        atlas: AtlasModel,
+        jobs: Jobs,
+        messages: Messages,
+        directory: Path | None = None,
+    ) -> None:
+        self._document, self._atlas, self._jobs, self._messages = document, atlas, jobs, messages
+        self._file = None if directory is None else directory / "specimen_list.json"
+        self.folders = self._recalled()
+        self._every: tuple[ListedSpecimen, ...] = ()
+        self._problems: Mapping[Path, int] = {}
+        self.words, self.kind = "", FILTERS[0]
+        document.saved.connect(self._on_saved)
+
+    @property
+    def every(self) -> tuple[ListedSpecimen, ...]:
+        """All specimens of the folders."""
+        return self._every
+
+    @property
+    def rows(self) -> tuple[ListedSpecimen, ...]:
+        """The specimens that the filter leaves."""
+        words = self.words.casefold().split()
+        return tuple(
+            row
+            for row in self._every
+            if self._is_of_kind(row) and all(word in row.text.casefold() for word in words)
+        )
+
+    @property
+    def is_listing(self) -> bool:
+        """Whether files are being read."""
+        return any(task.key == _LISTING for task in self._jobs.running)
+
+    @property
+    def text(self) -> str:
+        """Such as ``12 of 40 specimens, 7 finished``."""
+        n, shown = len(self._every), len(self.rows)
+        if not n:
+            return "No specimens yet" if self.folders else "Choose a folder of specimens"
+        many = "" if n == 1 else "s"
+        count = f"{n} specimen{many}" if shown == n else f"{shown} of {n} specimens"
+        return f"{count}, {sum(row.is_finished for row in self._every)} finished"
+
+    def n_problems(self, row: ListedSpecimen) -> int | None:
+        """Return how many labels of a specimen are doubtful; None while that is not known."""
+        return self._problems.get(row.path)
+
+    def add(self, *folders: str | PathLike[str]) -> None:
+        """Take folders, or specimen files, into the list, and read it again."""
+        for folder in folders:
+            if not Path(folder).exists():
+                raise GpError("does not exist", file=folder, remedy="Choose another folder.")
+        new = dict.fromkeys((*self.folders, *map(absolute_path, folders)))
+        self.folders = tuple(new)[-_MOST_FOLDERS:]
+        self._remember()
+        self.refresh()
+
+    def remove(self, folder: str | PathLike[str]) -> None:
+        """Take a folder out of the list; its files stay where they are."""
+        gone = absolute_path(folder)
+        self.folders = tuple(each for each in self.folders if each != gone)
+        self._remember()
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read all files again in the background."""
+        for task in self._jobs.running:
+            if task.key == _LISTING:
+                task.cancel()
+        there = tuple(folder for folder in self.folders if folder.exists())
+        self._jobs.submit(ListSpecimens(there), self._take, key=_LISTING)
+
+    def show(self, *, words: str | None = None, kind: str | None = None) -> None:
+        """Filter the list by words, or by one of `FILTERS`."""
+        if kind is not None:
+            check_option(kind, "filter", FILTERS)
+            self.kind = kind
+        self.words = self.words if words is None else words
+        self.changed.emit()
+
+    def next_unfinished(self) -> ListedSpecimen:
+        """Return the unfinished specimen after the open one, round the list.
+
+        Raises
+        ------
+        GpError
+            There is none.
+        """
+        rows, here = self._every, self._document.path
+        at = next((n for n, row in enumerate(rows) if row.path == here), -1)
+        for row in (*rows[at + 1 :], *rows[: max(at, 0)]):
+            if not row.is_finished and not row.problem:
+                return row
+        raise GpError("no specimen of the list is unfinished", remedy="Add a folder, or look at the list.")
+
+    def export(
+        self, folder: str | PathLike[str], rows: Iterable[ListedSpecimen] | None = None, **options: object
+    ) -> None:
+        """Export the landmarks of specimens, by default of all that are shown, in the background."""
+        chosen = self._files(rows)
+        job = ExportSpecimens(chosen, Path(folder), **options)  # type: ignore[arg-type]
+        self._jobs.submit(job, self._tell, key="export specimens")
+
+    def fit(self, rows: Iterable[ListedSpecimen] | None = None) -> None:
+        """Fit the atlas to specimens, by default to all that are shown."""
+        self._atlas.fit(self._files(rows))
+
+    def make_contact_sheets(
+        self, where: str | PathLike[str], rows: Iterable[ListedSpecimen] | None = None
+    ) -> None:
+        """Make contact sheets in the background: one file, or one for each specimen in a folder."""
+        self.make_contact_sheets_of(self._files(rows), where)
+
+    def make_contact_sheets_of(self, files: Iterable[Path], where: str | PathLike[str]) -> None:
+        """Make contact sheets of specimen files in the background."""
+        job = MakeContactSheets(tuple(files), Path(where))
+        self._jobs.submit(job, self._take_sheets, key="contact sheets")
+
+    # Inside
+
+    def _is_of_kind(self, row: ListedSpecimen) -> bool:
+        tests = {
+            "unfinished": not row.is_finished,
+            "finished": row.is_finished,
+            "in doubt": bool(self.n_problems(row)) or bool(row.problem),
+            "repeated": len(row.labellings) > 1,
+            "with notes": bool(row.notes) or row.n_notes > 0,
+        }
+        return tests.get(self.kind, True)
+
+    def _files(self, rows: Iterable[ListedSpecimen] | None) -> tuple[Path, ...]:
+        chosen = self.rows if rows is None else tuple(rows)
+        files = tuple(row.path for row in chosen if not row.problem)
+        if not files:
+            raise GpError("no specimens are listed", remedy="Add a folder of specimens, or show all.")
+        return files
+
+    def _take(self, rows: list[ListedSpecimen]) -> None:
+        self._every = tuple(rows)
+        self._problems = {path: n for path, n in self._problems.items() if any(r.path == path for r in rows)}
+        self.changed.emit()
+        if self._atlas.check is not None:
+            self._jobs.submit(
+                CountProblems(self._every, self._atlas.check), self._take_problems, key=_LISTING
+            )
+
+    def _take_problems(self, problems: Mapping[Path, int]) -> None:
+        self._problems = problems
+        self.changed.emit()
+
+    def _take_sheets(self, made: SheetsMade) -> None:
+        for file in made.files:
+            self._messages.wrote.emit("contact sheet", file)
+        self._tell(made.lines)
+
+    def _tell(self, lines: tuple[str, ...]) -> None:
+        self._messages.say("  ".join(lines), "info" if len(lines) == 1 else "warning")
+
+    def _on_saved(self, file: Path) -> None:
+        if any(row.path == file for row in self._every) or any(f in file.parents for f in self.folders):
+            self.refresh()
+
+    def _recalled(self) -> tuple[Path, ...]:
+        if self._file is None:
+            return ()
+        try:
+            content = read_json(self._file)
+        except GpError:
+            return ()
+        folders = content.get("folders") if isinstance(content, dict) else None
+        return (
+            tuple(Path(each) for each in folders if isinstance(each, str))
+            if isinstance(folders, list)
+            else ()
+        )
+
+    def _remember(self) -> None:
+        if self._file is None:
+            return
+        try:
+            self._file.parent.mkdir(parents=True, exist_ok=True)
+            write_text(self._file, json.dumps({"folders": [str(each) for each in self.folders]}, indent=1))
+        except (OSError, GpError):
+            return

@@ -1,0 +1,190 @@
+"""The list of specimens: how far each is, the next unfinished one, and work on all that are shown."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from qtpy.QtCore import QModelIndex, Qt, Signal
+from qtpy.QtWidgets import (
+    QAbstractItemView,
+    QComboBox,
+    QDialog,
+    QHBoxLayout,
+    QHeaderView,
+    QLineEdit,
+    QPushButton,
+    QTableView,
+    QVBoxLayout,
+    QWidget,
+)
+
+from gp_labeler.document.specimen_list import ListedSpecimen
+from gp_labeler.imaging.thumbnail import THUMBNAIL_SIZE
+from gp_labeler.models.specimen_list import FILTERS
+from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.panels.flow import FlowLayout
+from gp_labeler.views.panels.parts import open_at, text_label
+from gp_labeler.views.panels.scan.specimen_table_model import COLUMNS, SpecimenTableModel
+from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.signals import attempt, blocked, follow
+
+__all__ = ["SpecimenListDialog"]
+
+_SHEETS = "Contact sheet (*.pdf)"
+
+
+class SpecimenListDialog(QDialog):
+    """Shows the specimens of some folders.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Whose list it is.
+    prompts : Prompts
+        Who asks for folders.
+    folder : str
+        Where to look for folders first.
+    """
+
+    open_asked = Signal(object)
+    """The `Path` of a specimen to open."""
+
+    def __init__(
+        self, workspace: Workspace, prompts: Prompts, folder: str, parent: QWidget | None = None
+    ) -> None:
+        super().__init__(parent)
+        self._workspace, self._prompts, self._folder = workspace, prompts, folder
+        self.setWindowTitle("Specimens")
+        self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
+        self.model = SpecimenTableModel(workspace, self)
+        self._make_table()
+        self._make_filter()
+        self._make_buttons()
+        self._lay_out()
+        list_model = workspace.specimens
+        follow(self, list_model.changed, self.refresh)
+        for signal in (workspace.jobs.started, workspace.jobs.done, workspace.jobs.failed):
+            follow(self, signal, self.refresh)
+        if list_model.folders:
+            list_model.refresh()
+        self.refresh()
+        open_at(self, 980, 620)
+
+    def refresh(self, *_: object) -> None:
+        """Say how many there are, and what can be done."""
+        model = self._workspace.specimens
+        self.words.setText("Reading…" if model.is_listing and not model.every else model.text)
+        with blocked(self.kind, self.search):
+            self.kind.setCurrentIndex(FILTERS.index(model.kind))
+            if self.search.text().split() != model.words.split():
+                self.search.setText(model.words)
+        self.table.setVisible(bool(model.every) or bool(model.folders))
+        has_rows = any(not row.problem for row in model.rows)
+        for button in (self.export, self.fit_atlas, self.sheets):
+            button.setEnabled(has_rows)
+        self.next.setEnabled(any(not (row.is_finished or row.problem) for row in model.every))
+        self.forget.setEnabled(bool(model.folders))
+
+    def _make_table(self) -> None:
+        self.table = QTableView()
+        self.table.setModel(self.model)
+        self.table.setAccessibleName("Specimens")
+        self.table.setSelectionBehavior(QAbstractItemView.SelectionBehavior.SelectRows)
+        self.table.setSelectionMode(QAbstractItemView.SelectionMode.ExtendedSelection)
+        self.table.setEditTriggers(QAbstractItemView.EditTrigger.NoEditTriggers)
+        self.table.setWordWrap(False)
+        self.table.verticalHeader().hide()
+        self.table.verticalHeader().setDefaultSectionSize(THUMBNAIL_SIZE[1] // 2 + 4)
+        header = self.table.horizontalHeader()
+        header.setSectionResizeMode(QHeaderView.ResizeMode.ResizeToContents)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        header.setResizeContentsPrecision(50)  # hundreds of rows are not all measured
+        header.setSectionResizeMode(len(COLUMNS) - 1, QHeaderView.ResizeMode.Stretch)
+        self.table.activated.connect(self._open_row)
+
+    def _make_filter(self) -> None:
+        self.words = text_label("", "hint")
+        self.search = QLineEdit()
+        self.search.setPlaceholderText("Find: name, observer, note…")
+        self.search.setAccessibleName("Find specimens")
+        self.search.setClearButtonEnabled(True)
+        self.search.textChanged.connect(lambda text: self._workspace.specimens.show(words=text))
+        self.kind = QComboBox()
+        self.kind.setAccessibleName("Which specimens")
+        self.kind.addItems([kind.capitalize() for kind in FILTERS])
+        self.kind.currentIndexChanged.connect(lambda n: self._workspace.specimens.show(kind=FILTERS[n]))
+
+    def _make_buttons(self) -> None:
+        def button(words: str, hint: str, run: object) -> QPushButton:
+            made = QPushButton(words)
+            made.setToolTip(hint)
+            made.clicked.connect(run)
+            return made
+
+        self.add_folder = button("Add folder…", "It is searched, and the folders in it", self._add)
+        self.forget = button("Clear folders", "The files stay where they are", self._clear)
+        self.export = button("Export…", "Landmarks of all that are shown, or chosen", self._export)
+        hint = "Fit the atlas to all that are shown, or chosen"
+        self.fit_atlas = button("Fit atlas", hint, self._fit)
+        self.sheets = button(
+            "Contact sheets…", "Every label on its best slice and on bone, PDF", self._sheets
+        )
+        self.next = button("Next unfinished", "Open the next with something to do", self._next)
+        self.next.setProperty("role", "primary")
+
+    def _lay_out(self) -> None:
+        top = QHBoxLayout()
+        top.addWidget(self.search, 1)
+        top.addWidget(self.kind)
+        top.addWidget(self.add_folder)
+        top.addWidget(self.forget)
+        foot = FlowLayout()
+        for button in (self.next, self.export, self.fit_atlas, self.sheets):
+            foot.addWidget(button)
+        layout = QVBoxLayout(self)
+        layout.setContentsMargins(16, 14, 16, 12)
+        layout.setSpacing(8)
+        layout.addLayout(top)
+        layout.addWidget(self.words)
+        layout.addWidget(self.table, 1)
+        layout.addStretch(0)
+        layout.addLayout(foot)
+
+    @property
+    def chosen(self) -> tuple[ListedSpecimen, ...] | None:
+        """The selected rows; None where fewer than two are, so that all that are shown are meant."""
+        rows = self.table.selectionModel().selectedRows()
+        return tuple(self.model.rows[index.row()] for index in rows) if len(rows) > 1 else None
+
+    def _open_row(self, index: QModelIndex) -> None:
+        row = self.model.rows[index.row()]
+        if not row.problem:
+            self.open_asked.emit(row.path)
+
+    def _add(self) -> None:
+        folder = self._prompts.folder("A folder of specimens", self._folder)
+        if folder is not None:
+            attempt(self._workspace, lambda: self._workspace.specimens.add(folder))
+
+    def _clear(self) -> None:
+        for folder in self._workspace.specimens.folders:
+            self._workspace.specimens.remove(folder)
+
+    def _next(self) -> None:
+        attempt(
+            self._workspace, lambda: self.open_asked.emit(self._workspace.specimens.next_unfinished().path)
+        )
+
+    def _export(self) -> None:
+        folder = self._prompts.folder("Export landmarks into this folder", self._folder)
+        if folder is not None:
+            attempt(self._workspace, lambda: self._workspace.specimens.export(folder, self.chosen))
+
+    def _fit(self) -> None:
+        attempt(self._workspace, lambda: self._workspace.specimens.fit(self.chosen))
+
+    def _sheets(self) -> None:
+        suggested = str(Path(self._folder) / "contact.pdf")
+        path = self._prompts.save_file("Contact sheets", suggested, _SHEETS)
+        if path is not None:
+            attempt(self._workspace, lambda: self._workspace.specimens.make_contact_sheets(path, self.chosen))
