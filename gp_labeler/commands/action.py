@@ -61,6 +61,9 @@ class Ui(Protocol):
     def zoom_to_point(self) -> None: ...  # noqa: D102
     def look_closely(self, position: FloatArray | None) -> None: ...  # noqa: D102
     def ask_reopen_mirrored(self) -> None: ...  # noqa: D102
+    def reset_view_here(self) -> None: ...  # noqa: D102
+    def ask_position(self) -> None: ...  # noqa: D102
+    def cut_open(self) -> None: ...  # noqa: D102
     def look_from(self, letter: str) -> None: ...  # noqa: D102
     def cut(self, plane: str) -> None: ...  # noqa: D102
     def toggle_theme(self) -> None: ...  # noqa: D102

@@ -285,8 +285,13 @@ def view_rows() -> Iterator[Action]:
     for title, layout, key in _LAYOUTS:
         yield row(f"view.{layout}", title, (key,), _set_layout(layout), checked=_has_layout(layout),
                   group="layout")
+    yield row("view.fit_here", "Show everything in the view under the pointer", ("Ctrl+R",),
+              lambda w, ui: ui.reset_view_here(), _has_scan, group="layout",
+              hint="The other views stay as they are")
     yield row("view.reset", "Show everything", ("R",), lambda w, ui: ui.reset_views(), _has_scan,
               group="show")
+    yield row("view.go_to", "Go to position…", ("Ctrl+G",), lambda w, ui: ui.ask_position(), _has_scan,
+              group="show", hint="Such as L 4.6 P 9.1 S 12.4")
     yield row("view.zoom_to_point", "Look closely at the point", ("E", "Shift+R"),
               lambda w, ui: ui.zoom_to_point(), _has_scan, group="show")
     for word, letter, keys in _VIEWPOINTS:
@@ -316,8 +321,8 @@ def view_rows() -> Iterator[Action]:
 
 
 _LAYOUTS = (
-    ("Four views", "four-up", "V"), ("3D only", "3d", "D"), ("Axial only", "axial", "Z"),
-    ("Sagittal only", "sagittal", "S"), ("Coronal only", "coronal", "C"),
+    ("Four views", "four-up", "V"), ("3D and the best slice", "two-up", "Ctrl+2"), ("3D only", "3d", "D"),
+    ("Axial only", "axial", "Z"), ("Sagittal only", "sagittal", "S"), ("Coronal only", "coronal", "C"),
 )
 _TEXT_SIZES = (
     ("Larger text", "larger", 1, ("Ctrl+=", "Ctrl++")), ("Smaller text", "smaller", -1, ("Ctrl+-",)),

@@ -20,6 +20,16 @@ def _has_scan(workspace: Workspace) -> bool:
     return workspace.scan.volume is not None
 
 
+def _has_place(workspace: Workspace) -> bool:
+    """Whether there is bone, and it is known where the active feature is or is expected."""
+    active = workspace.labels.active
+    return (
+        _has_bone(workspace)
+        and active.code is not None
+        and workspace.labels.place_of(active.side, active.code) is not None
+    )
+
+
 def _is_cut(workspace: Workspace) -> bool:
     return workspace.view.state.cut is not None
 
@@ -82,6 +92,9 @@ def cut_rows() -> Iterator[Action]:
                   hint=f"Take away what lies before the {plane} plane through the crosshair")
     yield row("cut_view", "Cut bone: across the view", ("Shift+V",), _cut_by("view"), _has_bone,
               checked=_is_cut_by("view"), hint="Take away what lies nearer than the crosshair")
+    yield row("cut_open", "Cut bone: open at the feature", ("Shift+E",), lambda w, ui: ui.cut_open(),
+              _has_place,
+              hint="By the plane in which the feature is best seen, looked at from the open side")
     yield row("cut_flip", "Cut: leave the other side", ("Shift+X",), _flip)
     yield row("cut_here", "Cut: through the crosshair", ("Shift+H",), _cut_here,
               hint="Bring the cut to where the crosshair is now")

@@ -34,6 +34,9 @@ class VisibleArea(Protocol):
     def bring_close(self, position: FloatArray) -> None:
         """Show a (3,) scan position so closely that it can be judged."""
 
+    def hides(self, position: FloatArray) -> bool:
+        """Whether bone hides a (3,) scan position in the 3D view."""
+
 
 class PointDrag:
     """A placed or suggested point that is being dragged: shown where the pointer is, and not yet an edit."""

@@ -21,7 +21,8 @@ from gp_labeler.imaging.slice_plane import SlicePlane
 
 __all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "ViewModel", "ViewState"]
 
-LAYOUTS = ("four-up", "3d", "axial", "sagittal", "coronal")
+LAYOUTS = ("four-up", "two-up", "3d", "axial", "sagittal", "coronal")
+"""``two-up`` is the 3D view beside the slice view in which the active feature is best seen."""
 
 CUTS = ("axial", "sagittal", "coronal", "view")
 """By which planes bone can be cut open; ``view`` is across the line of sight."""

@@ -62,6 +62,12 @@ class ScriptPrompts:
         self.unanswered.append(text)
         return ""
 
+    def text(self, title: str, text: str, value: str = "") -> str | None:
+        """Return the answer of the step."""
+        if not self.answers:
+            self.unanswered.append(text)
+        return next(iter(self.answers), None)
+
     def number(self, title: str, text: str, value: float) -> float | None:
         """Leave it open: scripts give numbers where they are needed."""
         self.unanswered.append(text)

@@ -168,7 +168,7 @@ class WindowDriver:
         if name not in VIEWS:
             raise GpError(f"view must be one of {', '.join(VIEWS)}, got {name!r}")
         layout = self.workspace.view.state.layout
-        if layout not in ("four-up", name):
+        if layout not in ("four-up", name) and name not in self.window.grid.shown:
             self.workspace.view.update(layout=name)
             self.app.processEvents()
         return self.scene if name == "3d" else self.window.grid.slice_views[Plane(name)]

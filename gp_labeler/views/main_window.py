@@ -158,6 +158,7 @@ class MainWindow(QMainWindow):
     def _dock(self) -> None:
         workspace, actions = self.workspace, self.commands.actions
         self._scan, self._label = ScanPanel(workspace, actions), LabelPanel(workspace, actions)
+        self.grid.scene_view.frame_drawn.connect(self._label.card.refresh_hidden)
         self._atlas, self._pose = AtlasPanel(workspace, actions), PosePanel(workspace, actions)
         self._pose.add_card(TrackerCard(workspace, actions))
         self.steps: dict[str, QWidget] = {

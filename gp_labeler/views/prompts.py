@@ -73,6 +73,11 @@ class Prompts:
         chosen, ok = QInputDialog.getItem(self._parent, title, text, list(items), 0, False)
         return chosen if ok else ""
 
+    def text(self, title: str, text: str, value: str = "") -> str | None:
+        """Ask for words; None where the user thinks better of it."""
+        given, ok = QInputDialog.getText(self._parent, title, text, text=value)
+        return given if ok else None
+
     def number(self, title: str, text: str, value: float) -> float | None:
         """Ask for a number above 0."""
         given, ok = QInputDialog.getDouble(self._parent, title, text, value, 0.0001, 1000.0, 5)

@@ -227,12 +227,18 @@ class Recorder(QObject):
     def _on_command(self, id: str) -> None:
         if id == "file.new":
             self._begin()
-        elif id.startswith(LOOKS):
-            self.tables.append(step("action", id=id))
-        elif id == "view.zoom_to_point" or id.startswith("view.plane_"):  # they look at the active feature
+        elif id == "view.fit_here":
+            self.tables.append(step("view", reset=self._window.grid.name_here))
+        elif id == "view.go_to":
+            self.tables.append(step("view", go_to=self._window.workspace.view.crosshair.tolist()))
+        elif id in ("view.zoom_to_point", "view.cut_open") or id.startswith(
+            "view.plane_"
+        ):  # of the active feature
             active = self._window.workspace.labels.active
             if active.code is not None:
                 self.tables.append(step("choose", feature=active.code, side=active.side.value))
+            self.tables.append(step("action", id=id))
+        elif id.startswith(LOOKS):
             self.tables.append(step("action", id=id))
         elif id == "view.theme":
             self.tables.append(step("view", theme=self._window.theme_name))

@@ -171,6 +171,25 @@ class SceneView(QWidget):
         cut = Cut(plane, (0.0, 0.0, 0.0), (x, y, z)).through(self._workspace.view.crosshair)
         self._workspace.view.update(cut=cut)
 
+    def cut_open(self, position: FloatArray, plane: str, across_mm: float) -> None:
+        """Cut the bone open through a (3,) scan position, and look at it from the open side.
+
+        Parameters
+        ----------
+        position : (3,) float array
+            Scan frame, mm.
+        plane : str
+            One of `models.view.CUTS`; with ``view`` the camera keeps its direction.
+        across_mm : float
+            How much is shown, from top to bottom.
+        """
+        self._workspace.view.set_crosshair(position)
+        self.cut(plane)
+        cut = self._workspace.view.state.cut
+        if plane != "view" and cut is not None:
+            self.scene.camera.look(cut.normal, -self._workspace.view.planes[plane].down)
+        self.zoom_to(position, across_mm)
+
     def take_theme(self) -> None:
         """Draw in the colours of the window's theme."""
         self.scene.set_colours(theme_of(self).scene)

@@ -1,4 +1,4 @@
-"""The four views, each under its coloured header, in a four-up or single layout."""
+"""The four views, each under its coloured header: all of them, two beside each other, or one alone."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from qtpy.QtCore import QEvent, QSize, Qt, Signal
 from qtpy.QtGui import QColor, QMouseEvent, QPainter, QPaintEvent, QResizeEvent
 from qtpy.QtWidgets import QHBoxLayout, QLabel, QSizePolicy, QSplitter, QToolButton, QVBoxLayout, QWidget
 
+from gp_core.landmarks.features import feature
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
@@ -160,7 +161,7 @@ class ViewFrame(QWidget):
 
 
 class ViewGrid(QWidget):
-    """3D and axial above, sagittal and coronal below; any of them alone.
+    """3D and axial above, sagittal and coronal below; 3D and one slice side by side; any of them alone.
 
     Parameters
     ----------
@@ -188,6 +189,7 @@ class ViewGrid(QWidget):
         whole.addWidget(self._column)
         self.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Expanding)
         self._narrow = False
+        self._beside, self._several = "axial", "four-up"
         fit(self, self._ask_for_room)
         self._listen()
         self._lay_out()
@@ -198,10 +200,28 @@ class ViewGrid(QWidget):
         """The four views."""
         return (self.scene_view, *self.slice_views.values())
 
+    @property
+    def shown(self) -> tuple[str, ...]:
+        """Names of the views that the layout shows."""
+        layout = self._workspace.view.state.layout
+        four = _ROWS[0] if self._narrow else (*_ROWS[0], *_ROWS[1])
+        return {"four-up": four, "two-up": ("3d", self._beside)}.get(layout, (layout,))
+
+    @property
+    def name_here(self) -> str:
+        """Name of the view under the pointer, else of the one that takes the keys, else ``3d``."""
+        shown = [frame for frame in self.frames.values() if frame.isVisible()]
+        under = [frame.name for frame in shown if frame.underMouse()]
+        return next(iter(under + [frame.name for frame in shown if frame.view.hasFocus()]), "3d")
+
     def reset(self) -> None:
         """Show everything in every view."""
         for view in self.views:
             view.reset()
+
+    def hides(self, position: FloatArray) -> bool:
+        """Whether bone hides a (3,) scan position in the 3D view."""
+        return bool(self.scene_view.scene.hidden(position)[0])
 
     def can_judge(self, position: FloatArray) -> bool:
         """Whether a painted view shows a (3,) scan position with voxels at least two logical pixels wide.
@@ -256,14 +276,26 @@ class ViewGrid(QWidget):
         follow(self, self._workspace.view.planes_changed, self._say_titles)
         follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
         follow(self, self._workspace.document.reset, self._on_reset)
+        follow(self, self._workspace.labels.active_changed, self._show_best)
 
     def _maximise(self, name: str) -> None:
         view = self._workspace.view
-        view.update(layout="four-up" if view.state.layout == name else name)
+        view.update(layout=self._several if view.state.layout == name else name)
 
     def _on_view_changed(self, changed: frozenset[str]) -> None:
         if "layout" in changed:
+            layout = self._workspace.view.state.layout
+            self._several = layout if layout in ("four-up", "two-up") else self._several
             self._lay_out()
+
+    def _show_best(self, *_: object) -> None:
+        """Beside the 3D view, show the slice view in which the active feature is best seen."""
+        code = self._workspace.labels.active.code
+        best = self._beside if code is None else feature(code).view.lower()
+        if best in self.frames and best not in ("3d", self._beside):
+            self._beside = best
+            if self._workspace.view.state.layout == "two-up":
+                self._lay_out()
 
     def _on_reset(self) -> None:
         self._lay_out()
@@ -298,12 +330,23 @@ class ViewGrid(QWidget):
         self._check_room()
 
     def _lay_out(self) -> None:
-        layout = self._workspace.view.state.layout
-        shown = {"four-up": _ROWS[0] if self._narrow else (*_ROWS[0], *_ROWS[1])}.get(layout, (layout,))
+        shown, rows = self.shown, self._arranged()
+        for row, names in zip(self._rows, rows, strict=True):
+            if [row.indexOf(self.frames[name]) for name in names] != list(range(row.count())):
+                for n, name in enumerate(names):
+                    row.insertWidget(n, self.frames[name])
+                row.setSizes([1000] * len(names))
         for name, frame in self.frames.items():
             frame.setVisible(name in shown)
-        for row, names in zip(self._rows, _ROWS, strict=True):
+        for row, names in zip(self._rows, rows, strict=True):
             row.setVisible(not set(names).isdisjoint(shown))
+
+    def _arranged(self) -> tuple[tuple[str, ...], ...]:
+        """Return which views lie in which row: in the first, those of the layout with two."""
+        if self._workspace.view.state.layout != "two-up":
+            return _ROWS
+        two = self.shown
+        return two, tuple(name for name in self.frames if name not in two)
 
     def _say_where(self, plane: Plane, position: float) -> None:
         view = self._workspace.view

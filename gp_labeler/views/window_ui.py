@@ -17,6 +17,8 @@ from gp_labeler.imaging.mesh_files import MESH_SUFFIXES
 from gp_labeler.imaging.readers import ImportPlan
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.atlas import is_atlas_file
+from gp_labeler.models.typed_position import typed_position
+from gp_labeler.models.view import CUTS
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.canvas_ui import ask_canvas
@@ -34,6 +36,7 @@ from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import ask_about, export_asking, import_asking
 from gp_labeler.views.recorder import Recorder
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
+from gp_labeler.views.status_line import where_text
 from gp_labeler.views.view_grid import CLOSE_MM
 
 if TYPE_CHECKING:
@@ -46,6 +49,9 @@ _SCANS = (
     "*.isq *.ISQ *.log *.gpspecimen.json);;All files (*)"
 )
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
+_OPEN_MM = 16.0
+"""Across the 3D view once bone is cut open at a feature."""
+
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp);;OBJ (*.obj);;glTF (*.glb *.gltf)"
 
 
@@ -313,6 +319,34 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi):
             self.resolve_unsaved()
         ):
             self._workspace.scan.open(volume.path, **{**volume.choices, "reverse": reverse})
+
+    def reset_view_here(self) -> None:
+        """Show everything in the view under the pointer, and leave the others as they are."""
+        grid = self._window.grid
+        grid.frames[grid.name_here].view.reset()
+
+    def ask_position(self) -> None:
+        """Ask for a scan position, and bring it into every view."""
+        view, volume = self._workspace.view, self._workspace.scan.volume
+        here = where_text(view.crosshair).removesuffix(" mm")
+        text = self.prompts.text("Go to", "Position, mm (LPS)", here)
+        if text is None or volume is None:
+            return
+        position = typed_position(text)
+        if not volume.contains(position[None])[0]:
+            low, high = (where_text(corner) for corner in volume.extent)
+            problem = f"{where_text(position)} lies outside the scan"
+            raise GpError(problem, remedy=f"It reaches from {low} to {high}.")
+        view.show_point(position)
+
+    def cut_open(self) -> None:
+        """Cut the bone open so that the active point, or where it is expected, is seen."""
+        active, labels = self._workspace.labels.active, self._workspace.labels
+        where = None if active.code is None else labels.place_of(active.side, active.code)
+        if active.code is None or where is None:
+            raise GpError("nothing says yet where the feature is", remedy="Place it, or three others first.")
+        best = feature(active.code).view.lower()
+        self._window.grid.scene_view.cut_open(where, best if best in CUTS else "view", _OPEN_MM)
 
     def look_from(self, letter: str) -> None:
         """Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``."""

@@ -70,6 +70,10 @@ class Answers:
         given = self.answers.pop(0)
         return next(item for item in items if item.startswith(given))
 
+    def text(self, title: str, text: str, value: str = "") -> str | None:
+        self.asked.append(text)
+        return self.answers.pop(0) if self.answers else None
+
     def number(self, title: str, text: str, value: float) -> float | None:
         self.asked.append(text)
         return value

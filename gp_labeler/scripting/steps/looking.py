@@ -15,7 +15,7 @@ from gp_labeler.models.anatomical_planes import ANATOMICAL_PLANES
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.events import leave, press_keys
 from gp_labeler.scripting.step import Lengths, Pair, Step, Triple
-from gp_labeler.scripting.window_driver import WindowDriver
+from gp_labeler.scripting.window_driver import VIEWS, WindowDriver
 from gp_labeler.views.fonts import TEXT_SIZES
 from gp_labeler.views.pictures import PICTURES, picture, write_picture
 from gp_labeler.views.theme import THEMES
@@ -53,9 +53,10 @@ class Look(Step):
     panel : str, optional
         ``scan`` or ``label``: the panel beside the views.
     layout : str, optional
-        ``four-up``, ``3d``, ``axial``, ``sagittal`` or ``coronal``.
-    reset : bool
-        Show everything in every view.
+        ``four-up``, ``two-up`` (3D and the slice in which the chosen feature is best seen), ``3d``,
+        ``axial``, ``sagittal`` or ``coronal``.
+    reset : bool or str
+        Show everything in every view, or in one: ``3d``, ``axial``, ``sagittal`` or ``coronal``.
     camera : str or three numbers, optional
         Look at the bone from ``A``, ``P``, ``L``, ``R``, ``S`` or ``I``, or in a direction.
     go_to : three numbers or str, optional
@@ -91,7 +92,7 @@ class Look(Step):
     text_size: int | None = None
     panel: str | None = None
     layout: str | None = None
-    reset: bool = False
+    reset: bool | str = False
     camera: str | Triple | None = None
     go_to: Triple | str | None = None
     frame: str | None = None
@@ -128,11 +129,16 @@ class Look(Step):
             _check(self.greys, "greys", ("auto",))
         if isinstance(self.glyphs, str):
             _check(self.glyphs, "glyphs", ("screen",))
+        if isinstance(self.reset, str) and self.reset not in VIEWS:
+            allowed = ", ".join(VIEWS)
+            raise GpError(f"reset must be true or false, or one of {allowed}, got {self.reset!r}")
 
     def run(self, driver: WindowDriver) -> None:  # noqa: D102
         self._set_window(driver)
         driver.workspace.view.update(**self._shown())
-        if self.reset:
+        if isinstance(self.reset, str):
+            driver.window.grid.frames[self.reset].view.reset()
+        elif self.reset:
             driver.window.grid.reset()
         if isinstance(self.camera, str):
             driver.scene.view_from(self.camera.upper())

@@ -55,6 +55,7 @@ ACTION_STEPS = {
     "edit.swap_sides": "swap_sides",
     **{id: "view" for id in ACTIONS if id.startswith("view.") and id != "view.canvas"},
     **{id: "action" for id in ACTIONS if id.startswith(("view.from_", "view.cut_", "tool."))},
+    **dict.fromkeys(("view.cut_open",), "action"),
     **dict.fromkeys(("view.reset", "view.zoom_to_point", "view.projection", "view.slices_visible"), "action"),
     **{id: "action" for id in ACTIONS if id.startswith(("view.plane_", "view.frame", "view.straight"))},
     **dict.fromkeys(("head.straighten", "head.by_landmarks", "head.take_planes"), "set_head_frame"),

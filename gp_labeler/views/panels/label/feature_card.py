@@ -100,6 +100,7 @@ class FeatureCard(QWidget):
         self.picture.setVisible(bool(now.code))
         self.annotation.refresh()
         self._refresh_buttons(now)
+        self.refresh_hidden()
 
     def _make_widgets(self) -> None:
         self._eyebrow, self._title = _label("eyebrow"), _label("title")
@@ -120,6 +121,7 @@ class FeatureCard(QWidget):
         self.unseen.setToolTip("It was looked for and cannot be seen in this scan")
         self.unseen.clicked.connect(lambda: self._do(lambda: self._workspace.labels.mark_unseen()))
         self.plane = action_button(self._actions["view.plane_of_feature"], "")
+        self.cut_open = action_button(self._actions["view.cut_open"], "Cut open")
         self.sides = {side: self._side_button(side) for side in Side}
         fit(self, self._fit)
 
@@ -145,6 +147,7 @@ class FeatureCard(QWidget):
         top = QHBoxLayout()
         top.addWidget(self._eyebrow, 1)
         top.setSpacing(4)
+        top.addWidget(self.cut_open)
         for button in self.sides.values():
             top.addWidget(button)
         status = QHBoxLayout()
@@ -191,6 +194,15 @@ class FeatureCard(QWidget):
             workspace.view.planes_changed,
         ):
             follow(self, signal, self.refresh)
+
+    def refresh_hidden(self) -> None:
+        """Offer to cut the bone open where it hides the active feature, or where that is expected."""
+        workspace, active = self._workspace, self._workspace.labels.active
+        area = workspace.interaction.visible_area
+        where = None if active.code is None else workspace.labels.place_of(active.side, active.code)
+        self.cut_open.setVisible(
+            area is not None and where is not None and bool(workspace.bone.surfaces) and area.hides(where)
+        )
 
     def _refresh_buttons(self, now: CardContent) -> None:
         self.primary.setText(_with_key(now.action_text, _COMMANDS.get(now.action, "")))
