@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -153,12 +154,32 @@ class VolumeSlicer:
             position = low + round((position - low) / step) * step
         return float(np.clip(position, low, high))
 
-    def image(self, plane: SlicePlane, position: float) -> SliceImage:
-        """Return the slice nearest to a position along the plane's normal, mm."""
-        snapped, grid_axes = self.snap(plane, position), self._grid_axes(plane)
-        return (
-            self._resampled(plane, snapped) if grid_axes is None else self._voxels(plane, snapped, grid_axes)
-        )
+    def image(self, plane: SlicePlane, position: float, step: float | None = None) -> SliceImage:
+        """Return the slice nearest to a position along the plane's normal, mm.
+
+        Parameters
+        ----------
+        plane : SlicePlane
+        position : float
+            Along the normal, mm.
+        step : float, optional
+            How fine an oblique slice is sampled, mm; by default as fine as the voxels. See `sampling_step`.
+        """
+        there, grid_axes = self.snap(plane, position), self._grid_axes(plane)
+        if grid_axes is None:
+            return self._resampled(plane, there, step or min(self.volume.spacing))
+        return self._voxels(plane, there, grid_axes)
+
+    def sampling_step(self, plane: SlicePlane, mm_per_pixel: float) -> float:
+        """Return how fine an oblique slice needs to be sampled for a screen, mm.
+
+        It is the voxel, or a step between 0.7 and 1 pixel where that is coarser: more would be sampled, and
+        never seen.
+        """
+        voxel = min(self.volume.spacing)
+        if mm_per_pixel <= voxel or not self.is_oblique(plane):
+            return voxel
+        return float(voxel * 2.0 ** (0.5 * math.floor(2 * math.log2(mm_per_pixel / voxel))))
 
     def _grid_axes(self, plane: SlicePlane) -> tuple[int, int, int] | None:
         """Return which voxel axes run across, right and down; None where none runs along the plane."""
@@ -183,9 +204,8 @@ class VolumeSlicer:
         step = np.array([volume.spacing[right], volume.spacing[down]])
         return SliceImage(values, plane, plane.position_of(corner), plane.flat(corner)[0], step)
 
-    def _resampled(self, plane: SlicePlane, position: float) -> SliceImage:
+    def _resampled(self, plane: SlicePlane, position: float, step: float) -> SliceImage:
         """Interpolate on a square grid over the part of the plane that lies in the volume."""
-        step = min(self.volume.spacing)
         section = self.section(plane, position)
         first = np.floor(section.min(axis=0) / step + 0.5)  # the same grid for all slices: nothing trembles
         width, height = (int(n) for n in np.maximum(np.ceil(section.max(axis=0) / step - 0.5) - first + 1, 1))
@@ -221,7 +241,7 @@ class VolumeSlicer:
 def _interpolated(
     volume: Volume, origin: FloatArray, plane: SlicePlane, step: float, shape: tuple[int, int]
 ) -> NDArray[Any]:
-    """Interpolate linearly between voxels that stay in their file, as `vtkImageReslice` does in memory."""
+    """Interpolate linearly between voxels that must be converted, as `vtkImageReslice` does others."""
     down, right = np.indices(shape).reshape(2, -1)
     index = volume.scan_to_voxel(origin + step * (right[:, None] * plane.right + down[:, None] * plane.down))
     last = np.array(volume.size) - 1

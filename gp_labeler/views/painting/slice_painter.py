@@ -35,6 +35,9 @@ if TYPE_CHECKING:
 
 __all__ = ["SlicePainter", "SlicePoints", "reach_of"]
 
+_Where = tuple[VolumeSlicer, SlicePlane, float, float]
+"""What a picture of a slice is of: scan, plane, position and step of sampling, mm."""
+
 _REACH_MM = 1.0
 _CLOSE_PIXELS = 12.0
 """From so many logical pixels a millimetre on, points beside the slice are named too."""
@@ -79,7 +82,7 @@ class SlicePainter:
         self._workspace, self._view = workspace, view
         self._preview: float | None = None
         self._slice: SliceImage | None = None
-        self._where: tuple[VolumeSlicer | None, SlicePlane | None, float] = (None, None, 0.0)
+        self._where: _Where | None = None
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[SliceViewport, VolumeSlicer, object, QPixmap] | None = None
@@ -96,7 +99,7 @@ class SlicePainter:
     def forget(self) -> None:
         """Let go of the pictures."""
         self._slice, self._picture, self._outline, self._ground = None, None, None, None
-        self._where = (None, None, 0.0)
+        self._where = None
         self.forget_points()
 
     def forget_points(self) -> None:
@@ -166,9 +169,10 @@ class SlicePainter:
 
     def _paint_image(self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport) -> None:
         position = source.snap(shown.plane, shown.position)
-        if self._slice is None or self._slice_is_old(source, shown.plane, position):
-            self._slice = source.image(shown.plane, position)
-            self._where = (source, shown.plane, position)
+        where = (source, shown.plane, position, source.sampling_step(shown.plane, shown.mm_per_pixel))
+        if self._slice is None or self._slice_is_old(where):
+            self._slice = source.image(*where[1:])
+            self._where = where
             self._picture = self._outline = None
         window = self._view.window_level()
         wanted = (window, self._preview)
@@ -177,8 +181,9 @@ class SlicePainter:
         (left, top), (right, bottom) = shown.image_corners(self._slice)
         painter.drawImage(QRectF(left, top, right - left, bottom - top), self._picture[1])
 
-    def _slice_is_old(self, source: VolumeSlicer, plane: SlicePlane, position: float) -> bool:
-        return self._where[0] is not source or self._where[1] is not plane or self._where[2] != position
+    def _slice_is_old(self, where: _Where) -> bool:
+        kept = self._where
+        return kept is None or kept[0] is not where[0] or kept[1] is not where[1] or kept[2:] != where[2:]
 
     def _paint_outline(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         threshold = self._workspace.scan.threshold if self._preview is None else self._preview

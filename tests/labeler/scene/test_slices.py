@@ -167,6 +167,25 @@ def test_a_plane_of_any_orientation_shows_what_lies_on_it(name: str, n: int) -> 
         assert (section <= edges[1] + 1e-6).all()
 
 
+def test_an_oblique_slice_is_sampled_no_finer_than_the_screen_shows_it() -> None:
+    source = VolumeSlicer(scan_of([(MARKER, 1.0)], np.eye(3)))
+    plane = AXIAL.rotated([1, 0.4, 0.2], 0.5, MIDDLE)
+    voxel = min(source.volume.spacing)
+    for mm_per_pixel in (0.01, voxel, 0.33, 0.5, 1.7):
+        step = source.sampling_step(plane, mm_per_pixel)
+        assert step >= voxel
+        assert step <= max(voxel, mm_per_pixel)
+        assert step >= min(max(voxel, mm_per_pixel / 1.5), mm_per_pixel / 1.5) or step == voxel
+        assert source.sampling_step(AXIAL, mm_per_pixel) == voxel
+    fine, coarse = (source.image(plane, plane.position_of(MARKER), step) for step in (voxel, 2 * voxel))
+    assert (coarse.step == 2 * voxel).all()
+    assert fine.values.size > 3.5 * coarse.values.size
+    for image in (fine, coarse):  # the marker is where it is, however coarsely it is sampled
+        rows, columns = np.nonzero(image.values > 100)
+        middle = image.origin + image.step * [columns.mean(), rows.mean()]
+        assert middle == pytest.approx(plane.flat(MARKER[None])[0], abs=0.15)
+
+
 def _on_plane(volume: Volume, plane: SlicePlane, position: float) -> np.ndarray:
     """Voxels whose centres lie within half a voxel of a slice, moved onto it where that is inside."""
     index = np.stack(np.unravel_index(np.arange(volume.array.size), volume.size), axis=1)
