@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from gp_core.registration import jrmpc_kernels
 from gp_core.registration.compiling import compiled
 from gp_core.registration.lanes import (
     LANES,
@@ -35,9 +34,6 @@ __all__ = ["run_batch"]
 
 IndexArray = NDArray[np.uint64]
 
-_FEWEST = 3
-"""Problems that are worth a vector."""
-
 _NOTHING, _LEAST_SPREAD = 1e-290, 1e-10  # as in jrmpc_kernels
 _UNDETERMINED, _CONVERGED_ANGLE2, _NEWTON_STEPS = 1e-10, 1e-14, 12  # as in rotation
 
@@ -56,7 +52,9 @@ def run_batch(
     iterations: NDArray[np.int64],
     change: FloatArray,
 ) -> None:
-    """Run many problems whose sets are of the same sizes, eight at a time; few left over one by one.
+    """Run many problems whose sets are of the same sizes, eight at a time.
+
+    The answer to a problem does not depend on those beside it, to the last bit.
 
     Parameters
     ----------
@@ -83,22 +81,6 @@ def run_batch(
     for first in range(0, len(points), LANES):
         here = slice(first, min(first + LANES, len(points)))
         n = here.stop - first
-        if n < _FEWEST:
-            jrmpc_kernels.run_batch(
-                points[here],
-                starts,
-                poses[here],
-                centres[here],
-                beta[here],
-                prior,
-                epsilon,
-                sizes[here],
-                max_iterations,
-                still,
-                iterations[here],
-                change[here],
-            )
-            continue
         filled = np.minimum(np.arange(first, first + LANES), here.stop - 1)  # the last one fills up
         pose, centre = _in_lanes(poses[filled]), _in_lanes(centres[filled])
         n_done, last = np.zeros(LANES, np.int64), np.full(LANES, np.inf)
@@ -137,7 +119,7 @@ def _run(
     n_centres = centres.size // (5 * LANES)
     most = np.max(starts[1:] - starts[:-1])
     moved, inverse = np.empty(3 * most * LANES), np.empty(most * LANES)
-    table, scratch = np.empty(most * n_centres * LANES), np.empty(9 * LANES)
+    table, scratch = np.empty(most * n_centres * LANES), np.empty(14 * LANES)
     moments, sums = np.empty(5 * n_centres * LANES), np.empty(5 * n_centres * LANES)
     outlier, size = take(beta, 0), take(sizes, 0)
     for n in range(max_iterations):
@@ -298,45 +280,73 @@ def _covariance(moments: Any, centres: Any, x: Any, y: Any, z: Any) -> Any:
 def _rotation(h: Any, scratch: Any) -> Any:
     """Return the minimal rotation in each lane, as `rotation.minimal_rotation` does.
 
-    Newton's method starts from the identity; where it fails in any lane, each is found by itself.
+    Newton's method starts from the identity, and each lane stops by itself: so no problem is changed by those
+    beside it. Where the method fails, the rotation is found one by one.
     """
     h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
     size = magnitude(h0) + magnitude(h1) + magnitude(h2) + magnitude(h3) + magnitude(h4)
     least = (size + magnitude(h5) + magnitude(h6) + magnitude(h7) + magnitude(h8)) * _UNDETERMINED
     one, zero = lanes_of(1.0), lanes_of(0.0)
-    turn = (one, zero, zero, zero)
+    turn, going, failed = (one, zero, zero, zero), one, zero
     for _ in range(_NEWTON_STEPS):
-        r0, r1, r2, r3, r4, r5, r6, r7, r8 = as_matrix(turn)
-        xx, xy, xz = h0 * r0 + h1 * r1 + h2 * r2, h0 * r3 + h1 * r4 + h2 * r5, h0 * r6 + h1 * r7 + h2 * r8
-        yx, yy, yz = h3 * r0 + h4 * r1 + h5 * r2, h3 * r3 + h4 * r4 + h5 * r5, h3 * r6 + h4 * r7 + h5 * r8
-        zx, zy, zz = h6 * r0 + h7 * r1 + h8 * r2, h6 * r3 + h7 * r4 + h8 * r5, h6 * r6 + h7 * r7 + h8 * r8
-        d0, a, b, c = yy + zz, (xy + yx) * -0.5, (xz + zx) * -0.5, (yz + zy) * -0.5
-        l10, l20 = a / d0, b / d0
-        d1, c = xx + zz - l10 * a, c - l20 * a
-        l21 = c / d1
-        d2 = xx + yy - l20 * b - l21 * c
-        if not (all_above(d0, least) and all_above(d1, least) and all_above(d2, least)):
-            return _each_by_itself(h, scratch)
-        bx = zy - yz
-        by = xz - zx - l10 * bx
-        z = (yx - xy - (l20 * bx + l21 * by)) / d2
-        y = by / d1 - l21 * z
-        x = bx / d0 - l10 * y - l20 * z
-        turn = product((one, x * 0.5, y * 0.5, z * 0.5), turn)
-        if all_above(_CONVERGED_ANGLE2, x * x + y * y + z * z):
+        definite, x, y, z = _newton_step(h, as_matrix(turn), least)
+        failed = choose(above(going, definite), 1.0, failed)
+        going = going * definite
+        turned = product((one, x * 0.5, y * 0.5, z * 0.5), turn)
+        moves = above(going, 0.5)
+        turn = (
+            choose(moves, turned[0], turn[0]),
+            choose(moves, turned[1], turn[1]),
+            choose(moves, turned[2], turn[2]),
+            choose(moves, turned[3], turn[3]),
+        )
+        going = choose(above(_CONVERGED_ANGLE2, x * x + y * y + z * z), 0.0, going)
+        if all_above(0.5, going):
             break
-    return turn
+    return turn if all_above(0.5, failed) else _one_by_one(h, turn, failed, scratch)
 
 
 @compiled()
-def _each_by_itself(h: Any, scratch: Any) -> Any:
+def _newton_step(h: Any, r: Any, least: Any) -> Any:
+    """Return whether the step is to a maximum, as 1 or 0, and the step; see `rotation`."""
+    h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
+    r0, r1, r2, r3, r4, r5, r6, r7, r8 = r
+    xx, xy, xz = h0 * r0 + h1 * r1 + h2 * r2, h0 * r3 + h1 * r4 + h2 * r5, h0 * r6 + h1 * r7 + h2 * r8
+    yx, yy, yz = h3 * r0 + h4 * r1 + h5 * r2, h3 * r3 + h4 * r4 + h5 * r5, h3 * r6 + h4 * r7 + h5 * r8
+    zx, zy, zz = h6 * r0 + h7 * r1 + h8 * r2, h6 * r3 + h7 * r4 + h8 * r5, h6 * r6 + h7 * r7 + h8 * r8
+    d0, a, b, c = yy + zz, (xy + yx) * -0.5, (xz + zx) * -0.5, (yz + zy) * -0.5
+    l10, l20 = a / d0, b / d0
+    d1, c = xx + zz - l10 * a, c - l20 * a
+    l21 = c / d1
+    d2 = xx + yy - l20 * b - l21 * c
+    definite = choose(above(d1, least), choose(above(d2, least), 1.0, 0.0), 0.0)
+    bx = zy - yz
+    by = xz - zx - l10 * bx
+    z = (yx - xy - (l20 * bx + l21 * by)) / d2
+    y = by / d1 - l21 * z
+    return choose(above(d0, least), definite, 0.0), bx / d0 - l10 * y - l20 * z, y, z
+
+
+@compiled()
+def _one_by_one(h: Any, turn: Any, failed: Any, scratch: Any) -> Any:
     for n in range(9):
         put(scratch, n * LANES, h[n])
+    for n in range(4):
+        put(scratch, (9 + n) * LANES, turn[n])
+    put(scratch, 13 * LANES, failed)
     for lane in range(LANES):
         s = scratch[lane::LANES]
-        turn = minimal_rotation((s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8]))
-        s[0], s[1], s[2], s[3] = turn
-    return _pose_of(scratch, 0)
+        if s[13] > 0.5:
+            s[9], s[10], s[11], s[12] = minimal_rotation(
+                (s[0], s[1], s[2], s[3], s[4], s[5], s[6], s[7], s[8])
+            )
+    at = 9 * LANES
+    return (
+        take(scratch, at),
+        take(scratch, at + LANES),
+        take(scratch, at + 2 * LANES),
+        take(scratch, at + 3 * LANES),
+    )
 
 
 @compiled()

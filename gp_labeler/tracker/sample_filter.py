@@ -6,7 +6,6 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from gp_core.validation import FloatArray
 from gp_labeler.tracker.device_clock import DeviceClock
@@ -184,6 +183,8 @@ def _interpolated(before: Sample, after: Sample, time: float) -> FloatArray:
     if span <= 0:
         return before.matrix
     share = (time - before.time) / span
+    from scipy.spatial.transform import Rotation, Slerp  # takes long to import: not at start-up
+
     turns = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([before.matrix[:3, :3], after.matrix[:3, :3]])))
     pose = np.eye(4)
     pose[:3, :3] = turns(share).as_matrix()

@@ -59,6 +59,17 @@ def test_a_batch_of_any_size_has_the_answers_of_each_alone(
     assert_same(*both(batch, settings, monkeypatch))
 
 
+def test_an_answer_is_the_same_to_the_last_bit_whatever_stands_beside_it() -> None:
+    batch = problems(2 * LANES + 1, np.random.default_rng(6))
+    batch[3, :, 1:] = 0.0  # straight: its rotations are found another way
+    whole = jrmpc_batch(batch, SIZES, DEFAULTS)
+    for n in (0, 2, 3, 10, 2 * LANES):
+        alone = jrmpc_batch(batch[n : n + 1], SIZES, DEFAULTS)
+        np.testing.assert_array_equal(alone.rotations[0], whole.rotations[n])
+        np.testing.assert_array_equal(alone.centres[0], whole.centres[n])
+        assert alone.n_iterations[0] == whole.n_iterations[n]
+
+
 def test_problems_that_rest_early_stay_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     batch = problems(LANES, np.random.default_rng(3))
     batch[2] = np.tile(batch[2, :5], (6, 1))[: len(batch[2])]  # the same points in all sets: soon at rest
