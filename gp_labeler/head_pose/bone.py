@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.coarse import means_of_cubes
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 
@@ -148,8 +149,6 @@ def _block_means(values: NDArray[Any], factors: NDArray[np.intp]) -> _Values:
     """Return the means of blocks of (fx, fy, fz) voxels of a (z, y, x) array, without what is left over."""
     if len(set(factors.tolist())) == 1:
         array = values.view(np.uint8) if values.dtype == bool else values
-        from gp_labeler.imaging.coarse import means_of_cubes  # numba takes long to import: not at start-up
-
         return means_of_cubes(array, int(factors[0]))
     fx, fy, fz = (int(f) for f in factors)
     nz, ny, nx = (n // f for n, f in zip(values.shape, (fz, fy, fx), strict=True))

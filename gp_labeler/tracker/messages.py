@@ -18,15 +18,14 @@ import pyigtl
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
-from gp_labeler.tracker.pose_bodies import KINDS, POSE_KINDS, read_tools
 
 __all__ = ["MessageDecoder", "TrackerMessage", "hello", "pack_transform"]
 
 _HEADER_BYTES = 58
 _VERSIONS = (1, 2, 3)
-_READ = (*POSE_KINDS, "STRING")
+_READ = ("TRANSFORM", "STRING")
 
-_LARGEST = {"TRANSFORM": 10_000, "STRING": 1_000_000, "STATUS": 1_000_000} | dict.fromkeys(KINDS, 100_000)
+_LARGEST = {"TRANSFORM": 10_000, "STRING": 1_000_000, "STATUS": 1_000_000, "POSITION": 100_000}
 """Bytes that a message of a type can have, metadata included."""
 
 _LARGEST_OTHER = 2_000_000_000
@@ -43,15 +42,13 @@ class TrackerMessage:
     Parameters
     ----------
     device, kind : str
-        Device name and message type; in messages of several tools, the name of the tool, where it has one.
+        Device name and message type.
     time : float
         When it was measured, seconds of the sender's clock; 0 where the sender does not say.
     received : float
         When it arrived, seconds of this computer's monotonic clock.
     matrix : (4, 4) array, optional
-        Of a message of one of `gp_labeler.tracker.pose_bodies.POSE_KINDS`, as sent.
-    oriented : bool
-        Whether the rotation of the matrix was sent; else only the position was.
+        Of a TRANSFORM, as sent.
     text : str
         Of a STRING.
     metadata : mapping of str to str
@@ -71,7 +68,6 @@ class TrackerMessage:
     metadata: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     problem: str = ""
     damaged: bool = False
-    oriented: bool = True
 
 
 class MessageDecoder:
@@ -86,8 +82,7 @@ class MessageDecoder:
     def feed(self, data: bytes, received: float) -> list[TrackerMessage]:
         """Take what has arrived, and return the messages that are now complete.
 
-        A message of several tools gives one for each. Types that are not read come without content; so does a
-        body whose checksum is wrong.
+        Types other than TRANSFORM and STRING come without content; so does a body whose checksum is wrong.
 
         Raises
         ------
@@ -105,7 +100,7 @@ class MessageDecoder:
             if header["message_type"] in _READ:
                 if len(self._buffer) < size:
                     return self._wait(messages, received)
-                messages += _read_body(header, bytes(self._buffer[_HEADER_BYTES:size]), received)
+                messages.append(_read_body(header, bytes(self._buffer[_HEADER_BYTES:size]), received))
             else:
                 messages.append(_without_content(header, received))
             self._skip, self._begun = size, None
@@ -170,15 +165,12 @@ def _without_content(header: dict[str, Any], received: float, problem: str = "")
     )
 
 
-def _read_body(header: dict[str, Any], body: bytes, received: float) -> list[TrackerMessage]:
+def _read_body(header: dict[str, Any], body: bytes, received: float) -> TrackerMessage:
     if pyigtl.messages.CRC64(body) != header["crc"]:
-        return [replace(_without_content(header, received, "its checksum is wrong"), damaged=True)]
+        return replace(_without_content(header, received, "its checksum is wrong"), damaged=True)
+    message = pyigtl.MessageBase.create_message(header["message_type"])
     try:
-        return (
-            _tools(header, body, received)
-            if header["message_type"] in KINDS
-            else [_one(header, body, received)]
-        )
+        message.unpack(header, body)
     except (
         struct.error,
         ValueError,
@@ -186,39 +178,7 @@ def _read_body(header: dict[str, Any], body: bytes, received: float) -> list[Tra
         TypeError,
         KeyError,
     ) as error:  # a TypeError: it raises a str
-        return [_without_content(header, received, f"it cannot be read ({error})")]
-
-
-def _tools(header: dict[str, Any], body: bytes, received: float) -> list[TrackerMessage]:
-    """Return a message for each tool; one that has no name has that of the device."""
-    message = _Content()
-    message.unpack(header, body)
-    told = _without_content(header, received)
-    metadata = MappingProxyType(dict(message.metadata))
-    return [
-        replace(
-            told,
-            device=tool.name or told.device,
-            matrix=tool.matrix,
-            oriented=tool.oriented,
-            metadata=metadata,
-        )
-        for tool in read_tools(header["message_type"], message.content)
-    ]
-
-
-class _Content(pyigtl.MessageBase):  # type: ignore[misc]
-    """The content of a message, without header, extended header and metadata."""
-
-    content = b""
-
-    def _unpack_content(self, content: bytes) -> None:
-        self.content = bytes(content)
-
-
-def _one(header: dict[str, Any], body: bytes, received: float) -> TrackerMessage:
-    message = pyigtl.MessageBase.create_message(header["message_type"])
-    message.unpack(header, body)
+        return _without_content(header, received, f"it cannot be read ({error})")
     matrix = getattr(message, "matrix", None)
     return TrackerMessage(
         header["device_name"],

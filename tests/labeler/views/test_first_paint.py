@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 
-LATE = ("pyvista", "pyvistaqt", "skimage", "SimpleITK", "matplotlib", "numba", "llvmlite", "pandas")
+LATE = ("pyvista", "pyvistaqt", "skimage", "SimpleITK", "matplotlib")
 
 _CODE = """
 import json, sys
