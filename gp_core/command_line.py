@@ -150,10 +150,10 @@ def start_messages(prog: str, words: Sequence[str], verbose: bool | None, log_fi
     logging.basicConfig(format=f"{command}: %(message)s", level=logging.WARNING)
     for handler in logging.getLogger().handlers:
         if type(handler) is logging.StreamHandler:  # the terminal's, not what a caller has set up
-            handler.setLevel(logging.INFO if verbose else logging.WARNING)
+            handler.setLevel(logging.DEBUG if verbose else logging.WARNING)
     ours = [logging.getLogger(package) for package in _PACKAGES]
     for logger in ours:
-        logger.setLevel(logging.DEBUG if log_file else logging.INFO if verbose else logging.NOTSET)
+        logger.setLevel(logging.DEBUG if log_file or verbose else logging.NOTSET)
         for handler in [h for h in logger.handlers if h.name == _LOG_FILE]:  # an earlier command's
             logger.removeHandler(handler)
             handler.close()

@@ -128,7 +128,7 @@ def read_bytes(path: AnyPath, *, what: str = "file", max_bytes: int = MAX_BYTES)
         raise _unreadable(path, error) from None
     if len(content) > max_bytes:
         raise _too_large(path, what, max_bytes)
-    _log.info("read %s (%d bytes)", printable(os.fspath(path)), len(content))
+    _log.debug("read %s (%d bytes)", printable(os.fspath(path)), len(content))
     return content
 
 
@@ -290,7 +290,7 @@ def atomic_file(path: AnyPath) -> Iterator[Path]:
             if target.exists():
                 draft.chmod(stat.S_IMODE(target.stat().st_mode))
             draft.replace(target)
-        _log.info("wrote %s", printable(str(target)))
+        _log.debug("wrote %s", printable(str(target)))
         with contextlib.suppress(OSError):  # flush the directory entry too, where the system can
             _to_disk(target.parent)
     except (OSError, ValueError) as error:

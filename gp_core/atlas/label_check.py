@@ -7,7 +7,7 @@ label is compared with its prediction from the other labels.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from types import MappingProxyType
@@ -25,6 +25,7 @@ from gp_core.atlas.label_likelihood import (
 )
 from gp_core.atlas.labelling_error import LABELLING_NOISE_MM
 from gp_core.errors import GpError
+from gp_core.extensions import Extensions
 from gp_core.landmarks.anatomy import mirror_right
 from gp_core.landmarks.features import FEATURES, Side, feature
 from gp_core.landmarks.scan_evidence import ScanEvidence
@@ -32,6 +33,7 @@ from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.validation import FloatArray, freeze_arrays
 
 __all__ = [
+    "CHECKS",
     "OUTLIER_SD",
     "SHARED_WRONG_MM",
     "Deviation",
@@ -146,7 +148,7 @@ class Finding:
     kind : str
         ``other side``, ``exchanged``, ``duplicate``, ``outside``, ``off bone``, ``far``,
         ``shared point differs``, ``shared point wrong``, ``missing``, ``suggested``, ``unseen`` or
-        ``unchecked``.
+        ``unchecked``; of a check that a package adds, its name and ``(added)``.
     landmarks : tuple of str
         Features concerned.
     text : str
@@ -334,7 +336,7 @@ def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | Non
         Computed in 1 ms for a side in order, and in 10 ms for one that is not.
     """
     scan = scan or landmarks.scan_evidence
-    found = [*_duplicates(landmarks), *(() if scan is None else _against_scan(landmarks, scan))]
+    found = [*_found_by_checks(landmarks, atlas), *(() if scan is None else _against_scan(landmarks, scan))]
     deviations: dict[str, Deviation] = {}
     codes = tuple(code for code in landmarks.placed if code in atlas.codes)
     try:
@@ -435,6 +437,30 @@ def _duplicates(landmarks: LandmarkSet) -> Iterator[Finding]:
         if np.linalg.norm(landmarks[a] - landmarks[b]) < SAME_PLACE_MM:
             text, remedy = f"{a} and {b} are at the same place", "Place one of them again."
             yield _finding(landmarks, "duplicate", (a, b), text, remedy)
+
+
+CHECKS: Extensions[Callable[[LandmarkSet, Atlas], Iterable[Finding]]] = Extensions(
+    "gp_labeler.checks", {"duplicates": lambda landmarks, _: _duplicates(landmarks)}
+)
+"""Checks of the labels of one side, those of installed packages among them."""
+
+
+def _found_by_checks(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
+    """Yield what the checks find; one of a package that fails says so in a finding, and stops no other."""
+    for name in CHECKS.names():
+        if not CHECKS.is_added(name):
+            yield from CHECKS.get(name)(landmarks, atlas)
+            continue
+        try:
+            found = list(CHECKS.get(name)(landmarks, atlas))
+            if not all(isinstance(finding, Finding) for finding in found):
+                raise TypeError("it gave something else than findings")
+        except Exception as error:
+            failure = CHECKS.failure(name, error)
+            yield _finding(landmarks, "unchecked", (), failure.problem, failure.remedy or "")
+        else:
+            # under a kind of its own, so that no label is left out of an atlas because of it
+            yield from (replace(finding, kind=f"{name} (added)") for finding in found)
 
 
 def _against_scan(landmarks: LandmarkSet, scan: ScanEvidence) -> Iterator[Finding]:

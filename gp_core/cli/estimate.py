@@ -89,7 +89,11 @@ def add(commands: Subparsers) -> None:
         metavar="ATLAS",
         help="published (default), an atlas file, or landmark files of labelled animals",
     )
-    parser.add_argument("--method", choices=METHODS, help="default: robust")
+    parser.add_argument(
+        "--method",
+        metavar="METHOD",
+        help=f"{' or '.join(METHODS)}, or one of an installed package; default: robust",
+    )
     parser.add_argument(
         "--probe-noise",
         type=float,
@@ -296,7 +300,7 @@ def _given_pose(args: argparse.Namespace) -> _Given:
 def _atlas_for(words: list[str], method: str) -> AtlasSource:
     """Return the atlas, or the animals; the robust method has one fitted to them."""
     atlas, specimens = read_atlas(words)
-    if atlas is None and method == "robust":
+    if atlas is None and method != "jrmpc":
         with blaming(" ".join(words)):
             return fit_atlas(specimens or []), None
     return atlas, specimens
@@ -463,7 +467,7 @@ def _repeats_of(pose: CochleaPose, code: str) -> str:
 def _position_lines(pose: CochleaPose) -> Iterator[str]:
     """Yield origin and axis with their regions, the states of side and names, and the other hypotheses."""
     x, y, z = pose.origin
-    within = "95 % within" if pose.method == "robust" else "animals scatter by"
+    within = "95 % within" if pose.method != "jrmpc" else "animals scatter by"
     yield f"  origin CO     {x:10.3f} {y:10.3f} {z:10.3f} mm   {within} {pose.radius_95:.2f} mm"
     x, y, z = pose.axis
     yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"

@@ -13,6 +13,7 @@ from gp_core.argument_types import checks_arguments
 from gp_core.constants import METHODS
 from gp_core.disk import read_head
 from gp_core.errors import FileFormatError, GpError
+from gp_core.extensions import added_names
 from gp_core.frames import FRAMES, RigidTransform
 from gp_core.io.pose_inputs_json import inputs_from
 from gp_core.io.text import shown
@@ -104,7 +105,7 @@ def _load(path: str | PathLike[str]) -> dict[str, Any]:
 
 def _pose(content: dict[str, Any]) -> CochleaPose:
     frame = content["frame"]
-    if frame not in FRAMES or content["method"] not in METHODS:
+    if frame not in FRAMES or content["method"] not in (*METHODS, *added_names("gp_labeler.estimators")):
         raise GpError(f"unknown frame {shown(frame)} or method {shown(content['method'])}")
     T_touches_cochlea = RigidTransform(_numbers(content, "transform", (4, 4)), frame, "cochlea")
     for key, meant in (

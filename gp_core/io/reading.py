@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from os import PathLike, fspath
 from types import MappingProxyType
@@ -11,7 +12,8 @@ from typing import Literal
 import numpy as np
 
 from gp_core.argument_types import checks_arguments
-from gp_core.errors import FeatureError, FileFormatError, GeometryError, GpError
+from gp_core.errors import FeatureError, FileFormatError, GeometryError, GpError, blaming
+from gp_core.extensions import Extensions
 from gp_core.io.dat import is_sentinel, read_dat
 from gp_core.io.fcsv import read_fcsv
 from gp_core.io.file_names import is_named_suggested, labelling_named, name_parts, named_side, specimen_named
@@ -29,6 +31,7 @@ from gp_core.landmarks.sets import LandmarkSet, Status
 from gp_core.validation import FloatArray, check_option, near_matches
 
 __all__ = [
+    "FORMATS",
     "label_names",
     "landmarks_of",
     "read_landmarks",
@@ -43,21 +46,26 @@ _log = logging.getLogger(__name__)
 
 Unknown = Literal["error", "extra"]
 
-_READERS = {
-    ".mrk.json": read_markups,
-    ".json": read_markups,
-    ".fcsv": read_fcsv,
-    ".csv": read_table,
-    ".tsv": read_table,
-    ".dat": read_dat,
-}
+FORMATS: Extensions[Callable[[str | PathLike[str]], PointList]] = Extensions(
+    "gp_labeler.landmark_formats",
+    {
+        "mrk.json": read_markups,
+        "json": read_markups,
+        "fcsv": read_fcsv,
+        "csv": read_table,
+        "tsv": read_table,
+        "dat": read_dat,
+    },
+)
+"""Readers of landmark files by the ending of their names."""
+
 _SAME_PLACE_MM = 1e-3  # far below a voxel, even for a file in metres, which is detected elsewhere
 _MIN_TO_TELL_A_POINT_FROM_A_SHAPE = 3
 
 
 def _suffix(path: str | PathLike[str]) -> str:
     name = fspath(path).lower()
-    found = next((suffix for suffix in _READERS if name.endswith(suffix)), None)
+    found = _ending(name, FORMATS.builtin) or _ending(name, FORMATS.added)
     if found is None and name.endswith((".mha", ".mhd", ".nrrd")):
         raise FileFormatError(
             "is an image, or a recording of a tracker, and holds no named points",
@@ -67,9 +75,30 @@ def _suffix(path: str | PathLike[str]) -> str:
     if found is None:
         check_file(path)
         raise FileFormatError(
-            "is no kind of landmark file that is known", file=path, remedy=f"Give {', '.join(_READERS)}."
+            "is no kind of landmark file that is known",
+            file=path,
+            remedy=f"Give {', '.join(f'.{ending}' for ending in FORMATS.names())}.",
         )
     return found
+
+
+def _ending(name: str, formats: Iterable[str]) -> str | None:
+    return next((f".{ending}" for ending in formats if name.endswith(f".{ending.lower()}")), None)
+
+
+def _read_as(suffix: str, path: str | PathLike[str]) -> PointList:
+    ending = suffix.removeprefix(".")
+    if not FORMATS.is_added(ending):
+        return FORMATS.get(ending)(path)
+    check_file(path)
+    with blaming(path):
+        try:
+            points = FORMATS.get(ending)(path)
+        except Exception as error:
+            raise FORMATS.failure(ending, error) from error
+        if not isinstance(points, PointList):
+            raise GpError(f"{FORMATS.described(ending)} gave no PointList", remedy="Tell its authors.")
+    return points
 
 
 def read_points(
@@ -80,7 +109,7 @@ def read_points(
     Parameters
     ----------
     path : path
-        ``.mrk.json``, ``.json``, ``.fcsv``, ``.csv``, ``.tsv`` or ``.dat``.
+        ``.mrk.json``, ``.json``, ``.fcsv``, ``.csv``, ``.tsv``, ``.dat``, or of a format that a package adds.
     names : LabelNames, optional
         A lab's own names of the features.
     numbered : bool
@@ -101,7 +130,7 @@ def read_points(
         A label tells another side than the table's column.
     """
     suffix = _suffix(path)
-    points = _READERS[suffix](path)
+    points = _read_as(suffix, path)
     known = names or LabelNames({})
     listed = (_with_trial(p, known) if numbered else p for p in points.points)
     taken = tuple(_with_name(p, known, path) for p in listed if not known.leaves_out(p.label))

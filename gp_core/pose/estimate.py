@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import operator
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from numpy.typing import ArrayLike
 
@@ -13,6 +13,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.constants import METHODS
 from gp_core.errors import GpError
+from gp_core.extensions import Extensions
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.repeats import repeat_warnings
@@ -26,7 +27,7 @@ from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.pose.touched_window import towards_touched_window
 from gp_core.validation import check_option
 
-__all__ = ["estimate_again", "estimate_pose"]
+__all__ = ["ESTIMATORS", "EstimatorInput", "estimate_again", "estimate_pose"]
 
 
 @checks_arguments_but("touches")
@@ -56,7 +57,7 @@ def estimate_pose(
     atlas : Atlas, optional
         By default fitted to `specimens`, or else the published one. With ``jrmpc`` it judges side and names
         only, which JRMPC cannot.
-    method : {"robust", "jrmpc"}
+    method : {"robust", "jrmpc"}, or one that an installed package adds
         ``robust`` uses the names of the points; ``jrmpc`` is the paper's method and needs `specimens`.
     specimens : sequence of Specimen, optional
         Labelled animals.
@@ -92,23 +93,17 @@ def estimate_pose(
     >>> pose.suspects, bool(abs(pose.origin).max() < 1e-6)
     ((), True)
     """
-    check_option(method, "method", METHODS)
+    if method not in METHODS:
+        check_option(method, "method", ESTIMATORS.names())
     check_option(round_window, "round window", ROUND_WINDOWS)
     landmarks = touches if isinstance(touches, LandmarkSet) else _as_landmarks(touches, side)
     if landmarks.side is not Side.parse(side):
         raise GpError(f"the touches are of the {landmarks.side.word} side, not the {Side.parse(side).word}")
     check_plausible_size(landmarks, strict=True)
-    if method == "jrmpc":
-        pose = _with_hypotheses(estimate_jrmpc(landmarks, specimens), landmarks, atlas, specimens)
-    else:
+    if method != "jrmpc":
         atlas, specimens = atlas or _default_atlas(specimens), None
-        pose = estimate_robust(
-            landmarks,
-            atlas,
-            probe_noise=probe_noise,
-            shared_error=shared_error,
-            times=times,
-        )
+    given = EstimatorInput(landmarks, atlas, specimens, probe_noise, shared_error, times)
+    pose = _estimated(method, given)
     repeats = {name: one for name, one in landmarks.repeats.items() if name in pose.residuals}
     if repeats:
         pose = replace(pose, repeats=repeats, warnings=(*pose.warnings, *repeat_warnings(repeats)))
@@ -172,6 +167,68 @@ def estimate_again(pose: CochleaPose) -> CochleaPose:
     )
     assert again.inputs is not None
     return replace(again, inputs=replace(again.inputs, source=made.source))
+
+
+@dataclass(frozen=True)
+class EstimatorInput:
+    """What an estimator gets.
+
+    Parameters
+    ----------
+    touches : LandmarkSet
+        The touches, mm, in their own frame.
+    atlas : Atlas or None
+        The atlas; None only for ``jrmpc``.
+    specimens : sequence of Specimen or None
+        Labelled animals, for ``jrmpc`` alone: the others get an atlas that was fitted to them.
+    probe_noise : float or None
+        Scale of an ordinary touch error, mm a coordinate, where it is known.
+    shared_error : float
+        RMS length of the offset common to all touches, mm.
+    times : mapping of str to float, or None
+        When each feature was touched, s.
+    """
+
+    touches: LandmarkSet
+    atlas: Atlas | None = None
+    specimens: Sequence[Specimen] | None = None
+    probe_noise: float | None = None
+    shared_error: float = DEFAULT_SHARED_ERROR_MM
+    times: Mapping[str, float] | None = None
+
+
+def _robust(given: EstimatorInput) -> CochleaPose:
+    assert given.atlas is not None
+    return estimate_robust(
+        given.touches,
+        given.atlas,
+        probe_noise=given.probe_noise,
+        shared_error=given.shared_error,
+        times=given.times,
+    )
+
+
+def _jrmpc(given: EstimatorInput) -> CochleaPose:
+    pose = estimate_jrmpc(given.touches, given.specimens)
+    return _with_hypotheses(pose, given.touches, given.atlas, given.specimens)
+
+
+ESTIMATORS: Extensions[Callable[[EstimatorInput], CochleaPose]] = Extensions(
+    "gp_labeler.estimators", {"robust": _robust, "jrmpc": _jrmpc}
+)
+"""The methods, those of installed packages among them."""
+
+
+def _estimated(method: str, given: EstimatorInput) -> CochleaPose:
+    if not ESTIMATORS.is_added(method):
+        return ESTIMATORS.get(method)(given)
+    try:
+        pose = ESTIMATORS.get(method)(given)
+    except Exception as error:
+        raise ESTIMATORS.failure(method, error) from error
+    if not isinstance(pose, CochleaPose):
+        raise GpError(f"{ESTIMATORS.described(method)} gave no CochleaPose", remedy="Tell its authors.")
+    return replace(pose, method=method)
 
 
 def _as_landmarks(touches: Mapping[str, ArrayLike], side: Side | str) -> LandmarkSet:

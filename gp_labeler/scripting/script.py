@@ -14,6 +14,7 @@ from typing import Any
 
 from gp_core.disk import read_bytes
 from gp_core.errors import GpError
+from gp_core.extensions import Extensions
 from gp_labeler.scripting.step import Step, make_step
 from gp_labeler.scripting.steps import STEPS
 from gp_labeler.scripting.steps.edits import EDIT_STEPS
@@ -128,10 +129,26 @@ def make_script(
     steps = []
     for number, table in enumerate(tables, start=1):
         try:
-            steps.append(make_step({**STEPS, **EDIT_STEPS}, table))
+            steps.append(make_step(_kinds(table), table))
         except GpError as error:
             raise StepError(number, error.problem, file=file, remedy=error.remedy) from None
     return Script(name, tuple(steps), folder or Path.cwd(), tuple(tables), tuple(specimens), file)
+
+
+_ADDED: Extensions[type[Step]] = Extensions("gp_labeler.steps", {**STEPS, **EDIT_STEPS})
+
+
+def _kinds(table: Any) -> Mapping[str, type[Step]]:
+    """Return the steps that are built in; where a table asks for another, those of installed packages too."""
+    does = table.get("do") if isinstance(table, Mapping) else None
+    if not isinstance(does, str) or does in _ADDED.builtin:
+        return _ADDED.builtin
+    added = {name: kind for name, kind in _ADDED.added.items() if _is_step(kind)}
+    return {**_ADDED.builtin, **added}
+
+
+def _is_step(kind: object) -> bool:
+    return isinstance(kind, type) and issubclass(kind, Step)
 
 
 def _parsed(text: str, file: Path) -> Any:

@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.readers.added import inspect_added
 from gp_labeler.imaging.readers.choosing import FEW
 from gp_labeler.imaging.readers.dicom import inspect_dicom
 from gp_labeler.imaging.readers.dicom_disc import lost_files
@@ -85,6 +86,8 @@ def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportP
         return inspect_stack(path.parent, images, options, report)
     if scanco_suffix(path) in SCANCO_SUFFIXES or _begins(path, b"CTDATA-HEADER_V1"):
         return inspect_scanco(path, options)
+    if (added := inspect_added(path, options)) is not None:
+        return added
     raise VolumeError(
         "its format is not known", file=path, remedy=_HINTS.get(suffix, f"Readable are {READABLE}.")
     )
