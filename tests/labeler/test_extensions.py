@@ -94,7 +94,7 @@ def test_the_example_adds_a_reader_and_a_step(example: Path) -> None:
         "from gp_labeler.imaging.readers import read_volume\n"
         "from gp_labeler.scripting.script import make_script\n"
         "volume = read_volume('head.npyscan')\n"
-        "print(*volume.size, *volume.spacing.tolist())\n"
+        "print(*volume.size, *volume.spacing)\n"
         "print(make_script([{'do': 'count', 'least': 3}]).steps[0].title)"
     )
     done = _run(example, code)
