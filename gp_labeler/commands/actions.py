@@ -13,6 +13,7 @@ from gp_labeler.commands.labelling_rows import labelling_rows
 from gp_labeler.commands.measure_rows import measure_rows
 from gp_labeler.commands.pose_rows import pose_rows
 from gp_labeler.commands.rows import edit_rows, file_rows, help_rows, landmark_rows, view_rows
+from gp_labeler.commands.slab_rows import slab_rows
 from gp_labeler.commands.view_rows import cut_rows
 from gp_labeler.models.workspace import Workspace
 
@@ -26,6 +27,7 @@ ACTIONS: Mapping[str, Action] = MappingProxyType(
             edit_rows,
             view_rows,
             cut_rows,
+            slab_rows,
             frame_rows,
             landmark_rows,
             labelling_rows,

@@ -17,6 +17,7 @@ from gp_labeler.document.edits import as_position
 from gp_labeler.document.head_frame import HeadFrame
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame
+from gp_labeler.imaging.slab import DENOISERS, Slab
 from gp_labeler.imaging.slice_plane import SlicePlane
 
 __all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "ViewModel", "ViewState"]
@@ -92,6 +93,10 @@ class ViewState:
         Whether placing a point makes the next one active.
     follow_ghost : bool
         Whether the crosshair jumps to where the next point is expected.
+    slab : Slab, optional
+        What the slice views show in place of single slices; display only.
+    denoise : str, optional
+        One of `DENOISERS`, with which the slice views are denoised; display only.
     cut : Cut, optional
         What cuts bone open in the 3D view; None leaves it whole.
     slices_visible : bool
@@ -112,6 +117,8 @@ class ViewState:
     glyph_mm: float | None = None
     auto_advance: bool = True
     follow_ghost: bool = True
+    slab: Slab | None = None
+    denoise: str | None = None
     cut: Cut | None = None
     slices_visible: bool = False
     camera: Camera | None = None
@@ -120,13 +127,15 @@ class ViewState:
         check_option(self.layout, "layout", LAYOUTS)
         if not 0 <= self.mesh_opacity <= 1:
             raise GpError(f"mesh_opacity must be from 0 to 1, got {self.mesh_opacity}")
+        if self.denoise is not None:
+            check_option(self.denoise, "denoise", DENOISERS)
         for name in ("width", "glyph_mm"):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise GpError(f"{name} must be above 0, got {value}")
 
 
-_OF_ONE_SPECIMEN = ("level", "width", "cut", "camera")
+_OF_ONE_SPECIMEN = ("level", "width", "slab", "denoise", "cut", "camera")
 
 
 class ViewModel:

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 from contourpy import LineType, contour_generator
 from numpy.typing import ArrayLike, NDArray
+from vtkmodules.vtkCommonCore import VTK_IMAGE_SLAB_MAX, VTK_IMAGE_SLAB_MEAN, VTK_IMAGE_SLAB_MIN
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
 from vtkmodules.vtkImagingCore import vtkImageReslice
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.slab import Slab, reduced
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
@@ -104,6 +106,9 @@ def level_segments(values: NDArray[Any], level: float) -> FloatArray:
     return np.stack([points[begins], points[begins + 1]], axis=1)
 
 
+_VTK_SLABS = {"mean": VTK_IMAGE_SLAB_MEAN, "maximum": VTK_IMAGE_SLAB_MAX, "minimum": VTK_IMAGE_SLAB_MIN}
+
+
 class VolumeSlicer:
     """Cuts slices out of one volume: its voxels where a plane lies along its grid, resampled where not.
 
@@ -154,7 +159,14 @@ class VolumeSlicer:
             position = low + round((position - low) / step) * step
         return float(np.clip(position, low, high))
 
-    def image(self, plane: SlicePlane, position: float, step: float | None = None) -> SliceImage:
+    def thickness(self, plane: SlicePlane, slab: Slab, step: float | None = None) -> float:
+        """Return how thick a slab is in a plane, mm: whole layers of voxels, or of samples if oblique."""
+        layer = self._layer(plane, step)
+        return slab.n_layers(layer) * layer
+
+    def image(
+        self, plane: SlicePlane, position: float, step: float | None = None, slab: Slab | None = None
+    ) -> SliceImage:
         """Return the slice nearest to a position along the plane's normal, mm.
 
         Parameters
@@ -164,11 +176,17 @@ class VolumeSlicer:
             Along the normal, mm.
         step : float, optional
             How fine an oblique slice is sampled, mm; by default as fine as the voxels. See `sampling_step`.
+        slab : Slab, optional
+            What to take of a slab around the slice, in place of the slice; display only.
         """
         there, grid_axes = self.snap(plane, position), self._grid_axes(plane)
         if grid_axes is None:
-            return self._resampled(plane, there, step or min(self.volume.spacing))
-        return self._voxels(plane, there, grid_axes)
+            return self._resampled(plane, there, step or min(self.volume.spacing), slab)
+        return self._voxels(plane, there, grid_axes, slab)
+
+    def _layer(self, plane: SlicePlane, step: float | None) -> float:
+        """Return the distance of the layers of a slab, mm."""
+        return max(self.step(plane), step or 0.0) if self.is_oblique(plane) else self.step(plane)
 
     def sampling_step(self, plane: SlicePlane, mm_per_pixel: float) -> float:
         """Return how fine an oblique slice needs to be sampled for a screen, mm.
@@ -188,7 +206,9 @@ class VolumeSlicer:
         along[[right, down, across], [0, 1, 2]] = 0.0
         return None if along.max() > _STRAIGHT else (across, right, down)
 
-    def _voxels(self, plane: SlicePlane, position: float, grid_axes: tuple[int, int, int]) -> SliceImage:
+    def _voxels(
+        self, plane: SlicePlane, position: float, grid_axes: tuple[int, int, int], slab: Slab | None
+    ) -> SliceImage:
         """Take the voxels as they are, turned and flipped for the screen."""
         volume, (across, right, down) = self.volume, grid_axes
         index = volume.scan_to_voxel(plane.moved_to(self.corners.mean(axis=0), position)[None])
@@ -198,21 +218,39 @@ class VolumeSlicer:
             forward = volume.direction[:, axis] @ direction > 0
             flips.append(1 if forward else -1)
             index[0, axis] = 0 if forward else volume.size[axis] - 1
-        cut = volume.voxels.plane(across, int(index[0, across]))
+        cut = self._cut(plane, across, int(index[0, across]), slab)
         values = (cut if down > right else cut.T)[:: flips[0], :: flips[1]]  # its axes are z, y, x
         corner = volume.voxel_to_scan(index)
         step = np.array([volume.spacing[right], volume.spacing[down]])
         return SliceImage(values, plane, plane.position_of(corner), plane.flat(corner)[0], step)
 
-    def _resampled(self, plane: SlicePlane, position: float, step: float) -> SliceImage:
+    def _cut(self, plane: SlicePlane, across: int, index: int, slab: Slab | None) -> NDArray[Any]:
+        """Return one layer of voxels, or what a slab shows of those around it."""
+        half = 0 if slab is None else slab.n_layers(self.step(plane)) // 2
+        if slab is None or not half:
+            return self.volume.voxels.plane(across, index)
+        kji = [slice(None)] * 3
+        kji[2 - across] = slice(max(index - half, 0), index + half + 1)
+        return reduced(self.volume.voxels.read(*kji), 2 - across, slab.mode)
+
+    def _resampled(
+        self, plane: SlicePlane, position: float, step: float, slab: Slab | None = None
+    ) -> SliceImage:
         """Interpolate on a square grid over the part of the plane that lies in the volume."""
         section = self.section(plane, position)
         first = np.floor(section.min(axis=0) / step + 0.5)  # the same grid for all slices: nothing trembles
         width, height = (int(n) for n in np.maximum(np.ceil(section.max(axis=0) / step - 0.5) - first + 1, 1))
         low = first * step
         origin = plane.scan(low[None], position)[0]
+        layer = self._layer(plane, step)
+        n_layers = 1 if slab is None else slab.n_layers(layer)
         if (array := self.volume.voxels.uncopied()) is None:
-            values = _interpolated(self.volume, origin, plane, step, (height, width))
+            offsets = (np.arange(n_layers) - n_layers // 2) * layer
+            layers = [
+                _interpolated(self.volume, origin + offset * plane.normal, plane, step, (height, width))
+                for offset in offsets
+            ]
+            values = layers[0] if slab is None else reduced(np.stack(layers), 0, slab.mode)
             return SliceImage(values, plane, position, low, np.array([step, step]))
         if self._reslice is None:
             self._reslice = _reslice(self.volume, array)
@@ -221,7 +259,9 @@ class VolumeSlicer:
         to_voxel = vtkMatrixToLinearTransform()
         to_voxel.SetInput(matrix_of(self.volume.T_voxel_scan @ T_scan_screen))
         self._reslice.SetResliceTransform(to_voxel)
-        self._reslice.SetOutputSpacing(step, step, 1.0)
+        self._reslice.SetOutputSpacing(step, step, layer)
+        self._reslice.SetSlabNumberOfSlices(n_layers)
+        self._reslice.SetSlabMode(_VTK_SLABS["mean" if slab is None else slab.mode])
         self._reslice.SetOutputExtent(0, width - 1, 0, height - 1, 0, 0)
         self._reslice.Update()
         scalars = self._reslice.GetOutput().GetPointData().GetScalars()

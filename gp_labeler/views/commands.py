@@ -31,6 +31,7 @@ _FOLDED = {
     "text": "Text size",
     "references": "Compare with",
     "cut": "Cut bone",
+    "slab": "Slab and noise",
     "head": "Straighten the head",
     "planes": "Planes of the slices",
     "bone": "Bone in 3D",

@@ -276,6 +276,10 @@ class Recorder(QObject):
         if {"level", "width"} & changed:
             is_set = state.level is not None and state.width is not None
             seen["greys"] = [state.level, state.width] if is_set else "auto"
+        if "slab" in changed:
+            seen["slab"] = "off" if state.slab is None else {state.slab.mode: state.slab.mm}
+        if "denoise" in changed:
+            seen["denoise"] = state.denoise or "off"
         if "glyph_mm" in changed:
             seen["glyphs"] = "screen" if state.glyph_mm is None else state.glyph_mm
         return seen

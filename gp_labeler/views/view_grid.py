@@ -10,7 +10,8 @@ from gp_core.landmarks.features import feature
 from gp_core.validation import FloatArray
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
-from gp_labeler.views.fonts import HEADING, fit, line_height, pixels
+from gp_labeler.views.filter_words import filter_hint, filter_words
+from gp_labeler.views.fonts import HEADING, fit, line_height, pixels, text_width
 from gp_labeler.views.formatting import value_text
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
@@ -49,6 +50,9 @@ class ViewHeader(QWidget):
         title.setProperty("role", "heading")
         self.where = QLabel()
         self.where.setProperty("role", "hint")
+        self.filters = QLabel()
+        self.filters.setProperty("role", "warning")
+        self._filter_words: tuple[str, ...] = ()
         self._button = QToolButton()
         self._button.setProperty("role", "quiet")
         self._button.setStyleSheet("padding: 0")
@@ -61,6 +65,7 @@ class ViewHeader(QWidget):
         self._row.setSpacing(8)
         self._row.addWidget(title)
         self._row.addWidget(self.where)
+        self._row.addWidget(self.filters)
         self._row.addStretch(1)
         self._row.addWidget(self._button)
         self._slider: SliceSlider | None = None
@@ -82,6 +87,13 @@ class ViewHeader(QWidget):
         self.where.setText(words)
         self._leave_out()
 
+    def say_filters(self, *words: str, hint: str = "") -> None:
+        """Say that not the slice itself is shown, in the first of these words that there is room for."""
+        self._filter_words = words
+        self.filters.setToolTip(hint)
+        self.filters.setAccessibleName(hint)
+        self._leave_out()
+
     def _fit(self) -> None:
         """Give bar and button a size that goes with the text."""
         self.setFixedHeight(max(pixels(self, _HEADER_HEIGHT), line_height(self, HEADING) + 4))
@@ -90,9 +102,14 @@ class ViewHeader(QWidget):
         self._leave_out()
 
     def _leave_out(self) -> None:
-        """In a narrow view leave out the slider, and then where it is, rather than cut a word."""
+        """In a narrow view leave out the slider and where it is, and say filters shortly: no word is cut."""
         room = self.width() - self.title.sizeHint().width() - self._button.width() - 3 * self._row.spacing()
         room -= self._row.contentsMargins().left() + self._row.contentsMargins().right()
+        fitting = [words for words in self._filter_words if text_width(self.filters, words) <= room]
+        said = (*fitting, *self._filter_words[-1:], "")[0]
+        self.filters.setText(said)
+        self.filters.setVisible(bool(said))
+        room -= text_width(self.filters, said) + self._row.spacing() if said else 0
         words = self.where.sizeHint().width() if self.where.text() else 0
         self.where.setVisible(words <= room)
         if self._slider is not None:
@@ -276,6 +293,7 @@ class ViewGrid(QWidget):
         follow(self, self._workspace.view.planes_changed, self._say_titles)
         follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
         follow(self, self._workspace.document.reset, self._on_reset)
+        follow(self, self._workspace.view.planes_changed, self._say_filters)
         follow(self, self._workspace.labels.active_changed, self._show_best)
 
     def _maximise(self, name: str) -> None:
@@ -287,6 +305,18 @@ class ViewGrid(QWidget):
             layout = self._workspace.view.state.layout
             self._several = layout if layout in ("four-up", "two-up") else self._several
             self._lay_out()
+        if changed & {"slab", "denoise"}:
+            self._say_filters()
+
+    def _say_filters(self) -> None:
+        """Say in the header of each slice view that it shows a slab, or less noise than the scan has."""
+        state = self._workspace.view.state
+        for plane, view in self.slice_views.items():
+            mm = state.slab.mm if state.slab is not None else 0.0
+            if state.slab is not None and view.source is not None:
+                mm = view.source.thickness(view.slice_plane, state.slab)
+            words, hint = filter_words(state, mm), filter_hint(state, mm)
+            self.frames[plane.value].header.say_filters(*words, hint=hint)
 
     def _show_best(self, *_: object) -> None:
         """Beside the 3D view, show the slice view in which the active feature is best seen."""
@@ -299,6 +329,7 @@ class ViewGrid(QWidget):
 
     def _on_reset(self) -> None:
         self._lay_out()
+        self._say_filters()
         self._say_titles()
         for frame in self.frames.values():
             frame.header.say_where("")

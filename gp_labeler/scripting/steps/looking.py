@@ -11,6 +11,7 @@ from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.commands.actions import action
 from gp_labeler.imaging.anatomical_frame import FRAMES
+from gp_labeler.imaging.slab import DENOISERS, Slab
 from gp_labeler.models.anatomical_planes import ANATOMICAL_PLANES
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.events import leave, press_keys
@@ -77,6 +78,11 @@ class Look(Step):
         Of the bone, 0 to 1.
     greys : two numbers or str, optional
         Level and width of the grey window of the slices, or ``auto``.
+    slab : table or str, optional
+        Thickness in mm by what is shown of a thick slab, such as ``{maximum = 0.5}`` (or ``mean``,
+        ``minimum``), or ``off``.
+    denoise : str, optional
+        ``median``, ``gaussian``, ``bilateral`` or ``off``.
     outline, names, ghosts, axes, hidden : bool, optional
         Whether the edge of bone is drawn on the slices, the names of points, where points are expected, the
         axis and the round window, points behind bone.
@@ -104,6 +110,8 @@ class Look(Step):
     zoom: float | None = None
     opacity: float | None = None
     greys: Pair | str | None = None
+    slab: Lengths | str | None = None
+    denoise: str | None = None
     outline: bool | None = None
     names: bool | None = None
     ghosts: bool | None = None
@@ -129,6 +137,10 @@ class Look(Step):
             _check(self.greys, "greys", ("auto",))
         if isinstance(self.glyphs, str):
             _check(self.glyphs, "glyphs", ("screen",))
+        if self.slab is not None:
+            _slab(self.slab)
+        if self.denoise is not None:
+            _check(self.denoise, "denoise", ("off", *DENOISERS))
         if isinstance(self.reset, str) and self.reset not in VIEWS:
             allowed = ", ".join(VIEWS)
             raise GpError(f"reset must be true or false, or one of {allowed}, got {self.reset!r}")
@@ -160,6 +172,10 @@ class Look(Step):
             shown |= {"level": None, "width": None}
         elif self.greys is not None:
             shown |= {"level": self.greys[0], "width": self.greys[1]}
+        if self.slab is not None:
+            shown |= {"slab": _slab(self.slab)}
+        if self.denoise is not None:
+            shown |= {"denoise": None if self.denoise == "off" else self.denoise}
         if isinstance(self.glyphs, str):
             shown |= {"glyph_mm": None}
         elif self.glyphs is not None:
@@ -338,6 +354,17 @@ class Undo(Step):
             driver.window.commands.run("edit.undo")
         driver.wait_until_idle(in_passing=False)
         return ", ".join(undone)
+
+
+def _slab(given: Lengths | str) -> Slab | None:
+    """Return the slab of a table such as ``{maximum = 0.5}``; None for ``off``."""
+    if isinstance(given, str):
+        _check(given, "slab", ("off",))
+        return None
+    if len(given) != 1:
+        raise GpError("slab must be a table of one thickness, such as {maximum = 0.5}, or off")
+    ((mode, mm),) = given.items()
+    return Slab(mode, mm)
 
 
 def _pixels(size: Pair) -> tuple[int, int]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -9,6 +10,7 @@ from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.slab import denoised
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
@@ -20,6 +22,7 @@ from gp_labeler.scene.segments import Segment
 from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.scene.slices import SliceImage, VolumeSlicer
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
+from gp_labeler.views.filter_words import filter_words
 from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.painting.marks import ACTIVE_GROWTH, paint_mark
 from gp_labeler.views.painting.name_tags import NameTag, paint_words, place_names
@@ -83,6 +86,7 @@ class SlicePainter:
         self._preview: float | None = None
         self._slice: SliceImage | None = None
         self._where: _Where | None = None
+        self._filtered: tuple[object, SliceImage] | None = None
         self._picture: tuple[object, QImage] | None = None
         self._outline: tuple[object, QPainterPath] | None = None
         self._ground: tuple[SliceViewport, VolumeSlicer, object, QPixmap] | None = None
@@ -96,9 +100,15 @@ class SlicePainter:
             self._points = SlicePoints.of(self._workspace)
         return self._points
 
+    @property
+    def outline_length(self) -> float:
+        """How long the edge of bone is that was painted last, mm; 0 where none is."""
+        return 0.0 if self._outline is None else float(self._outline[1].length())
+
     def forget(self) -> None:
         """Let go of the pictures."""
         self._slice, self._picture, self._outline, self._ground = None, None, None, None
+        self._filtered = None
         self._where = None
         self.forget_points()
 
@@ -120,6 +130,7 @@ class SlicePainter:
         self._paint_ground(painter, view.source, view.shown, ratio)
         self._paint_crosshair(painter, view.shown, theme, ratio)
         self._paint_letters(painter, view.shown, ratio)
+        self._paint_filters(painter, view.source, view.shown, ratio)
         paint_scale_bar(
             painter,
             view.shown.mm_per_pixel,
@@ -154,7 +165,9 @@ class SlicePainter:
     ) -> None:
         """Paint the slice and the edge of bone, from what is kept while nothing of them changes."""
         view, workspace = self._view.window_level(), self._workspace
-        looks = (view, self._preview, workspace.scan.threshold, workspace.view.state.outline_visible)
+        state = workspace.view.state
+        filters = (state.slab, state.denoise)
+        looks = (view, self._preview, workspace.scan.threshold, state.outline_visible, filters)
         kept = self._ground
         if kept is None or kept[0] is not shown or kept[1] is not source or kept[2] != looks:
             picture = QPixmap(*shown.size)
@@ -173,13 +186,28 @@ class SlicePainter:
         if self._slice is None or self._slice_is_old(where):
             self._slice = source.image(*where[1:])
             self._where = where
-            self._picture = self._outline = None
-        window = self._view.window_level()
-        wanted = (window, self._preview)
+            self._picture = self._outline = self._filtered = None
+        window, state = self._view.window_level(), self._workspace.view.state
+        wanted = (window, self._preview, state.slab, state.denoise)
         if self._picture is None or self._picture[0] != wanted:
-            self._picture = (wanted, _picture(self._slice, window, self._preview))
+            self._picture = (wanted, _picture(self._to_show(where), window, self._preview))
         (left, top), (right, bottom) = shown.image_corners(self._slice)
         painter.drawImage(QRectF(left, top, right - left, bottom - top), self._picture[1])
+
+    def _to_show(self, where: _Where) -> SliceImage:
+        """Return what is seen of the slice: a slab, or less noise; while a threshold is chosen, itself."""
+        state = self._workspace.view.state
+        wanted = (state.slab, state.denoise)
+        assert self._slice is not None
+        if wanted == (None, None) or self._preview is not None:
+            return self._slice
+        if self._filtered is None or self._filtered[0] != wanted:
+            source, plane, position, step = where
+            shown = self._slice if state.slab is None else source.image(plane, position, step, state.slab)
+            if state.denoise is not None:
+                shown = replace(shown, values=denoised(shown.values, state.denoise))
+            self._filtered = (wanted, shown)
+        return self._filtered[1]
 
     def _slice_is_old(self, where: _Where) -> bool:
         kept = self._where
@@ -234,6 +262,20 @@ class SlicePainter:
             (bottom, width / 2, height - inset),
         ):
             word_picture(letter, self._text, DARK.text, ratio).draw_about(painter, x, y)
+
+    def _paint_filters(
+        self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport, ratio: float
+    ) -> None:
+        """Say in the lower left corner that not the slice itself is shown: pictures have no headers."""
+        state = self._workspace.view.state
+        step = source.sampling_step(shown.plane, shown.mm_per_pixel)
+        mm = 0.0 if state.slab is None else source.thickness(shown.plane, state.slab, step)
+        if words := filter_words(state, mm):
+            colour = DARK.states["placed"]
+            pictures = [word_picture(text, 0.9 * self._text, colour, ratio) for text in words]
+            room = 0.5 * shown.size[0] - self._text * ratio
+            said = next((each for each in pictures if each.box.width() <= room), pictures[-1])
+            said.draw(painter, 6 * ratio, shown.size[1] - 0.6 * self._text * ratio)
 
     def _paint_ghosts(
         self, painter: QPainter, ghosts: list[GhostEllipsoid], shown: SliceViewport, ratio: float

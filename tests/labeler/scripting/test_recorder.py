@@ -244,6 +244,16 @@ def test_clicks_nudges_marks_and_undo_are_done_again(recording) -> None:
     ]  # the three nudges are one step
 
 
+def test_slab_and_noise_are_written_with_their_values(recording) -> None:
+    recording.begin()
+    assert recording.run("view.slab_maximum") == ["view"]
+    assert recording.recorder.tables[-1]["slab"] == {"maximum": 0.5}
+    recording.run("view.denoise_gaussian")
+    assert recording.recorder.tables[-1]["denoise"] == "gaussian"
+    recording.run("view.slab_maximum")
+    assert recording.recorder.tables[-1]["slab"] == "off"
+
+
 def test_rulers_and_angles_are_done_again(recording) -> None:
     recording.begin()
     axial, scene = recording.window.grid.slice_views[Plane.AXIAL], recording.window.grid.scene_view

@@ -14,6 +14,7 @@ from gp_labeler.views.panels.scan.bone_card import BoneCard
 from gp_labeler.views.panels.scan.head_card import HeadCard
 from gp_labeler.views.panels.scan.mesh_card import MeshCard
 from gp_labeler.views.panels.scan.notes_card import NotesCard
+from gp_labeler.views.panels.scan.slab_card import SlabCard
 from gp_labeler.views.panels.scan.window_level_card import WindowLevelCard
 from gp_labeler.views.signals import follow
 
@@ -58,7 +59,8 @@ class ScanPanel(QWidget):
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
         self.notes, self.head = NotesCard(workspace), HeadCard(workspace, actions)
-        for card in (about, self.bone, self.head, self.grey, self.mesh, self.notes):
+        self.slab = SlabCard(workspace)
+        for card in (about, self.bone, self.head, self.grey, self.slab, self.mesh, self.notes):
             column.addWidget(card)
         column.addStretch(1)
         layout = QVBoxLayout(self)

@@ -1,0 +1,75 @@
+"""Thick slabs and less noise in the slice views: display only."""
+
+from __future__ import annotations
+
+from qtpy.QtWidgets import QComboBox, QGridLayout, QWidget
+
+from gp_labeler.imaging.slab import Slab
+from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.panels.number_field import NumberField
+from gp_labeler.views.panels.parts import Card, text_label
+from gp_labeler.views.signals import attempt, blocked, follow
+
+__all__ = ["SlabCard"]
+
+_MODES = {"Single slice": "", "Mean": "mean", "Maximum": "maximum", "Minimum": "minimum"}
+_KINDS = {"None": "", "Median": "median", "Gaussian": "gaussian", "Bilateral": "bilateral"}
+_FIRST_MM = 0.5
+
+
+class SlabCard(Card):
+    """What the slice views show in place of single slices.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Whose view it sets.
+    """
+
+    def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
+        super().__init__("Slab and noise", parent)
+        self._workspace = workspace
+        self.mode, self.denoise = QComboBox(), QComboBox()
+        self.mode.addItems(list(_MODES))
+        self.mode.setAccessibleName("What the slices show of a slab")
+        self.denoise.addItems(list(_KINDS))
+        self.denoise.setAccessibleName("How the slices are denoised")
+        self.thickness = NumberField("Thickness of the slab, mm")
+        self.thickness.step = 0.1
+        grid = QGridLayout()
+        grid.setHorizontalSpacing(8)
+        for column, (name, field) in enumerate((("Slab", self.mode), ("mm", self.thickness))):
+            grid.addWidget(text_label(name, "hint"), 0, 2 * column)
+            grid.addWidget(field, 0, 2 * column + 1)
+        grid.addWidget(text_label("Denoise", "hint"), 1, 0)
+        grid.addWidget(self.denoise, 1, 1)
+        grid.setColumnStretch(1, 2)
+        grid.setColumnStretch(3, 1)
+        self.add(grid)
+        self.add(
+            text_label("Only what is seen: values, bone edge and clicks take the slice.", "hint", wrap=True)
+        )
+        self.mode.activated.connect(self._on_slab)
+        self.thickness.value_chosen.connect(self._on_slab)
+        self.denoise.activated.connect(self._on_denoise)
+        for signal in (workspace.view.changed, workspace.document.reset):
+            follow(self, signal, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show what is in effect."""
+        state = self._workspace.view.state
+        with blocked(self.mode, self.denoise):
+            mode = "" if state.slab is None else state.slab.mode
+            self.mode.setCurrentIndex(list(_MODES.values()).index(mode))
+            self.denoise.setCurrentIndex(list(_KINDS.values()).index(state.denoise or ""))
+        self.thickness.setEnabled(state.slab is not None)
+        self.thickness.set_value(None if state.slab is None else state.slab.mm)
+
+    def _on_slab(self, _: object) -> None:
+        mode, mm = _MODES[self.mode.currentText()], self.thickness.value or _FIRST_MM
+        attempt(self._workspace, lambda: self._workspace.view.update(slab=Slab(mode, mm) if mode else None))
+        self.refresh()
+
+    def _on_denoise(self, _: object) -> None:
+        self._workspace.view.update(denoise=_KINDS[self.denoise.currentText()] or None)
