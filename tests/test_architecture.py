@@ -104,7 +104,18 @@ def test_the_project_speaks_the_words_of_the_field() -> None:
 
 
 def test_the_core_brings_no_window_with_it() -> None:
-    heavy = ("PySide6", "PyQt6", "qtpy", "vtk", "vtkmodules", "pyvista", "SimpleITK", "skimage", "numba")
+    heavy = (
+        "PySide6",
+        "PyQt6",
+        "qtpy",
+        "vtk",
+        "vtkmodules",
+        "pyvista",
+        "SimpleITK",
+        "skimage",
+        "numba",
+        "scipy",
+    )
     code = (
         "import sys, gp_core, gp_core.cli;"
         f"print([m for m in sys.modules if m.split('.')[0] in {(*heavy, 'matplotlib')}])"

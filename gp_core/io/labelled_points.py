@@ -29,6 +29,7 @@ __all__ = [
     "is_computed",
     "labelled_point",
     "points_of",
+    "suggested_description",
     "suggestions_of",
 ]
 
@@ -283,10 +284,28 @@ def suggestions_of(landmarks: LandmarkSet) -> tuple[LabelledPoint, ...]:
 def _suggested_point(feature: Feature, suggestion: Suggestion | None) -> LabelledPoint:
     if suggestion is None:
         return LabelledPoint(feature.code, None, Status.TO_DO, _description(feature))
+    text = suggested_description(suggestion, _description(feature))
+    return LabelledPoint(feature.code, np.array(suggestion.position), Status.PLACED, text)
+
+
+def suggested_description(suggestion: Suggestion, about: str = "") -> str:
+    """Return the description by which every reader of this library takes a point as a suggestion.
+
+    Parameters
+    ----------
+    suggestion : Suggestion
+        Its source and radius are told.
+    about : str
+        What else the description says.
+
+    Returns
+    -------
+    str
+        One line.
+    """
     radius = "" if suggestion.radius_95 is None else f"; 95 % within {suggestion.radius_95:.3f} mm"
     origin = f" ({suggestion.source}{radius})" if suggestion.source or radius else ""
-    text = f"Suggested, not confirmed{origin}. {_description(feature)}"
-    return LabelledPoint(feature.code, np.array(suggestion.position), Status.PLACED, text)
+    return f"Suggested, not confirmed{origin}. {about}".rstrip()
 
 
 def _description(feature: Feature) -> str:

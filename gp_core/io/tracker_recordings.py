@@ -15,7 +15,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from gp_core.disk import read_head
 from gp_core.errors import FileFormatError, GpError
@@ -330,9 +329,13 @@ def _is_seen(state: str) -> bool:
 def _rotation(numbers: FloatArray) -> FloatArray:
     """Return the rotation of a quaternion (w first) or of three angles about z, y, x, degrees."""
     if len(numbers) == 3:
+        from scipy.spatial.transform import Rotation  # takes long to import: only where it is needed
+
         turned: FloatArray = Rotation.from_euler("ZYX", numbers, degrees=True).as_matrix()
         return turned
     w, x, y, z = numbers
+    from scipy.spatial.transform import Rotation  # as above
+
     rotation: FloatArray = Rotation.from_quat([x, y, z, w]).as_matrix()
     return rotation
 

@@ -263,7 +263,7 @@ def jrmpc_batch(problems: ArrayLike, sizes: Sequence[int], settings: JrmpcSettin
     problem = _Problem.prepare(points, counts, None, settings)
     n_problems = len(points)
     iterations, change = np.zeros(n_problems, dtype=np.int64), np.zeros(n_problems)
-    _kernels().run_batch(
+    _batch_kernels().run_batch(
         problem.points,
         problem.starts,
         problem.poses,
@@ -465,6 +465,14 @@ def _check_sizes(size: FloatArray) -> None:
             f"the point sets have no usable extent, got {size[~good][0]:.3g}",
             remedy="Check that the points differ and that their unit is mm.",
         )
+
+
+def _batch_kernels() -> Any:
+    """Return what runs many problems: compiled for eight at a time, or else as `_kernels` says."""
+    try:
+        return import_module("gp_core.registration.jrmpc_lanes")
+    except ImportError:
+        return _kernels()
 
 
 def _kernels() -> Any:

@@ -8,7 +8,6 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
@@ -113,6 +112,8 @@ def draw_touches(
     GpError
         A number is negative.
     """
+    from scipy.spatial.transform import Rotation  # takes long to import: only where it is needed
+
     if touch_error_mm < 0 or seed < 0:
         raise GpError("draw needs no negative number")
     rng = np.random.default_rng([seed, 1])  # another animal than those of `draw_labels`

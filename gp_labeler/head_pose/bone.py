@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
-from gp_labeler.imaging.coarse import means_of_cubes
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 
@@ -149,6 +148,8 @@ def _block_means(values: NDArray[Any], factors: NDArray[np.intp]) -> _Values:
     """Return the means of blocks of (fx, fy, fz) voxels of a (z, y, x) array, without what is left over."""
     if len(set(factors.tolist())) == 1:
         array = values.view(np.uint8) if values.dtype == bool else values
+        from gp_labeler.imaging.coarse import means_of_cubes  # numba takes long to import: not at start-up
+
         return means_of_cubes(array, int(factors[0]))
     fx, fy, fz = (int(f) for f in factors)
     nz, ny, nx = (n // f for n, f in zip(values.shape, (fz, fy, fx), strict=True))
@@ -244,6 +245,10 @@ class Bone:
         from scipy.spatial import cKDTree
 
         return cKDTree(self.points)
+
+    def inside(self, points: FloatArray) -> _Mask:
+        """Return which points (N, 3), LPS mm, lie where the scanner measured."""
+        return self.scan.inside(points)
 
     @cached_property
     def centre(self) -> FloatArray:

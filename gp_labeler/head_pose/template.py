@@ -7,12 +7,20 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
 from gp_labeler.head_pose.bone import Bone, bone_of
 from gp_labeler.head_pose.mid_plane import MidPlane
 from gp_labeler.head_pose.mirror_search import clipped_distances
+from gp_labeler.head_pose.surface_fit import (
+    SCALES_OF_A_SPECIES,
+    Similarity,
+    angle_deg,
+    distance_score,
+    fit_surface,
+)
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.volume import Volume
 
@@ -23,7 +31,6 @@ _TURN_STEP_DEG = 15.0
 _SHIFTS = np.arange(-0.6, 0.61, 0.12)
 _KEPT, _FINER = 8, 3
 _APART_DEG = 25.0
-_SCALES = (0.75, 1.33)
 _CLIP_SEARCH, _CLIP_FIT = 6.0, 8.0
 
 
@@ -63,6 +70,10 @@ class HeadTemplate:
 
         return cKDTree(self.points)
 
+    def inside(self, points: FloatArray) -> NDArray[np.bool_]:
+        """Return that all points (N, 3) could have been seen: the template is a whole head."""
+        return np.ones(len(points), dtype=bool)
+
 
 @cache
 def phantom_template() -> HeadTemplate:
@@ -74,23 +85,6 @@ def phantom_template() -> HeadTemplate:
     mean = mean_animal(Atlas.published(), name="the synthetic guinea pig")
     phantom = make_phantom(spacing=0.5, specimen=mean, noise=0.0)
     return HeadTemplate.of(phantom.volume, phantom.T_head_scan)
-
-
-@dataclass(frozen=True, eq=False)
-class _Fit:
-    """A template laid onto bone: ``p = scale * R @ q + shift``."""
-
-    scale: float
-    rotation: FloatArray
-    shift: FloatArray
-
-    def forth(self, points: FloatArray) -> FloatArray:
-        moved: FloatArray = self.scale * points @ self.rotation.T + self.shift
-        return moved
-
-    def back(self, points: FloatArray) -> FloatArray:
-        moved: FloatArray = (points - self.shift) @ self.rotation / self.scale
-        return moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,20 +112,26 @@ class InPlane:
 def front_and_up(bone: Bone, plane: MidPlane, template: HeadTemplate, report: Report) -> InPlane:
     """Return how a template lies in a mid-plane of a bone."""
     clip = bone.radius / _CLIP_FIT
+    ratio = bone.radius / template.radius
+    scales = (SCALES_OF_A_SPECIES[0] * ratio, SCALES_OF_A_SPECIES[1] * ratio)
     fits = []
     for n, start in enumerate(_starts(bone, plane, template)):
         report(0.3 + 0.4 * n / _KEPT)
-        fit = _fitted(bone, template, start, (1.6 * clip, 0.5 * clip), 12, every=4)
-        fits.append((_distance_score(bone, template, fit, clip, every=2), fit))
+        fit = fit_surface(
+            bone, template, start, widths=(1.6 * clip, 0.5 * clip), steps=12, scales=scales, every=4
+        )
+        fits.append((distance_score(bone, template, fit, clip, every=2), fit))
     fits.sort(key=lambda pair: pair[0])
     finer = []
     for n, (_, fit) in enumerate(fits[:_FINER]):
         report(0.7 + 0.3 * n / _FINER)
-        fine = _fitted(bone, template, fit, (0.8 * clip, 0.2 * clip), 16, every=2)
-        finer.append((_distance_score(bone, template, fine, clip), fine))
+        fine = fit_surface(
+            bone, template, fit, widths=(0.8 * clip, 0.2 * clip), steps=16, scales=scales, every=2
+        )
+        finer.append((distance_score(bone, template, fine, clip), fine))
     finer.sort(key=lambda pair: pair[0])
     score, best = finer[0]
-    others = [score for score, fit in (*finer, *fits) if _angle_deg(fit.rotation, best.rotation) > _APART_DEG]
+    others = [score for score, fit in (*finer, *fits) if angle_deg(fit.rotation, best.rotation) > _APART_DEG]
     axes = axes_in_plane(best.rotation, plane)
     return InPlane(axes, plane.nearest(best.shift), score, min([*others, 1.0]) - score)
 
@@ -144,7 +144,7 @@ def axes_in_plane(rotation: FloatArray, plane: MidPlane) -> FloatArray:
     return np.stack([left, back, np.cross(left, back)], axis=1)
 
 
-def _starts(bone: Bone, plane: MidPlane, template: HeadTemplate) -> list[_Fit]:
+def _starts(bone: Bone, plane: MidPlane, template: HeadTemplate) -> list[Similarity]:
     """Return distinct turns and shifts of the template in the plane, by a clipped distance field."""
     field, size = clipped_distances(bone, template.radius / _CLIP_SEARCH * bone.radius / template.radius)
     scale = bone.radius / template.radius
@@ -161,11 +161,13 @@ def _starts(bone: Bone, plane: MidPlane, template: HeadTemplate) -> list[_Fit]:
         i, j, k = np.moveaxis(np.clip(index, 0, size - 1), -1, 0)
         score = field[(k * size[1] + j) * size[0] + i].mean(axis=1)
         best = int(score.argmin())
-        scored.append((float(score[best]), _Fit(scale, rotation, shifts[best] - scale * rotation @ middle)))
+        scored.append(
+            (float(score[best]), Similarity(scale, rotation, shifts[best] - scale * rotation @ middle))
+        )
     scored.sort(key=lambda pair: pair[0])
-    kept: list[_Fit] = []
+    kept: list[Similarity] = []
     for _, fit in scored:
-        if all(_angle_deg(fit.rotation, other.rotation) >= _APART_DEG for other in kept):
+        if all(angle_deg(fit.rotation, other.rotation) >= _APART_DEG for other in kept):
             kept.append(fit)
     return kept[:_KEPT]
 
@@ -179,52 +181,3 @@ def _turns(plane: MidPlane, first: FloatArray, second: FloatArray) -> list[Float
             np.stack([left, back, np.cross(left, back)], axis=1) for left in (plane.normal, -plane.normal)
         ]
     return turns
-
-
-def _angle_deg(first: FloatArray, second: FloatArray) -> float:
-    cosine = (float(np.trace(first.T @ second)) - 1) / 2
-    return float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-
-
-def _fitted(
-    bone: Bone, template: HeadTemplate, fit: _Fit, widths: tuple[float, float], steps: int, *, every: int
-) -> _Fit:
-    """Return a fit, with its scale, after ICP in both directions with weights that fall with distance."""
-    own, other = template.points[::every], bone.points[::every]
-    smallest, largest = (bone.radius / template.radius * s for s in _SCALES)
-    for width in np.geomspace(*widths, steps):
-        there, back = fit.forth(own), fit.back(other)
-        d, j = bone.tree.query(there)
-        e, k = template.tree.query(back)
-        weights = np.concatenate(
-            [
-                bone.scan.inside(there) / (1 + (d / width) ** 2) ** 2,
-                1 / (1 + (fit.scale * e / width) ** 2) ** 2,
-            ]
-        )
-        weights /= weights.sum()
-        a = np.concatenate([own, template.points[k]])
-        b = np.concatenate([bone.points[j], other])
-        fit = _similarity(a, b, weights, (smallest, largest))
-    return fit
-
-
-def _similarity(a: FloatArray, b: FloatArray, weights: FloatArray, scales: tuple[float, float]) -> _Fit:
-    """Return the weighted least-squares similarity from points a to points b (N, 3)."""
-    ca, cb = weights @ a, weights @ b
-    u, s, vt = np.linalg.svd(((a - ca) * weights[:, None]).T @ (b - cb))
-    signs = np.array([1.0, 1.0, np.linalg.det(vt.T @ u.T)])
-    rotation = vt.T @ np.diag(signs) @ u.T
-    spread = float(weights @ ((a - ca) ** 2).sum(axis=1))
-    scale = float(np.clip((s * signs).sum() / spread, *scales))
-    return _Fit(scale, rotation, cb - scale * rotation @ ca)
-
-
-def _distance_score(bone: Bone, template: HeadTemplate, fit: _Fit, clip: float, *, every: int = 1) -> float:
-    there = fit.forth(template.points[::every])
-    inside = bone.scan.inside(there)
-    d = np.minimum(bone.tree.query(there, distance_upper_bound=clip)[0], clip)
-    back = fit.back(bone.points[::every])
-    e = np.minimum(template.tree.query(back, distance_upper_bound=clip / fit.scale)[0] * fit.scale, clip)
-    own = float(d[inside].mean()) if inside.sum() > 50 else clip
-    return (own + float(e.mean())) / (2 * clip)

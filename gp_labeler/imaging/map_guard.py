@@ -130,7 +130,7 @@ def _action(handler: int) -> ctypes.Array[ctypes.c_char]:
 
 def _compiled(module: str) -> Any:
     """Compile a module to machine code; return the engine that holds it."""
-    import llvmlite.binding as llvm  # type: ignore[import-untyped]
+    import llvmlite.binding as llvm
 
     with suppress(RuntimeError):  # no longer needed, and refused, from llvmlite 0.45 on
         llvm.initialize()

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.mesh import Surface
@@ -81,6 +80,8 @@ def _normals_at(
     where: FloatArray, facing: FloatArray, points: FloatArray, normals: FloatArray
 ) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return the mean normals of nearby points that face about as `facing`, and where there are any."""
+    from scipy.spatial import cKDTree  # takes long to import: not at start-up
+
     k = min(_NEIGHBOURS, len(points))
     found = cKDTree(points).query(where, k=k)
     distance, nearest = (np.asarray(each).reshape(-1, k) for each in found)

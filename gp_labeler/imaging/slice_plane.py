@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from gp_core.errors import GeometryError
 from gp_core.validation import FloatArray, as_points
@@ -99,6 +98,8 @@ class SlicePlane:
     def rotated(self, axis: ArrayLike, angle: float, about: ArrayLike) -> SlicePlane:
         """Return the plane rotated about an axis (3,) through a point (3,); the angle in rad."""
         unit = np.asarray(axis, dtype=np.float64)
+        from scipy.spatial.transform import Rotation  # takes long to import: not at start-up
+
         R = Rotation.from_rotvec(angle * unit / np.linalg.norm(unit)).as_matrix()
         right, down, normal = (R @ self._orthonormal()).T
         point = np.asarray(about, dtype=np.float64)

@@ -24,6 +24,7 @@ from gp_labeler.models.messages import Messages
 from gp_labeler.models.pose import PoseModel
 from gp_labeler.models.pose_sending import PoseSending
 from gp_labeler.tracker import (
+    NO_ORIENTATION,
     FrameCheck,
     Limits,
     LinkPhase,
@@ -189,7 +190,12 @@ class TrackerModel:
     @property
     def trouble(self) -> str:
         """What is wrong with the newest reading; empty where nothing is."""
-        return "" if self._latest is None else self._latest.detail
+        latest = self._latest
+        if latest is None:
+            return ""
+        if latest.usable and self.probe.lacks_orientation(latest):
+            return NO_ORIENTATION
+        return latest.detail
 
     @property
     def handle(self) -> FloatArray | None:

@@ -12,9 +12,16 @@ from gp_labeler.tracker.pose_message import PoseMessage
 from gp_labeler.tracker.probe import PivotCollector, Probe
 from gp_labeler.tracker.samples import Fault, Limits, Sample
 from gp_labeler.tracker.sender import PoseSender
-from gp_labeler.tracker.touching import RecordedTouch, RefusedTouch, TouchRecorder, TouchSettings
+from gp_labeler.tracker.touching import (
+    NO_ORIENTATION,
+    RecordedTouch,
+    RefusedTouch,
+    TouchRecorder,
+    TouchSettings,
+)
 
 __all__ = [
+    "NO_ORIENTATION",
     "Fault",
     "FrameCheck",
     "Limits",

@@ -24,6 +24,12 @@ _MOTION_SHARE = 1 / 3
 _MOTION_FACTOR = 2.0
 """How much faster than the limit a step may be that belongs to a movement."""
 
+_ISOLATED_SHARE = 0.25
+"""Of the acceleration of a hand: how far one step may differ from those before and after it."""
+
+_OF_STEPS = 0.3
+"""And how far beyond that, as a share of these."""
+
 _LONGEST_MEMORY_S = 0.3
 """A velocity or a place from longer ago says nothing about where the marker is now."""
 
@@ -71,6 +77,18 @@ class _State:
     suspicious_since: float | None = None
 
 
+@dataclass(frozen=True)
+class _Step:
+    """The step before the last sample: where it began, what moved before it, and what was known there.
+
+    Empty where the step was a jump itself.
+    """
+
+    start: Sample | None = None
+    motion_before: _Motion | None = None
+    state: _State = _State()
+
+
 class JumpFilter:
     """Marks samples between a jump and its way back, or for some time after a jump that stays.
 
@@ -86,6 +104,7 @@ class JumpFilter:
         self._before_jump: _State | None = None
         self._previous: Sample | None = None
         self._motion: _Motion | None = None
+        self._last_step = _Step()
 
     def check(self, sample: Sample) -> Sample:
         """Return the sample with its segment, and with the fault JUMP where it is in doubt."""
@@ -96,9 +115,15 @@ class JumpFilter:
         if previous is not None:
             self._motion = _motion(previous, sample)
             self._call_off(earlier, self._motion)
+            step = _Step(previous, earlier, self._state)
             if self._is_jump(self._motion, earlier):
                 self._before_jump = self._state
-                self._state = self._jumped(previous, sample)
+                self._state = self._jumped(self._state, previous, sample)
+                step = _Step()
+            elif self._is_isolated(self._last_step.motion_before, earlier, self._motion):
+                assert self._last_step.start is not None
+                self._state = self._jumped(self._last_step.state, self._last_step.start, previous)
+            self._last_step = step
         return self._believe(sample)
 
     def _believe(self, sample: Sample) -> Sample:
@@ -142,11 +167,24 @@ class JumpFilter:
         if motion.continues(jump):
             self._state = before
 
-    def _jumped(self, previous: Sample, sample: Sample) -> _State:
+    def _is_isolated(self, before: _Motion | None, step: _Motion | None, after: _Motion) -> bool:
+        """Whether a step, followed by one more, leads away from a movement that goes on as before.
+
+        A hand that moves so far in one step still moves in the next, or has moved in the one before. Where
+        readings are slow, a jump of some millimetres is within what a hand could do, but not within that.
+        """
+        if before is None or step is None or max(before.seconds, after.seconds) > _LONGEST_MEMORY_S:
+            return False
+        first, last = (step.seconds / one.seconds * one.shift for one in (before, after))
+        off = min(float(np.linalg.norm(step.shift - near)) for near in (first, last, (first + last) / 2))
+        reach = _ISOLATED_SHARE * self.limits.acceleration_mm_s2 * step.seconds**2
+        reach += _OF_STEPS * max(float(np.linalg.norm(near)) for near in (first, last))
+        return off > self.limits.noise_mm + reach
+
+    def _jumped(self, state: _State, previous: Sample, sample: Sample) -> _State:
         """Return the state after a jump: back in a segment that was left, or in a new one."""
         assert previous.matrix is not None
         assert sample.matrix is not None
-        state = self._state
         T_jump = sample.matrix @ np.linalg.inv(previous.matrix)
         left = tuple(replace(one, T_now_left=T_jump @ one.T_now_left) for one in state.left)
         for at in range(len(left) - 1, -1, -1):

@@ -11,6 +11,7 @@ from enum import Enum
 from gp_labeler.tracker.address import TrackerAddress
 from gp_labeler.tracker.connection import Arrived, Connection, Event, Lost, Opened
 from gp_labeler.tracker.messages import TrackerMessage, hello
+from gp_labeler.tracker.pose_bodies import POSE_KINDS
 from gp_labeler.tracker.sample_filter import SampleFilter
 from gp_labeler.tracker.samples import Fault, Limits, Sample
 
@@ -193,7 +194,7 @@ class TrackerLink:
     def _note(self, message: TrackerMessage) -> None:
         if message.device in self.devices or len(self.devices) < _MOST_DEVICES:
             self.devices[message.device] = message.kind
-        if message.device == self.address.probe and message.kind == "TRANSFORM":
+        if message.device == self.address.probe and message.kind in POSE_KINDS:
             self._heard = message.received
             self._arrivals.append(message.received)
         elif message.device == self.address.button and message.kind == "STRING":
@@ -226,11 +227,11 @@ class TrackerLink:
     def _why_silent(self) -> str:
         probe = self.address.probe
         kind = self.devices.get(probe)
-        if kind == "TRANSFORM":
+        if kind in POSE_KINDS:
             return "its marker is out of sight, or the tracker is paused."
         if kind is not None:
             return f"it comes as {kind}; have the server send it as TRANSFORM."
-        others = [name for name, kind in self.devices.items() if kind == "TRANSFORM" and name]
+        others = [name for name, kind in self.devices.items() if kind in POSE_KINDS and name]
         if others:
             return f"the server sends {', '.join(sorted(others)[:6])}; is the name right?"
         return "its marker is out of sight, or it has another name there."

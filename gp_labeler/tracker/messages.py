@@ -18,14 +18,15 @@ import pyigtl
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.tracker.pose_bodies import KINDS, POSE_KINDS, read_tools
 
 __all__ = ["MessageDecoder", "TrackerMessage", "hello", "pack_transform"]
 
 _HEADER_BYTES = 58
 _VERSIONS = (1, 2, 3)
-_READ = ("TRANSFORM", "STRING")
+_READ = (*POSE_KINDS, "STRING")
 
-_LARGEST = {"TRANSFORM": 10_000, "STRING": 1_000_000, "STATUS": 1_000_000, "POSITION": 100_000}
+_LARGEST = {"TRANSFORM": 10_000, "STRING": 1_000_000, "STATUS": 1_000_000} | dict.fromkeys(KINDS, 100_000)
 """Bytes that a message of a type can have, metadata included."""
 
 _LARGEST_OTHER = 2_000_000_000
@@ -42,13 +43,15 @@ class TrackerMessage:
     Parameters
     ----------
     device, kind : str
-        Device name and message type.
+        Device name and message type; in messages of several tools, the name of the tool, where it has one.
     time : float
         When it was measured, seconds of the sender's clock; 0 where the sender does not say.
     received : float
         When it arrived, seconds of this computer's monotonic clock.
     matrix : (4, 4) array, optional
-        Of a TRANSFORM, as sent.
+        Of a message of one of `gp_labeler.tracker.pose_bodies.POSE_KINDS`, as sent.
+    oriented : bool
+        Whether the rotation of the matrix was sent; else only the position was.
     text : str
         Of a STRING.
     metadata : mapping of str to str
@@ -68,6 +71,7 @@ class TrackerMessage:
     metadata: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
     problem: str = ""
     damaged: bool = False
+    oriented: bool = True
 
 
 class MessageDecoder:
@@ -82,7 +86,8 @@ class MessageDecoder:
     def feed(self, data: bytes, received: float) -> list[TrackerMessage]:
         """Take what has arrived, and return the messages that are now complete.
 
-        Types other than TRANSFORM and STRING come without content; so does a body whose checksum is wrong.
+        A message of several tools gives one for each. Types that are not read come without content; so does a
+        body whose checksum is wrong.
 
         Raises
         ------
@@ -100,7 +105,7 @@ class MessageDecoder:
             if header["message_type"] in _READ:
                 if len(self._buffer) < size:
                     return self._wait(messages, received)
-                messages.append(_read_body(header, bytes(self._buffer[_HEADER_BYTES:size]), received))
+                messages += _read_body(header, bytes(self._buffer[_HEADER_BYTES:size]), received)
             else:
                 messages.append(_without_content(header, received))
             self._skip, self._begun = size, None
@@ -165,12 +170,15 @@ def _without_content(header: dict[str, Any], received: float, problem: str = "")
     )
 
 
-def _read_body(header: dict[str, Any], body: bytes, received: float) -> TrackerMessage:
+def _read_body(header: dict[str, Any], body: bytes, received: float) -> list[TrackerMessage]:
     if pyigtl.messages.CRC64(body) != header["crc"]:
-        return replace(_without_content(header, received, "its checksum is wrong"), damaged=True)
-    message = pyigtl.MessageBase.create_message(header["message_type"])
+        return [replace(_without_content(header, received, "its checksum is wrong"), damaged=True)]
     try:
-        message.unpack(header, body)
+        return (
+            _tools(header, body, received)
+            if header["message_type"] in KINDS
+            else [_one(header, body, received)]
+        )
     except (
         struct.error,
         ValueError,
@@ -178,7 +186,39 @@ def _read_body(header: dict[str, Any], body: bytes, received: float) -> TrackerM
         TypeError,
         KeyError,
     ) as error:  # a TypeError: it raises a str
-        return _without_content(header, received, f"it cannot be read ({error})")
+        return [_without_content(header, received, f"it cannot be read ({error})")]
+
+
+def _tools(header: dict[str, Any], body: bytes, received: float) -> list[TrackerMessage]:
+    """Return a message for each tool; one that has no name has that of the device."""
+    message = _Content()
+    message.unpack(header, body)
+    told = _without_content(header, received)
+    metadata = MappingProxyType(dict(message.metadata))
+    return [
+        replace(
+            told,
+            device=tool.name or told.device,
+            matrix=tool.matrix,
+            oriented=tool.oriented,
+            metadata=metadata,
+        )
+        for tool in read_tools(header["message_type"], message.content)
+    ]
+
+
+class _Content(pyigtl.MessageBase):  # type: ignore[misc]
+    """The content of a message, without header, extended header and metadata."""
+
+    content = b""
+
+    def _unpack_content(self, content: bytes) -> None:
+        self.content = bytes(content)
+
+
+def _one(header: dict[str, Any], body: bytes, received: float) -> TrackerMessage:
+    message = pyigtl.MessageBase.create_message(header["message_type"])
+    message.unpack(header, body)
     matrix = getattr(message, "matrix", None)
     return TrackerMessage(
         header["device_name"],

@@ -51,9 +51,13 @@ class Probe:
         offset.setflags(write=False)
         self.tip_offset: FloatArray = offset
 
+    def lacks_orientation(self, sample: Sample) -> bool:
+        """Whether the tip is unknown, as the sample has a position only, and the tip lies elsewhere."""
+        return not sample.oriented and bool(self.tip_offset.any())
+
     def tip(self, sample: Sample) -> FloatArray | None:
         """Return the (3,) tip, mm, in the sample's frame; None where the marker's pose is not known."""
-        if sample.matrix is None:
+        if sample.matrix is None or self.lacks_orientation(sample):
             return None
         tip: FloatArray = sample.matrix[:3, :3] @ self.tip_offset + sample.matrix[:3, 3]
         return tip
@@ -118,7 +122,7 @@ class PivotCollector:
         """Take samples; return how many of them became poses."""
         before = self.count
         for sample in samples:
-            if not sample.usable or sample.matrix is None:
+            if not sample.usable or sample.matrix is None or not sample.oriented:
                 self.refused[sample.fault] += 1
             else:
                 self._take(sample.matrix)

@@ -6,12 +6,12 @@ from collections import deque
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
 
 from gp_core.validation import FloatArray
 from gp_labeler.tracker.device_clock import DeviceClock
 from gp_labeler.tracker.jump_filter import JumpFilter
 from gp_labeler.tracker.messages import TrackerMessage
+from gp_labeler.tracker.pose_bodies import POSE_KINDS
 from gp_labeler.tracker.rigid import nearest_rigid, why_not_rigid
 from gp_labeler.tracker.samples import UNTIMELY, Fault, Limits, Sample
 
@@ -65,7 +65,7 @@ class SampleFilter:
         """
         probe, reference = self._names
         for message in messages:
-            if message.kind != "TRANSFORM":
+            if message.kind not in POSE_KINDS:
                 continue
             if message.device == probe:
                 self._waiting.append(self._probe.check(message))
@@ -116,9 +116,15 @@ class SampleFilter:
             return _without_pose(probe, Fault.NO_REFERENCE, f"no message of {name} at that moment")
         for reference in (before, after):
             if not reference.usable:
-                return _without_pose(probe, Fault.NO_REFERENCE, f"{name}: {reference.detail}")
+                spoils = reference.fault in (Fault.JUMP, Fault.FROZEN)  # of the readings before it too
+                fault = reference.fault if spoils else Fault.NO_REFERENCE
+                return _without_pose(probe, fault, f"{name}: {reference.detail}")
+            if not reference.oriented:
+                detail = f"{name}: its messages tell a position without an orientation"
+                return _without_pose(probe, Fault.NO_REFERENCE, detail)
         T_reference_probe = np.linalg.inv(_interpolated(before, after, probe.time)) @ probe.matrix
-        return Sample(probe.time, probe.received, nearest_rigid(T_reference_probe), segment=after.segment)
+        matrix = nearest_rigid(T_reference_probe)
+        return Sample(probe.time, probe.received, matrix, segment=after.segment, oriented=probe.oriented)
 
 
 @dataclass
@@ -147,8 +153,8 @@ class _Device:
         matrix = nearest_rigid(message.matrix)
         if self._frozen(message):
             detail = "the tracker repeats its last position"
-            return Sample(time, message.received, matrix, Fault.FROZEN, detail)
-        return Sample(time, message.received, matrix)
+            return Sample(time, message.received, matrix, Fault.FROZEN, detail, oriented=message.oriented)
+        return Sample(time, message.received, matrix, oriented=message.oriented)
 
     def _check_content(self, message: TrackerMessage) -> tuple[Fault, str]:
         status = message.metadata.get("TransformStatus", "OK").upper().removeprefix("TOOL_")
@@ -184,6 +190,8 @@ def _interpolated(before: Sample, after: Sample, time: float) -> FloatArray:
     if span <= 0:
         return before.matrix
     share = (time - before.time) / span
+    from scipy.spatial.transform import Rotation, Slerp  # takes long to import: not at start-up
+
     turns = Slerp([0.0, 1.0], Rotation.from_matrix(np.array([before.matrix[:3, :3], after.matrix[:3, :3]])))
     pose = np.eye(4)
     pose[:3, :3] = turns(share).as_matrix()

@@ -105,6 +105,8 @@ class Sample:
     segment : int
         Counts the jumps that the marker has not taken back: samples of different segments may be in frames
         that differ by the jump between them.
+    oriented : bool
+        Whether the orientation is known; else only the position of the marker's origin is.
     """
 
     time: float
@@ -113,6 +115,7 @@ class Sample:
     fault: Fault = Fault.NONE
     detail: str = ""
     segment: int = 0
+    oriented: bool = True
 
     @property
     def usable(self) -> bool:

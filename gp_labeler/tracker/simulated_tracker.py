@@ -16,6 +16,7 @@ import pyigtl
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.tracker.address import DEFAULT_PORT
+from gp_labeler.tracker.pose_bodies import PoseBody, ToolPose
 from gp_labeler.tracker.simulated_probe import Reading, SimulatedProbe
 
 __all__ = ["HIDDEN_BY", "Simulator"]
@@ -87,6 +88,8 @@ class Simulator:
         Readings a second.
     hidden : {"status", "identity", "stop"}
         How a covered marker is told: PLUS does any of the three, by its settings and the client's version.
+    kind : str
+        Type of the messages of poses, one of `gp_labeler.tracker.pose_bodies.POSE_KINDS`.
     say : callable
         Told what has been done, in one line.
     """
@@ -99,13 +102,14 @@ class Simulator:
         names: Mapping[str, str] | None = None,
         rate_hz: float = 60.0,
         hidden: str = "status",
+        kind: str = "TRANSFORM",
         say: Callable[[str], None] = lambda line: None,
     ) -> None:
         self.probe = probe
         self._names = {"probe": "ProbeToTracker", "reference": "ReferenceToTracker", "button": "Button"}
         self._names.update(names or {})
         self._period = 1.0 / rate_hz
-        self._hidden = hidden
+        self._hidden, self._kind = hidden, kind
         self._say = say
         self._server: _Server | None = _Server(port)
         self.port: int = self._server.server_address[1]
@@ -274,13 +278,21 @@ class Simulator:
         if not reading.seen and self._hidden == "stop":
             return []
         matrix = _spoilt(reading.matrix, bad)
-        message = pyigtl.TransformMessage(matrix, device_name=device, timestamp=moment)
+        message = self._message(matrix, device, moment)
         if bad == "back":
             message.timestamp = moment - 0.5
         if self._hidden == "status":
             message.header_version = 2
             message.metadata = {"TransformStatus": "OK" if reading.seen else "OUT_OF_VIEW"}
         return [message, message] if bad == "repeat" else [message]
+
+    def _message(self, matrix: FloatArray, device: str, moment: float) -> Any:
+        """Return a message of the chosen type; those of several tools have ``Tracker`` as their device."""
+        if self._kind == "TRANSFORM":
+            return pyigtl.TransformMessage(matrix, device_name=device, timestamp=moment)
+        tool = ToolPose(device, matrix, oriented=self._kind != "POINT")
+        of = device if self._kind in ("POSITION", "QTRANS") else "Tracker"
+        return PoseBody(self._kind, [tool], device=of, time=moment)
 
     def _send(self, message: Any) -> None:
         if self._server is not None and self._server.is_connected():

@@ -29,6 +29,7 @@ from gp_core.landmarks.features import EXTERNAL, PROBE, Side
 from gp_core.standard_streams import STANDARD, standard_streams
 from gp_core.validation import FloatArray
 from gp_labeler.tracker.address import DEFAULT_PORT, check_device
+from gp_labeler.tracker.pose_bodies import POSE_KINDS
 from gp_labeler.tracker.rigid import rotation_of
 from gp_labeler.tracker.simulated_probe import SimulatedProbe
 from gp_labeler.tracker.simulated_tracker import HIDDEN_BY, Simulator
@@ -157,7 +158,15 @@ def _simulator(args: argparse.Namespace, points: dict[str, FloatArray]) -> Simul
         reference=args.reference is not None,
         rng=np.random.default_rng([args.seed, 1]),
     )
-    return Simulator(probe, port=args.port, names=names, rate_hz=args.rate, hidden=args.hidden, say=_say)
+    return Simulator(
+        probe,
+        port=args.port,
+        names=names,
+        rate_hz=args.rate,
+        hidden=args.hidden,
+        kind=args.messages,
+        say=_say,
+    )
 
 
 def _points(args: argparse.Namespace) -> tuple[dict[str, FloatArray], dict[str, object]]:
@@ -214,6 +223,9 @@ def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
     devices.add_argument("--sway", type=float, default=0.0, metavar="MM", help="how far the head moves")
     devices.add_argument("--rate", type=float, default=60.0, metavar="HZ")
     devices.add_argument("--hidden", choices=HIDDEN_BY, default="status", help="how a covered marker is told")
+    devices.add_argument(
+        "--messages", choices=POSE_KINDS, default="TRANSFORM", help="type of the messages; default: TRANSFORM"
+    )
     parser.add_argument("--script", type=Path, metavar="FILE", help="commands, done again and again")
     parser.add_argument("--live", action="store_true", help="take commands typed; ends with the input")
     return parser

@@ -18,6 +18,12 @@ from gp_labeler.tracker.samples import Fault, Sample
 
 __all__ = ["RecordedTouch", "RefusedTouch", "TouchRecorder", "TouchSettings"]
 
+NO_ORIENTATION = (
+    "The tracker tells the position of the marker without its orientation: set the tip to 0, 0, 0 if that is "
+    "the tip, or have the server send TRANSFORM"
+)
+"""What is told of a probe with a tip offset whose messages have no orientation."""
+
 _SECONDS_BETWEEN_LOOKS = 0.015
 _INITIAL_SHARE = 0.2
 """The part of the window, at its beginning, in which a tip that comes to rest is not averaged yet."""
@@ -264,6 +270,8 @@ class TouchRecorder:
     def _average(self, window: Sequence[Sample]) -> RecordedTouch | RefusedTouch:
         """Average a window of samples, or say why not."""
         usable = [s for s in window if s.usable]
+        if any(map(self.probe.lacks_orientation, usable)):
+            return RefusedTouch(f"{NO_ORIENTATION}.")
         refusal = self._too_little(window, usable)
         if refusal is not None:
             return refusal

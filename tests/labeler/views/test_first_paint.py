@@ -7,7 +7,7 @@ import os
 import subprocess
 import sys
 
-LATE = ("pyvista", "pyvistaqt", "skimage", "SimpleITK", "matplotlib")
+LATE = ("pyvista", "pyvistaqt", "skimage", "SimpleITK", "matplotlib", "numba", "llvmlite", "pandas")
 
 _CODE = """
 import json, sys

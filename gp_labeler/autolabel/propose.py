@@ -1,0 +1,174 @@
+"""First labels of a scan from labelled scans: the one function that window, script, shell and Python call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from gp_core.errors import GpError
+from gp_core.validation import FloatArray
+from gp_labeler.autolabel.confidence import GuessConfidence, centre_of, spread_of
+from gp_labeler.autolabel.library import TemplateLibrary
+from gp_labeler.autolabel.pose_search import ACCEPTED
+from gp_labeler.autolabel.prediction import Prediction, predict
+from gp_labeler.autolabel.proposal import Guess, Proposal, least_certain_first
+from gp_labeler.autolabel.registration import COARSER, Registration, engine_named
+from gp_labeler.autolabel.registration_process import HereRegistration
+from gp_labeler.imaging.progress import Progress, Report
+from gp_labeler.imaging.volume import Volume
+
+__all__ = ["Stored", "propose"]
+
+Stored = Literal["as it is", "mirrored"]
+
+_MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
+_HISTORY_SHARE = 0.6
+
+
+def propose(
+    volume: Volume,
+    library: TemplateLibrary,
+    *,
+    placed: Mapping[str, ArrayLike] | None = None,
+    stored: Stored | None = None,
+    registration: Registration | None = None,
+    with_history: bool = True,
+    progress: Progress | None = None,
+    cancel: Callable[[], bool] | None = None,
+) -> Proposal:
+    """Guess the landmarks of a scan from labelled scans.
+
+    Parameters
+    ----------
+    volume : Volume
+        The scan.
+    library : TemplateLibrary
+        Labelled scans; that of the volume itself, if it is among them, does not count.
+    placed : mapping of str to (3,) array_like, optional
+        Landmarks that are known in the scan, LPS mm; three or more say how the head lies.
+    stored : {"as it is", "mirrored"}, optional
+        What is known of left and right: nothing in a scan tells whether it was stored as its mirror image.
+        None: not known; the file is believed, and the proposal warns.
+    registration : Registration, optional
+        By default greedy in this process, or demons where it is not installed.
+    with_history : bool
+        Predict the labelled scans from each other first, once, for the radii; without, there are none.
+    progress, cancel : callable, optional
+        Told the fraction done; asked whether to stop.
+
+    Returns
+    -------
+    Proposal
+
+    Raises
+    ------
+    HeadNotFoundError
+        The head was not found in the scan.
+    GpError
+        A scan cannot be read, or has no bone or contrast.
+    Cancelled
+        `cancel` said so.
+    """
+    registration = registration or HereRegistration(engine_named())
+    report = Report(progress, cancel)
+    own = [scan.name for scan in library.scans if _is_same(volume, scan.path)]
+    if len(own) == len(library.scans):
+        raise GpError("its own labels are the only ones to suggest from", file=volume.path)
+    first = _HISTORY_SHARE if with_history else 0.1
+    confidence = GuessConfidence(())
+    if with_history:
+        confidence = library.confidence(registration, report.part(0.0, first))
+    scan = replace(volume, T_scan_voxel=_MIRROR @ volume.T_scan_voxel) if stored == "mirrored" else volume
+    known = {name: np.asarray(xyz, dtype=np.float64).reshape(3) for name, xyz in (placed or {}).items()}
+    if stored == "mirrored":
+        known = {name: _mirrored(xyz) for name, xyz in known.items()}
+    prediction = predict(
+        scan,
+        library.templates(report.part(first, first), without=own),
+        registration,
+        library.settings,
+        placed=known,
+        most=library.most,
+        report=report.part(first, 1.0),
+    )
+    if stored == "mirrored":
+        prediction = _mirrored_prediction(prediction)
+    return _proposal(volume, prediction, confidence, registration, stored, has_points=len(known) >= 3)
+
+
+def _proposal(
+    volume: Volume,
+    prediction: Prediction,
+    confidence: GuessConfidence,
+    registration: Registration,
+    stored: Stored | None,
+    *,
+    has_points: bool,
+) -> Proposal:
+    assert prediction.pose is not None
+    score = prediction.pose.score
+    guesses, outside = [], []
+    for name in prediction.names:
+        points = prediction.of(name)
+        centre, spread = centre_of(points), spread_of(points)
+        if not volume.contains(centre[None])[0]:
+            outside.append(name)
+            continue
+        guesses.append(
+            Guess(
+                name,
+                centre,
+                confidence.radius_95(name, spread),
+                None if np.isnan(spread) else spread,
+                confidence.history_of(name),
+                len(points),
+            )
+        )
+    warnings = []
+    if score > ACCEPTED and not has_points:
+        warnings.append(f"the head's pose is uncertain (score {score:.2f}): check where the guesses lie")
+    if registration.name == "demons":
+        warnings.append(COARSER)
+    if not confidence.history:
+        warnings.append("the radii are not known: suggest from two labelled scans or more")
+    left = _LEFT[stored]
+    if stored is None:
+        warnings.append(left)
+    return Proposal(
+        least_certain_first(guesses),
+        prediction.names,
+        tuple(outside),
+        tuple(prediction.carried),
+        score,
+        registration.name,
+        left,
+        tuple(warnings),
+    )
+
+
+_LEFT = {
+    None: "left and right are the file's, which nothing in the scan proves: say if it is stored mirrored",
+    "as it is": "left and right are the file's, as was confirmed",
+    "mirrored": "the scan is stored as its mirror image, as was said",
+}
+
+
+def _is_same(volume: Volume, path: Path | None) -> bool:
+    return volume.path is not None and path is not None and path.absolute() == volume.path.absolute()
+
+
+def _mirrored(point: FloatArray) -> FloatArray:
+    return point * (-1.0, 1.0, 1.0)
+
+
+def _mirrored_prediction(prediction: Prediction) -> Prediction:
+    carried = {
+        template: {name: _mirrored(xyz) for name, xyz in points.items()}
+        for template, points in prediction.carried.items()
+    }
+    return Prediction(carried, prediction.pose, prediction.scores)

@@ -1,0 +1,133 @@
+"""Registration in a process of its own: the window stays alive, and it can be stopped at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.errors import GpError
+from gp_core.study.worker_processes import worker_context
+from gp_labeler.autolabel.registration import ENGINES, Field
+from gp_labeler.imaging.progress import Cancelled
+
+__all__ = ["HereRegistration", "ProcessRegistration"]
+
+_LOOK_EVERY_S = 0.1
+
+
+class HereRegistration:
+    """Registers in this process, where nothing else waits.
+
+    Parameters
+    ----------
+    name : {"greedy", "demons"}
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def register(
+        self,
+        fixed: NDArray[np.float32],
+        moving: NDArray[np.float32],
+        step: float,
+        iterations: str,
+        cancel: Callable[[], bool] | None = None,
+    ) -> Field:
+        """Return the displacements; see `gp_labeler.autolabel.registration.RegisterImages`."""
+        if cancel is not None and cancel():
+            raise Cancelled
+        return ENGINES[self.name](fixed, moving, step, iterations)
+
+
+class ProcessRegistration:
+    """Registers in a process of its own, which is started when it is needed first.
+
+    Use it in a ``with`` statement, which ends the process.
+
+    Parameters
+    ----------
+    name : {"greedy", "demons"}
+    """
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._process: Any = None
+        self._connection: Connection | None = None
+
+    def __enter__(self) -> ProcessRegistration:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, frames: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def register(
+        self,
+        fixed: NDArray[np.float32],
+        moving: NDArray[np.float32],
+        step: float,
+        iterations: str,
+        cancel: Callable[[], bool] | None = None,
+    ) -> Field:
+        """Return the displacements; see `gp_labeler.autolabel.registration.RegisterImages`.
+
+        Raises
+        ------
+        Cancelled
+            `cancel` says so; the process is ended.
+        GpError
+            The registration failed, or its process died.
+        """
+        connection = self._started()
+        try:
+            connection.send((fixed, moving, step, iterations))
+            while not connection.poll(_LOOK_EVERY_S):
+                if cancel is not None and cancel():
+                    self.close()
+                    raise Cancelled
+            found = connection.recv()
+        except (EOFError, OSError):
+            self.close()
+            raise GpError("the registration died", remedy="Free some memory, and try again.") from None
+        if isinstance(found, str):
+            raise GpError(f"the registration failed ({found})")
+        return np.asarray(found, dtype=np.float32)
+
+    def close(self) -> None:
+        """End the process, whatever it does."""
+        process, self._process = self._process, None
+        connection, self._connection = self._connection, None
+        if process is not None:
+            process.terminate()
+            process.join()
+        if connection is not None:
+            connection.close()
+
+    def _started(self) -> Connection:
+        if self._connection is None:
+            context = worker_context()
+            self._connection, theirs = context.Pipe()
+            self._process = context.Process(target=_serve, args=(theirs, self.name), daemon=True)
+            self._process.start()
+            theirs.close()
+        return self._connection
+
+
+def _serve(connection: Connection, name: str) -> None:
+    """In the process: register what comes, until the other end is closed."""
+    while True:
+        try:
+            fixed, moving, step, iterations = connection.recv()
+        except EOFError:
+            return
+        try:
+            connection.send(ENGINES[name](fixed, moving, step, iterations))
+        except Exception as error:  # whatever a library raises is told, in words
+            connection.send(f"{type(error).__name__}: {error}")

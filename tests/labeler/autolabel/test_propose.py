@@ -1,0 +1,179 @@
+"""First labels: a head is found however it lies, its landmarks are guessed, and never taken as labels."""
+
+import json
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from small_heads import FEATURES, OWN, TURN, save_markups, save_volume, small_head
+
+from gp_core.errors import GpError
+from gp_core.io import load_specimens, read_points
+from gp_core.landmarks.features import Side
+from gp_core.landmarks.sets import Status
+from gp_labeler.autolabel import HeadNotFoundError, LabelledScan, TemplateLibrary, propose
+from gp_labeler.autolabel.labelled_scan import side_and_code
+from gp_labeler.autolabel.pose_search import find_pose
+from gp_labeler.autolabel.settings import Settings
+from gp_labeler.autolabel.suggestion_files import write_proposal
+from gp_labeler.autolabel.template import Template
+from gp_labeler.cli.entry import main
+from gp_labeler.imaging.progress import Cancelled
+from gp_labeler.imaging.volume import Volume
+
+
+def labelled(seed):
+    volume, points = small_head(seed)
+    return LabelledScan(f"small-{seed}", points, volume=volume)
+
+
+@cache
+def library():
+    return TemplateLibrary([labelled(seed) for seed in range(3)])
+
+
+@cache
+def proposed():
+    return propose(small_head(7, turn=TURN)[0], library())
+
+
+def errors(proposal, truth):
+    return np.array([np.linalg.norm(proposal.positions[name] - truth[name]) for name in truth])
+
+
+def test_a_turned_head_is_labelled_like_the_others():
+    off = errors(proposed(), small_head(7, turn=TURN)[1])
+    assert np.median(off) < 0.5  # voxels of 1 mm
+    assert off.max() < 1.2
+    assert proposed().score < 0.5
+    assert proposed().scheme == FEATURES
+    assert set(proposed().templates) == {"small-0", "small-1", "small-2"}
+
+
+def test_the_radii_hold_and_the_doubtful_come_first():
+    truth = small_head(7, turn=TURN)[1]
+    radii = [guess.radius_95 for guess in proposed().guesses]
+    assert radii == sorted(radii, reverse=True)
+    held = [np.linalg.norm(g.position - truth[g.name]) <= g.radius_95 for g in proposed().guesses]
+    assert sum(held) >= 7
+    assert max(radii) < 3.0  # and not by being huge
+
+
+def test_guesses_are_suggestions_by_side(tmp_path):
+    sides = proposed().suggestions()
+    assert set(sides[Side.LEFT]) == {"IN", "CA", "RWA", "OI"}
+    assert set(sides[Side.RIGHT]) == {"ZL", "CA", "RWA", "OI"}
+    assert sides[Side.LEFT]["CA"].source == "3 labelled scans"
+    files = write_proposal(tmp_path, "small-7", proposed())
+    assert [file.name for file in files] == ["small-7_L_suggested.mrk.json", "small-7_R_suggested.mrk.json"]
+    (specimen,) = load_specimens(tmp_path)
+    for side, wanted in sides.items():
+        assert specimen.side(side).placed == ()
+        for code, suggestion in wanted.items():
+            read = specimen.side(side).suggested[code]
+            assert read.position == pytest.approx(suggestion.position)
+            assert read.radius_95 == pytest.approx(suggestion.radius_95, abs=1e-3)
+
+
+def test_a_mirrored_scan_is_labelled_right_once_that_is_said():
+    volume, points = small_head(7, turn=TURN)
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    scan = replace(volume, T_scan_voxel=mirror @ volume.T_scan_voxel)
+    truth = {name: xyz * (-1, 1, 1) for name, xyz in points.items()}
+    alone = TemplateLibrary([labelled(0)])
+    told = propose(scan, alone, stored="mirrored")
+    assert np.median(errors(told, truth)) < 0.7
+    assert not any("mirrored" in warning for warning in told.warnings)
+    assert any("mirrored" in warning for warning in proposed().warnings)  # where nothing was said
+    assert told.guesses[0].radius_95 is None  # one labelled scan says nothing of errors
+
+
+def test_points_say_how_a_head_lies():
+    volume, truth = small_head(7, turn=TURN)
+    alone = TemplateLibrary([labelled(0)])
+    three = {name: truth[name] for name in ("CA_L", "OI_L", "ZL_R")}
+    assert np.median(errors(propose(volume, alone, placed=three), truth)) < 0.7
+    line = {name: truth["IN"] + [0, 0, n] for n, name in enumerate(three)}
+    with pytest.raises(GpError, match="not on a line"):
+        propose(volume, alone, placed=line)
+
+
+def test_a_ball_is_no_head():
+    far = np.linalg.norm(np.stack(np.meshgrid(*[np.arange(-20, 20)] * 3, indexing="ij")), axis=0)
+    ball = Volume.from_parts((1000 * (far < 11)).astype(np.int16), [1.0] * 3)
+    found = find_pose(ball, Template.of(labelled(0)).surface)
+    assert not found.is_accepted
+    assert found.refusal in str(HeadNotFoundError(found))
+    assert "Place three landmarks" in str(HeadNotFoundError(found))
+
+
+def test_it_stops_when_it_is_asked_to():
+    with pytest.raises(Cancelled):
+        propose(small_head(7)[0], TemplateLibrary([labelled(0)]), cancel=lambda: True)
+
+
+def test_what_was_kept_is_made_again_when_a_label_or_a_setting_changes():
+    scan = labelled(0)
+    moved = replace(scan, points={**scan.points, "CA_L": scan.points["CA_L"] + 0.01})
+    keys = {Template.key_of(scan, Settings()), Template.key_of(moved, Settings())}
+    assert len(keys | {Template.key_of(scan, Settings(fine=50))}) == 3
+    assert Template.key_of(labelled(0), Settings()) in keys
+
+
+@pytest.fixture(scope="module")
+def lab(tmp_path_factory):
+    """Return a folder of two labelled small heads of a lab's own scheme, and of one that is new."""
+    folder = tmp_path_factory.mktemp("lab")
+    (folder / "labelled").mkdir()
+    (folder / "new").mkdir()
+    for seed in range(2):
+        volume, points = small_head(seed, names=OWN)
+        save_volume(folder / "labelled" / f"small-{seed}.nrrd", volume)
+        save_markups(folder / "labelled" / f"small-{seed}.mrk.json", points)
+    save_volume(folder / "new" / "small-3.nrrd", small_head(3, turn=TURN)[0])
+    return folder
+
+
+def proposing(lab, *more):
+    given = ["propose", lab / "new", "--like", lab / "labelled", "-o", lab / "out"]
+    return main([str(word) for word in (*given, "--templates", lab / "kept", *more)])
+
+
+def test_the_command_suggests_any_scheme_for_a_folder_and_goes_on_where_it_was(lab, capsys):
+    assert proposing(lab) == 0
+    said = capsys.readouterr()
+    assert "small-3.nrrd: 8 suggestions from 2 labelled scans" in said.out
+    assert "stored mirrored" in said.err
+    truth = small_head(3, turn=TURN, names=OWN)[1]
+    read = read_points(lab / "out" / "small-3_suggested.mrk.json")
+    assert read.labels == OWN
+    assert set(read.statuses) == {Status.SUGGESTED}  # never labels
+    assert np.median([np.linalg.norm(p.suggestion.position - truth[p.label]) for p in read.points]) < 0.7
+    assert all(p.suggestion.radius_95 > 0 for p in read.points)
+    content = json.loads((lab / "out" / "small-3.proposal.json").read_text())
+    assert {guess["name"] for guess in content["guesses"]} == set(OWN)
+
+    before = (lab / "out" / "small-3_suggested.mrk.json").stat().st_mtime_ns
+    (lab / "new" / "broken.nrrd").write_text("no scan")
+    assert proposing(lab) == 2  # and the other head is not lost
+    assert (lab / "out" / "small-3_suggested.mrk.json").stat().st_mtime_ns == before
+    said = capsys.readouterr()
+    assert "as an earlier run wrote" in said.out
+    assert said.err.count("broken.nrrd") >= 1
+
+
+def test_a_library_without_scans_is_refused_in_one_line(lab, tmp_path, capsys):
+    save_markups(tmp_path / "alone.mrk.json", small_head(0)[1])
+    status = main(["propose", str(lab / "new"), "--like", str(tmp_path), "-o", str(tmp_path / "out")])
+    assert status == 2
+    said = capsys.readouterr().err
+    assert "its scan is not there" in said
+    assert len(said.strip().splitlines()) == 1
+
+
+def test_names_of_features_carry_their_side():
+    assert side_and_code("CA_L") == (Side.LEFT, "CA")
+    assert side_and_code("IN") == (Side.LEFT, "IN")
+    for other in ("CA", "nose", "CO_L"):
+        assert side_and_code(other) is None
