@@ -30,6 +30,10 @@ def _can_straighten(workspace: Workspace) -> bool:
     return _has_scan(workspace) and not workspace.head.is_running
 
 
+def _can_take_planes(workspace: Workspace) -> bool:
+    return _has_scan(workspace) and not workspace.view.shows_anatomy
+
+
 def _is_turned(workspace: Workspace) -> bool:
     return _has_scan(workspace) and workspace.view.planes_are_turned
 
@@ -63,6 +67,7 @@ def _turn_by_hand(workspace: Workspace, ui: Ui) -> None:
     if interaction.tool == "turn":
         interaction.leave_turning()
     else:
+        workspace.planes.straighten()  # what is turned are the planes of the frame
         interaction.set_tool("turn")
 
 
@@ -88,7 +93,8 @@ def frame_rows() -> Iterator[Action]:
               checked=lambda w: w.interaction.tool == "turn",
               hint="Drag over a slice: the head turns about the crosshair; in the sagittal slice, its pitch")
     yield row("head.take_planes", "Take these planes for those of the head", (),
-              lambda w, ui: w.head.take_planes(), hint="After the arms of the crosshair were dragged")
+              lambda w, ui: w.head.take_planes(), _can_take_planes,
+              hint="After the arms of the crosshair were dragged")
     yield row("head.take_mid_plane", "Let the mid-plane go through the crosshair", (),
               lambda w, ui: w.head.take_mid_plane(), _has_head)
     yield row("head.confirm_left", "Left is left, as the file says", (), lambda w, ui: w.head.confirm_left(),

@@ -197,8 +197,10 @@ class HeadModel:
         Raises
         ------
         GpError
-            The views do not show three planes at right angles.
+            The views show planes along an ear, or not three planes at right angles.
         """
+        if self._view.shows_anatomy:
+            raise GpError("the views show planes of an ear, not of the head", remedy="Straighten them first.")
         sagittal, coronal, axial = (self._view.planes[n] for n in ("sagittal", "coronal", "axial"))
         axes = np.stack([sagittal.normal, coronal.normal, axial.normal])
         if np.linalg.det(axes) < 1 - 1e-6:
@@ -270,12 +272,18 @@ class HeadModel:
             raise GpError("there is no scan to straighten", remedy="Open one first.")
         return volume
 
+    @property
+    def _left_is_known(self) -> bool:
+        """Whether a person has said which side is left: asked once, or when the scan was read in reverse."""
+        volume = self._scan.volume
+        reversed_by_hand = volume is not None and bool(volume.choices.get("reverse"))
+        return reversed_by_hand or (self.frame is not None and self.frame.left_confirmed)
+
     def _submit(self, job: Job[HeadPose]) -> None:
         self.refusal = ""
         self._jobs.submit(job, self._take, key=_KEY)
 
     def _take(self, pose: HeadPose) -> None:
-        known = self.frame
         self._document.do(
             SetHeadFrame(
                 HeadFrame(
@@ -283,7 +291,7 @@ class HeadModel:
                     pose.found_by,
                     pose.pitch,
                     pose.left,
-                    known is not None and known.left_confirmed,
+                    self._left_is_known,
                 )
             )
         )
@@ -295,13 +303,10 @@ class HeadModel:
 
     def _take_by_hand(self, axes: FloatArray, origin: FloatArray, *, merge: bool) -> None:
         T_head_scan = RigidTransform.from_parts(axes, -axes @ origin, dst="head", src="scan")
-        known = self.frame
-        rest: dict[str, Any] = (
-            {} if known is None else {"left": known.left, "left_confirmed": known.left_confirmed}
-        )
-        self._document.do(
-            SetHeadFrame(HeadFrame.of(T_head_scan, found_by="hand", pitch="by hand", **rest)), merge=merge
-        )
+        left = "" if self.frame is None else self.frame.left
+        matrix = HeadFrame.of(T_head_scan).matrix
+        head = HeadFrame(matrix, "hand", "by hand", left, self._left_is_known)
+        self._document.do(SetHeadFrame(head), merge=merge)
 
     def _on_reset(self) -> None:
         self._points.clear()

@@ -229,6 +229,11 @@ class ViewModel:
         return f"{name.capitalize()}, oblique" if self.is_turned(name) else name.capitalize()
 
     @property
+    def shows_anatomy(self) -> bool:
+        """Whether a view shows a plane with a title of its own, such as one along an ear."""
+        return bool(self._titles)
+
+    @property
     def frame_text(self) -> str:
         """Say in which frame the views are, and whether they are turned out of it."""
         return f"{self._frame.name.capitalize()} frame" + (", turned" if self.planes_are_turned else "")

@@ -59,7 +59,7 @@ def aim_at_bone(driver: WindowDriver, aim: FloatArray, *, turn: bool) -> bool:
     size = float(camera.viewpoint().pixel_sizes(aim[None])[0])
     middle = view.rect().center()
     turn_wheel(view, middle.x(), middle.y(), _notches(size, driver))
-    looks = list(_directions()) if turn else [(camera.direction, camera.up)]
+    looks = list(_directions(driver.workspace.view.frame.axes)) if turn else [(camera.direction, camera.up)]
     misses = []
     for look in looks:
         camera.look(*look)
@@ -100,9 +100,10 @@ def _miss(driver: WindowDriver, aim: FloatArray) -> float:
     return math.inf if hit is None else float(np.linalg.norm(hit.point - aim))
 
 
-def _directions() -> Iterator[tuple[FloatArray, FloatArray]]:
+def _directions(axes: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Directions to look in, along axes, edges and corners of a cube, each with what is up."""
     for corner in product((-1.0, 0.0, 1.0), repeat=3):
         if any(corner):
             direction = np.array(corner) / np.linalg.norm(corner)
-            yield direction, np.array([0.0, -1.0, 0.0] if abs(direction[2]) > 0.95 else [0.0, 0.0, 1.0])
+            up = np.array([0.0, -1.0, 0.0] if abs(direction[2]) > 0.95 else [0.0, 0.0, 1.0])
+            yield axes @ direction, axes @ up

@@ -60,6 +60,9 @@ _SLICE_SECONDS = 0.02
 _FIRST_LOOK = (-0.45, 0.75, -0.48)
 """Direction of the first look: from the front, the left and above."""
 
+_FAR_TURN = 1 + 2 * float(np.cos(np.radians(30)))
+"""Trace of a rotation by 30 degrees: where the frame turns farther, everything is shown again."""
+
 _MIDDLE = 0.6
 _NEAR_PIXELS = 8.0
 """A mark is meant by a click within so many logical pixels."""
@@ -253,6 +256,8 @@ class SceneView(QWidget):
             turn, camera = axes @ self.scene.cube.axes.T, self.scene.camera
             camera.look(turn @ camera.direction, turn @ camera.up)
             self.scene.cube.axes = axes
+            if np.trace(turn) < _FAR_TURN:
+                self.scene.fit()
             self.redraw()
 
     def _show_slices(self, *_: object) -> None:

@@ -156,7 +156,8 @@ class Look(Step):
             driver.scene.view_from(self.camera.upper())
         elif self.camera is not None:
             direction = np.array(self.camera) / np.linalg.norm(self.camera)
-            up = (0, -1, 0) if abs(direction[2]) > 0.95 else (0, 0, 1)
+            axes = driver.workspace.view.frame.axes
+            up = -axes[:, 1] if abs(direction @ axes[:, 2]) > 0.95 else axes[:, 2]
             driver.scene.scene.camera.look(direction, up)
             driver.scene.redraw()
         self._go(driver)

@@ -74,9 +74,12 @@ def test_the_three_planes_are_at_right_angles_and_never_mirrored(ear, kind, layo
     if layout == "sagittal":
         wanted = {"along": "Along the axis", "across": "Across the axis", "round window": "Round window"}
         assert ear.view.title("sagittal") == wanted.get(kind, "Through the footplate")
+    with pytest.raises(GpError, match="planes of an ear"):
+        ear.head.take_planes()
     ear.planes.straighten()
     assert not ear.view.planes_are_turned
     assert ear.view.frame.name == "head"
+    ear.head.take_planes()
 
 
 def test_what_is_only_expected_will_do_and_too_little_is_said() -> None:

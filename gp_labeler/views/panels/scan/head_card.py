@@ -6,6 +6,7 @@ from qtpy.QtWidgets import QCheckBox, QPushButton, QToolButton, QVBoxLayout, QWi
 
 from gp_labeler.models.head import FREE_POINTS
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.fonts import fit
 from gp_labeler.views.panels.action_button import Actions, action_button, do_action
 from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, Notice, emptied, text_label
@@ -47,6 +48,7 @@ class HeadCard(Card):
         self.by_hand = QToolButton()
         self.by_hand.setText("By hand")
         do_action(self.by_hand, actions["head.by_hand"])
+        fit(self, lambda: self.by_hand.setFixedHeight(self.straighten.sizeHint().height()))
         self.stop = QPushButton("Stop")
         self.stop.clicked.connect(workspace.head.cancel)
         self.add(_row(self.straighten, self.stop, self.by_landmarks, self.by_hand))
