@@ -110,7 +110,7 @@ class Volume:
         nz, ny, nx = self.voxels.shape
         return nx, ny, nz
 
-    @property
+    @cached_property
     def spacing(self) -> tuple[float, float, float]:
         """Voxel size along i, j, k, mm."""
         x, y, z = (float(length) for length in np.linalg.norm(self.T_scan_voxel[:3, :3], axis=0))
@@ -121,10 +121,11 @@ class Volume:
         """(3,) LPS mm: the centre of voxel (0, 0, 0)."""
         return self.T_scan_voxel[:3, 3]
 
-    @property
+    @cached_property
     def direction(self) -> FloatArray:
         """(3, 3) unit columns: where i, j, k point in LPS; determinant -1 if the grid is left-handed."""
         axes: FloatArray = self.T_scan_voxel[:3, :3] / np.asarray(self.spacing)
+        axes.setflags(write=False)
         return axes
 
     @property

@@ -219,6 +219,8 @@ class VolumeSlicer:
             flips.append(1 if forward else -1)
             index[0, axis] = 0 if forward else volume.size[axis] - 1
         cut = self._cut(plane, across, int(index[0, across]), slab)
+        if cut.strides[-1] > cut.itemsize:  # single voxels all over the scan
+            cut = np.ascontiguousarray(cut)  # read once, and not again for each use
         values = (cut if down > right else cut.T)[:: flips[0], :: flips[1]]  # its axes are z, y, x
         corner = volume.voxel_to_scan(index)
         step = np.array([volume.spacing[right], volume.spacing[down]])

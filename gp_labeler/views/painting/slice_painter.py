@@ -169,7 +169,7 @@ class SlicePainter:
         filters = (state.slab, state.denoise)
         looks = (view, self._preview, workspace.scan.threshold, state.outline_visible, filters)
         kept = self._ground
-        if kept is None or kept[0] is not shown or kept[1] is not source or kept[2] != looks:
+        if kept is None or kept[1] is not source or kept[2] != looks or not _alike(kept[0], shown, source):
             picture = QPixmap(*shown.size)
             picture.fill(QColor("#000000"))
             below = QPainter(picture)
@@ -333,6 +333,15 @@ def _picture(image: SliceImage, window: object, preview: float | None) -> QImage
     rgb = np.ascontiguousarray(image.rgb(window, threshold=preview))  # type: ignore[arg-type]
     height, width, _ = rgb.shape
     return QImage(rgb.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+
+
+def _alike(one: SliceViewport, other: SliceViewport, source: VolumeSlicer) -> bool:
+    """Whether two views show the same slice in the same place: the crosshair moved along others only."""
+    return one is other or (
+        (one.plane, one.mm_per_pixel, one.size) == (other.plane, other.mm_per_pixel, other.size)
+        and source.snap(one.plane, one.position) == source.snap(other.plane, other.position)
+        and np.array_equal(one.centre, other.centre)
+    )
 
 
 def _on_black(state: str) -> str:
