@@ -299,12 +299,12 @@ def waiting(path: str) -> Callable[[], Any]:
 def measured(name: str, path: str) -> dict[str, float]:
     """Do one thing in this process; return its CPU seconds, seconds and peak of memory, MB."""
     work = globals()[name](path)
-    before, begun, used = _anonymous_mb(), time.perf_counter(), _cpu()
+    before, begun, used = anonymous_mb(), time.perf_counter(), _cpu()
     peak, done = [before], threading.Event()
 
     def watch() -> None:
         while not done.wait(0.01):
-            peak[0] = max(peak[0], _anonymous_mb())
+            peak[0] = max(peak[0], anonymous_mb())
 
     watcher = threading.Thread(target=watch, daemon=True)
     watcher.start()
@@ -312,7 +312,7 @@ def measured(name: str, path: str) -> dict[str, float]:
     done.set()
     watcher.join()
     cpu, seconds = _cpu() - used, time.perf_counter() - begun
-    peak[0] = max(peak[0], _anonymous_mb())
+    peak[0] = max(peak[0], anonymous_mb())
     del kept
     return {"cpu": cpu, "seconds": seconds, "mb": peak[0] - before}
 
@@ -322,7 +322,8 @@ def _cpu() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def _anonymous_mb() -> float:
+def anonymous_mb() -> float:
+    """Return the anonymous and shared memory of this process."""
     status = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
     lines = [line.split() for line in status if line.startswith(("RssAnon", "RssShmem"))]
     return sum(int(line[1]) for line in lines) * 1024 / MB

@@ -101,7 +101,8 @@ def test_straight_slices_are_the_voxels_themselves() -> None:
         for plane in PLANES:
             low, high = source.limits(plane)
             image = source.image(plane, low + 0.4 * (high - low))
-            assert np.shares_memory(image.values, volume.array)
+            if abs(direction[:, 0] @ plane.normal) < 0.5:  # else single voxels all over it, gathered once
+                assert np.shares_memory(image.values, volume.array)
             row, column = len(image.values) - 2, 1
             flat = image.origin + image.step * [column, row]
             point = plane.scan(flat[None], image.position)
