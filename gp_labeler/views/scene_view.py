@@ -38,6 +38,7 @@ from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
 from gp_labeler.views.drawn_measurements import kept_measurements, mark_or_handle, moving_measurements
+from gp_labeler.views.focus_ring import FocusRing
 from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.scene_overlay import (
@@ -104,6 +105,8 @@ class SceneView(QWidget):
         self.setMinimumSize(120, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName("3D view")
+        FocusRing(self)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self._workspace = workspace
         self.canvas = canvas(self)

@@ -23,6 +23,7 @@ from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.scene.window_level import WindowLevel
 from gp_labeler.views.drawn import drawn_marks, point_of
 from gp_labeler.views.drawn_measurements import handle_of, mark_or_handle
+from gp_labeler.views.focus_ring import FocusRing
 from gp_labeler.views.mouse import button_of, modifiers_of, notches_of, painted, pixel_of
 from gp_labeler.views.painting.slice_layers import SliceLayer
 from gp_labeler.views.painting.slice_painter import SlicePainter, reach_of
@@ -73,6 +74,8 @@ class SliceView(QWidget):
         self.setMinimumSize(120, 90)
         self.setMouseTracking(True)
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
+        self.setAccessibleName(f"{plane.value} slice")
+        FocusRing(self)
         self.setAttribute(Qt.WidgetAttribute.WA_OpaquePaintEvent)
         self.plane = plane
         self._workspace = workspace

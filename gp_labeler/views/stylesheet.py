@@ -53,6 +53,7 @@ QPushButton:hover, QToolButton:hover { background: $hover; }
 QPushButton:pressed, QToolButton:pressed, QToolButton:checked { background: $selected; }
 QToolButton:checked { border-color: $accent_text; }
 QPushButton:focus, QToolButton:focus { border-color: $accent_text; }
+QToolButton:checked:focus { border-color: $text; }
 QPushButton:disabled, QToolButton:disabled { background: transparent; border-color: $border; color: $faint; }
 QPushButton[role="primary"] {
     background: $accent; border-color: $accent; color: $on_accent; font-weight: 600;
@@ -105,6 +106,7 @@ QRadioButton::indicator:checked {
     width: $dot; height: $dot; background: $on_accent; border: 5px solid $accent; border-radius: $ring;
 }
 
+QTableView:focus, QListView:focus, QTreeView:focus { border-color: $accent_text; }
 QTableView, QListView, QTreeView {
     background: $card; border: 1px solid $border; border-radius: 8px; outline: none; gridline-color: $border;
     selection-background-color: $selected; selection-color: $text;
