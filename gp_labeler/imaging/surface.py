@@ -112,7 +112,7 @@ def extract_isosurface(
     report(0.0)
     region = _region(volume, box)
     level = volume_level(volume, threshold)
-    mesh = METHODS[method](*_image(volume, region, stride, level))
+    mesh = METHODS[method](*_image(volume, region, stride, level, report.part(0.0, 0.5)))
     if volume.is_mirrored:
         _turn_over(mesh)
     surface = Surface(mesh, level, volume.T_voxel_scan, region, stride)
@@ -155,7 +155,9 @@ def _region(volume: Volume, box: ArrayLike | None) -> FloatArray:
     return region
 
 
-def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tuple[pv.ImageData, float]:
+def _image(
+    volume: Volume, region: FloatArray, stride: int, level: float, report: Report
+) -> tuple[pv.ImageData, float]:
     """Wrap (a part of) the voxels for VTK, with the level to cut them at.
 
     Narrow types are not copied at full resolution. Others, and means, become heights above the level.
@@ -166,7 +168,7 @@ def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tup
     k, j, i = slice(k0, k1 + 1), slice(j0, j1 + 1), slice(i0, i1 + 1)
     first = region[:1]
     if stride > 1:
-        part, first = _means(volume, (k, j, i), stride, level), first + (stride - 1) / 2
+        part, first = _means(volume, (k, j, i), stride, level, report), first + (stride - 1) / 2
         level = 0.0
     elif (part := volume.voxels.read(k, j, i)).dtype.name not in _CUT_BY_VTK:
         part, level = _heights(part, level), 0.0
@@ -180,14 +182,20 @@ def _image(volume: Volume, region: FloatArray, stride: int, level: float) -> tup
     return image, level
 
 
-def _means(volume: Volume, box: tuple[slice, slice, slice], stride: int, level: float) -> GreyArray:
-    """Return the means of cubes of a box, read a slab at a time, so that a mapped scan stays in its file."""
+def _means(
+    volume: Volume, box: tuple[slice, slice, slice], stride: int, level: float, report: Report
+) -> GreyArray:
+    """Return the means of cubes of a box, read a slab at a time: a mapped scan stays in its file."""
     from gp_labeler.imaging.coarse import means_of_cubes  # numba, as above
 
     k, j, i = box
     layers = max(stride, _SLAB_VOXELS // ((j.stop - j.start) * (i.stop - i.start)) // stride * stride)
-    slabs = (slice(first, min(first + layers, k.stop)) for first in range(k.start, k.stop, layers))
-    return np.concatenate([means_of_cubes(volume.voxels.read(slab, j, i), stride, level) for slab in slabs])
+    means = []
+    for first in range(k.start, k.stop, layers):
+        report((first - k.start) / (k.stop - k.start))
+        slab = volume.voxels.read(slice(first, min(first + layers, k.stop)), j, i)
+        means.append(means_of_cubes(slab, stride, level))
+    return np.concatenate(means)
 
 
 def _heights(values: GreyArray, level: float) -> NDArray[np.float32]:

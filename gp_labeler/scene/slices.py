@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
 from vtkmodules.vtkImagingCore import vtkImageReslice
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.disk_cache import available_memory
 from gp_labeler.imaging.slab import Slab, reduced
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.threshold import surface_level
@@ -23,6 +25,9 @@ from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
 from gp_labeler.scene.window_level import WindowLevel
 
 __all__ = ["SliceImage", "VolumeSlicer", "level_segments"]
+
+_MOST_READ = 4e9
+"""Bytes of a file that one slice may read."""
 
 _STRAIGHT = 1e-4
 """Off-axis part of a direction below which voxel rows run along a plane: 0.1 voxel in a thousand."""
@@ -219,12 +224,27 @@ class VolumeSlicer:
             flips.append(1 if forward else -1)
             index[0, axis] = 0 if forward else volume.size[axis] - 1
         cut = self._cut(plane, across, int(index[0, across]), slab)
+        apart = self._rows_apart(across)
+        down_by, right_by = apart * flips[0], apart * flips[1]
+        values = (cut if down > right else cut.T)[::down_by, ::right_by]  # its axes are z, y, x
         if cut.strides[-1] > cut.itemsize:  # single voxels all over the scan
-            cut = np.ascontiguousarray(cut)  # read once, and not again for each use
-        values = (cut if down > right else cut.T)[:: flips[0], :: flips[1]]  # its axes are z, y, x
+            values = np.ascontiguousarray(values)  # read once, and not again for each use
         corner = volume.voxel_to_scan(index)
-        step = np.array([volume.spacing[right], volume.spacing[down]])
+        step = apart * np.array([volume.spacing[right], volume.spacing[down]])
         return SliceImage(values, plane, plane.position_of(corner), plane.flat(corner)[0], step)
+
+    def _rows_apart(self, across: int) -> int:
+        """Return every how many-th row and layer a slice shows that takes one voxel of each row.
+
+        To read a voxel of a file is to read its page: in a scan that is larger than the memory, such a slice
+        would read it all, and keep the window waiting.
+        """
+        voxels = self.volume.voxels
+        if across != 0 or not voxels.in_file:
+            return 1
+        nz, ny, _ = voxels.shape
+        n_bytes = min(voxels.nbytes, nz * ny * mmap.PAGESIZE)
+        return math.ceil(math.sqrt(n_bytes / min(_MOST_READ, available_memory() / 2)))
 
     def _cut(self, plane: SlicePlane, across: int, index: int, slab: Slab | None) -> NDArray[Any]:
         """Return one layer of voxels, or what a slab shows of those around it."""

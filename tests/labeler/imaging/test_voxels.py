@@ -22,6 +22,7 @@ from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, MappedVoxels
+from gp_labeler.scene import slices
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slices import VolumeSlicer
 
@@ -252,6 +253,27 @@ def test_values_that_are_not_finite_are_found_wherever_they_are(tmp_path: Path) 
     mapped = read_volume(path, mapped=True).array
     assert np.isfinite(mapped).all()
     assert mapped[1, 20, 20] <= mapped.min()
+
+
+def test_a_slice_of_a_scan_larger_than_the_memory_reads_few_of_its_rows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    array = ball("uint8")
+    volume = read_volume(written(tmp_path / "ball.nrrd", array), mapped=True)
+    middle = volume.extent.mean(axis=0)
+    whole = {
+        plane: VolumeSlicer(volume).image(plane.in_scan, float(middle @ plane.in_scan.normal))
+        for plane in Plane
+    }
+    monkeypatch.setattr(slices, "_MOST_READ", array.nbytes / 4)
+    for plane, before in whole.items():
+        image = VolumeSlicer(volume).image(plane.in_scan, float(middle @ plane.in_scan.normal))
+        if plane is Plane.SAGITTAL:
+            np.testing.assert_array_equal(image.values, before.values[::2, ::2])
+            np.testing.assert_allclose(image.step, 2 * before.step)
+        else:
+            np.testing.assert_array_equal(image.values, before.values)
+        np.testing.assert_allclose(image.origin, before.origin)
 
 
 class InParts(ArrayVoxels):
