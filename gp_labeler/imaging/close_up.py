@@ -49,6 +49,11 @@ class PictureAxes:
     right: tuple[float, float, float]
     down: tuple[float, float, float]
 
+    def turned(self, rotation: FloatArray) -> PictureAxes:
+        """Return the same look in another frame; `rotation` (3, 3) leads from that frame into the scan's."""
+        right, down = (tuple((rotation @ np.asarray(v)).tolist()) for v in (self.right, self.down))
+        return PictureAxes(self.name, right, down)
+
     @property
     def away(self) -> FloatArray:
         """(3,) unit vector away from the viewer."""

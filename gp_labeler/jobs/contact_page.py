@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.landmarks.features import FEATURES, Feature, Side
+from gp_core.validation import FloatArray
 from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.close_up import PICTURE_AXES, CloseUp
@@ -60,6 +61,7 @@ def feature_pictures(
 ) -> Iterator[FeaturePictures]:
     """Yield the 20 features of one side, in the table's order."""
     low, high = volume.intensity_range
+    turn = _turn(state)
     for n, row in enumerate(FEATURES):
         tell(n / len(FEATURES))
         landmarks = state.side(side)
@@ -69,11 +71,21 @@ def feature_pictures(
             continue
         plane = row.view if row.view in ("axial", "coronal", "sagittal") else "axial"
         near = CloseUp(volume, landmarks[row.code], _ACROSS_MM, _PIXELS)
-        grey = np.nan_to_num((near.slice(PICTURE_AXES[plane]) - low) / max(high - low, 1e-9)).clip(0, 1)
-        bone = near.bone(PICTURE_AXES[side.value], threshold)
+        grey = np.nan_to_num(
+            (near.slice(PICTURE_AXES[plane].turned(turn)) - low) / max(high - low, 1e-9)
+        ).clip(0, 1)
+        bone = near.bone(PICTURE_AXES[side.value].turned(turn), threshold)
         tinted = np.where(bone[..., None] > 0, bone[..., None] * _BONE, _EMPTY)
         pictures = np.concatenate([np.repeat(grey[..., None], 3, axis=2), tinted], axis=1)
         yield FeaturePictures(row.code, heading, note, plane, pictures.astype(np.float32))
+
+
+def _turn(state: SpecimenState) -> FloatArray:
+    """Return the (3, 3) rotation from the head's frame, where that is known, into the scan's."""
+    if state.head_frame is None:
+        return np.eye(3)
+    rotation: FloatArray = state.head_frame.T_head_scan.matrix[:3, :3].T
+    return rotation
 
 
 def _note(state: SpecimenState, side: Side, row: Feature) -> str:

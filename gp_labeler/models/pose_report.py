@@ -14,9 +14,10 @@ from html import escape
 
 import numpy as np
 
-from gp_core.constants import METHOD_NAMES
+from gp_core.constants import DEFINING_FEATURES, METHOD_NAMES
 from gp_core.landmarks.features import CODES
 from gp_core.pose.cochlea_pose import CochleaPose
+from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.document.specimen_file import application
 from gp_labeler.document.state import PoseCheck, SpecimenState
 from gp_labeler.document.touches import Touch
@@ -149,7 +150,7 @@ class PoseReport:
                 f", {len(registered.fiducials.names)} points: FRE {registered.fre_mm:.2f} mm, "
                 f"TRE at CO {registered.tre_mm(placed.origin):.2f} mm"
             )
-        return f"<p>{text}{self._unconfirmed()}</p>"
+        return f"<p>{text}{self._unconfirmed()}{self._labelled()}</p>"
 
     def _unconfirmed(self) -> str:
         """Say which labels the registration and the errors leave out, since nobody has looked at them."""
@@ -158,6 +159,20 @@ class PoseReport:
             return ""
         what = "label is" if len(codes) == 1 else "labels are"
         return f"<br>{len(codes)} {what} only suggested and not used: {' '.join(codes)}"
+
+    def _labelled(self) -> str:
+        """Say who labelled this side, and what was noted of the labels that define the cochlea."""
+        state, side = self.state, self.estimate.side
+        if not state.side(side).placed:
+            return ""
+        who = labelling_text(state.labeller, state.round) if state.labeller else ""
+        text = f"<br>Labelled by {escape(who)}" if who else ""
+        for code in DEFINING_FEATURES:
+            mark = state.landmark(side, code)
+            said = [mark.certainty.value] if mark.certainty else []
+            said += [mark.note] if mark.note else []
+            text += f"<br>{code}: {escape(', '.join(said))}" if said else ""
+        return text
 
     def _warnings(self) -> Iterator[str]:
         many = len(self.estimate.poses) > 1

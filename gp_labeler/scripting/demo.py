@@ -1,7 +1,8 @@
 """The demo: a phantom labelled, exported and checked, and a cochlea estimated from touches.
 
 On the left, suggestions are judged one by one: confirmed where they lie within a voxel of the truth, else
-re-placed by a click. On the right, everything is placed by clicks.
+re-placed by a click. On the right, everything is placed by clicks. Some features are labelled again, blind,
+to show how repeatable labels are, and a contact sheet shows all of them.
 """
 
 from __future__ import annotations
@@ -14,6 +15,9 @@ from gp_labeler.models.workflow import OPENING
 from gp_labeler.scripting.script import Script, make_script
 
 __all__ = ["demo_script"]
+
+AGAIN = (*OPENING, "CB")
+"""Features that are labelled a second time."""
 
 
 def demo_script(seed: int = 0, voxel_mm: float = 0.2) -> Script:
@@ -30,6 +34,7 @@ def demo_script(seed: int = 0, voxel_mm: float = 0.2) -> Script:
 
 
 def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
+    yield {"do": "observer", "name": "demo"}
     yield {"do": "open", "phantom": seed, "spacing": voxel_mm}
     left, right = list(_order(Side.LEFT)), list(_order(Side.RIGHT))
     yield from _placed(left[: len(OPENING)], Side.LEFT, voxel_mm)
@@ -42,6 +47,8 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
         yield {"do": "confirm", "feature": code, "side": "L", **judged}
     yield from _placed(right, Side.RIGHT, voxel_mm)
     yield {"do": "expect", "placed": 2 * len(FEATURES), "suggested": 0}
+    note = "deep in the joint, hard to see"
+    yield {"do": "annotate_point", "side": "L", "code": "MN", "certainty": "fair", "note": note}
     yield {"do": "export", "complete": True}
     yield {"do": "check", "path": "check.json", "strict": True}
     yield {"do": "save"}
@@ -62,7 +69,20 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "overlay"}
     yield {"do": "view", "opacity": 0.5}
     yield {"do": "screenshot", "path": "overlay.png", "what": "views", "size": [1400, 1000]}
+    yield {"do": "view", "opacity": 1.0}
+    yield {"do": "overlay", "visible": False}
+    yield from _again(voxel_mm)
+
+
+def _again(voxel_mm: float) -> Iterator[dict[str, Any]]:
+    """Label some features again, blind, and compare both labellings; make a contact sheet of the first."""
+    yield {"do": "label_again"}
+    yield from _placed(list(AGAIN), Side.LEFT, voxel_mm)
+    yield {"do": "labelling", "observer": "demo"}
     yield {"do": "save"}
+    yield {"do": "reliability", "path": ["reliability.csv", "reliability.json"]}
+    yield {"do": "contact_sheet", "path": "contact.pdf"}
+    yield {"do": "list", "path": "specimens.json"}
 
 
 def _placed(codes: list[str], side: Side, voxel_mm: float) -> Iterator[dict[str, Any]]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from gp_core.disk import write_text
 from gp_core.landmarks.features import CODES, Side
+from gp_core.landmarks.provenance import LabelProvenance
 from gp_labeler.scripting.window_driver import WindowDriver
 
 __all__ = ["RunReport", "StepRecord", "feature_rows", "pose_rows", "suggested_rows"]
@@ -58,6 +59,8 @@ class RunReport:
     script: str
     specimen: str = ""
     error: str = ""
+    observer: str = ""
+    round: int = 1
     steps: list[StepRecord] = field(default_factory=list)
     features: list[dict[str, Any]] = field(default_factory=list)
     suggested: list[dict[str, Any]] = field(default_factory=list)
@@ -76,7 +79,8 @@ class RunReport:
 
     def take_stock(self, driver: WindowDriver) -> None:
         """Note what the window holds now."""
-        self.specimen = driver.workspace.document.state.specimen
+        state = driver.workspace.document.state
+        self.specimen, self.observer, self.round = state.specimen, state.labeller, state.round
         self.features, self.suggested = feature_rows(driver), suggested_rows(driver)
         self.poses = pose_rows(driver)
         self.files = [_relative(file, driver.output) for file in driver.files]
@@ -88,6 +92,8 @@ class RunReport:
         return {
             "script": self.script,
             "specimen": self.specimen,
+            "observer": self.observer,
+            "round": self.round,
             "ok": self.ok,
             "error": self.error,
             "seconds": round(self.seconds, 3),
@@ -120,15 +126,23 @@ def feature_rows(driver: WindowDriver) -> list[dict[str, Any]]:
     """Return a row for each placed or computed feature: where it is and, of a phantom, where it should be."""
     rows = []
     for side in Side:
-        landmarks = driver.workspace.document.landmarks(side)
+        landmarks = driver.workspace.document.state.described_side(side)
         for code in (code for code in CODES if code in landmarks):
             row: dict[str, Any] = {"side": side.value, "feature": code, "placed": landmarks[code].tolist()}
+            row |= _annotation(landmarks.provenance.get(code))
             if driver.workspace.scan.truth is not None:
                 truth = driver.truth(side, code)
                 off = float(np.linalg.norm(landmarks[code] - truth))
                 row |= {"true": truth.tolist(), "error_mm": off, "error_voxels": off / driver.voxel}
             rows.append(row)
     return rows
+
+
+def _annotation(about: LabelProvenance | None) -> dict[str, Any]:
+    """Return who placed a point, how certain that was, and what was noted; without what nobody said."""
+    known = {} if about is None else about.as_json()
+    names = {"by": "observer", "certainty": "certainty", "note": "note", "checked_by": "checked_by"}
+    return {name: known[key] for key, name in names.items() if key in known}
 
 
 def suggested_rows(driver: WindowDriver) -> list[dict[str, Any]]:

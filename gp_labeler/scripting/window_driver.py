@@ -92,6 +92,13 @@ class WindowDriver:
                 protect(read)
         return file
 
+    def saved_specimen(self) -> Path:
+        """Return the file of the open specimen; raises `GpError` where it is not saved as it stands."""
+        document = self.workspace.document
+        if document.path is None or document.dirty:
+            raise GpError("the open specimen is not saved", remedy='Save it first: do = "save".')
+        return document.path
+
     def to_write(self, path: str) -> Path:
         """Return a path to write, relative to the output folder, which is made if need be."""
         file = self.output / path

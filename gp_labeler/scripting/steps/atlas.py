@@ -103,7 +103,7 @@ class Reliability(Step):
     Parameters
     ----------
     specimens : text or texts
-        Landmark files, specimen files, or folders of them.
+        Landmark files, specimen files, or folders of them; by default the open specimen, as it is saved.
     path : text or texts
         Where to write what was found: ``.json``, ``.csv``, or a picture.
     use : bool, optional
@@ -111,13 +111,14 @@ class Reliability(Step):
     """
 
     do: ClassVar[str] = "reliability"
-    specimens: tuple[str, ...]
+    specimens: tuple[str, ...] = ()
     path: tuple[str, ...] = ()
     use: bool | None = None
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         model = driver.workspace.reliability
-        model.measure([driver.to_read(each) for each in self.specimens])
+        places = [driver.to_read(each) for each in self.specimens] or [driver.saved_specimen()]
+        model.measure(places)
         driver.wait_until_idle()
         report = model.report
         if report is None:

@@ -23,18 +23,18 @@ class ListFolders(Step):
     Parameters
     ----------
     folders : text or texts
-        Folders, searched with the folders in them.
+        Folders, searched with the folders in them, or specimen files; by default the open specimen.
     path : str, optional
         Where to write the list, JSON.
     """
 
     do: ClassVar[str] = "list"
-    folders: tuple[str, ...]
+    folders: tuple[str, ...] = ()
     path: str | None = None
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         model = driver.workspace.specimens
-        model.add(*[driver.to_read(each) for each in self.folders])
+        model.add(*([driver.to_read(each) for each in self.folders] or [driver.saved_specimen()]))
         driver.wait_until_idle()
         if self.path is not None:
             file = driver.to_write(self.path)
@@ -60,12 +60,8 @@ class ContactSheet(Step):
     path: str = "contact.pdf"
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
-        workspace, document = driver.workspace, driver.workspace.document
-        if not self.specimens and (document.path is None or document.dirty):
-            raise GpError("contact_sheet: the specimen is not saved", remedy='Save it first: do = "save".')
-        places = [driver.to_read(each) for each in self.specimens]
-        if not places and document.path is not None:
-            places = [document.path]
+        workspace = driver.workspace
+        places = [driver.to_read(each) for each in self.specimens] or [driver.saved_specimen()]
         files = specimen_files(places)
         if not files:
             raise GpError(f"contact_sheet: there are no specimens (*{SUFFIX})")

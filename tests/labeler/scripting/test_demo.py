@@ -30,6 +30,13 @@ def test_the_demo_leaves_everything_it_promises(qapp, tmp_path) -> None:
     assert {name: pose["side"] for name, pose in poses.items()} == {"": "L", "_L": "L", "_R": "R"}
     assert {pose["frame"] for pose in poses.values()} == {"tracker"}
     assert set(content(tmp_path / "phantom-1.gpspecimen.json")["touches"]) == {"L", "R"}
+    first = content(tmp_path / "phantom-1.gpspecimen.json")
+    assert (first["landmarks"]["L"]["MN"]["certainty"], first["observer"]) == ("fair", "demo")
+    (again,) = first["other_labellings"]
+    assert (again["round"], again["blind"], len(again["landmarks"]["L"])) == (2, True, 4)
+    assert content(tmp_path / "reliability.json")["overall"]["intra"]["n_pairs"] == 4
+    assert (tmp_path / "contact.pdf").read_bytes().count(b"/Type /Page ") == 2
+    assert content(tmp_path / "specimens.json")[0]["finished"]
     for name in PICTURES:
         image = QImage(str(tmp_path / name))
         assert min(image.width(), image.height()) >= 600

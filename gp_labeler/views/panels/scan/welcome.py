@@ -144,10 +144,14 @@ class Welcome(QWidget):
         row = FlowLayout(spacing=8)
         self.open_scan = self._big("Open scan…", "scan", "primary", "A file or folder with a micro-CT")
         self.open_specimen = self._big("Open specimen…", "file", "", "Go on with a labelled specimen")
+        self.specimens = self._big(
+            "All specimens…", "layout", "", "The list of your folders, and what comes next"
+        )
         self.demo = self._big("Try a demo head", "play", "", "A synthetic head to practise on; takes seconds")
         for button, id in (
             (self.open_scan, "file.open"),
             (self.open_specimen, "file.open"),
+            (self.specimens, "file.specimens"),
             (self.demo, "file.demo"),
         ):
             do_action(button, self._actions[id])

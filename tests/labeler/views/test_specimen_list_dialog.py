@@ -1,0 +1,112 @@
+"""The list of specimens as a dialog: what it shows, and what its buttons do."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from panel_cases import cut_words, deliver
+from qtpy.QtCore import Qt
+from repeated_cases import write_repeated
+
+from gp_labeler.document.specimen_file import read_specimen, write_specimen
+from gp_labeler.imaging.thumbnail import thumbnail
+from gp_labeler.jobs.runner import QueueDispatcher
+from gp_labeler.models.workspace import Workspace
+from gp_labeler.scripting.prompts import ScriptPrompts
+from gp_labeler.views.panels.scan.specimen_list_dialog import SpecimenListDialog
+
+CODES = ("CA", "CB", "RWA", "RWP", "OS", "LLI")
+
+
+@pytest.fixture
+def folder(tmp_path):
+    folder = tmp_path / "lab"
+    folder.mkdir()
+    files = write_repeated(folder, 3)
+    (part,) = write_repeated(folder, 1, codes=CODES)  # GP0 again, unfinished
+    assert part == files[0]
+    (folder / "damaged.gpspecimen.json").write_text("{")
+    return folder
+
+
+@pytest.fixture
+def workspace():
+    workspace = Workspace(None, QueueDispatcher(), author="AB")
+    yield workspace
+    workspace.close(discard=True)
+
+
+@pytest.fixture
+def dialog(workspace, folder, qtbot):
+    prompts = ScriptPrompts()
+    dialog = SpecimenListDialog(workspace, prompts, str(folder))
+    qtbot.addWidget(dialog)
+    dialog.resize(820, 500)
+    dialog.show()
+    prompts.prepare(files=[folder])
+    qtbot.mouseClick(dialog.add_folder, Qt.MouseButton.LeftButton)
+    deliver(workspace)
+    return dialog
+
+
+def cells(dialog, column):
+    model = dialog.model
+    return [model.data(model.index(row, column)) for row in range(model.rowCount())]
+
+
+def test_it_shows_progress_rounds_and_what_is_wrong(dialog, workspace):
+    assert cells(dialog, 1) == ["damaged", "GP0", "GP1", "GP2"]
+    assert cells(dialog, 2) == ["\N{EN DASH}", "7/20", "20/20", "20/20"]
+    assert cells(dialog, 5)[1:] == ["AB 2, CD"] * 3
+    assert cells(dialog, 7)[0] == "cannot be read: is not JSON: damaged or cut off"
+    assert cells(dialog, 7)[1] == "no scan"
+    assert dialog.words.text() == "4 specimens, 2 finished"
+    assert list(cut_words(dialog)) == []
+
+
+def test_words_and_the_box_filter_it(dialog, qtbot):
+    qtbot.keyClicks(dialog.search, "gp2")
+    assert cells(dialog, 1) == ["GP2"]
+    assert dialog.words.text() == "1 of 4 specimens, 2 finished"
+    dialog.search.clear()
+    dialog.kind.setCurrentText("Unfinished")
+    assert cells(dialog, 1) == ["damaged", "GP0"]
+    assert dialog.export.isEnabled()
+    dialog.kind.setCurrentText("With notes")
+    assert cells(dialog, 1) == []
+    assert not dialog.export.isEnabled()
+
+
+def test_rows_and_the_next_unfinished_open(dialog, folder, qtbot):
+    asked = []
+    dialog.open_asked.connect(asked.append)
+    dialog.table.activated.emit(dialog.model.index(2, 1))
+    dialog.table.activated.emit(dialog.model.index(0, 1))  # which cannot be read
+    qtbot.mouseClick(dialog.next, Qt.MouseButton.LeftButton)
+    assert [path.name for path in asked] == ["GP1.gpspecimen.json", "GP0.gpspecimen.json"]
+
+
+def test_chosen_rows_are_exported(dialog, workspace, folder, tmp_path, qtbot):
+    dialog.table.selectRow(2)
+    assert dialog.chosen is None  # one row is where the pointer is: all that are shown are meant
+    dialog.table.selectionModel().select(
+        dialog.model.index(3, 0),
+        dialog.table.selectionModel().SelectionFlag.Select | dialog.table.selectionModel().SelectionFlag.Rows,
+    )
+    dialog._prompts.prepare(files=[tmp_path / "out"])
+    qtbot.mouseClick(dialog.export, Qt.MouseButton.LeftButton)
+    deliver(workspace)
+    assert {path.name.split("_")[0] for path in (tmp_path / "out").iterdir()} == {"GP1", "GP2"}
+
+
+def test_a_thumbnail_is_painted_in_its_row(dialog, workspace, folder):
+    block = SimpleNamespace(points=np.random.default_rng(0).uniform(0, 30, (20000, 3)))
+    file = folder / "GP1.gpspecimen.json"
+    write_specimen(file, read_specimen(file), thumbnail=thumbnail([block]))
+    workspace.specimens.refresh()
+    deliver(workspace)
+    picture = dialog.model.data(dialog.model.index(2, 0), Qt.ItemDataRole.DecorationRole)
+    assert picture.width() == 128
+    assert dialog.model.data(dialog.model.index(1, 0), Qt.ItemDataRole.DecorationRole) is None
