@@ -17,9 +17,10 @@ from gp_core.landmarks.sets import LandmarkSet
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import point_text
 from gp_labeler.document.import_edit import ImportLandmarks
+from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_json import provenance_of
-from gp_labeler.document.state import How, Provenance
+from gp_labeler.document.state import How, Provenance, SpecimenState
 
 __all__ = ["ImportLandmarks", "OffBoneError", "Predicate", "import_landmarks"]
 
@@ -93,13 +94,30 @@ def import_landmarks(
         "accept_misfit": accept_off_bone,
     }
     new = document.provenance(How.IMPORTED, source=source)
+    other = _other_labelling(document.state, sets, source)
     with blaming(source):
         document.do(ImportLandmarks(sets, new, known, replace_placed=replace_placed, asked=asked))
-    return (*_doubtful_origin(document, lists), *off_bone, *_suggested(sets))
+    return (*other, *_doubtful_origin(document, lists), *off_bone, *_suggested(sets))
 
 
 def _sides(points: PointList, side: Side | str | None) -> tuple[LandmarkSet, ...]:
     return sides_of(points) if side is None else (landmarks_of(points, side=side),)
+
+
+def _other_labelling(state: SpecimenState, sets: tuple[LandmarkSet, ...], source: str) -> tuple[str, ...]:
+    """Say so where labels of one observer, or round, are put among those of another."""
+    here = (state.labeller.casefold(), state.round)
+    theirs = {(each.observer, each.round) for each in sets if each.observer}
+    if not state.labeller or not any(mark.decided for mark in state.landmarks.values()):
+        return ()
+    named = [labelling_text(*who) for who in sorted(theirs) if (who[0].casefold(), who[1]) != here]
+    if not named:
+        return ()
+    mine = labelling_text(state.labeller, state.round)
+    return (
+        f"{source} is by {' and '.join(named)}, and is now part of the labelling by {mine}: to keep them "
+        "apart, undo, and begin a labelling for it first",
+    )
 
 
 def _suggested(sets: tuple[LandmarkSet, ...]) -> list[str]:

@@ -68,6 +68,8 @@ class AtlasModel:
     """Another atlas is in use: `current`, `specimens`."""
     details_changed = Signal()
     """What is known of the atlas in use changed: `file`, `problem`, `trial`."""
+    labelling_error_changed = Signal(object)
+    """The `LabellingError` that checks and regions allow for from now on, or None."""
     expectations_changed = Signal()
     """Features are expected, and labels checked, by another atlas: `predict`, `check`."""
 
@@ -140,6 +142,7 @@ class AtlasModel:
         self.labelling_error = error
         if self._errors is not None:
             self._errors.remember(error)
+        self.labelling_error_changed.emit(error)
         self.details_changed.emit()
         self.expectations_changed.emit()
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 from qtpy.QtCore import QObject
 
+from gp_core.atlas.labelling_error import LabellingError
 from gp_core.disk import write_text
 from gp_core.landmarks.features import Side
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
@@ -101,6 +102,8 @@ class Recorder(QObject):
             (workspace.measure.changed, self._on_measure),
             (workspace.view.changed, self._on_view_changed),
             (workspace.view.planes_turned, self._on_planes_turned),
+            (workspace.document.author_changed, self._on_observer),
+            (workspace.atlas.labelling_error_changed, self._on_labelling_error),
             (workspace.interaction.tool_changed, self._on_tool),
             (workspace.pose.overlay_changed, self._on_overlay),
         ):
@@ -150,14 +153,27 @@ class Recorder(QObject):
         self.tables.append(step("view", size=size, theme=theme, text_size=text_size) | self._seen(differing))
 
     def _take_as_here(self) -> None:
-        """Write which atlas is in use, and which insertion path is carried."""
+        """Write who labels, which atlas is in use, and which insertion path is carried."""
         workspace = self._window.workspace
+        if workspace.document.author:
+            self._on_observer(workspace.document.author)
         if workspace.atlas.current is not None and not workspace.atlas.is_published:
             self._on_atlas()
         self._on_path(workspace.pose.path)
         if workspace.references.points:
             self._on_references()
         self._on_meshes()
+
+    def _on_observer(self, name: str) -> None:
+        self.tables.append(step("observer", name=name))
+
+    def _on_labelling_error(self, error: LabellingError | None) -> None:
+        reliability = self._window.workspace.reliability
+        if error is not None and reliability.is_used:
+            specimens = [str(path.absolute()) for path in reliability.paths]
+            self.tables.append(step("reliability", specimens=specimens, use=True))
+        elif error is None:
+            self.tables.append({"do": "reliability", "use": False})
 
     def _on_volume(self, _: Volume) -> None:
         self._begin()

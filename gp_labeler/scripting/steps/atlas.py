@@ -117,6 +117,10 @@ class Reliability(Step):
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         model = driver.workspace.reliability
+        if self.use is False and not self.specimens and not self.path:
+            model.use_error(False)
+            driver.wait_until_idle()
+            return "the error of labels is no longer taken from a report"
         places = [driver.to_read(each) for each in self.specimens] or [driver.saved_specimen()]
         model.measure(places)
         driver.wait_until_idle()

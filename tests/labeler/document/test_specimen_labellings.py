@@ -243,3 +243,16 @@ def test_an_unnamed_labelling_gets_the_observer_who_answers_later(tmp_path):
     workspace.open_labelling("AB", 1)
     assert tuple(workspace.document.landmarks(L)["CA"]) == (1, 2, 3)
     workspace.close()
+
+
+def test_labels_of_another_observer_are_not_mixed_in_unsaid(editing, tmp_path):
+    relabelled(editing, "CD")
+    files = export_landmarks(editing.document.state, tmp_path).files
+    theirs = next(file for file in files if "_CD_" in file.name)
+    editing.document.do(OpenLabelling("AB", 1))
+    (said,) = import_landmarks(editing.document, [theirs])
+    assert said.startswith(
+        "GP-014_CD_r1_L.mrk.json is by CD, round 1, and is now part of the labelling by AB"
+    )
+    own = next(file for file in files if "_AB_r1_L" in file.name)
+    assert import_landmarks(editing.document, [own]) == ()

@@ -71,6 +71,10 @@ ACTION_STEPS = {
     "point.clear": "clear_point",
     "point.check": "check_point",
     **dict.fromkeys(("point.lock", "point.lock_all"), "lock_points"),
+    **dict.fromkeys(("point.sure", "point.fair", "point.guess"), "annotate_point"),
+    "labelling.again": "begin_labelling",
+    "file.next_specimen": "open",
+    "atlas.save_reliability": "reliability",
     "pose.open_touches": "take_touches",
     "pose.clear": "remove_touches",
     "pose.open_skull": "set_skull",
@@ -102,6 +106,11 @@ NOT_WRITTEN = {
     "point.replace": "arms a click: the move is written",
     "measure.show": "tells only: what is done in it is written",
     "pose.physical": "tells only: its result is no part of the specimen",
+    "file.specimens": DIALOG,
+    "labelling.show": DIALOG,
+    **dict.fromkeys(
+        ("atlas.reliability_files", "atlas.reliability_folder"), "written once it is saved, or its error used"
+    ),
     **dict.fromkeys(("atlas.show", "atlas.try"), "tells only: nothing of it is kept"),
     **dict.fromkeys(
         ("pose.robust", "pose.jrmpc", "pose.both", "pose.touched_window"), "written with a verdict"
@@ -168,7 +177,7 @@ class Recording:
 
 
 def untimed(path) -> str:
-    return re.sub(r'"time": "[^"]*"|; time: [^]]*', "", path.read_text())
+    return re.sub(r'"time": "[^"]*"| \[time: [^]]*\]|; time: [^]]*', "", path.read_text())
 
 
 def write_path(folder) -> Path:

@@ -26,9 +26,11 @@ class AnnotationRow(QWidget):
         self._workspace = workspace
         self.buttons = {each: self._button(each) for each in Certainty}
         self.note = QLineEdit()
-        self.note.setPlaceholderText("Note: broken bulla, fluid, artefact…")
+        self.note.setPlaceholderText("Note: fluid…")
         self.note.setAccessibleName("Note on this label")
-        self.note.setToolTip("What was seen there; kept with the label in every file")
+        self.note.setToolTip(
+            "What was seen there: broken bulla, fluid, artefact; kept with the label in every file"
+        )
         self.note.editingFinished.connect(self._keep_note)
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
