@@ -93,11 +93,23 @@ def _read(file: Path) -> pv.PolyData:
     if not _attributes_fit(read):
         raise FileFormatError("the mesh is cut off or damaged", file=file, remedy=_REMEDY)
     read = pv.wrap(read)
-    whole = read.combine() if isinstance(read, pv.MultiBlock) else read
+    whole = _joined(read) if isinstance(read, pv.MultiBlock) else read
     mesh: pv.PolyData = (
         whole if isinstance(whole, pv.PolyData) else whole.extract_surface(algorithm="dataset_surface")
     )
     return mesh
+
+
+def _joined(blocks: pv.MultiBlock) -> pv.DataSet:
+    """Return the surfaces of all blocks as one; in pyvista 0.49.0, `combine` fails on blocks in blocks."""
+    import pyvista as pv
+    from vtkmodules.vtkFiltersGeometry import vtkCompositeDataGeometryFilter
+
+    join = vtkCompositeDataGeometryFilter()
+    join.SetInputDataObject(blocks)
+    join.Update()
+    joined: pv.DataSet = pv.wrap(join.GetOutput())
+    return joined
 
 
 def _attributes_fit(read: Any) -> bool:
