@@ -106,7 +106,7 @@ class Commands(QObject):
                 if row.menu != name:
                     continue
                 if row.group != group:
-                    if group is not None:
+                    if group is not None and not {group, row.group} <= _FOLDED.keys():
                         menu.addSeparator()
                     group = row.group
                     shown = menu.addMenu(_FOLDED[group]) if group in _FOLDED else menu
