@@ -75,7 +75,10 @@ class GuardedMap:
 
     def __init__(self, fileno: int, length: int) -> None:
         self._map = mmap.mmap(fileno, length, access=mmap.ACCESS_READ)
+        self._length = length
         self._start = int(np.frombuffer(self._map, np.uint8).ctypes.data)
+        if hasattr(mmap, "MADV_RANDOM"):  # else each voxel of a row would bring megabytes after it
+            self._map.madvise(mmap.MADV_RANDOM)
         end = self._start + -(-length // mmap.PAGESIZE) * mmap.PAGESIZE
         self.__array_interface__ = {
             "data": (self._start, True),
@@ -95,6 +98,22 @@ class GuardedMap:
     def broken(self) -> bool:
         """Whether some of what was read was not there any more, and came as zeros."""
         return bool(_table[self._row, _BROKEN])
+
+    def fetch(self, address: int, n_bytes: int) -> None:
+        """Have the system read a part of the file ahead, in one piece.
+
+        Parameters
+        ----------
+        address : int
+            Of the first byte, in memory.
+        n_bytes : int
+            How many.
+        """
+        begin = max(0, address - self._start) // mmap.PAGESIZE * mmap.PAGESIZE
+        end = min(address - self._start + n_bytes, self._length)
+        if hasattr(mmap, "MADV_WILLNEED") and end > begin:
+            with suppress(OSError, ValueError):
+                self._map.madvise(mmap.MADV_WILLNEED, begin, end - begin)
 
     def close(self) -> None:
         """Let go of the file; raises no error where arrays still hold it."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.lib.array_utils import byte_bounds
 from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
@@ -20,6 +21,10 @@ __all__ = ["MappedFile", "can_map"]
 def can_map() -> bool:
     """Whether files can be mapped so that the program survives whatever is done to them."""
     return maps_can_be_guarded()
+
+
+_LEAST_AHEAD, _MOST_AHEAD = 1 << 16, 1 << 28
+"""Bytes that are worth it, and that the system's cache can take at once."""
 
 
 class MappedFile:
@@ -72,6 +77,18 @@ class MappedFile:
             return values.view(dtype).reshape(shape)
         first = values[:inner].view(dtype).reshape(shape[1:])
         return as_strided(first, shape, (step, *first.strides), writeable=False)
+
+    def fetch(self, part: NDArray[Any]) -> None:
+        """Have the system read ahead what will be read of the file, where that lies densely and is not huge.
+
+        Parameters
+        ----------
+        part : array
+            A view of `array`.
+        """
+        low, high = byte_bounds(part)
+        if part.nbytes >= _LEAST_AHEAD and high - low <= min(2 * part.nbytes, _MOST_AHEAD):
+            self._map.fetch(low, high - low)
 
     @property
     def problem(self) -> str | None:

@@ -182,6 +182,8 @@ class MappedVoxels(Voxels):
     def read(self, k: slice, j: slice, i: slice) -> GreyArray:
         """Return the values of a box: a view of the map where nothing has to be changed."""
         values = self._stored[k, j, i]
+        if self._file is not None:
+            self._file.fetch(values)
         return self._converted(values, [fill.part(j, i) for fill in self._fills])
 
     def at(self, k: _Index, j: _Index, i: _Index) -> GreyArray:
