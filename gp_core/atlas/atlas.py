@@ -19,6 +19,7 @@ from gp_core.atlas.published import published_shape
 from gp_core.constants import DEFINING_FEATURES
 from gp_core.disk import read_head, read_json, write_text
 from gp_core.errors import FeatureError, FileFormatError, GpError
+from gp_core.html_tables import html_table
 from gp_core.landmarks.anatomy import cochlea_frame, cochlea_origin
 from gp_core.landmarks.features import CODES, FEATURES, check_codes, index_of
 from gp_core.landmarks.plausible_size import check_plausible_size
@@ -188,6 +189,16 @@ class Atlas:
             ) from None
 
     @checks_arguments
+    def _repr_html_(self) -> str:
+        """Return the atlas for a notebook."""
+        spread = np.sqrt(self.covariance.diagonal().reshape(-1, 3).sum(axis=1))
+        rows = [
+            (code, *(f"{value:.2f}" for value in mean), f"{sd:.2f}")
+            for code, mean, sd in zip(self.codes, self.mean, spread, strict=True)
+        ]
+        title = f"Atlas {self.name}, {self.n_samples} sides"
+        return html_table(title, [("feature", "x mm", "y mm", "z mm", "SD mm"), *rows])
+
     def save(self, path: str | PathLike[str]) -> None:
         """Write the atlas as JSON, with full precision.
 

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import FeatureError, FrameError, GpError
 from gp_core.frames import RigidTransform
+from gp_core.html_tables import html_table
 from gp_core.landmarks.features import CODES, Side, check_codes, feature, index_of
 from gp_core.landmarks.labels import is_skull_feature, tidy_label
 from gp_core.landmarks.provenance import LabelProvenance
@@ -542,6 +543,14 @@ class Specimen:
                     f"the {side.word} side holds {landmarks.side.word} landmarks", specimen=self.name
                 )
         object.__setattr__(self, "sides", MappingProxyType(dict(self.sides)))
+
+    def _repr_html_(self) -> str:
+        """Return the animal for a notebook."""
+        rows = [
+            (side.word, f"{len(landmarks.placed)} placed", " ".join(landmarks.placed))
+            for side, landmarks in self.sides.items()
+        ]
+        return html_table(f"Specimen {self.name}", rows)
 
     def __reduce__(self) -> tuple[object, ...]:
         """Let pickle carry the animal to other processes, though it cannot carry a read-only mapping."""

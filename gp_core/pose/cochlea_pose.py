@@ -15,6 +15,7 @@ from gp_core.argument_types import checks_arguments
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform, quaternion_xyzw
+from gp_core.html_tables import html_table
 from gp_core.io.pose_export import pose_text, write_csv, write_landmarks
 from gp_core.io.tfm import write_tfm
 from gp_core.landmarks.features import Side
@@ -180,6 +181,19 @@ class CochleaPose:
         yield self.probability, self.origin, self.axis, self.covariance
         for h in self.hypotheses:
             yield h.probability, h.origin, h.axis, h.covariance
+
+    def _repr_html_(self) -> str:
+        """Return the pose for a notebook."""
+        origin = "  ".join(f"{value:.3f}" for value in self.origin)
+        axis = "  ".join(f"{value:.4f}" for value in self.axis)
+        rows = [
+            ("origin CO", f"{origin} mm", f"95 % within {self.radius_95:.2f} mm"),
+            ("axis CB->CA", axis, f"95 % within {np.degrees(self.cone_95):.1f} deg"),
+            ("state", f"side {self.side_state}, names {self.names_state}", ""),
+            *(("warning", warning, "") for warning in self.warnings),
+        ]
+        title = f"Cochlea, {self.side.word} side, method {self.method}, atlas {self.atlas}"
+        return html_table(title, rows)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the pose itself as the JSON file holds it; `content` adds what it was made from.
