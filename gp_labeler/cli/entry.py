@@ -26,6 +26,7 @@ _EXAMPLE = """examples:
   gp-labeler phantom -o head.nrrd            a synthetic head with its truth; see gp-labeler phantom --help
   gp-labeler straighten head.nrrd            how the head lies in its scan; see gp-labeler straighten --help
   gp-labeler propose head.nrrd --like labelled/ -o suggested/    first labels; see gp-labeler propose --help
+  gp-labeler check-library labelled/         labels that the other labelled scans contradict
   gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
   gp-labeler list scans/              all specimens, and how far each is; see gp-labeler list --help
   gp-labeler contact-sheet scans/ -o sheets  every label for review; see gp-labeler contact-sheet --help

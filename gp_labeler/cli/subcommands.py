@@ -50,6 +50,9 @@ SUBCOMMANDS = {
     "phantom": Subcommand("phantom", "phantom", "make a synthetic head with its truth"),
     "straighten": Subcommand("straighten", "straighten", "find how the head lies in its scan"),
     "propose": Subcommand("propose", "propose", "suggest the landmarks of scans from labelled scans"),
+    "check-library": Subcommand(
+        "check_library", "check_library", "find labels that the other labelled scans contradict"
+    ),
     "export": Subcommand("export", "export", "write the landmark files of a specimen"),
     "list": Subcommand("specimens", "list", "list the specimens of folders, and how far each is"),
     "contact-sheet": Subcommand("specimens", "contact_sheet", "make contact sheets of specimens, PDF"),

@@ -32,6 +32,7 @@ class Ui(Protocol):
     def show_measurements(self) -> None: ...  # noqa: D102
     def ask_import_measurements(self) -> None: ...  # noqa: D102
     def ask_export_measurements(self) -> None: ...  # noqa: D102
+    def ask_suggest_like(self) -> None: ...  # noqa: D102
     def ask_swap(self) -> None: ...  # noqa: D102
     def show_specimens(self) -> None: ...  # noqa: D102
     def open_next_specimen(self) -> None: ...  # noqa: D102

@@ -356,6 +356,9 @@ def landmark_rows() -> Iterator[Action]:
     yield row("point.accept_all", "Accept all ghosts of this side", (),
               lambda w, ui: w.labels.accept_all_ghosts(),
               lambda w: bool(w.labels.ghosts(w.labels.active.side)), hint="As suggestions to confirm")
+    yield row("point.suggest_like", "Suggest from my scans…", (), lambda w, ui: ui.ask_suggest_like(),
+              lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
+              hint="First labels from scans that are labelled, to confirm; again, to stop")
     yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
               icon="label")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),

@@ -25,6 +25,7 @@ from gp_labeler.models.added_meshes import AddedMeshesModel
 from gp_labeler.models.anatomical_planes import AnatomicalPlanesModel
 from gp_labeler.models.atlas import AtlasModel, is_atlas_file
 from gp_labeler.models.bone import BoneModel
+from gp_labeler.models.first_labels import FirstLabelsModel
 from gp_labeler.models.head import HeadModel
 from gp_labeler.models.interaction import InteractionModel
 from gp_labeler.models.labels import LabelsModel
@@ -84,6 +85,7 @@ class Workspace:
         self.measure = MeasureModel(document, self.interaction, self.labels, self.view, messages)
         self.bone = BoneModel(document, self.scan, self.labels, jobs, messages)
         self.head = HeadModel(document, self.view, self.scan, jobs, messages)
+        self.first_labels = FirstLabelsModel(document, self.scan, self.labels, jobs, messages, directory)
         document.picture = self._thumbnail
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
         self.planes = AnatomicalPlanesModel(self.labels, self.pose, self.view)

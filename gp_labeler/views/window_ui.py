@@ -22,6 +22,7 @@ from gp_labeler.models.view import CUTS
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.atlas_ui import AtlasUi
 from gp_labeler.views.canvas_ui import ask_canvas
+from gp_labeler.views.first_labels_ui import FirstLabelsUi
 from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.measure_ui import MeasureUi
 from gp_labeler.views.panels.label.export_dialog import ExportDialog
@@ -55,7 +56,7 @@ _OPEN_MM = 16.0
 _MESHES = "PLY (*.ply);;STL (*.stl);;VTP (*.vtp);;OBJ (*.obj);;glTF (*.glb *.gltf)"
 
 
-class WindowUi(AtlasUi, PoseUi, MeasureUi):
+class WindowUi(AtlasUi, PoseUi, MeasureUi, FirstLabelsUi):
     """The answers that a main window gives to actions.
 
     Parameters

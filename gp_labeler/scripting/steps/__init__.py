@@ -9,6 +9,7 @@ from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.steps.atlas import Check, Fit, Reliability, UseAtlas
 from gp_labeler.scripting.steps.expecting import Expect
 from gp_labeler.scripting.steps.files import AddMesh, Details, Export, Import, Reference, RemoveMesh, Save
+from gp_labeler.scripting.steps.first_labels import SuggestLike
 from gp_labeler.scripting.steps.head import StraightenHead, TurnHead
 from gp_labeler.scripting.steps.labellings import LabelAgain, Observer, OpenOther
 from gp_labeler.scripting.steps.looking import Act, Look, PressKey, Screenshot, Undo
@@ -33,6 +34,7 @@ _ALL: tuple[type[Step], ...] = (
         Details,
         StraightenHead,
         TurnHead,
+        SuggestLike,
         Observer,
         LabelAgain,
         OpenOther,

@@ -65,7 +65,7 @@ ACTION_STEPS = {
     "head.forget": "clear_head_frame",
     "head.left_is_right": "open",
     "point.place": "place_point",
-    **dict.fromkeys(("point.accept_ghost", "point.accept_all"), "suggest_points"),
+    **dict.fromkeys(("point.accept_ghost", "point.accept_all", "point.suggest_like"), "suggest_points"),
     "point.confirm": "confirm_point",
     "point.unseen": "mark_unseen",
     "point.clear": "clear_point",

@@ -1,0 +1,86 @@
+"""The command ``gp-labeler check-library``: labels that the other labelled scans contradict."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from gp_core.command_line import CommandParser
+from gp_core.disk import protected_inputs, write_text
+from gp_labeler.cli.propose import add_library_options, library_of, prepare
+
+__all__ = ["make_check_library_parser", "run_check_library"]
+
+_EXAMPLE = """examples:
+  gp-labeler check-library labelled/
+  gp-labeler check-library GP-0*.gpspecimen.json --json library.json
+
+Every labelled scan is predicted from the others; labels that lie far from there, or fit under each other's
+names, are named. The status is 1 where something was found.
+"""
+
+
+def make_check_library_parser() -> argparse.ArgumentParser:
+    """Return the parser of ``gp-labeler check-library``."""
+    parser = CommandParser(
+        prog="gp-labeler check-library",
+        description="Find labels that the other labelled scans contradict.",
+        epilog=_EXAMPLE,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "labelled", type=Path, nargs="+", metavar="LABELLED", help="labelled scans, or folders of them"
+    )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found")
+    add_library_options(parser)
+    return parser
+
+
+def run_check_library(arguments: Sequence[str]) -> int:
+    """Predict every scan from the others, and say what does not agree.
+
+    Returns
+    -------
+    int
+        0; 1 where a label should be looked at.
+
+    Raises
+    ------
+    GpError
+        The labelled scans cannot be read, or there are fewer than three.
+    """
+    args = make_check_library_parser().parse_args(arguments)
+    from gp_core.errors import GpError  # here: `--help` need not wait
+    from gp_core.study.parallel import open_executor
+    from gp_labeler.autolabel.cross_check import check_predictions
+    from gp_labeler.autolabel.registration import COARSER, engine_named
+    from gp_labeler.autolabel.registration_process import HereRegistration
+
+    engine = engine_named(args.engine)
+    if engine == "demons":
+        sys.stderr.write(f"gp-labeler: {COARSER}\n")
+    library = library_of(args.labelled, args)
+    if len(library.scans) < 3:
+        raise GpError(f"three labelled scans or more are needed, got {len(library.scans)}")
+    with protected_inputs(args.labelled), open_executor(args.workers, args.scheduler) as executor:
+        prepare(library, engine, executor)
+        check = check_predictions(library.scans, library.held_out(HereRegistration(engine)))
+        if args.json is not None:
+            content = {
+                "schema": "gp-labeler library check",
+                "version": 1,
+                "checked": list(check.checked),
+                "notFound": list(check.unchecked),
+                "findings": [finding.as_json() for finding in check.findings],
+            }
+            write_text(args.json, json.dumps(content, indent=1) + "\n")
+    for name in check.checked:
+        found = check.of(name)
+        sys.stdout.write(f"{name}: {f'{len(found)} to look at' if found else 'agrees with the others'}\n")
+        sys.stdout.write("".join(f"  {finding.text}\n" for finding in found))
+    for name in check.unchecked:
+        sys.stdout.write(f"{name}: the head was not found, so its labels were not checked\n")
+    return 1 if check.findings else 0

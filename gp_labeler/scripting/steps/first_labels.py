@@ -1,0 +1,45 @@
+"""The step that suggests landmarks from labelled scans."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from gp_core.errors import GpError
+from gp_labeler.scripting.step import Step
+from gp_labeler.scripting.window_driver import WindowDriver
+
+__all__ = ["SuggestLike"]
+
+
+@dataclass(frozen=True)
+class SuggestLike(Step):
+    """Suggest the landmarks of the open scan from labelled scans, for a person to confirm.
+
+    Parameters
+    ----------
+    labelled : text or texts
+        Specimen files, landmark files beside their scans, and folders of them.
+    left_confirmed : bool
+        Whether left is known to be left as the file says; nothing in a scan can prove it. Needed unless a
+        feature of one side is placed, or left was confirmed before.
+    """
+
+    do: ClassVar[str] = "suggest_like"
+    labelled: tuple[str, ...]
+    left_confirmed: bool = False
+
+    def run(self, driver: WindowDriver) -> str:  # noqa: D102
+        model = driver.workspace.first_labels
+        if not (self.left_confirmed or model.knows_left):
+            raise GpError(
+                "suggest_like: which side is left is not known",
+                remedy="Say left_confirmed = true if left is as the file says.",
+            )
+        before = model.proposal
+        model.suggest([driver.to_read(each) for each in self.labelled])
+        driver.wait_until_idle()
+        if model.proposal is None or model.proposal is before:
+            raise GpError("suggest_like: nothing was suggested")
+        proposal = model.proposal
+        return f"{len(proposal.guesses)} suggested from {proposal.source}"

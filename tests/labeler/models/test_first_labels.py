@@ -1,0 +1,88 @@
+"""Suggestions from labelled scans reach the document off the user's thread, and are never taken as labels."""
+
+import time
+
+import pytest
+from small_heads import TURN, save_markups, save_volume, small_head
+
+from gp_core.errors import GpError
+from gp_core.landmarks.features import Side
+from gp_labeler.commands.actions import ACTIONS
+from gp_labeler.imaging.progress import Cancelled
+from gp_labeler.jobs.first_labels import SuggestFromScans
+from gp_labeler.jobs.runner import Progress, QueueDispatcher
+from gp_labeler.models.workflow import Active
+from gp_labeler.models.workspace import Workspace
+
+
+@pytest.fixture(scope="module")
+def labelled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("labelled")
+    volume, points = small_head(0)
+    save_volume(folder / "small-0.nrrd", volume)
+    for side in "LR":
+        own = {name.removesuffix(f"_{side}"): xyz for name, xyz in points.items() if name[-1] in (side, "N")}
+        save_markups(folder / f"small-0_{side}.mrk.json", own)
+    return folder
+
+
+@pytest.fixture
+def workspace(tmp_path):
+    calls = QueueDispatcher()
+    made = Workspace(tmp_path / "state", calls, author="AB")
+    made.scan.begin(small_head(7, turn=TURN)[0])
+    calls.deliver_until_idle(made.jobs)
+    yield made, calls
+    made.close(discard=True)
+
+
+def test_suggestions_arrive_the_least_certain_first_and_placed_points_stay(workspace, labelled):
+    made, calls = workspace
+    truth = small_head(7, turn=TURN)[1]
+    assert not made.first_labels.knows_left
+    made.labels.place(truth["OI_L"], side="L", code="OI")
+    assert made.first_labels.knows_left
+    said = []
+    made.messages.said.connect(lambda text, level: said.append(text))
+    made.first_labels.suggest([labelled])
+    assert made.first_labels.is_running
+    calls.deliver_until_idle(made.jobs)
+    assert not made.first_labels.is_running
+    left, right = (made.document.landmarks(side) for side in Side)
+    assert left.placed == ("OI",)
+    assert set(left.suggested) == {"IN", "CA", "RWA"}
+    assert set(right.suggested) == {"CA", "RWA", "OI", "ZL", "IN"}
+    assert right.suggested["CA"].position == pytest.approx(truth["CA_R"], abs=1.5)
+    assert made.labels.active != Active(Side.LEFT, "OI")
+    assert any("points suggested from 1 labelled scan" in text for text in said)
+    made.document.undo()
+    made.document.undo()
+    assert not made.document.landmarks(Side.RIGHT).suggested
+
+
+def test_it_is_stopped_within_two_seconds_while_images_are_registered(labelled, tmp_path):
+    job = SuggestFromScans(small_head(7)[0], (labelled,), tmp_path)
+    stopped = []
+
+    def report(fraction, text):
+        if fraction > 0.2 and not stopped:  # the pose is found: the other process is at work
+            stopped.append(time.monotonic())
+            progress.cancel()
+
+    progress = Progress(report)
+    with pytest.raises(Cancelled):
+        job.run(progress)
+    assert time.monotonic() - stopped[0] < 2.0
+
+
+def test_what_cannot_be_suggested_is_said(workspace, tmp_path):
+    made, calls = workspace
+    failed = []
+    made.jobs.failed.connect(lambda task: failed.append(task.message))
+    made.first_labels.suggest([tmp_path / "nothing"])
+    calls.deliver_until_idle(made.jobs)
+    assert "does not exist" in failed[0]
+    with pytest.raises(GpError, match="Open one first"):
+        Workspace().first_labels.suggest([tmp_path])
+    assert ACTIONS["point.suggest_like"].enabled(made)
+    assert not ACTIONS["point.suggest_like"].enabled(Workspace())
