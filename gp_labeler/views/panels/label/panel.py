@@ -11,6 +11,7 @@ from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.label.feature_card import FeatureCard
 from gp_labeler.views.panels.label.landmark_table import LandmarkTable
 from gp_labeler.views.panels.label.observer_row import ObserverRow
+from gp_labeler.views.panels.label.suggest_row import SuggestRow
 from gp_labeler.views.panels.parts import Scrolled
 
 __all__ = ["LabelPanel"]
@@ -35,6 +36,7 @@ class LabelPanel(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "panel")
         self.observer = ObserverRow(workspace, actions)
+        self.suggest = SuggestRow(workspace, actions)
         self.card = FeatureCard(workspace, actions)
         self.table = LandmarkTable(workspace)
         content = QWidget()
@@ -44,6 +46,7 @@ class LabelPanel(QWidget):
         column.setSpacing(6)
         fit(self, lambda: self.card.setMaximumHeight(pixels(self, _TALLEST_CARD)))
         column.addWidget(self.observer)
+        column.addWidget(self.suggest)
         column.addWidget(self.card, 1)
         column.addWidget(self.table, 2)
         column.addStretch(0)

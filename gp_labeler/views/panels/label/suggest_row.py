@@ -1,0 +1,50 @@
+"""The first offer of the step Label: suggestions from labelled scans, before anything is placed."""
+
+from __future__ import annotations
+
+from qtpy.QtWidgets import QHBoxLayout, QWidget
+
+from gp_core.landmarks.features import Side
+from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.panels.action_button import Actions, action_button
+from gp_labeler.views.signals import follow
+
+__all__ = ["SuggestRow"]
+
+
+class SuggestRow(QWidget):
+    """A button, shown while a scan has no label and no suggestion yet, and while suggestions are made.
+
+    Parameters
+    ----------
+    workspace : Workspace
+        Whose labels it looks at.
+    actions : mapping of str to QAction
+        What its button does.
+    """
+
+    def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
+        super().__init__(parent)
+        self._workspace = workspace
+        words = "Suggest from my scans…"
+        self.button = action_button(
+            actions["point.suggest_like"],
+            words,
+            "First labels from labelled scans; again, to stop",
+        )
+        row = QHBoxLayout(self)
+        row.setContentsMargins(12, 0, 12, 0)
+        row.addWidget(self.button)
+        row.addStretch(1)
+        document = workspace.document
+        for signal in (document.reset, document.landmarks_changed, workspace.first_labels.changed):
+            follow(self, signal, self.refresh)
+        follow(self, workspace.scan.opened, self.refresh)
+        self.refresh()
+
+    def refresh(self, *_: object) -> None:
+        """Show the offer, or hide it."""
+        running = self._workspace.first_labels.is_running
+        sides = [self._workspace.document.landmarks(side) for side in Side]
+        is_new = not any(landmarks.placed or landmarks.suggested for landmarks in sides)
+        self.setVisible(running or (is_new and self._workspace.scan.volume is not None))

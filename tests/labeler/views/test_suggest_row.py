@@ -1,0 +1,34 @@
+"""The step Label offers first labels before anything is placed, and asks what no scan can tell."""
+
+from small_heads import TURN, save_markups, save_volume, small_head
+from window_cases import Answers, wait_until_idle
+
+from gp_core.landmarks.features import Side
+from gp_labeler.views.panels.label.suggest_row import SuggestRow
+
+
+def labelled_head(folder):
+    volume, points = small_head(0)
+    save_volume(folder / "small-0.nrrd", volume)
+    for side in "LR":
+        own = {name.removesuffix(f"_{side}"): xyz for name, xyz in points.items() if name[-1] in (side, "N")}
+        save_markups(folder / f"small-0_{side}.mrk.json", own)
+    return folder
+
+
+def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path):
+    window = make_window()
+    window.workspace.scan.begin(small_head(7, turn=TURN)[0])
+    wait_until_idle(qtbot, window)
+    window.set_step("label")
+    button = window.findChild(SuggestRow).button
+    assert button.isVisible()
+    answers = window.ui.prompts = Answers()
+    answers.files = [labelled_head(tmp_path)]
+    answers.answers = ["From a folder…", "Left is as the file says"]
+    button.click()
+    assert answers.asked == ["Suggest from my scans", "Left and right"]
+    wait_until_idle(qtbot, window)
+    suggested = [window.workspace.document.landmarks(side).suggested for side in Side]
+    assert [len(each) for each in suggested] == [4, 5]
+    assert not button.isVisible()
