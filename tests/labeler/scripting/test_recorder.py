@@ -292,7 +292,7 @@ def test_imports_of_every_kind_are_done_again(recording) -> None:
         *(f"{c},{INSIDE[0] + n / 7},{INSIDE[1]},1e3" for n, c in enumerate(["CA", "CB", "IN"])),
     ]
     (recording.folder / "far.csv").write_text("\n".join(lines))
-    files, how = [recording.folder / "far.csv"], {"side": "L", "accept_misfit": True}
+    files, how = [recording.folder / "far.csv"], {"side": "L", "accept_off_bone": True}
     import_landmarks(recording.document, files, replace_placed=False, **how)
     assert recording.document.undo()
     import_landmarks(recording.document, files, **how)
