@@ -197,6 +197,7 @@ class WindowDriver:
         self.window.set_step("label")
         table = self.window.steps["label"].table  # type: ignore[attr-defined]
         cell = table.model.index(index_of(code), 1 + list(Side).index(side))
+        table.view.scrollTo(cell)
         middle = table.view.visualRect(cell).center()
         click(table.view.viewport(), middle.x(), middle.y())
         if self.workspace.labels.active != Active(side, code):
