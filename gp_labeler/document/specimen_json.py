@@ -241,6 +241,8 @@ def _touch_out(touch: Touch) -> Document:
     out |= {name: text for name in ("time", "by", "source") if (text := getattr(touch, name))}
     if touch.n_samples > 1:
         out |= {"n_samples": touch.n_samples, "spread_mm": touch.spread_mm}
+    if touch.earlier:
+        out["earlier"] = [list(place) for place in touch.earlier]
     return out | ({"left_out": True} if touch.left_out else {})
 
 
@@ -349,12 +351,14 @@ def _touches_in(document: Mapping[str, Any]) -> dict[TouchKey, Touch]:
 
 
 def _touch_in(document: Mapping[str, Any], where: str) -> Touch:
+    earlier = _typed(document.get("earlier", []), list, f"{where}.earlier")
     return Touch(
         _triple(document.get("position"), f"{where}.position"),
         _parsed(TouchHow, document.get("how"), f"{where}.how"),
         n_samples=int(_number(document.get("n_samples", 1), f"{where}.n_samples")),
         spread_mm=_number(document.get("spread_mm", 0.0), f"{where}.spread_mm"),
         left_out=_typed(document.get("left_out", False), bool, f"{where}.left_out"),
+        earlier=tuple(_triple(place, f"{where}.earlier[{i}]") for i, place in enumerate(earlier)),
         **{name: _typed(document.get(name, ""), str, f"{where}.{name}") for name in ("time", "by", "source")},
     )
 

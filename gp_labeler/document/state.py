@@ -475,7 +475,8 @@ def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> Landmar
 def _check_touches(touches: Mapping[TouchKey, Touch]) -> None:
     frames: dict[Side, str] = {}
     for (side, name), touch in touches.items():
-        _plausible(touch.position, name)
+        for position in touch.positions:
+            _plausible(position, name)
         if frames.setdefault(side, touch.frame) != touch.frame:
             raise GpError(
                 f"the {side.word} side has touches in the {frames[side]}'s frame already",

@@ -26,7 +26,7 @@ __all__ = [
 
 @dataclass(frozen=True)
 class RecordTouch:
-    """Record one touch, in place of an earlier one of the same name."""
+    """Record one touch, in place of an earlier one of the same name; `Touch.earlier` says which count too."""
 
     do: ClassVar[str] = "record_touch"
     side: Side
@@ -37,7 +37,8 @@ class RecordTouch:
         object.__setattr__(self, "side", Side.parse(self.side))
         object.__setattr__(self, "name", touch_name(self.name))
         position = as_position(self.touch.position, self.name)
-        object.__setattr__(self, "touch", replace(self.touch, position=position))
+        earlier = tuple(as_position(place, self.name) for place in self.touch.earlier)
+        object.__setattr__(self, "touch", replace(self.touch, position=position, earlier=earlier))
 
     @property
     def text(self) -> str:

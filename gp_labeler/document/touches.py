@@ -16,6 +16,7 @@ import numpy as np
 from gp_core.errors import FeatureError
 from gp_core.landmarks.features import CODES, EXTERNAL, Side
 from gp_core.landmarks.labels import tidy_label
+from gp_core.landmarks.repeats import combine_repeats
 from gp_core.landmarks.sets import LandmarkSet
 
 __all__ = ["Touch", "TouchHow", "TouchKey", "Touches", "frame_of", "touch_name", "touched_set"]
@@ -51,6 +52,9 @@ class Touch:
         Root mean square distance of these from the average, mm.
     left_out : bool
         Whether the estimate does without it.
+    earlier : tuple of (3,) tuple of float
+        Earlier touches of the same feature that count too, oldest first, in the same frame, mm. The estimate
+        takes the mean of all, without outliers.
     """
 
     position: tuple[float, float, float]
@@ -61,6 +65,12 @@ class Touch:
     n_samples: int = 1
     spread_mm: float = 0.0
     left_out: bool = False
+    earlier: tuple[tuple[float, float, float], ...] = ()
+
+    @property
+    def positions(self) -> tuple[tuple[float, float, float], ...]:
+        """All touches of the feature, the last one last."""
+        return (*self.earlier, self.position)
 
     @property
     def frame(self) -> str:
@@ -95,8 +105,10 @@ def frame_of(touches: Touches, side: Side) -> str:
 
 def touched_set(touches: Touches, side: Side) -> LandmarkSet:
     """Return one side's touches that count: features as landmarks, skull features in `extra`."""
-    counted = {name: t.position for (of, name), t in touches.items() if of is side and not t.left_out}
-    features = {name: position for name, position in counted.items() if name in CODES}
-    skull = {name: np.array(position) for name, position in counted.items() if name not in CODES}
+    counted = {name: t for (of, name), t in touches.items() if of is side and not t.left_out}
+    repeats = combine_repeats({name: t.positions for name, t in counted.items() if t.earlier})
+    places = {name: repeats[name].mean if name in repeats else t.position for name, t in counted.items()}
+    features = {name: position for name, position in places.items() if name in CODES}
+    skull = {name: np.array(position) for name, position in places.items() if name not in CODES}
     landmarks = LandmarkSet.from_mapping(features, side, frame=frame_of(touches, side))
-    return replace(landmarks, extra=MappingProxyType(skull))
+    return replace(landmarks, extra=MappingProxyType(skull), repeats=repeats)

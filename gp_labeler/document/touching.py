@@ -6,6 +6,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.errors import GpError, blaming
@@ -13,6 +14,7 @@ from gp_core.io import label_names, read_points, read_touches
 from gp_core.io.file_names import named_side
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.labels import same_label, tidy_label
+from gp_core.validation import FloatArray
 from gp_labeler.document.edits import as_position
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.touch_edits import (
@@ -45,9 +47,11 @@ def record_touch(
     name: str,
     position: ArrayLike,
     how: TouchHow = TouchHow.TYPED,
+    *,
+    keep: bool = False,
     **details: Any,
 ) -> bool:
-    """Record one touch, in place of an earlier one of the same name.
+    """Record one touch, in place of an earlier one of the same name, or beside it.
 
     Parameters
     ----------
@@ -58,6 +62,8 @@ def record_touch(
     position : (3,) array_like
         Tracker frame, mm; scan frame where `how` is ``TouchHow.SCAN``.
     how : TouchHow
+    keep : bool
+        Whether the touches of this name that are there count too; they are in the same frame.
     **details
         `source`, `n_samples` and `spread_mm` of `Touch`.
 
@@ -71,8 +77,10 @@ def record_touch(
     GpError
         The feature cannot be touched, or the side's other touches are in another frame.
     """
-    where = as_position(position, name)
-    touch = Touch(where, how, time=document.now(), by=document.author, **details)
+    where, wanted = as_position(position, name), Side.parse(side)
+    before = document.state.touches.get((wanted, touch_name(name))) if keep else None
+    earlier = () if before is None else before.positions
+    touch = Touch(where, how, time=document.now(), by=document.author, earlier=earlier, **details)
     return document.do(RecordTouch(Side.parse(side), name, touch))
 
 
@@ -91,10 +99,15 @@ def load_touches(document: SpecimenDocument, path: str | PathLike[str], side: Si
     """
     touched = read_touches(path, side)
     about: dict[str, Any] = {"how": TouchHow.FILE, "time": document.now(), "by": document.author}
-    points = {**touched.as_mapping(), **touched.extra}
+    points, repeats = {**touched.as_mapping(), **touched.extra}, touched.repeats
     source = Path(path).name
     with blaming(path):
-        taken = {name: Touch(as_position(p, name), source=source, **about) for name, p in points.items()}
+        taken = {
+            name: _touch_of(
+                np.atleast_2d(repeats[name].points if name in repeats else p), name, source, about
+            )
+            for name, p in points.items()
+        }
     if not taken:
         raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
     with blaming(path):
@@ -104,6 +117,12 @@ def load_touches(document: SpecimenDocument, path: str | PathLike[str], side: Si
     if named not in (None, Side.parse(side)):
         warnings.append(f"By its name it is of the {named.word} side: check the side")
     return tuple(warnings)
+
+
+def _touch_of(rows: FloatArray, name: str, source: str, about: dict[str, Any]) -> Touch:
+    """Return the touch of a feature of a file, with its repeats, (n, 3) mm."""
+    *earlier, last = (as_position(row, name) for row in rows)
+    return Touch(last, source=source, earlier=tuple(earlier), **about)
 
 
 def misnamed_files(document: SpecimenDocument, side: Side) -> tuple[str, ...]:

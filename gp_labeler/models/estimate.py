@@ -66,6 +66,8 @@ class EstimateSettings:
         Which round window y of the cochlea frame points to: ``touched`` or ``expected``.
     shared_error : float
         RMS length of one offset that all touches of the session share, mm; the regions allow for it.
+    touches_each : int
+        How often each feature is asked for; the estimate takes all touches there are.
     """
 
     side: Side = Side.LEFT
@@ -74,6 +76,7 @@ class EstimateSettings:
     registration: str = "auto"
     round_window: str = "touched"
     shared_error: float = DEFAULT_SHARED_ERROR_MM
+    touches_each: int = 1
 
 
 @dataclass(frozen=True, eq=False)

@@ -26,7 +26,7 @@ from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import RecordPoseCheck
 from gp_labeler.document.state import PoseCheck
 from gp_labeler.document.touch_edits import RecordTouch
-from gp_labeler.document.touches import TouchHow
+from gp_labeler.document.touches import TouchHow, touch_name
 from gp_labeler.jobs.pose import WarmFit, WarmJoint
 from gp_labeler.jobs.runner import Jobs
 from gp_labeler.models.atlas import AtlasModel
@@ -37,6 +37,9 @@ from gp_labeler.models.pose_exports import InsertionPath, save_pose, says_its_st
 from gp_labeler.models.view import ViewModel
 
 __all__ = ["ORDER", "OverlayOptions", "PoseModel"]
+
+CONFIRMED_MM = 1.0
+"""Up to here a second touch of a feature confirms the first."""
 
 _FIRST = (*RECOMMENDED, "ZL")
 ORDER = (*_FIRST, *(code for code in EXTERNAL if code not in _FIRST))
@@ -291,13 +294,32 @@ class PoseModel:
             Nothing is left to touch, or as `touching.record_touch`.
         """
         wanted = name or self.require_target()
-        if not touching.record_touch(self._document, self.side, wanted, position, how, **details):
+        keep = self.keeps_earlier(wanted, position, how)
+        if not touching.record_touch(self._document, self.side, wanted, position, how, keep=keep, **details):
             self.go_on(wanted)  # the very same touch once more
+
+    def keeps_earlier(self, name: str, position: ArrayLike, how: TouchHow) -> bool:
+        """Whether a new touch counts beside those of its feature that are there, or replaces them.
+
+        It counts beside them while the feature is asked for again (`EstimateSettings.touches_each`). Beyond
+        that, a touch of the tracked probe does where it confirms the one before, within 1 mm, or where there
+        are several already; another one replaces them, as a correction does.
+        """
+        before = self._document.state.touches.get((self.side, touch_name(name)))
+        on_scan = how is TouchHow.SCAN
+        if before is None or how is TouchHow.TYPED or (before.frame == "scan") is not on_scan:
+            return False
+        if len(before.positions) < self.settings.touches_each:
+            return True
+        if TouchHow.TRACKED not in (how, before.how) or how is not before.how:
+            return False
+        apart_mm = float(np.linalg.norm(np.asarray(position, float) - np.mean(before.positions, axis=0)))
+        return bool(before.earlier) or apart_mm <= CONFIRMED_MM
 
     def go_on(self, name: str) -> None:
         """Announce that a feature was touched, and go on to the next where it was the target."""
         self.recorded.emit(name)
-        if name == self._target:
+        if name == self._target and not self._is_wanted(name):
             self._aim(self._first_untouched(after=name))
 
     def require_target(self) -> str:
@@ -504,12 +526,17 @@ class PoseModel:
         lost, gained = before.here - self._seen.here, self._seen.here - before.here
         if lost:
             self._aim(next(name for name in (*ORDER, *sorted(lost, key=_by_number)) if name in lost))
-        elif self._target is None or self._target in gained:
+        elif self._target is None or (self._target in gained and not self._is_wanted(self._target)):
             self._aim(self._first_untouched(after=self._target))
 
     def _touched(self, side: Side | None = None) -> frozenset[str]:
         wanted = side or self.side
         return frozenset(name for side, name in self._document.state.touches if side is wanted)
+
+    def _is_wanted(self, name: str) -> bool:
+        """Whether a feature is to be touched, or touched again."""
+        touch = self._document.state.touches.get((self.side, name))
+        return touch is None or len(touch.positions) < self.settings.touches_each
 
     def _touched_now(self) -> _Touched:
         return _Touched(self.side, self._touched(), self._touched(self.side.other))
@@ -517,7 +544,7 @@ class PoseModel:
     def _first_untouched(self, after: str | None = None) -> str | None:
         start = ORDER.index(after) + 1 if after in ORDER else 0
         around: Iterable[str] = (*ORDER[start:], *ORDER[:start])
-        left = [code for code in around if code not in self._touched()]
+        left = [code for code in around if self._is_wanted(code)]
         fresh = [code for code in left if (self.side, code) not in self._skipped]
         return next(iter(fresh or left), None)
 

@@ -22,6 +22,7 @@ from gp_labeler.models.estimate import REGISTRATIONS, EstimateSettings, SideEsti
 __all__ = ["PoseEstimator"]
 
 FEWEST_TOUCHES = 3
+MOST_TOUCHES_EACH = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +68,10 @@ class PoseEstimator:
         if noise is not None and not 0 < noise < 20:
             raise GpError(f"probe noise must lie between 0 and 20 mm, got {noise!r}")
         SystematicError(settings.shared_error)  # refuses what is not allowed
+        if settings.touches_each not in range(1, MOST_TOUCHES_EACH + 1):
+            raise GpError(
+                f"touches of each feature must be 1 to {MOST_TOUCHES_EACH}, got {settings.touches_each!r}"
+            )
         for method in settings.methods:
             check_option(method, "method", METHODS)
         check_option(settings.registration, "registration", REGISTRATIONS)

@@ -212,6 +212,8 @@ class PoseReport:
         bar = "" if residual is None else _bar(residual, _BAD if is_suspect else "#4d7fb3")
         mark = " <b>suspect</b>" if is_suspect else " left out" if touch.left_out else ""
         how = touch.how.value + (f", {touch.source}" if touch.source else "")
+        if touch.earlier:
+            how += f", mean of {len(touch.positions)} touches"
         if touch.n_samples > 1:
             how += f", {touch.n_samples} samples \u00b1{touch.spread_mm:.2f} mm"
         number = "" if residual is None else f"{residual:.2f}"

@@ -375,12 +375,16 @@ class TrackerModel:
             self._check_frame()
             side, name = self._pose.side, self._pose.require_target()
             before = self._document.state.touches.get((side, name))
+            keep = self._pose.keeps_earlier(name, outcome.position, TouchHow.TRACKED) and self._may_keep(
+                outcome.position, before
+            )
             is_new = touching.record_touch(
                 self._document,
                 side,
                 name,
                 outcome.position,
                 TouchHow.TRACKED,
+                keep=keep,
                 source=self._source(),
                 n_samples=outcome.n_samples,
                 spread_mm=outcome.spread_mm,
@@ -409,6 +413,13 @@ class TrackerModel:
             self._messages.say(self.frame_words, "warning")
         self._update_sending()
         self.changed.emit()
+
+    def _may_keep(self, position: ArrayLike, before: Touch | None) -> bool:
+        """Whether touches may be averaged: not one of another frame with one that disagrees."""
+        if before is None or not self._frame.is_doubtful(before.position):
+            return True
+        mm = float(np.linalg.norm(np.asarray(position, float) - np.array(before.position)))
+        return mm <= self._frame.limit_mm
 
     def _segment(self, segment: int) -> tuple[int, int]:
         connections = 0 if self._link is None else self._link.connections

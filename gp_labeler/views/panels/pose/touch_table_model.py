@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
 
 from gp_core.errors import GpError
@@ -185,9 +186,10 @@ class TouchTableModel(QAbstractTableModel):
 
     def _words(self, row: TouchRow, column: int) -> str:
         if column == NAME:
-            return row.name
+            n = 0 if row.touch is None else len(row.touch.positions)
+            return f"{row.name} ×{n}" if n > 1 else row.name  # noqa: RUF001 - the sign of times
         if column == XYZ:
-            return "" if row.touch is None else triple(row.touch.position)
+            return "" if row.touch is None else triple(np.mean(row.touch.positions, axis=0))
         return fine_mm(row.residual) if column == RESIDUAL and row.residual is not None else ""
 
     def _hint(self, row: TouchRow, column: int) -> str:

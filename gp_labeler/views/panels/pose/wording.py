@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from gp_core.constants import METHOD_NAMES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, feature
+from gp_core.landmarks.repeats import combine_repeats
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.next_touch import TouchGain
 from gp_labeler.document.touches import Touch, TouchHow
@@ -138,6 +139,9 @@ def touch_text(name: str, touch: Touch | None, estimate: SideEstimate | None) ->
     lines.append(_how(touch))
     if touch.n_samples > 1:
         lines.append(f"Average of {touch.n_samples} readings, spread {touch.spread_mm:.3f} mm")
+    if touch.earlier:
+        (one,) = combine_repeats({name: touch.positions}).values()
+        lines.append(f"{len(one.points)} touches, the mean of {one.n_used}, spread {fine_mm(one.spread_mm)}")
     if touch.left_out:
         lines.append("Left out of the estimate")
     for method, pose in () if estimate is None else estimate.poses.items():
