@@ -52,9 +52,9 @@ def test_a_feature_is_asked_for_as_often_as_wanted(workspace: Workspace) -> None
 def test_the_probe_confirms_or_corrects_a_touch(workspace: Workspace) -> None:
     pose, at = workspace.pose, ATLAS["MN"]
     pose.record(at, TouchHow.TRACKED, name="MN")
-    pose.record(at + [0, 0, 0.4], TouchHow.TRACKED, name="MN")
+    pose.record(at + np.array([0, 0, 0.4]), TouchHow.TRACKED, name="MN")
     assert _touched(workspace, "MN") == 2  # confirmed: both count
-    pose.record(at + [0, 0, 9.0], TouchHow.TRACKED, name="MN")
+    pose.record(at + np.array([0, 0, 9.0]), TouchHow.TRACKED, name="MN")
     assert _touched(workspace, "MN") == 3  # of three, the odd one is found and named
     for name in ("CL", "OS", "RWA", "RWP"):
         pose.record(ATLAS[name], TouchHow.TRACKED, name=name)
@@ -63,23 +63,27 @@ def test_the_probe_confirms_or_corrects_a_touch(workspace: Workspace) -> None:
     assert estimate.pose is not None
     assert estimate.pose.repeats["MN"].outliers == (3,)
     assert any("touch 3 of 3 of MN" in warning for warning in estimate.pose.warnings)
-    pose.record(ATLAS["CL"] + [4, 0, 0], TouchHow.TRACKED, name="CL")
+    pose.record(ATLAS["CL"] + np.array([4, 0, 0]), TouchHow.TRACKED, name="CL")
     assert _touched(workspace, "CL") == 1  # of two that disagree, the later one: a correction
 
 
 @pytest.mark.parametrize("how", [TouchHow.TYPED, TouchHow.SCAN])
 def test_what_is_typed_or_clicked_again_is_a_correction(workspace: Workspace, how: TouchHow) -> None:
     workspace.pose.record(ATLAS["MN"], how, name="MN")
-    workspace.pose.record(ATLAS["MN"] + [0, 0, 0.2], how, name="MN")
+    workspace.pose.record(ATLAS["MN"] + np.array([0, 0, 0.2]), how, name="MN")
     assert _touched(workspace, "MN") == 1
 
 
 def test_repeats_of_a_file_come_and_stay(workspace: Workspace, tmp_path: Path) -> None:
     file = tmp_path / "touches.csv"
-    rows = [(code, ATLAS[code] + [0, 0, 0.1 * n]) for code in ("CL", "MN", "OS", "RWA") for n in range(3)]
+    rows = [
+        (code, ATLAS[code] + np.array([0, 0, 0.1 * n]))
+        for code in ("CL", "MN", "OS", "RWA")
+        for n in range(3)
+    ]
     file.write_text("name,x,y,z\n" + "".join(f"{code},{x},{y},{z}\n" for code, (x, y, z) in rows))
     workspace.pose.load(file)
     assert _touched(workspace, "MN") == 3
     state = workspace.document.state
     assert state_of(document_of(state)).touches == state.touches
-    np.testing.assert_allclose(state.touched(L)["MN"], ATLAS["MN"] + [0, 0, 0.1])
+    np.testing.assert_allclose(state.touched(L)["MN"], ATLAS["MN"] + np.array([0, 0, 0.1]))
