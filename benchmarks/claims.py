@@ -2,7 +2,8 @@
 
 Run from the top of a checkout: ``python benchmarks/claims.py labelled/``, labelled animals as for gp-core.
 Each is estimated with an atlas that has seen nothing of it, by the paper's six touched features. It takes
-half a minute; ``--seed N`` draws other touches. ``--conditions N`` prints the table of all conditions,
+half a minute; ``--seed N`` draws other touches. ``--probe FILE...`` prints, alone, what files of real touches
+give by themselves, their sides from their names. ``--conditions N`` prints the table of all conditions,
 each side touched N times: that of ``gp-core conditions labelled/ --repeats N``, in some minutes.
 """
 
@@ -31,12 +32,15 @@ from gp_core import (  # noqa: E402
     fit_atlas,
     gains,
     load_specimens,
+    read_touches,
 )
 from gp_core.atlas.sampling import draw_animal  # noqa: E402
 from gp_core.cli.conditions import condition_lines  # noqa: E402
 from gp_core.frames import angle_between_deg  # noqa: E402
+from gp_core.io.file_names import named_side  # noqa: E402
 from gp_core.landmarks.anatomy import with_cochlea_origin  # noqa: E402
 from gp_core.study.trials import make_trial  # noqa: E402
+from gp_core.validation import FloatArray  # noqa: E402
 
 _REPEATS, _MANY = 20, 80
 _CONDITIONS = ((0.0, 0.0, "no noise"), (0.4, 0.0, "0.4 mm noise"), (0.1, 3.0, "0.1 mm noise, one 3 mm off"))
@@ -69,6 +73,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("specimens", nargs="+", metavar="SPECIMENS")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--probe", nargs="+", default=(), metavar="FILE")
     parser.add_argument("--conditions", type=int, default=0, metavar="N")
     args = parser.parse_args()
     try:
@@ -78,6 +83,10 @@ def main() -> None:
     if args.conditions:
         rng = np.random.default_rng(args.seed)
         for line in condition_lines(conditions(animals, repeats=args.conditions, rng=rng)):
+            print(line)
+        return
+    if args.probe:
+        for line in probe_files(args.probe):
             print(line)
         return
     sides = list(held_out(animals))
@@ -106,14 +115,49 @@ def regions(sides: Sequence[HeldOut], rng: np.random.Generator) -> Iterator[str]
             joint = estimate_pose(touches, touches.side, method="jrmpc", specimens=held.others)
             pose = estimate_pose(touches, touches.side, held.atlas)
             mm, degrees = held.off(pose)
-            rows.append(
-                (*held.off(joint), mm, degrees, mm < pose.radius_95, degrees < np.degrees(pose.cone_95))
-            )
-        co_joint, ma_joint, co, ma, radius, cone = np.mean(rows, axis=0)
+            own = pose.radius_95, float(np.degrees(pose.cone_95))
+            rows.append((*held.off(joint), mm, degrees, mm < own[0], degrees < own[1], *own))
+        names = [held.animal.name for held in sides * (_REPEATS if noise else 1)]
+        co_joint, ma_joint, co, ma, radius, cone, mm_95, deg_95 = np.array(rows, dtype=float).T
+        yield words
+        for method, distances, angles in (("jrmpc", co_joint, ma_joint), ("robust", co, ma)):
+            yield f"  {method:<7} CO {_summary(distances, names)} mm; axis {_summary(angles, names)} deg"
         yield (
-            f"{words:<28} jrmpc {co_joint:.2f} mm {ma_joint:4.1f} deg, robust {co:.2f} mm {ma:4.1f} deg;"
-            f" within radius {radius:.1%}, cone {cone:.1%} of {len(rows)}"
+            f"  regions median {np.median(mm_95):.2f} mm, {np.median(deg_95):.1f} deg;"
+            f" within radius {radius.mean():.1%}, cone {cone.mean():.1%} of {len(rows)}"
         )
+
+
+def _summary(values: FloatArray, animals: Sequence[str]) -> str:
+    """Return mean, its 95 % bootstrap interval over animals, and median."""
+    of = np.array(animals)
+    means = np.array([values[of == name].mean() for name in np.unique(of)])
+    drawn = np.random.default_rng(0).choice(means, (4000, len(means))).mean(axis=1)
+    low, high = np.percentile(drawn, (2.5, 97.5))
+    return f"mean {values.mean():.2f} ({low:.2f} to {high:.2f}) median {np.median(values):.2f}"
+
+
+def probe_files(paths: Sequence[str]) -> Iterator[str]:
+    """Files of real touches, the published atlas: the noise that they show, and their own regions."""
+    rows = []
+    for path in paths:
+        side = named_side(path)
+        if side is None:
+            raise SystemExit(f"{path}: its name must tell the side, as SkullA_Left.dat does")
+        pose = estimate_pose(read_touches(path, side), side)
+        assert pose.probe_noise is not None
+        plain = pose.plain_radius_95, float(np.degrees(pose.plain_cone_95))
+        rows.append((pose.probe_noise, pose.radius_95, float(np.degrees(pose.cone_95)), *plain))
+        yield f"{Path(path).name}: {_region(rows[-1])}, {pose.state}"
+    yield f"median of {len(rows)}: {_region(np.median(rows, axis=0))}"
+
+
+def _region(row: Sequence[float] | FloatArray) -> str:
+    noise, mm, degrees, plain_mm, plain_deg = row
+    return (
+        f"noise {noise:.2f} mm, 95 % within {mm:.2f} mm, {degrees:.0f} deg"
+        f" (as named {plain_mm:.2f} mm, {plain_deg:.0f} deg)"
+    )
 
 
 def mistouched(sides: Sequence[HeldOut], rng: np.random.Generator) -> Iterator[str]:
@@ -157,8 +201,9 @@ def published(sides: Sequence[HeldOut], rng: np.random.Generator) -> Iterator[st
     """Errors with the published atlas alone, no noise."""
     atlas = Atlas.published()
     poses = [estimate_pose(held.touched(0.0, 0.0, rng), held.side.side, atlas) for held in sides]
-    mm, degrees = np.mean([held.off(pose) for held, pose in zip(sides, poses, strict=True)], axis=0)
-    yield f"{len(sides)} sides: {mm:.2f} mm, {degrees:.1f} deg on average"
+    mm, degrees = np.transpose([held.off(pose) for held, pose in zip(sides, poses, strict=True)])
+    names = [held.animal.name for held in sides]
+    yield f"{len(sides)} sides: CO {_summary(mm, names)} mm; axis {_summary(degrees, names)} deg"
 
 
 def next_touches(sides: Sequence[HeldOut], rng: np.random.Generator) -> Iterator[str]:

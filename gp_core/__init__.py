@@ -36,6 +36,7 @@ from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.pose.both_ears import EarCheck, MirrorPlane, check_ears, fuse_ears, mirror_plane
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.estimate import estimate_again, estimate_pose
 from gp_core.pose.estimate_inputs import EstimateInputs
@@ -83,6 +84,7 @@ __all__ = [
     "Deviation",
     "DistanceCheck",
     "DistanceTable",
+    "EarCheck",
     "EstimateInputs",
     "Feature",
     "FiducialRegistration",
@@ -97,6 +99,7 @@ __all__ = [
     "LandmarkSet",
     "LeaveOneOutReport",
     "Measurement",
+    "MirrorPlane",
     "NestedReport",
     "PairDistance",
     "PhysicalReport",
@@ -119,6 +122,7 @@ __all__ = [
     "calibrate_pivot",
     "carry_path",
     "check_distances",
+    "check_ears",
     "check_side",
     "check_specimen",
     "compare",
@@ -127,12 +131,14 @@ __all__ = [
     "estimate_again",
     "estimate_pose",
     "fit_atlas",
+    "fuse_ears",
     "gains",
     "import_mat",
     "jrmpc",
     "leave_one_out",
     "load_labellings",
     "load_specimens",
+    "mirror_plane",
     "nested_search",
     "physical_test",
     "pose_quality",

@@ -30,8 +30,10 @@ from gp_core.io import read_touches
 from gp_core.io.file_names import named_side
 from gp_core.io.pose_export import pose_text
 from gp_core.io.pose_json import is_pose_file, read_pose
+from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.answer import WITHHELD, pose_answer
+from gp_core.pose.both_ears import EarCheck, check_ears, fuse_ears, mirror_plane
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.estimate import estimate_pose
 from gp_core.pose.gate import GateReason, PoseGate, named_for_other_side
@@ -141,6 +143,17 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
         help="if the other side, or an exchange of two names, is likelier than the given ones, use that",
     )
     group.add_argument(
+        "--other-ear",
+        metavar="FILE",
+        help="touches of the other ear of the same head, in the same frame: the two estimates, mirrored on each "
+        "other, are a check without any CT. It may be TOUCHES itself, if that holds both sides",
+    )
+    group.add_argument(
+        "--both-ears",
+        action="store_true",
+        help="make one axis of both ears, where they agree (needs --other-ear)",
+    )
+    group.add_argument(
         "--accept-warnings",
         action="store_true",
         help="write all files even where names or side look wrong or are undecided; without it, only --json "
@@ -191,13 +204,20 @@ def run(args: argparse.Namespace) -> int:
             if given.atlas is None
             else gains(touches, given.atlas, probe_noise=given.probe_noise, shared_error=given.shared_error)
         )
-    others = _other_reasons(given.source, pose, taken)
+    check = _checked(args, given, touches, pose)
+    if check is not None:
+        pose, ears = check
+    others = [*_other_reasons(given.source, pose, taken), *([] if check is None else _of_ears(ears))]
     answer = pose_answer(pose, others, accept_warnings=args.accept_warnings)
+    if check is not None:
+        answer["other_ear"] = ears.as_dict()
     held_back = answer["status"] == WITHHELD
     ambiguities = [reason["text"] for reason in answer["reasons"]]
     _write(args, pose, answer, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
+    if check is not None:
+        say(f"  {'' if ears.agrees else '! '}{ears.text}")
     if taken is not None:
         odds = f"{100 * taken.probability:.1f} %"
         say(f"  ! used as {taken.label}, which is likelier than the given names and side ({odds})")
@@ -304,6 +324,29 @@ def _atlas_for(words: list[str], method: str) -> AtlasSource:
         with blaming(" ".join(words)):
             return fit_atlas(specimens or []), None
     return atlas, specimens
+
+
+def _checked(
+    args: argparse.Namespace, given: _Given, touches: LandmarkSet, pose: CochleaPose
+) -> tuple[CochleaPose, EarCheck] | None:
+    """Compare the estimate with that of the other ear, and with ``--both-ears`` make one axis of both."""
+    if args.other_ear is None:
+        if args.both_ears:
+            raise GpError("--both-ears needs the touches of the other ear", remedy="Give --other-ear FILE.")
+        return None
+    with blaming(args.other_ear):
+        other = read_touches(args.other_ear, touches.side.other, names=lab_names(args))
+        poses = {touches.side: pose, other.side: given.estimate(other)}
+        touched = {touches.side: touches, other.side: other}
+        plane = mirror_plane(touched[Side.LEFT], touched[Side.RIGHT])
+        check = check_ears(poses[Side.LEFT], poses[Side.RIGHT], plane)
+        if not (args.both_ears and check.agrees):
+            return pose, check
+        return fuse_ears(poses[Side.LEFT], poses[Side.RIGHT], plane)[pose.side], check
+
+
+def _of_ears(check: EarCheck) -> list[GateReason]:
+    return [] if check.agrees else [GateReason("ears disagree", check.text)]
 
 
 def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:

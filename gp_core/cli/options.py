@@ -58,6 +58,7 @@ _ENDINGS = {
 
 _READ = (
     *("touches", "specimens", "atlas", "recording", "poses", "ct_landmarks", "bone", "path", "names", "tip"),
+    "other_ear",
     *("left", "right", "labelling_error"),
 )
 """Options and arguments whose files are read."""

@@ -1,0 +1,318 @@
+"""Both ears of one head: two estimates that check each other without any CT, or that are made one.
+
+Where both ears of a skull were touched in one frame, its mid-sagittal plane follows from the touches: of the
+features that were touched on both sides, and IN. The estimate of one ear, mirrored in that plane, should then be
+that of the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gp_core.argument_types import checks_arguments
+from gp_core.constants import CHI2_3_95
+from gp_core.errors import GpError
+from gp_core.frames import RigidTransform, angle_between_deg, cross_matrix
+from gp_core.landmarks.features import EXTERNAL, Side, feature
+from gp_core.landmarks.sets import LandmarkSet
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.validation import FloatArray
+
+__all__ = ["EarCheck", "MirrorPlane", "check_ears", "fuse_ears", "mirror_plane"]
+
+_FEWEST_PAIRS = 3
+_PAIR_SD_MM = 0.5
+"""Standard deviation by which the two sides of a head differ in a touched feature, mm a coordinate."""
+
+_ASYMMETRY_MM, _RESIDUAL_FACTOR = 0.3, 1.5
+"""How much the two sides of a head differ, mm a coordinate, and how far pairs may exceed what that lets expect."""
+
+_CORRELATION = 0.6
+"""Of the errors of the two axes: both ears of an animal differ from the atlas in much the same way."""
+
+
+@dataclass(frozen=True)
+class MirrorPlane:
+    """The mid-sagittal plane of a head, from touches of both ears.
+
+    Attributes
+    ----------
+    normal : (3,) array
+        Unit normal, towards the left ear, in the frame of the touches.
+    offset : float
+        The plane is ``normal @ x = offset``, mm.
+    residual_mm : float
+        RMS distance of the pairs from being mirror images.
+    codes : tuple of str
+        Features that it is made from.
+    normal_sd_deg, offset_sd_mm : float
+        Standard deviation of its direction, and of its place at the middle of the pairs.
+    """
+
+    normal: FloatArray
+    offset: float
+    residual_mm: float
+    codes: tuple[str, ...]
+    normal_sd_deg: float
+    offset_sd_mm: float
+
+    def mirror(self, points: FloatArray) -> FloatArray:
+        """Return points (N, 3) mirrored in the plane, mm."""
+        off: FloatArray = points - 2 * np.outer(points @ self.normal - self.offset, self.normal)
+        return off
+
+    def mirror_direction(self, vector: FloatArray) -> FloatArray:
+        """Return a direction (3,) mirrored in the plane."""
+        mirrored: FloatArray = vector - 2 * float(vector @ self.normal) * self.normal
+        return mirrored
+
+
+@dataclass(frozen=True)
+class EarCheck:
+    """How the estimates of two ears agree.
+
+    Attributes
+    ----------
+    plane : MirrorPlane
+        The mid-plane.
+    origin_mm, axis_deg : float
+        Distance of the left origin from the mirrored right one, and angle of the axes.
+    expected_mm, expected_deg : float
+        What 95 % of heads stay within, by the regions of both estimates and of the plane.
+    expected_residual_mm : float
+        What the residual of the plane stays within, by the noise of the touches and the asymmetry of heads.
+    """
+
+    plane: MirrorPlane
+    origin_mm: float
+    axis_deg: float
+    expected_mm: float
+    expected_deg: float
+    expected_residual_mm: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether both differences, and those of the touched pairs, are within what is expected."""
+        within = self.origin_mm <= self.expected_mm and self.axis_deg <= self.expected_deg
+        return within and self.plane.residual_mm <= self.expected_residual_mm
+
+    @property
+    def text(self) -> str:
+        """The check in a sentence."""
+        word = "agree" if self.agrees else "DISAGREE"
+        return (
+            f"the two ears {word}: CO {self.origin_mm:.2f} mm and axis {self.axis_deg:.1f} deg from the mirror "
+            f"image of the other (expected within {self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg), "
+            f"pairs {self.plane.residual_mm:.2f} mm ({self.expected_residual_mm:.2f} mm); mid-plane from {', '.join(self.plane.codes)}"
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the check for a JSON file, mm and degrees.
+
+        Returns
+        -------
+        dict
+            Plain values.
+        """
+        return {
+            "agrees": self.agrees,
+            "origin_mm": self.origin_mm,
+            "axis_deg": self.axis_deg,
+            "expected_mm": self.expected_mm,
+            "expected_deg": self.expected_deg,
+            "plane_normal": self.plane.normal.tolist(),
+            "plane_offset_mm": self.plane.offset,
+            "plane_from": list(self.plane.codes),
+            "plane_residual_mm": self.plane.residual_mm,
+            "expected_residual_mm": self.expected_residual_mm,
+        }
+
+
+@checks_arguments
+def mirror_plane(left: LandmarkSet, right: LandmarkSet) -> MirrorPlane:
+    """Return the mid-sagittal plane of a head from touches of both ears, in one frame.
+
+    Parameters
+    ----------
+    left, right : LandmarkSet
+        Touches of the two sides, mm.
+
+    Returns
+    -------
+    MirrorPlane
+        In the frame of the touches.
+
+    Raises
+    ------
+    GpError
+        The frames differ, fewer than three features were touched on both sides, or the pairs do not lie about
+        one plane.
+
+    Examples
+    --------
+    >>> from gp_core import Atlas
+    >>> atlas = Atlas.published()
+    >>> points = {code: atlas[code] + [0, 20, 0] for code in ("CL", "MN", "OS", "RWA")}
+    >>> left = LandmarkSet.from_mapping(points, "L", frame="tracker")
+    >>> mirrored = {code: point * [1, -1, 1] for code, point in points.items()}
+    >>> right = LandmarkSet.from_mapping(mirrored, "R", frame="tracker")
+    >>> mirror_plane(left, right).normal.round(6).tolist()
+    [0.0, 1.0, 0.0]
+    """
+    _check_sides(left, right)
+    codes = tuple(c for c in EXTERNAL if c in left and c in right and not feature(c).shared)
+    if len(codes) < _FEWEST_PAIRS:
+        raise GpError(
+            f"the mid-plane needs {_FEWEST_PAIRS} features that are touched on both sides, got {len(codes)}",
+            remedy="Touch the same features on both ears.",
+        )
+    one, other = left.array(codes), right.array(codes)
+    middle, half = (one + other) / 2, (one - other) / 2
+    shared = [c for c in EXTERNAL if feature(c).shared and (c in left or c in right)]
+    on_plane = np.vstack([middle, *(_shared_point(left, right, c)[None] for c in shared)])
+    normal = _normal(half, on_plane)
+    offset = float((on_plane @ normal).mean())
+    plane = MirrorPlane(normal, offset, 0.0, (*codes, *shared), 0.0, 0.0)
+    residual = float(np.sqrt(((plane.mirror(other) - one) ** 2).sum(axis=1).mean()))
+    # each pair turns the normal by its error over its width, as a lever
+    levers = float(np.sqrt((half**2).sum() + ((on_plane - on_plane.mean(axis=0)) ** 2).sum()))
+    spread = max(_PAIR_SD_MM, residual / np.sqrt(3)) / np.sqrt(2)
+    return replace(
+        plane,
+        residual_mm=residual,
+        normal_sd_deg=float(np.degrees(spread / levers)),
+        offset_sd_mm=float(spread / np.sqrt(len(on_plane))),
+    )
+
+
+def _normal(half: FloatArray, on_plane: FloatArray) -> FloatArray:
+    """Return the direction that half distances of pairs have, and that points of the plane do not."""
+    about = on_plane - on_plane.mean(axis=0)
+    values, vectors = np.linalg.eigh(half.T @ half - about.T @ about)
+    normal: FloatArray = vectors[:, -1]
+    along = half @ normal
+    if values[-1] <= 0 or np.abs(along).min() <= 0 or abs(np.sign(along).sum()) < len(along):
+        raise GpError(
+            "the touches of the two ears do not lie about one plane",
+            remedy="Check sides and names; touch both ears without moving the head.",
+        )
+    return normal if along[0] > 0 else -normal
+
+
+def _shared_point(left: LandmarkSet, right: LandmarkSet, code: str) -> FloatArray:
+    points: FloatArray = np.mean([one[code] for one in (left, right) if code in one], axis=0)
+    return points
+
+
+def _check_sides(left: LandmarkSet, right: LandmarkSet) -> None:
+    if (left.side, right.side) != (Side.LEFT, Side.RIGHT):
+        raise GpError(f"the touches must be of the left and of the right, got {left.side} and {right.side}")
+    if left.frame != right.frame:
+        raise GpError(f"the ears were touched in different frames, {left.frame} and {right.frame}")
+
+
+@checks_arguments
+def check_ears(left: CochleaPose, right: CochleaPose, plane: MirrorPlane) -> EarCheck:
+    """Compare the estimates of two ears: each, mirrored in the mid-plane, should be the other.
+
+    Parameters
+    ----------
+    left, right : CochleaPose
+        In one frame.
+    plane : MirrorPlane
+        See `mirror_plane`.
+
+    Returns
+    -------
+    EarCheck
+        With what is expected of a correct pair.
+    """
+    mirrored, axis = plane.mirror(right.origin[None])[0], plane.mirror_direction(right.axis)
+    apart = float(np.linalg.norm(mirrored - left.origin))
+    turned = float(angle_between_deg(axis, left.axis))
+    lever = np.linalg.norm(left.origin - right.origin)
+    sway = 2 * plane.normal_sd_deg
+    of_plane_mm = np.hypot(2 * plane.offset_sd_mm, np.radians(sway) * lever)
+    expected_mm = float(np.sqrt(left.radius_95**2 + right.radius_95**2 + CHI2_3_95 * of_plane_mm**2))
+    cones = np.degrees([left.cone_95, right.cone_95])
+    expected_deg = float(np.sqrt((cones**2).sum() + CHI2_3_95 * sway**2))
+    noise = max(left.probe_noise or 0.0, right.probe_noise or 0.0)
+    residual_mm = _RESIDUAL_FACTOR * float(np.sqrt(3 * (2 * noise**2 + _ASYMMETRY_MM**2)))
+    return EarCheck(plane, apart, turned, expected_mm, expected_deg, residual_mm)
+
+
+@checks_arguments
+def fuse_ears(left: CochleaPose, right: CochleaPose, plane: MirrorPlane) -> Mapping[Side, CochleaPose]:
+    """Make one estimate of two ears, as a head's two cochleae are nearly mirror images.
+
+    Each axis becomes the mean of its own and of the other's mirror image, weighted by their covariances with
+    that of the plane; origins are not changed, since the touches of their own ear determine them far better.
+
+    Parameters
+    ----------
+    left, right : CochleaPose
+        In one frame, with side and names clear.
+    plane : MirrorPlane
+        See `mirror_plane`.
+
+    Returns
+    -------
+    mapping of Side to CochleaPose
+        The two poses, with smaller cones.
+
+    Raises
+    ------
+    GpError
+        The two ears disagree.
+    """
+    check = check_ears(left, right, plane)
+    if not check.agrees:
+        raise GpError(f"no estimate is made of both ears: {check.text}", remedy="Touch both ears again.")
+    poses = {Side.LEFT: left, Side.RIGHT: right}
+    return {side: _fused(pose, poses[side.other], plane) for side, pose in poses.items()}
+
+
+def _fused(pose: CochleaPose, other: CochleaPose, plane: MirrorPlane) -> CochleaPose:
+    own = pose.covariance[3:, 3:]
+    reflection = np.eye(3) - 2 * np.outer(plane.normal, plane.normal)
+    # a rotation vector is a pseudo-vector: it mirrors with the opposite sign, its covariance without
+    mirrored = reflection @ other.covariance[3:, 3:] @ reflection.T
+    theirs, common = mirrored + _of_plane(plane), _CORRELATION * (own + mirrored) / 2
+    axis = plane.mirror_direction(other.axis)
+    turn = np.cross(pose.axis, axis)  # the least rotation from one axis to the other, for small angles
+    across = np.eye(3) - np.outer(pose.axis, pose.axis)  # nothing is said of the rotation about the axis
+    # the best linear combination of two estimates whose errors have a covariance in common
+    total = across @ (own + theirs - 2 * common) @ across
+    gain = across @ (own - common) @ across @ np.linalg.pinv(total, rcond=1e-9, hermitian=True)
+    step = gain @ turn
+    angle = float(np.linalg.norm(step))
+    rotation = _rotation(step, angle) @ pose.transform_to_touches.rotation
+    turned = RigidTransform.from_parts(
+        rotation, pose.origin, dst=pose.transform_to_touches.dst, src="cochlea"
+    )
+    left_over = np.eye(3) - gain
+    covariance = pose.covariance.copy()
+    shared = left_over @ common @ gain.T
+    covariance[3:, 3:] = left_over @ own @ left_over.T + gain @ theirs @ gain.T + shared + shared.T
+    covariance[:3, 3:] = covariance[:3, 3:] @ left_over.T
+    covariance[3:, :3] = covariance[:3, 3:].T
+    return replace(pose, transform_to_touches=turned, covariance=(covariance + covariance.T) / 2, inputs=None)
+
+
+def _of_plane(plane: MirrorPlane) -> FloatArray:
+    """Return the covariance of a mirrored direction by that of the plane, rad^2: twice its tilt."""
+    across = np.eye(3) - np.outer(plane.normal, plane.normal)
+    covariance: FloatArray = (2 * np.radians(plane.normal_sd_deg)) ** 2 * across
+    return covariance
+
+
+def _rotation(vector: FloatArray, angle: float) -> FloatArray:
+    if angle == 0:
+        return np.eye(3)
+    cross = cross_matrix(vector / angle)
+    rotation: FloatArray = np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+    return rotation
