@@ -145,8 +145,8 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--other-ear",
         metavar="FILE",
-        help="touches of the other ear of the same head, in the same frame: the two estimates, mirrored on each "
-        "other, are a check without any CT. It may be TOUCHES itself, if that holds both sides",
+        help="touches of the other ear of the same head, in the same frame: the two estimates, mirrored on "
+        "each other, are a check without any CT. It may be TOUCHES itself, if that holds both sides",
     )
     group.add_argument(
         "--both-ears",

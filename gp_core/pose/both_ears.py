@@ -1,8 +1,8 @@
 """Both ears of one head: two estimates that check each other without any CT, or that are made one.
 
 Where both ears of a skull were touched in one frame, its mid-sagittal plane follows from the touches: of the
-features that were touched on both sides, and IN. The estimate of one ear, mirrored in that plane, should then be
-that of the other.
+features that were touched on both sides, and IN. The estimate of one ear, mirrored in that plane, should then
+be that of the other.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PAIR_SD_MM = 0.5
 """Standard deviation by which the two sides of a head differ in a touched feature, mm a coordinate."""
 
 _ASYMMETRY_MM, _RESIDUAL_FACTOR = 0.3, 1.5
-"""How much the two sides of a head differ, mm a coordinate, and how far pairs may exceed what that lets expect."""
+"""How much the two sides of a head differ, mm a coordinate; factor by which pairs may exceed that and noise."""
 
 _CORRELATION = 0.6
 """Of the errors of the two axes: both ears of an animal differ from the atlas in much the same way."""
@@ -105,9 +105,10 @@ class EarCheck:
         """The check in a sentence."""
         word = "agree" if self.agrees else "DISAGREE"
         return (
-            f"the two ears {word}: CO {self.origin_mm:.2f} mm and axis {self.axis_deg:.1f} deg from the mirror "
-            f"image of the other (expected within {self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg), "
-            f"pairs {self.plane.residual_mm:.2f} mm ({self.expected_residual_mm:.2f} mm); mid-plane from {', '.join(self.plane.codes)}"
+            f"the two ears {word}: CO {self.origin_mm:.2f} mm and axis {self.axis_deg:.1f} deg from the "
+            f"mirror image of the other (within {self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg), "
+            f"pairs {self.plane.residual_mm:.2f} mm (within {self.expected_residual_mm:.2f} mm); mid-plane from "
+            f"{', '.join(self.plane.codes)}"
         )
 
     def as_dict(self) -> dict[str, Any]:

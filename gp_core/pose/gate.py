@@ -34,7 +34,8 @@ class GateReason:
     ----------
     code : str
         For programs: ``no pose``, ``wrong side``, ``side undecided``, ``side unchecked``, ``wrong names``,
-        ``names undecided``, ``names unchecked``, ``ears disagree``, ``radius``, ``cone``, ``not accepted`` or ``stale``.
+        ``names undecided``, ``names unchecked``, ``ears disagree``, ``radius``, ``cone``, ``not accepted`` or
+        ``stale``.
     text : str
         For people, a clause without a full stop.
     """

@@ -1,4 +1,4 @@
-"""Both ears of one head: the mid-plane from touches, two estimates that check each other, one axis of both."""
+"""Both ears of one head: the mid-plane from touches, two estimates that check each other, one axis."""
 
 from __future__ import annotations
 
