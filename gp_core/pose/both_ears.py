@@ -29,7 +29,7 @@ _PAIR_SD_MM = 0.5
 """Standard deviation by which the two sides of a head differ in a touched feature, mm a coordinate."""
 
 _ASYMMETRY_MM, _RESIDUAL_FACTOR = 0.3, 1.5
-"""How much the two sides of a head differ, mm a coordinate; factor by which pairs may exceed that and noise."""
+"""How much the two sides of a head differ, mm a coordinate; factor by which pairs may exceed that."""
 
 _CORRELATION = 0.6
 """Of the errors of the two axes: both ears of an animal differ from the atlas in much the same way."""
@@ -107,8 +107,8 @@ class EarCheck:
         return (
             f"the two ears {word}: CO {self.origin_mm:.2f} mm and axis {self.axis_deg:.1f} deg from the "
             f"mirror image of the other (within {self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg), "
-            f"pairs {self.plane.residual_mm:.2f} mm (within {self.expected_residual_mm:.2f} mm); mid-plane from "
-            f"{', '.join(self.plane.codes)}"
+            f"pairs {self.plane.residual_mm:.2f} mm (within {self.expected_residual_mm:.2f} mm); "
+            f"mid-plane from {', '.join(self.plane.codes)}"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -282,7 +282,8 @@ def _fused(pose: CochleaPose, other: CochleaPose, plane: MirrorPlane) -> Cochlea
     reflection = np.eye(3) - 2 * np.outer(plane.normal, plane.normal)
     # a rotation vector is a pseudo-vector: it mirrors with the opposite sign, its covariance without
     mirrored = reflection @ other.covariance[3:, 3:] @ reflection.T
-    theirs, common = mirrored + _of_plane(plane), _CORRELATION * (own + mirrored) / 2
+    theirs = mirrored + _of_plane(plane)
+    common = _CORRELATION * min(own, mirrored, key=lambda one: float(np.trace(one)))
     axis = plane.mirror_direction(other.axis)
     turn = np.cross(pose.axis, axis)  # the least rotation from one axis to the other, for small angles
     across = np.eye(3) - np.outer(pose.axis, pose.axis)  # nothing is said of the rotation about the axis

@@ -12,7 +12,6 @@ from tracker_cases import DEADLINE, POINTS, TIP, SimulatorProcess, until
 from gp_core import PROBE, Atlas, Side
 from gp_core.errors import GpError
 from gp_labeler.document import touching
-from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.touches import TouchHow
 from gp_labeler.models.pose import ORDER
 from gp_labeler.models.workspace import Workspace
@@ -218,26 +217,3 @@ def test_touches_in_two_frames_of_the_tracker_do_not_mix(workspace, simulator):
         lambda: any("in the frame of ReferenceToTracker" in t for t in refusals), workspace.tracker.poll, "it"
     )
     assert list(workspace.document.state.touches) == [(workspace.pose.side, "ZL")]
-
-
-def test_touches_of_a_specimen_that_is_opened_again_are_doubtful_until_touched_again(
-    workspace, simulator, tmp_path
-):
-    """The reference may have moved since: nothing is sent before one of them was touched again."""
-    connected(workspace, simulator)
-    for name in ("RWA", "OS", "MN"):
-        simulator.do(f"go {name} 0.2")
-        recorded(workspace, name)
-    assert workspace.tracker.doubtful == ()
-    file = workspace.document.save(tmp_path / "GP01.gpspecimen.json")
-    again = Workspace(atlas=Atlas.published(), author="AB")
-    try:
-        again.document.load(read_specimen(file or tmp_path / "GP01.gpspecimen.json"))
-        assert set(again.tracker.doubtful) == {"RWA", "OS", "MN"}  # without any tracker
-        assert "earlier sitting" in again.tracker.frame_words
-        connected(again, simulator)
-        simulator.do("go OS 0.2")
-        recorded(again, "OS")
-        assert set(again.tracker.doubtful) == {"RWA", "MN"}
-    finally:
-        again.close(discard=True)
