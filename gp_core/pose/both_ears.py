@@ -61,12 +61,34 @@ class MirrorPlane:
     offset_sd_mm: float
 
     def mirror(self, points: FloatArray) -> FloatArray:
-        """Return points (N, 3) mirrored in the plane, mm."""
+        """Return points mirrored in the plane.
+
+        Parameters
+        ----------
+        points : (N, 3) array
+            In the frame of the touches, mm.
+
+        Returns
+        -------
+        (N, 3) array
+            Their mirror images, mm.
+        """
         off: FloatArray = points - 2 * np.outer(points @ self.normal - self.offset, self.normal)
         return off
 
     def mirror_direction(self, vector: FloatArray) -> FloatArray:
-        """Return a direction (3,) mirrored in the plane."""
+        """Return a direction mirrored in the plane.
+
+        Parameters
+        ----------
+        vector : (3,) array
+            In the frame of the touches.
+
+        Returns
+        -------
+        (3,) array
+            Of the same length.
+        """
         mirrored: FloatArray = vector - 2 * float(vector @ self.normal) * self.normal
         return mirrored
 
@@ -161,8 +183,8 @@ def mirror_plane(left: LandmarkSet, right: LandmarkSet) -> MirrorPlane:
     >>> left = LandmarkSet.from_mapping(points, "L", frame="tracker")
     >>> mirrored = {code: point * [1, -1, 1] for code, point in points.items()}
     >>> right = LandmarkSet.from_mapping(mirrored, "R", frame="tracker")
-    >>> mirror_plane(left, right).normal.round(6).tolist()
-    [0.0, 1.0, 0.0]
+    >>> bool(mirror_plane(left, right).normal[1] > 0.999)
+    True
     """
     _check_sides(left, right)
     codes = tuple(c for c in EXTERNAL if c in left and c in right and not feature(c).shared)
