@@ -18,6 +18,7 @@ from platformdirs import user_cache_path
 from gp_core.errors import GpError
 from gp_core.settings import setting
 from gp_labeler.imaging.mapped_file import MappedFile, can_map
+from gp_labeler.imaging.memory import available_memory
 
 __all__ = ["available_memory", "cache_folder", "needs_cache", "space_problem", "unpacked"]
 
@@ -30,19 +31,6 @@ _SPARE_BYTES = 1 << 28
 def needs_cache(n_bytes: int) -> bool:
     """Return whether voxels that must be unpacked do so into a file: more than half of the free memory."""
     return can_map() and n_bytes > available_memory() / 2
-
-
-def available_memory() -> float:
-    """Return the bytes of memory that programs can have; infinity where the system does not say."""
-    try:
-        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
-        return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable"))
-    except (OSError, StopIteration, ValueError):
-        pass
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):
-        return float("inf")
 
 
 def cache_folder() -> Path:

@@ -64,6 +64,9 @@ class GuardedMap:
         File descriptor, which may be closed afterwards.
     length : int
         Bytes to map, from the beginning of the file.
+    page_by_page : bool
+        Whether the system reads no more than what is asked for. A file that the memory holds is read sooner
+        as a whole; of a larger one, each voxel of a row would bring megabytes after it.
 
     Raises
     ------
@@ -73,11 +76,11 @@ class GuardedMap:
         The file is shorter.
     """
 
-    def __init__(self, fileno: int, length: int) -> None:
+    def __init__(self, fileno: int, length: int, *, page_by_page: bool = False) -> None:
         self._map = mmap.mmap(fileno, length, access=mmap.ACCESS_READ)
         self._length = length
         self._start = int(np.frombuffer(self._map, np.uint8).ctypes.data)
-        if hasattr(mmap, "MADV_RANDOM"):  # else each voxel of a row would bring megabytes after it
+        if page_by_page and hasattr(mmap, "MADV_RANDOM"):
             self._map.madvise(mmap.MADV_RANDOM)
         end = self._start + -(-length // mmap.PAGESIZE) * mmap.PAGESIZE
         self.__array_interface__ = {

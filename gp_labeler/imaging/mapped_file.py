@@ -14,6 +14,7 @@ from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from gp_labeler.imaging.map_guard import GuardedMap, maps_can_be_guarded
+from gp_labeler.imaging.memory import available_memory
 
 __all__ = ["MappedFile", "can_map"]
 
@@ -51,7 +52,7 @@ class MappedFile:
         self._n_bytes = n_bytes
         self._thrown_away = path if thrown_away else None
         self._file = path.open("rb")
-        self._map = GuardedMap(self._file.fileno(), n_bytes)
+        self._map = GuardedMap(self._file.fileno(), n_bytes, page_by_page=n_bytes > available_memory() / 2)
         self._written = os.fstat(self._file.fileno()).st_mtime_ns
 
     def array(
