@@ -36,6 +36,7 @@ from gp_core.landmarks.measurements import Measurement
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
+from gp_core.moved_modules import keep_importable
 from gp_core.pose.both_ears import EarCheck, MirrorPlane, check_ears, fuse_ears, mirror_plane
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.estimate import estimate_again, estimate_pose
@@ -68,6 +69,37 @@ FiducialRegistration = RegistrationResult
 
 Departure = Deviation
 """Earlier name of `Deviation`."""
+
+MOVED_MODULES = {
+    "gp_core.atlas.draw": "gp_core.atlas.sampling",
+    "gp_core.atlas.expected": "gp_core.pose.expected_landmarks",
+    "gp_core.atlas.insertion": "gp_core.pose.insertion_path",
+    "gp_core.atlas.named_fit": "gp_core.registration.named_points",
+    "gp_core.atlas.next_touch": "gp_core.pose.next_touch",
+    "gp_core.atlas.pose": "gp_core.pose.cochlea_pose",
+    "gp_core.atlas.pose_files": "gp_core.io.pose_json",
+    "gp_core.atlas.quality": "gp_core.atlas.label_check",
+    "gp_core.atlas.shape": "gp_core.atlas.prediction",
+    "gp_core.checks": "gp_core.validation",
+    "gp_core.landmarks.files": "gp_core.io",
+    "gp_core.landmarks.files.dat": "gp_core.io.dat",
+    "gp_core.landmarks.files.fcsv": "gp_core.io.fcsv",
+    "gp_core.landmarks.files.header": "gp_core.io.header",
+    "gp_core.landmarks.files.markups": "gp_core.io.markups",
+    "gp_core.landmarks.files.mat": "gp_core.io.authors_mat",
+    "gp_core.landmarks.files.points": "gp_core.io.labelled_points",
+    "gp_core.landmarks.files.reading": "gp_core.io.reading",
+    "gp_core.landmarks.files.specimens": "gp_core.io.specimens",
+    "gp_core.landmarks.files.table": "gp_core.io.table",
+    "gp_core.registration.stl": "gp_core.io.stl",
+    "gp_core.registration.targets": "gp_core.registration.icp_targets",
+    "gp_core.study.elimination": "gp_core.study.backward_elimination",
+    "gp_core.study.nested": "gp_core.study.nested_search",
+    "gp_core.study.skull_registration": "gp_core.registration.skull",
+}
+"""Modules of version 0.1.0's predecessors that scripts of labs import; see docs/api-stability.md."""
+
+keep_importable(MOVED_MODULES)
 
 __all__ = [
     "CODES",
