@@ -88,7 +88,9 @@ def test_no_cell_of_a_table_is_a_formula(label: str, tmp_path: Path) -> None:
     "names", [("S2", "s2"), ("Bolt", "bolt"), ("S2", " s2 "), ("OS", "os"), ("a b", "A  B")]
 )
 @pytest.mark.parametrize("suffix", [".csv", ".fcsv"])
-def test_two_names_of_one_point_are_refused(names: tuple[str, str], suffix: str, tmp_path: Path) -> None:
+def test_two_names_of_one_point_are_that_point_twice(
+    names: tuple[str, str], suffix: str, tmp_path: Path
+) -> None:
     file = tmp_path / f"a_L{suffix}"
     one, other = names
     if suffix == ".csv":
@@ -99,8 +101,13 @@ def test_two_names_of_one_point_are_refused(names: tuple[str, str], suffix: str,
         file.write_text(
             "# Markups fiducial file version = 4.11\n# CoordinateSystem = LPS\n" + "\n".join(lines)
         )
+    touches = read_touches(file, "L", unknown="extra")
+    points = [*touches.placed, *touches.extra]
+    assert len(points) == 2
+    (repeated,) = touches.repeats.values()
+    assert len(repeated.points) == 2
     with pytest.raises(FeatureError, match="is in the file twice"):
-        read_touches(file, "L", unknown="extra")
+        read_landmarks(file, side="L", unknown="extra")
 
 
 @pytest.mark.parametrize("shift", [0.0, 1e-7, 5e-4])

@@ -51,7 +51,7 @@ def test_the_formatter_of_pages_finds_nothing_wrong(pages: Path) -> None:
     [
         ("gp-core", "gp-core est", {"estimate"}),
         ("gp-core", "gp-core estimate --met", {"--method"}),
-        ("gp-core", "gp-core estimate --method ", {"robust", "jrmpc"}),
+        ("gp-core", "gp-core simulate --method ", {"robust", "jrmpc"}),
         ("gp-labeler", "gp-labeler do", {"doctor"}),
         ("gp-labeler", "gp-labeler --off", {"--offscreen"}),
         ("gp-labeler", "gp-labeler mesh --thr", {"--threshold"}),

@@ -177,7 +177,8 @@ class Recording:
 
 
 def untimed(path) -> str:
-    return re.sub(r'"time": "[^"]*"| \[time: [^]]*\]|; time: [^]]*', "", path.read_text())
+    text = re.sub(r'"time": "[^"]*"| \[time: [^]]*\]|; time: [^]]*', "", path.read_text())
+    return re.sub(r"\d{4}-\d\d-\d\dT[\d:.]+|\b\d{10}\.\d+", "", text)
 
 
 def write_path(folder) -> Path:

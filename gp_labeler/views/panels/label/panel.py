@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from qtpy.QtCore import Qt
-from qtpy.QtWidgets import QVBoxLayout, QWidget
+from qtpy.QtWidgets import QHBoxLayout, QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import fit, pixels
@@ -45,8 +45,11 @@ class LabelPanel(QWidget):
         column.setContentsMargins(4, 8, 8, 8)
         column.setSpacing(6)
         fit(self, lambda: self.card.setMaximumHeight(pixels(self, _TALLEST_CARD)))
-        column.addWidget(self.observer)
-        column.addWidget(self.suggest)
+        head = QHBoxLayout()
+        head.setSpacing(0)
+        head.addWidget(self.observer, 1)
+        head.addWidget(self.suggest)
+        column.addLayout(head)
         column.addWidget(self.card, 1)
         column.addWidget(self.table, 2)
         column.addStretch(0)

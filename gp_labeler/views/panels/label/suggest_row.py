@@ -26,16 +26,15 @@ class SuggestRow(QWidget):
     def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
-        words = "Suggest from my scans…"
+        words = "Suggest…"
         self.button = action_button(
             actions["point.suggest_like"],
             words,
             "First labels from labelled scans; again, to stop",
         )
         row = QHBoxLayout(self)
-        row.setContentsMargins(12, 0, 12, 0)
+        row.setContentsMargins(0, 0, 12, 0)
         row.addWidget(self.button)
-        row.addStretch(1)
         document = workspace.document
         for signal in (document.reset, document.landmarks_changed, workspace.first_labels.changed):
             follow(self, signal, self.refresh)
