@@ -26,8 +26,10 @@ import numpy as np
 from gp_core.io import read_points
 from gp_labeler.autolabel import LabelledScan, TemplateLibrary
 from gp_labeler.autolabel.confidence import GuessConfidence, HeldOut, centre_of, spread_of
+from gp_labeler.autolabel.cross_check import check_predictions
 from gp_labeler.autolabel.labelled_scan import flat_points
 from gp_labeler.autolabel.pose_search import find_pose
+from gp_labeler.autolabel.prediction import Prediction
 from gp_labeler.autolabel.registration import engine_named
 from gp_labeler.autolabel.registration_process import HereRegistration
 from gp_labeler.autolabel.template import Template
@@ -241,6 +243,29 @@ def tell_guesses(k: int, rows: list[tuple]) -> None:
     print(text, flush=True)
 
 
+def run_exchanges(heads: list[LabelledScan], args: argparse.Namespace) -> None:
+    """Exchange two labels of a head, many times, and print how often the check of the library names them."""
+    predictions = {
+        name: Prediction(carried, None)
+        for name, carried in run_carry(heads, args).items()
+        if len(carried) > 2
+    }
+    scans = [scan for scan in heads if scan.name in predictions]
+    rng, found = np.random.default_rng(0), []
+    for scan in scans:
+        for _ in range(args.exchanges):
+            a, b = (str(name) for name in rng.choice(list(scan.points), 2, replace=False))
+            points = dict(scan.points) | {a: scan.points[b], b: scan.points[a]}
+            library = [replace(each, points=points) if each is scan else each for each in scans]
+            told = check_predictions(library, predictions).of(scan.name)
+            found.append(any(f.kind == "exchanged" and set(f.names) == {a, b} for f in told))
+    alarms = sum(len(check_predictions(scans, predictions).of(scan.name)) for scan in scans)
+    print(
+        f"{len(scans)} heads: {sum(found)} of {len(found)} exchanges named; {alarms} findings without one",
+        flush=True,
+    )
+
+
 def main() -> None:
     """Run one part."""
     parser = argparse.ArgumentParser(
@@ -253,6 +278,7 @@ def main() -> None:
     parser.add_argument("--kinds", nargs="+", default=["whole"])
     parser.add_argument("--k", type=int, nargs="+", default=[1, 3, 5])
     parser.add_argument("--subsets", type=int, default=30)
+    parser.add_argument("--exchanges", type=int, default=25, help="planted in each head")
     parser.add_argument("--library", nargs="+", help="predict from these alone; by default from all others")
     parser.add_argument("--engine", default="auto")
     parser.add_argument("--out", type=Path, required=True)
@@ -268,6 +294,8 @@ def main() -> None:
         run_carry(heads, args)
     elif args.part == "guesses":
         run_guesses(heads, args)
+    else:
+        run_exchanges(heads, args)
 
 
 if __name__ == "__main__":
