@@ -104,7 +104,9 @@ def on_screen(view) -> np.ndarray:
 def over_of(view) -> QWidget:
     from qtpy.QtOpenGLWidgets import QOpenGLWidget
 
-    (over,) = [w for w in view.findChildren(QWidget) if not isinstance(w, QOpenGLWidget)]
+    from gp_labeler.views.focus_ring import FocusRing
+
+    (over,) = [w for w in view.findChildren(QWidget) if not isinstance(w, (QOpenGLWidget, FocusRing))]
     return over
 
 
