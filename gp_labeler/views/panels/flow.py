@@ -68,14 +68,27 @@ class FlowLayout(QLayout):
         return size + QSize(margins.left() + margins.right(), margins.top() + margins.bottom())
 
     def _place(self, rect: QRect, *, move: bool) -> int:
-        """Go along the lines; return how high they are together."""
+        """Go along the lines, each item in the middle of its line; return how high they are together."""
         inner = rect.marginsRemoved(self.contentsMargins())
-        x, y, line = inner.left(), inner.top(), 0
+        bottom = inner.top()
+        for n, line in enumerate(self._lines(inner.width())):
+            top = bottom + (self.spacing() if n else 0)
+            height = max(item.sizeHint().height() for _, item in line)
+            for x, item in line if move else ():
+                size = item.sizeHint()
+                corner = QPoint(inner.left() + x, top + (height - size.height()) // 2)
+                item.setGeometry(QRect(corner, size))
+            bottom = top + height
+        return bottom - inner.top()
+
+    def _lines(self, width: int) -> list[list[tuple[int, QLayoutItem]]]:
+        """Return the items of each line, with their distances from its beginning."""
+        lines: list[list[tuple[int, QLayoutItem]]] = []
+        x = width
         for item in self._shown():
-            size = item.sizeHint()
-            if x > inner.left() and x + size.width() > inner.left() + inner.width():
-                x, y, line = inner.left(), y + line + self.spacing(), 0
-            if move:
-                item.setGeometry(QRect(QPoint(x, y), size))
-            x, line = x + size.width() + self.spacing(), max(line, size.height())
-        return y + line - inner.top()
+            if not lines or x + item.sizeHint().width() > width:
+                lines.append([])
+                x = 0
+            lines[-1].append((x, item))
+            x += item.sizeHint().width() + self.spacing()
+        return lines

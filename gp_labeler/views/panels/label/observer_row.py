@@ -41,7 +41,7 @@ class ObserverRow(QWidget):
         line.addWidget(self.name, 1)
         line.addWidget(self.keep)
         question = QVBoxLayout(self._asked)
-        question.setContentsMargins(12, 4, 12, 4)
+        question.setContentsMargins(12, 4, 12, 0)
         question.setSpacing(4)
         words = "Who labels? It goes with each label into all files."
         question.addWidget(text_label(words, "warning", wrap=True))

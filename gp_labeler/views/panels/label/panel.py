@@ -48,7 +48,7 @@ class LabelPanel(QWidget):
         head = QHBoxLayout()
         head.setSpacing(0)
         head.addWidget(self.observer, 1)
-        head.addWidget(self.suggest)
+        head.addWidget(self.suggest, 0, Qt.AlignmentFlag.AlignBottom)
         column.addLayout(head)
         column.addWidget(self.card, 1)
         column.addWidget(self.table, 2)
