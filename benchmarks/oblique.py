@@ -24,6 +24,7 @@ from scipy.ndimage import gaussian_filter, zoom  # noqa: E402
 from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
 from vtkmodules.vtkImagingCore import vtkImageReslice  # noqa: E402
 
+from gp_labeler.imaging.slab import Slab  # noqa: E402
 from gp_labeler.imaging.volume import Volume  # noqa: E402
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_vtk  # noqa: E402
 from gp_labeler.views.application import make_window  # noqa: E402
@@ -38,25 +39,13 @@ def main() -> None:
     """Print the table."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 512
     volume = bubbles(n)
-    window = make_window(None, atlas=False)
-    window.resize(1440, 900)
-    window.show()
-    QTest.qWaitForWindowExposed(window)
-    window.workspace.scan.begin(volume)
-    window.workspace.scan.set_threshold(11_000)
-    while window.workspace.jobs.running:
-        QTest.qWait(50)
+    window = shown(volume)
     print(f"{n} x {n} x {n} voxels of 16 bits")
     print(f"{'turned by':<14}{'axial':>9}{'sagittal':>9}{'coronal':>9}{'mean':>8}{'ratio':>8}{'reslice':>9}")
     straight = 0.0
     for turn in TURNS:
-        view = window.workspace.view
-        view.set_frame(view.frame)
-        view.set_crosshair(volume.extent.mean(axis=0))
-        view.rotate_planes("axial", np.radians(turn[0]))
-        view.rotate_planes("sagittal", np.radians(turn[1]))
-        window.grid.reset()
-        costs = [scrolled(window, name) for name in view.planes]
+        turn_planes(window, turn)
+        costs = [scrolled(window, name) for name in window.workspace.view.planes]
         mean = float(np.mean(costs))
         straight = straight or mean
         alone = resliced(volume, window)
@@ -68,6 +57,29 @@ def main() -> None:
     window.workspace.document.abandon()
     window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
     window.close()
+
+
+def shown(volume: Volume) -> MainWindow:
+    """Return a window that shows a scan and its bone."""
+    window = make_window(None, atlas=False)
+    window.resize(1440, 900)
+    window.show()
+    QTest.qWaitForWindowExposed(window)
+    window.workspace.scan.begin(volume)
+    window.workspace.scan.set_threshold(11_000)
+    while window.workspace.jobs.running:
+        QTest.qWait(50)
+    return window
+
+
+def turn_planes(window: MainWindow, turn: tuple[int, int]) -> None:
+    """Turn the planes about the middle of the scan, degrees; see `TURNS`."""
+    view = window.workspace.view
+    view.set_frame(view.frame)
+    view.set_crosshair(window.workspace.scan.volume.extent.mean(axis=0))
+    view.rotate_planes("axial", np.radians(turn[0]))
+    view.rotate_planes("sagittal", np.radians(turn[1]))
+    window.grid.reset()
 
 
 def bubbles(n: int) -> Volume:
@@ -93,19 +105,23 @@ def scrolled(window: MainWindow, name: str) -> float:
     return float(np.median(costs))
 
 
-def resliced(volume: Volume, window: MainWindow) -> float:
-    """Return what `vtkImageReslice` alone takes of the main thread for the axial slice, s."""
+def resliced(volume: Volume, window: MainWindow, slab: Slab | None = None) -> float:
+    """Return what `vtkImageReslice` alone takes of the main thread for the axial slice, or slab, s."""
     image, plane = vtkImageData(), window.workspace.view.planes["axial"]
     image.SetDimensions(volume.size)
     image.SetSpacing(volume.spacing)
     image.SetOrigin(volume.origin.tolist())
     image.GetPointData().SetScalars(to_vtk(volume.array.reshape(-1), share=True))
     costs = []
-    for n in range(N_SLICES):
+    for n in range(N_SLICES if slab is None else N_SLICES // 6):
         reslice = vtkImageReslice()
         reslice.SetInputData(image)
         reslice.SetInterpolationModeToLinear()
         reslice.SetOutputDimensionality(2)
+        if slab is not None:
+            set_mode = {"mean": "Mean", "maximum": "Max", "minimum": "Min"}[slab.mode]
+            getattr(reslice, f"SetSlabModeTo{set_mode}")()
+            reslice.SetSlabNumberOfSlices(slab.n_layers(VOXEL_MM))
         axes = np.eye(4)
         axes[:3, :3] = plane.axes
         axes[:3, 3] = window.workspace.view.crosshair + n * VOXEL_MM * plane.normal

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -21,15 +20,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
 
 import numpy as np  # noqa: E402
-from oblique import N_SLICES, VOXEL_MM, bubbles, scrolled  # noqa: E402
-from qtpy.QtTest import QTest  # noqa: E402
-from vtkmodules.vtkCommonDataModel import vtkImageData  # noqa: E402
-from vtkmodules.vtkImagingCore import vtkImageReslice  # noqa: E402
+from oblique import VOXEL_MM, bubbles, resliced, scrolled, shown, turn_planes  # noqa: E402
 
 from gp_labeler.imaging.slab import DENOISERS, SLAB_MODES, Slab  # noqa: E402
 from gp_labeler.imaging.volume import Volume  # noqa: E402
-from gp_labeler.imaging.vtk_arrays import matrix_of, to_vtk  # noqa: E402
-from gp_labeler.views.application import make_window  # noqa: E402
 from gp_labeler.views.main_window import MainWindow  # noqa: E402
 
 TURNS = ((0, 0), (30, 20))
@@ -40,23 +34,16 @@ def main() -> None:
     """Print the table."""
     n = int(sys.argv[1]) if len(sys.argv) > 1 else 512
     volume = bubbles(n)
-    window = make_window(None, atlas=False)
-    window.resize(1440, 900)
-    window.show()
-    QTest.qWaitForWindowExposed(window)
-    window.workspace.scan.begin(volume)
-    window.workspace.scan.set_threshold(11_000)
-    while window.workspace.jobs.running:
-        QTest.qWait(50)
+    window = shown(volume)
     print(f"{n} x {n} x {n} voxels of 16 bits and {VOXEL_MM} mm; ms of the main thread for a slice")
     print(f"{'shown':<18}{'straight':>10}{'turned':>10}{'reslice straight':>18}{'reslice turned':>16}")
     cases: list[tuple[str, dict[str, Any]]] = [("single slice", {})]
     cases += [(f"{m} {mm:g} mm", {"slab": Slab(m, mm)}) for m in SLAB_MODES for mm in SLAB_MM]
     cases += [(kind, {"denoise": kind}) for kind in DENOISERS]
-    for name, shown in cases:
-        window.workspace.view.update(**{"slab": None, "denoise": None, **shown})
-        costs = [cost(volume, window, turn, shown.get("slab")) for turn in TURNS]
-        alone = [f"{1e3 * each:.1f}" if "denoise" not in shown else "" for _, each in costs]
+    for name, how in cases:
+        window.workspace.view.update(**{"slab": None, "denoise": None, **how})
+        costs = [cost(volume, window, turn, how.get("slab")) for turn in TURNS]
+        alone = [f"{1e3 * each:.1f}" if "denoise" not in how else "" for _, each in costs]
         print(f"{name:<18}" + "".join(f"{1e3 * each:>10.1f}" for each, _ in costs), end="")
         print(f"{alone[0]:>18}{alone[1]:>16}", flush=True)
     window.workspace.document.abandon()
@@ -66,41 +53,10 @@ def main() -> None:
 
 def cost(volume: Volume, window: MainWindow, turn: tuple[int, int], slab: Slab | None) -> tuple[float, float]:
     """Return what a slice takes of the main thread in the window, and in `vtkImageReslice` alone, s."""
-    view = window.workspace.view
-    view.set_frame(view.frame)
-    view.set_crosshair(volume.extent.mean(axis=0))
-    view.rotate_planes("axial", np.radians(turn[0]))
-    view.rotate_planes("sagittal", np.radians(turn[1]))
-    window.grid.reset()
-    return float(np.mean([scrolled(window, name) for name in view.planes])), resliced(volume, window, slab)
-
-
-def resliced(volume: Volume, window: MainWindow, slab: Slab | None) -> float:
-    """Return what `vtkImageReslice` alone takes of the main thread for the axial slice, s."""
-    image, plane = vtkImageData(), window.workspace.view.planes["axial"]
-    image.SetDimensions(volume.size)
-    image.SetSpacing(volume.spacing)
-    image.SetOrigin(volume.origin.tolist())
-    image.GetPointData().SetScalars(to_vtk(volume.array.reshape(-1), share=True))
-    costs = []
-    for n in range(max(3, N_SLICES // 6)):
-        reslice = vtkImageReslice()
-        reslice.SetInputData(image)
-        reslice.SetInterpolationModeToLinear()
-        reslice.SetOutputDimensionality(2)
-        if slab is not None:
-            set_mode = {"mean": "Mean", "maximum": "Max", "minimum": "Min"}[slab.mode]
-            getattr(reslice, f"SetSlabModeTo{set_mode}")()
-            reslice.SetSlabNumberOfSlices(slab.n_layers(VOXEL_MM))
-        axes = np.eye(4)
-        axes[:3, :3] = plane.axes
-        axes[:3, 3] = window.workspace.view.crosshair + n * VOXEL_MM * plane.normal
-        reslice.SetResliceAxes(matrix_of(axes))
-        reslice.AutoCropOutputOn()
-        start = time.thread_time()
-        reslice.Update()
-        costs.append(time.thread_time() - start)
-    return float(np.median(costs))
+    turn_planes(window, turn)
+    return float(np.mean([scrolled(window, name) for name in window.workspace.view.planes])), resliced(
+        volume, window, slab
+    )
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from gp_core.registration.compiling import compiled
+from gp_core.registration.jrmpc_limits import LEAST_SPREAD, NOTHING
 from gp_core.registration.rotation import Matrix3, Quaternion
 from gp_core.registration.rotation_compiled import as_matrix, minimal_rotation, product
 from gp_core.validation import FloatArray
@@ -31,10 +32,6 @@ IndexArray = NDArray[np.uint64]
 _SUMS = {"contract", "reassoc", "nsz"}
 _EXACT = {"contract"}
 
-_NOTHING = 1e-290  # smaller than any weight of a point
-_LEAST_SPREAD = (
-    1e-10  # of a centre, relative to the size: keeps one that collapsed onto a point finite at epsilon 0
-)
 
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH, _LN2_LOW = 6.93147180369123816490e-01, 1.90821492927058770002e-10
@@ -285,7 +282,7 @@ def _weighted_means(
         dx += q * moments[j, 1, k]
         dy += q * moments[j, 2, k]
         dz += q * moments[j, 3, k]
-    if w <= _NOTHING:
+    if w <= NOTHING:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     return x / w, y / w, z / w, dx / w, dy / w, dz / w
 
@@ -354,11 +351,11 @@ def _add_set(moments: FloatArray, j: int, motion: FloatArray, centres: FloatArra
 @compiled()
 def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: float, size: float) -> float:
     """Move each centre to the mean of its moved points, then set its variance about that mean."""
-    floor = (_LEAST_SPREAD * size) ** 2
+    floor = (LEAST_SPREAD * size) ** 2
     change = 0.0
     for k in range(centres.shape[1]):
         weight = sums[0, k]
-        if weight <= _NOTHING:
+        if weight <= NOTHING:
             continue  # no point has weight here: the centre stays
         x, y, z = sums[1, k] / weight, sums[2, k] / weight, sums[3, k] / weight
         moved = x * x + y * y + z * z

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.registration.compiling import compiled
+from gp_core.registration.jrmpc_limits import LEAST_SPREAD, NOTHING
 from gp_core.registration.lanes import (
     LANES,
     above,
@@ -27,15 +28,13 @@ from gp_core.registration.lanes import (
     square_root,
     take,
 )
+from gp_core.registration.rotation import CONVERGED_ANGLE2, NEWTON_STEPS, UNDETERMINED
 from gp_core.registration.rotation_compiled import as_matrix, minimal_rotation, product
 from gp_core.validation import FloatArray
 
 __all__ = ["run_batch"]
 
 IndexArray = NDArray[np.uint64]
-
-_NOTHING, _LEAST_SPREAD = 1e-290, 1e-10  # as in jrmpc_kernels
-_UNDETERMINED, _CONVERGED_ANGLE2, _NEWTON_STEPS = 1e-10, 1e-14, 12  # as in rotation
 
 
 def run_batch(
@@ -240,7 +239,7 @@ def _weighted_means(moments: Any, centres: Any) -> Any:
         dx = dx + q * take(moments, row + k)
         dy = dy + q * take(moments, 2 * row + k)
         dz = dz + q * take(moments, 3 * row + k)
-    there = above(w, _NOTHING)
+    there = above(w, NOTHING)
     w = choose(there, w, 1.0)
     none = 0.0
     return (
@@ -285,10 +284,10 @@ def _rotation(h: Any, scratch: Any) -> Any:
     """
     h0, h1, h2, h3, h4, h5, h6, h7, h8 = h
     size = magnitude(h0) + magnitude(h1) + magnitude(h2) + magnitude(h3) + magnitude(h4)
-    least = (size + magnitude(h5) + magnitude(h6) + magnitude(h7) + magnitude(h8)) * _UNDETERMINED
+    least = (size + magnitude(h5) + magnitude(h6) + magnitude(h7) + magnitude(h8)) * UNDETERMINED
     one, zero = lanes_of(1.0), lanes_of(0.0)
     turn, going, failed = (one, zero, zero, zero), one, zero
-    for _ in range(_NEWTON_STEPS):
+    for _ in range(NEWTON_STEPS):
         definite, x, y, z = _newton_step(h, as_matrix(turn), least)
         failed = choose(above(going, definite), 1.0, failed)
         going = going * definite
@@ -300,7 +299,7 @@ def _rotation(h: Any, scratch: Any) -> Any:
             choose(moves, turned[2], turn[2]),
             choose(moves, turned[3], turn[3]),
         )
-        going = choose(above(_CONVERGED_ANGLE2, x * x + y * y + z * z), 0.0, going)
+        going = choose(above(CONVERGED_ANGLE2, x * x + y * y + z * z), 0.0, going)
         if all_above(0.5, going):
             break
     return turn if all_above(0.5, failed) else _one_by_one(h, turn, failed, scratch)
@@ -375,10 +374,10 @@ def _add_set(moments: Any, motion: Any, centres: Any, sums: Any) -> None:
 def _centre_step(sums: Any, centres: Any, prior: float, epsilon: float, active: Any, size: Any) -> Any:
     """Move each centre to the mean of its moved points, then set its variance about that mean."""
     row = centres.size // 5
-    floor = (size * _LEAST_SPREAD) * (size * _LEAST_SPREAD)
+    floor = (size * LEAST_SPREAD) * (size * LEAST_SPREAD)
     change = lanes_of(0.0)
     for k in range(0, row, LANES):
-        there = above(take(sums, k), _NOTHING)  # else no point has weight here: the centre stays
+        there = above(take(sums, k), NOTHING)  # else no point has weight here: the centre stays
         w = choose(there, take(sums, k), 1.0)
         x, y = choose(there, take(sums, row + k) / w, 0.0), choose(there, take(sums, 2 * row + k) / w, 0.0)
         z = choose(there, take(sums, 3 * row + k) / w, 0.0)

@@ -11,15 +11,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.registration.jrmpc_limits import LEAST_SPREAD, NOTHING
 from gp_core.registration.rotation import IDENTITY, Quaternion, as_matrix, minimal_rotation, product
 from gp_core.validation import FloatArray
 
 __all__ = ["expect", "maximise", "move", "run_batch"]
 
 IndexArray = NDArray[np.uint64]
-
-_NOTHING = 1e-290  # smaller than any weight of a point
-_LEAST_SPREAD = 1e-10  # of a centre, relative to the size
 
 
 def move(points: FloatArray, starts: IndexArray, poses: FloatArray, moved: FloatArray) -> None:
@@ -133,7 +131,7 @@ def _pose_steps(
     weights = centres[3] * moments[:, 0]
     offsets = centres[3] * moments[:, 1:4]
     total = weights.sum(axis=1)
-    divisor = np.where(total > _NOTHING, total, np.inf)[:, None]
+    divisor = np.where(total > NOTHING, total, np.inf)[:, None]
     means = weights @ centres[:3].T / divisor
     beyond = offsets.sum(axis=2) / divisor
     about = centres[:3] - means[:, :, None]
@@ -165,13 +163,13 @@ def _centre_sums(
 
 def _centre_step(sums: FloatArray, centres: FloatArray, prior: float, epsilon: float, size: float) -> float:
     """Move each centre to the mean of its moved points, then set its variance about that mean."""
-    reached = sums[0] > _NOTHING  # where no point has weight, the centre stays
+    reached = sums[0] > NOTHING  # where no point has weight, the centre stays
     if not reached.any():
         return 0.0
     steps = sums[1:4, reached] / sums[0, reached]
     squared = (steps * steps).sum(axis=0)
     variances = np.maximum((sums[4, reached] / sums[0, reached] - squared) / 3.0, 0.0) + epsilon
-    precisions = 1.0 / np.maximum(variances, (_LEAST_SPREAD * size) ** 2)
+    precisions = 1.0 / np.maximum(variances, (LEAST_SPREAD * size) ** 2)
     changes = np.maximum(np.sqrt(squared) / size, np.abs(1.0 - centres[3, reached] / precisions))
     centres[:3, reached] += steps
     centres[3, reached], centres[4, reached] = precisions, prior * precisions**1.5

@@ -11,8 +11,11 @@ import math
 from typing import TypeAlias
 
 __all__ = [
+    "CONVERGED_ANGLE2",
     "IDENTITY",
+    "NEWTON_STEPS",
     "ROTATIONS",
+    "UNDETERMINED",
     "Matrix3",
     "Quaternion",
     "as_matrix",
@@ -28,9 +31,9 @@ Symmetric4: TypeAlias = tuple[float, float, float, float, float, float, float, f
 IDENTITY = (1.0, 0.0, 0.0, 0.0)
 """The identity."""
 
-_UNDETERMINED = 1e-10  # relative gap below which a rotation is not determined
-_CONVERGED_ANGLE2 = 1e-14  # squared angle of a Newton step after which the next would be below rounding
-_NEWTON_STEPS = 12
+UNDETERMINED = 1e-10  # relative gap below which a rotation is not determined
+CONVERGED_ANGLE2 = 1e-14  # squared angle of a Newton step after which the next would be below rounding
+NEWTON_STEPS = 12
 _SQUARINGS = 40
 _SQUARINGS_OF_TIES = 24  # each doubles the rounding difference between eigenvalues that tie
 _ALIGNED = 1.0 - 1e-6  # trace of the square of a matrix of trace 1: only the top eigenvector is left
@@ -57,11 +60,11 @@ def optimal_rotation(h: Matrix3, start: Quaternion) -> Quaternion:
     """
     scale = _size(h)
     quaternion, restarted = start, False
-    for _ in range(_NEWTON_STEPS):
-        definite, x, y, z = _newton_step(h, as_matrix(quaternion), _UNDETERMINED * scale)
+    for _ in range(NEWTON_STEPS):
+        definite, x, y, z = _newton_step(h, as_matrix(quaternion), UNDETERMINED * scale)
         if definite:
             quaternion = product((1.0, 0.5 * x, 0.5 * y, 0.5 * z), quaternion)
-            if x * x + y * y + z * z < _CONVERGED_ANGLE2:
+            if x * x + y * y + z * z < CONVERGED_ANGLE2:
                 break
         elif restarted:
             return math.nan, math.nan, math.nan, math.nan
@@ -93,7 +96,7 @@ def minimal_rotation(h: Matrix3) -> Quaternion:
     if scale == 0.0:
         return IDENTITY
     n = _horn(h, scale, _SQUARINGS_OF_TIES)
-    return product(IDENTITY, (n[0], n[1], n[2], n[3])) if n[0] > _UNDETERMINED else _top(n)
+    return product(IDENTITY, (n[0], n[1], n[2], n[3])) if n[0] > UNDETERMINED else _top(n)
 
 
 def _size(h: Matrix3) -> float:
