@@ -25,7 +25,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.answer import MAY_BE_USED, pose_answer
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
-from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.estimate import estimate_from, estimate_pose
 from gp_core.pose.estimate_inputs import versions_now
 from gp_core.pose.gate import named_for_other_side
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
@@ -106,18 +106,7 @@ def _again(content: Mapping[str, Any]) -> CochleaPose:
         made = inputs_from(content["inputs"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
         raise GpError("the inputs of the pose are damaged", remedy="Send the touches.") from None
-    pose = estimate_pose(
-        made.touches,
-        made.touches.side,
-        made.atlas,
-        method=made.method,
-        specimens=made.specimens or None,
-        probe_noise=made.probe_noise,
-        round_window=made.round_window,
-        shared_error=made.shared_error,
-        times=made.times,
-    )
-    return _from(pose, made.source)
+    return estimate_from(made)
 
 
 def _estimated(content: Mapping[str, Any], known: _Known) -> CochleaPose:
@@ -139,7 +128,8 @@ def _estimated(content: Mapping[str, Any], known: _Known) -> CochleaPose:
         shared_error=_number(content, "shared_error_mm", DEFAULT_SHARED_ERROR_MM),  # type: ignore[arg-type]
         times=_times(content),
     )
-    return _from(pose, _word(content, "source", ""))
+    assert pose.inputs is not None
+    return replace(pose, inputs=replace(pose.inputs, source=_word(content, "source", "")))
 
 
 def _atlas(own: Any, known: _Known, method: str) -> Atlas | None:
@@ -147,11 +137,6 @@ def _atlas(own: Any, known: _Known, method: str) -> Atlas | None:
     if own is None:
         return None if method == "jrmpc" else known.atlas
     return Atlas.published() if own == "published" else Atlas.from_dict(_mapping(own, "atlas"))
-
-
-def _from(pose: CochleaPose, source: str) -> CochleaPose:
-    assert pose.inputs is not None
-    return replace(pose, inputs=replace(pose.inputs, source=source))
 
 
 def _touches(content: Mapping[str, Any]) -> LandmarkSet:

@@ -27,7 +27,7 @@ from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.pose.touched_window import towards_touched_window
 from gp_core.validation import check_option
 
-__all__ = ["ESTIMATORS", "EstimatorInput", "estimate_again", "estimate_pose"]
+__all__ = ["ESTIMATORS", "EstimatorInput", "estimate_again", "estimate_from", "estimate_pose"]
 
 
 @checks_arguments_but("touches")
@@ -154,19 +154,40 @@ def estimate_again(pose: CochleaPose) -> CochleaPose:
             "the pose does not hold the touches and the atlas that it was estimated from",
             remedy="Its file is of an earlier version: estimate it from the file of touches.",
         )
-    again = estimate_pose(
-        made.touches,
-        made.touches.side,
-        made.atlas,
-        method=made.method,
-        specimens=made.specimens or None,
-        probe_noise=made.probe_noise,
-        round_window=made.round_window,
-        shared_error=made.shared_error,
-        times=made.times,
+    return estimate_from(made)
+
+
+def estimate_from(inputs: EstimateInputs) -> CochleaPose:
+    """Estimate the pose of a cochlea from all that a pose file holds.
+
+    Parameters
+    ----------
+    inputs : EstimateInputs
+        Touches, atlas and settings.
+
+    Returns
+    -------
+    CochleaPose
+        As `estimate_pose`, with the same source.
+
+    Raises
+    ------
+    GpError
+        As `estimate_pose`.
+    """
+    pose = estimate_pose(
+        inputs.touches,
+        inputs.touches.side,
+        inputs.atlas,
+        method=inputs.method,
+        specimens=inputs.specimens or None,
+        probe_noise=inputs.probe_noise,
+        round_window=inputs.round_window,
+        shared_error=inputs.shared_error,
+        times=inputs.times,
     )
-    assert again.inputs is not None
-    return replace(again, inputs=replace(again.inputs, source=made.source))
+    assert pose.inputs is not None
+    return replace(pose, inputs=replace(pose.inputs, source=inputs.source))
 
 
 @dataclass(frozen=True)

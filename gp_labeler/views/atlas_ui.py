@@ -33,15 +33,7 @@ class AtlasUi(UiPart):
 
     def ask_fit_atlas(self, *, folder: bool = False) -> None:
         """Ask for the files of labelled animals, or a folder of them, and fit an atlas."""
-        title = "Fit an atlas to these animals"
-        if folder:
-            chosen = self.prompts.folder(title, self._folder)
-            paths = [] if chosen is None else [chosen]
-        else:
-            paths = self.prompts.open_files(title, self._folder, _LABELLED, many=True)
-        if paths:
-            self._remember_folder(paths[0])
-            self._window.set_step("atlas")
+        if paths := self._ask_animals("Fit an atlas to these animals", folder=folder):
             self._workspace.atlas.fit(paths)
 
     def show_finding(self, finding: Finding) -> None:
@@ -66,15 +58,7 @@ class AtlasUi(UiPart):
 
     def ask_reliability(self, *, folder: bool = False) -> None:
         """Ask for animals that were labelled more than once, and compare their labels."""
-        title = "Compare the labels of these animals"
-        if folder:
-            chosen = self.prompts.folder(title, self._folder)
-            paths = [] if chosen is None else [chosen]
-        else:
-            paths = self.prompts.open_files(title, self._folder, _LABELLED, many=True)
-        if paths:
-            self._remember_folder(paths[0])
-            self._window.set_step("atlas")
+        if paths := self._ask_animals("Compare the labels of these animals", folder=folder):
             self._workspace.reliability.measure(paths)
 
     def ask_save_reliability(self) -> None:
@@ -112,3 +96,15 @@ class AtlasUi(UiPart):
             self._workspace.atlas.save(path)
             self._remember_folder(path)
             self._workspace.say(f"Wrote {path.name}")
+
+    def _ask_animals(self, title: str, *, folder: bool) -> list[Path]:
+        """Ask for the files of labelled animals, or a folder of them, and show the step Atlas."""
+        if folder:
+            chosen = self.prompts.folder(title, self._folder)
+            paths = [] if chosen is None else [chosen]
+        else:
+            paths = self.prompts.open_files(title, self._folder, _LABELLED, many=True)
+        if paths:
+            self._remember_folder(paths[0])
+            self._window.set_step("atlas")
+        return paths
