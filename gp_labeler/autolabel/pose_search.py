@@ -82,12 +82,12 @@ class FoundPose:
     @property
     def is_accepted(self) -> bool:
         """Whether it can be trusted, with a warning or without."""
-        return self.score <= UNCERTAIN and self._stands_out
+        return not self.refusal
 
     @property
     def is_certain(self) -> bool:
         """Whether it can be trusted without a warning."""
-        return self.score <= ACCEPTED and self._stands_out
+        return self.score <= ACCEPTED and self.is_accepted
 
     @property
     def refusal(self) -> str:
@@ -99,10 +99,6 @@ class FoundPose:
         if self.rival - self.score < LEAST_LEAD:
             return "it fits nearly as well turned otherwise"
         return ""
-
-    @property
-    def _stands_out(self) -> bool:
-        return self.rival - self.score >= LEAST_LEAD and self.seen >= LEAST_SEEN
 
 
 def find_pose(volume: Volume, known: HeadSurface, report: Report | None = None) -> FoundPose:

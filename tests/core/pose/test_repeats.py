@@ -96,6 +96,7 @@ def test_an_outlier_among_repeats_is_named_and_left_out() -> None:
     assert pose.repeats["MN"].outliers == (2,)
     assert any(w.startswith("touch 2 of 3 of MN lies 2.") for w in pose.warnings)
     assert all(not pose.repeats[code].outliers for code in PROBE if code != "MN")
+    assert pose.repeats["MN"].spread_mm < 0.5, "of those that are used"
     assert not any("of the others" in w for w in estimate_pose(touches, "L", ATLAS).warnings)
 
 

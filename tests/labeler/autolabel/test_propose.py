@@ -14,7 +14,7 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
 from gp_labeler.autolabel import HeadNotFoundError, LabelledScan, TemplateLibrary, propose
 from gp_labeler.autolabel.labelled_scan import side_and_code
-from gp_labeler.autolabel.pose_search import find_pose
+from gp_labeler.autolabel.pose_search import FoundPose, find_pose
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.autolabel.template import Template
@@ -106,6 +106,23 @@ def test_a_ball_is_no_head():
     assert not found.is_accepted
     assert found.refusal in str(HeadNotFoundError(found))
     assert "Place three landmarks" in str(HeadNotFoundError(found))
+
+
+@pytest.mark.parametrize(
+    ("score", "rival", "seen", "accepted", "why"),
+    [
+        (0.40, 0.60, 0.9, True, ""),
+        (0.56, 0.60, 0.9, True, ""),
+        (0.58, 0.90, 0.9, False, "the bones do not meet"),
+        (0.40, 0.42, 0.9, False, "turned otherwise"),
+        (0.40, 0.60, 0.2, False, "only 20 % of a head"),
+    ],
+)
+def test_a_pose_is_accepted_if_it_fits_stands_out_and_shows_enough(score, rival, seen, accepted, why):
+    found = FoundPose(None, score, rival, seen, None)
+    assert found.is_accepted is accepted
+    assert why in found.refusal
+    assert found.is_certain is (accepted and score <= 0.5)
 
 
 def test_it_stops_when_it_is_asked_to():
