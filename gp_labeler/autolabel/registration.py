@@ -32,8 +32,8 @@ Field = NDArray[np.float32]
 """Displacements (nz, ny, nx, 3), mm: from a point of the fixed image to the same place in the moving one."""
 
 COARSER = (
-    "picsl_greedy is not installed, so SimpleITK's demons are used: their suggestions are coarser. "
-    "Install it with: pip install 'gp-labeler[auto]'"
+    "registered by SimpleITK's demons, whose suggestions are coarser than those of greedy "
+    "(pip install 'gp-labeler[auto]')"
 )
 
 _METRIC = "NCC 2x2x2"

@@ -104,7 +104,7 @@ def run_propose(arguments: Sequence[str]) -> int:
     args = make_propose_parser().parse_args(arguments)
     from gp_core.study.parallel import open_executor, run_map  # here: `--help` need not wait
     from gp_labeler.autolabel.head_run import HeadRun
-    from gp_labeler.autolabel.registration import COARSER, engine_named
+    from gp_labeler.autolabel.registration import engine_named
     from gp_labeler.document.labelled_scans import scans_at
 
     heads = list(dict.fromkeys(scan for path in args.volumes for scan in scans_at(path)))
@@ -112,8 +112,6 @@ def run_propose(arguments: Sequence[str]) -> int:
         raise GpError(f"--points are of one scan, got {len(heads)} scans")
     _check_names(heads)
     engine = engine_named(args.engine)
-    if engine == "demons":
-        sys.stderr.write(f"gp-labeler: {COARSER}\n")
     library = library_of(args.like, args)
     placed = _placed(args.points) if args.points else {}
     run = HeadRun(

@@ -15,6 +15,7 @@ from gp_core.landmarks.sets import Status
 from gp_labeler.autolabel import HeadNotFoundError, LabelledScan, TemplateLibrary, propose
 from gp_labeler.autolabel.labelled_scan import side_and_code
 from gp_labeler.autolabel.pose_search import FoundPose, find_pose
+from gp_labeler.autolabel.registration import engine_named, register_demons
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.autolabel.template import Template
@@ -194,3 +195,18 @@ def test_names_of_features_carry_their_side():
     assert side_and_code("IN") == (Side.LEFT, "IN")
     for other in ("CA", "nose", "CO_L"):
         assert side_and_code(other) is None
+
+
+def test_demons_are_said_to_be_coarser(monkeypatch):
+    """In a plain image that is shifted, the field is that shift; without greedy, demons are taken."""
+    z, y, x = np.meshgrid(*[np.arange(24.0)] * 3, indexing="ij")
+    fixed, moving = (
+        np.exp(-((x - 12 - shift) ** 2 + (y - 12) ** 2 + (z - 12) ** 2) / 40).astype(np.float32)
+        for shift in (0, 1.5)
+    )
+    field = register_demons(fixed, moving, 0.5, "40x30x15")
+    assert field[12, 12, 12] == pytest.approx([0.75, 0, 0], abs=0.15)
+    monkeypatch.setattr("gp_labeler.autolabel.registration.find_spec", lambda name: None)
+    assert engine_named() == "demons"
+    with pytest.raises(GpError, match="picsl_greedy is not installed"):
+        engine_named("greedy")

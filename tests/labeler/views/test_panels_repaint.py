@@ -54,7 +54,7 @@ def panel(workspace: Workspace, qtbot) -> LabelPanel:
 
 
 def wait_until_idle() -> None:
-    for _ in range(4):  # layouts inside layouts take a turn each
+    for _ in range(6):  # layouts inside layouts take a turn each
         QApplication.processEvents()
 
 
