@@ -359,7 +359,7 @@ class _Handler(BaseHTTPRequestHandler):
         if not (length.isascii() and length.isdigit()):
             self.close_connection = True
             raise _RefusedError(_NO_LENGTH, "the request has no Content-Length")
-        if int(length) > MAX_BYTES:
+        if len(length) > len(str(MAX_BYTES)) or int(length) > MAX_BYTES:
             self.close_connection = True
             raise _RefusedError(_TOO_LARGE, f"the request is larger than {MAX_BYTES} bytes")
         return self.rfile.read(int(length))
