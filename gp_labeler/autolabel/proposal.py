@@ -39,6 +39,8 @@ class Guess:
         How many labelled scans have the landmark.
     is_doubtful : bool
         Whether it needs a closer look than the others.
+    atlas_distance : float or None
+        From where the atlas expects it, given the other guesses of its side, mm; None where they agree.
     """
 
     name: str
@@ -48,6 +50,7 @@ class Guess:
     history: float | None
     n_templates: int
     is_doubtful: bool = False
+    atlas_distance: float | None = None
 
     def as_json(self) -> dict[str, Any]:
         """Return the guess as JSON values."""
@@ -59,6 +62,7 @@ class Guess:
             "history": _rounded(self.history),
             "templates": self.n_templates,
             "doubtful": self.is_doubtful,
+            "atlasDistance": _rounded(self.atlas_distance),
         }
 
 
@@ -142,7 +146,8 @@ def least_certain_first(guesses: Sequence[Guess]) -> tuple[Guess, ...]:
 
 
 def _marked(guess: Guess, limit: float) -> Guess:
-    return replace(guess, is_doubtful=guess.radius_95 is not None and guess.radius_95 > limit)
+    is_wide = guess.radius_95 is not None and guess.radius_95 > limit
+    return replace(guess, is_doubtful=guess.is_doubtful or is_wide)
 
 
 def _rounded(value: float | None) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
@@ -10,8 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.autolabel.atlas_agreement import compare_with_atlas, disagreement_text
 from gp_labeler.autolabel.confidence import GuessConfidence, centre_of, spread_of
 from gp_labeler.autolabel.library import TemplateLibrary
 from gp_labeler.autolabel.pose_search import ACCEPTED
@@ -28,6 +30,7 @@ Stored = Literal["as it is", "mirrored"]
 
 _MIRROR = np.diag([-1.0, 1.0, 1.0, 1.0])
 _HISTORY_SHARE = 0.6
+_FEWEST_PLACED = 3
 
 
 def propose(
@@ -38,6 +41,7 @@ def propose(
     stored: Stored | None = None,
     registration: Registration | None = None,
     with_history: bool = True,
+    atlas: Atlas | None = None,
     progress: Progress | None = None,
     cancel: Callable[[], bool] | None = None,
 ) -> Proposal:
@@ -58,6 +62,8 @@ def propose(
         By default greedy in this process, or demons where it is not installed.
     with_history : bool
         Predict the labelled scans from each other first, once, for the radii; without, there are none.
+    atlas : Atlas, optional
+        Guesses of the guinea pig's features are compared with it; by default the published one.
     progress, cancel : callable, optional
         Told the fraction done; asked whether to stop.
 
@@ -98,20 +104,27 @@ def propose(
     )
     if stored == "mirrored":
         prediction = _mirrored_prediction(prediction)
-    return _proposal(volume, prediction, confidence, registration, stored, has_points=len(known) >= 3)
-
-
-def _proposal(
-    volume: Volume,
-    prediction: Prediction,
-    confidence: GuessConfidence,
-    registration: Registration,
-    stored: Stored | None,
-    *,
-    has_points: bool,
-) -> Proposal:
+    found, outside = _guesses(volume, prediction, confidence)
+    guesses = compare_with_atlas(found, atlas or Atlas.published())
     assert prediction.pose is not None
     score = prediction.pose.score
+    uncertain = score if score > ACCEPTED and len(known) < _FEWEST_PLACED else None
+    return Proposal(
+        least_certain_first(guesses),
+        prediction.names,
+        tuple(outside),
+        tuple(prediction.carried),
+        score,
+        registration.name,
+        _LEFT[stored],
+        tuple(_warnings(guesses, confidence, registration, stored, uncertain)),
+    )
+
+
+def _guesses(
+    volume: Volume, prediction: Prediction, confidence: GuessConfidence
+) -> tuple[list[Guess], list[str]]:
+    """Return the guesses, and the names of what is expected beyond the edge of the scan."""
     guesses, outside = [], []
     for name in prediction.names:
         points = prediction.of(name)
@@ -129,26 +142,28 @@ def _proposal(
                 len(points),
             )
         )
-    warnings = []
-    if score > ACCEPTED and not has_points:
-        warnings.append(f"the head's pose is uncertain (score {score:.2f}): check where the guesses lie")
+    return guesses, outside
+
+
+def _warnings(
+    guesses: Sequence[Guess],
+    confidence: GuessConfidence,
+    registration: Registration,
+    stored: Stored | None,
+    uncertain_score: float | None,
+) -> Iterator[str]:
+    """Yield what a person should look at."""
+    if uncertain_score is not None:
+        yield f"the head's pose is uncertain (score {uncertain_score:.2f}): check where the guesses lie"
     if registration.name == "demons":
-        warnings.append(COARSER)
+        yield COARSER
     if not confidence.history:
-        warnings.append("the radii are not known: suggest from two labelled scans or more")
-    left = _LEFT[stored]
+        yield "the radii are not known: suggest from two labelled scans or more"
+    disagreement = disagreement_text(guesses)
+    if disagreement:
+        yield disagreement
     if stored is None:
-        warnings.append(left)
-    return Proposal(
-        least_certain_first(guesses),
-        prediction.names,
-        tuple(outside),
-        tuple(prediction.carried),
-        score,
-        registration.name,
-        left,
-        tuple(warnings),
-    )
+        yield _LEFT[stored]
 
 
 _LEFT = {
