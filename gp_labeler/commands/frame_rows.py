@@ -26,6 +26,10 @@ def _has_head(workspace: Workspace) -> bool:
     return _has_scan(workspace) and workspace.head.frame is not None
 
 
+def _has_points(workspace: Workspace) -> bool:
+    return _has_scan(workspace) and bool(workspace.head.points)
+
+
 def _can_straighten(workspace: Workspace) -> bool:
     return _has_scan(workspace) and not workspace.head.is_running
 
@@ -89,6 +93,8 @@ def frame_rows() -> Iterator[Action]:
               hint="The same place on both sides, such as the edge of the ear canal")
     yield row("head.right", "Straighten: the crosshair is on the right of a pair", (), _mark("right"),
               hint="Once all three points are there, the head is straightened")
+    yield row("head.forget_points", "Take the marked points away", (), lambda w, ui: w.head.forget_points(),
+              _has_points, hint="Midline, left and right: no head is straightened by them")
     yield row("head.by_hand", "Turn the head by hand", ("Ctrl+Shift+H",), _turn_by_hand,
               checked=lambda w: w.interaction.tool == "turn",
               hint="Drag over a slice: the head turns about the crosshair; in the sagittal slice, its pitch")

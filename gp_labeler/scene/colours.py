@@ -38,6 +38,7 @@ _STATES = MappingProxyType(
         "touch": "#C8619F",
         "unseen": "#8A929B",
         "reference": "#B4BCC4",
+        "free point": "#E39CF0",
         "path": "#F0E442",
         "measure": "#B9E34B",
     }
@@ -122,6 +123,7 @@ LIGHT = SceneColours(
             "touch": "#A8397F",
             "unseen": "#6B747E",
             "reference": "#5B646D",
+            "free point": "#8A3BA0",
             "path": "#F0E442",
             "measure": "#5C7F00",
         }

@@ -10,10 +10,16 @@ import numpy as np
 from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 
-__all__ = ["ACTIVE_GROWTH", "REFERENCE", "GlyphSize", "Mark", "MarkSet"]
+__all__ = ["ACTIVE_GROWTH", "FREE_POINT", "LOOKED_AT", "REFERENCE", "GlyphSize", "Mark", "MarkSet"]
 
 REFERENCE = "reference"
 """The state of a mark that is only looked at: smaller, hollow, and never picked."""
+
+FREE_POINT = "free point"
+"""The state of one of the three points that a head is straightened by: no landmark, and never picked."""
+
+LOOKED_AT = frozenset({REFERENCE, FREE_POINT})
+"""States of marks that are hollow, and never picked."""
 
 ACTIVE_GROWTH = 1.25
 """How much larger the landmark being worked on is drawn."""
@@ -50,8 +56,8 @@ class Mark:
     label : str
         What stands beside it; empty for none.
     state : str
-        ``placed``, ``suggested``, ``computed``, ``doubtful``, ``other`` (the other side), `REFERENCE` or
-        any other state of the theme.
+        ``placed``, ``suggested``, ``computed``, ``doubtful``, ``other`` (the other side), one of
+        `LOOKED_AT` or any other state of the theme.
     active : bool
         Whether it is the one being worked on: larger, and its label is never left out.
     """

@@ -21,7 +21,7 @@ from gp_labeler.scene.camera import SceneCamera
 from gp_labeler.scene.colours import SceneColours, rgb
 from gp_labeler.scene.gestures import CameraControl
 from gp_labeler.scene.ghosts import GhostActor
-from gp_labeler.scene.marks import REFERENCE, MarkSet
+from gp_labeler.scene.marks import LOOKED_AT, MarkSet
 from gp_labeler.scene.orientation_cube import OrientationCube
 from gp_labeler.scene.pose import PoseActor
 from gp_labeler.scene.render_layers import RenderLayers
@@ -298,7 +298,7 @@ class Scene3D:
         if not marks:
             return None
         away = np.linalg.norm(self.display_of(self.marks.positions) - [x, y], axis=1)
-        pickable = np.array([mark.state != REFERENCE for mark in marks])
+        pickable = np.array([mark.state not in LOOKED_AT for mark in marks])
         near = pickable & (away <= within * self.scale)
         if not near.any():
             return None

@@ -16,10 +16,18 @@ from gp_labeler.models.workflow import PointState
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import SceneColours
 from gp_labeler.scene.ghosts import GhostEllipsoid
-from gp_labeler.scene.marks import REFERENCE, Mark
+from gp_labeler.scene.marks import FREE_POINT, REFERENCE, Mark
 from gp_labeler.scene.segments import Segment
 
-__all__ = ["drawn_ghosts", "drawn_marks", "drawn_references", "drawn_segments", "key_of", "point_of"]
+__all__ = [
+    "drawn_free_points",
+    "drawn_ghosts",
+    "drawn_marks",
+    "drawn_references",
+    "drawn_segments",
+    "key_of",
+    "point_of",
+]
 
 _BEYOND_MM = 1.0
 """The modiolar axis is drawn this much longer at each end."""
@@ -76,6 +84,12 @@ def drawn_references(workspace: Workspace) -> list[Mark]:
         for n, point in enumerate(points)
         if inside[n]
     ]
+
+
+def drawn_free_points(workspace: Workspace) -> list[Mark]:
+    """Return the points that were marked to straighten the head by: midline, left and right."""
+    points = workspace.head.points
+    return [Mark(f"free point:{name}", np.array(at), name, FREE_POINT) for name, at in points.items()]
 
 
 def _shown_at(landmarks: LandmarkSet, code: str) -> FloatArray | None:

@@ -36,7 +36,14 @@ from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.slices import VolumeSlicer
 from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
-from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_references, drawn_segments, key_of
+from gp_labeler.views.drawn import (
+    drawn_free_points,
+    drawn_ghosts,
+    drawn_marks,
+    drawn_references,
+    drawn_segments,
+    key_of,
+)
 from gp_labeler.views.drawn_measurements import kept_measurements, mark_or_handle, moving_measurements
 from gp_labeler.views.focus_ring import FocusRing
 from gp_labeler.views.fonts import TEXT, text_scale
@@ -236,7 +243,7 @@ class SceneView(QWidget):
             workspace.labels.active_changed,
         ):
             follow(self, signal, self._show_cursor)
-        for signal in (workspace.pose.overlay_changed, workspace.references.changed):
+        for signal in (workspace.pose.overlay_changed, workspace.references.changed, workspace.head.changed):
             follow(self, signal, self._show_points)
         follow(self, workspace.meshes.changed, self.redraw)
         follow(self, workspace.measure.changed, self._show_points)
@@ -330,7 +337,8 @@ class SceneView(QWidget):
         self._points_old = False
         drag = self._workspace.interaction.drag
         dragged = "" if drag is None else key_of(drag.side, drag.code)
-        marks = drawn_references(self._workspace) + drawn_marks(self._workspace)
+        marks = drawn_references(self._workspace) + drawn_free_points(self._workspace)
+        marks += drawn_marks(self._workspace)
         self.scene.marks.show([mark for mark in marks if mark.key != dragged])
         self.scene.ghosts.show(drawn_ghosts(self._workspace))
         self.overlay.measurements = kept_measurements(self._workspace.measure)

@@ -12,7 +12,7 @@ from qtpy.QtGui import QColor, QPainter, QPen
 from gp_core.validation import FloatArray
 from gp_labeler.scene.camera import Viewpoint
 from gp_labeler.scene.colours import SceneColours
-from gp_labeler.scene.marks import ACTIVE_GROWTH, REFERENCE, Mark, MarkSet
+from gp_labeler.scene.marks import ACTIVE_GROWTH, LOOKED_AT, REFERENCE, Mark, MarkSet
 from gp_labeler.views.painting.marker_pictures import marker_picture
 from gp_labeler.views.painting.name_tags import NameTag
 
@@ -21,7 +21,7 @@ __all__ = ["ACTIVE_GROWTH", "PlacedMark", "paint_mark", "place_marks", "tags_of"
 _SHAPES = {"computed": "rhomb", "doubtful": "triangle", "suggested": "square", REFERENCE: "inverted"}
 """A state shows by shape as well as by colour; others are balls."""
 
-_HOLLOW = frozenset({"suggested", REFERENCE})
+_HOLLOW = LOOKED_AT | {"suggested"}
 """Never filled: what lies beneath is to be judged."""
 
 _LINE, _HALO, _RING, _RING_LINE = 1.6, 3.2, 4.0, 1.8

@@ -1,4 +1,4 @@
-"""Reference points over a slice: grey, small and hollow, with their names."""
+"""Points over a slice that are no landmarks: reference points, and those a head is straightened by."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
 from gp_labeler.scene.marks import Mark
 from gp_labeler.scene.slice_viewport import SliceViewport
-from gp_labeler.views.drawn import drawn_references
+from gp_labeler.views.drawn import drawn_free_points, drawn_references
 from gp_labeler.views.painting.marks import paint_mark
 from gp_labeler.views.painting.name_tags import NameTag
 from gp_labeler.views.painting.slice_painter import reach_of
@@ -34,7 +34,7 @@ class ReferenceLayer(QObject):
     Parameters
     ----------
     workspace : Workspace
-        Whose reference points.
+        Whose reference points and free points.
     view : SliceView
         The view, which owns it.
     """
@@ -43,7 +43,8 @@ class ReferenceLayer(QObject):
         super().__init__(view)
         self._workspace, self._view = workspace, view
         view.layers.append(self)
-        follow(self, workspace.references.changed, self._repaint)
+        for signal in (workspace.references.changed, workspace.head.changed):
+            follow(self, signal, self._repaint)
 
     def _repaint(self) -> None:
         self._view.update()
@@ -56,12 +57,14 @@ class ReferenceLayer(QObject):
 
     def names(self, shown: SliceViewport, ratio: float) -> list[NameTag]:
         """Return their names, which give way to those of landmarks."""
-        colour = DARK.word("reference")
-        return [NameTag(mark.label, pixel, colour, 7.0, -1.0) for mark, pixel, _ in self._near(shown)]
+        return [
+            NameTag(mark.label, pixel, DARK.word(mark.state), 7.0, -1.0)
+            for mark, pixel, _ in self._near(shown)
+        ]
 
     def _near(self, shown: SliceViewport) -> list[tuple[Mark, FloatArray, float]]:
         """Return the points near the slice, their pixels, and how far off it they are: 0 on it, 1 at most."""
-        marks = drawn_references(self._workspace)
+        marks = drawn_references(self._workspace) + drawn_free_points(self._workspace)
         if not marks or self._view.source is None:
             return []
         positions = np.array([mark.position for mark in marks])

@@ -103,6 +103,7 @@ NOT_WRITTEN = {
     **dict.fromkeys(("point.skip", "point.next", "point.previous", "point.other_side"), CHOOSES),
     **dict.fromkeys(("pose.skip", "pose.other_side"), CHOOSES),
     **dict.fromkeys(("pose.tracker", "pose.guide"), "shows settings, or asks for touches, which are written"),
+    "head.forget_points": "what is straightened by them is written",
     "point.replace": "arms a click: the move is written",
     "measure.show": "tells only: what is done in it is written",
     "pose.physical": "tells only: its result is no part of the specimen",

@@ -90,6 +90,7 @@ class HeadCard(Card):
         turned = workspace.view.planes_are_turned or workspace.interaction.tool == "turn"
         self._hand.setVisible(turned)
         self.mid_plane.setVisible(head.frame is not None)
+        self.forget_points.setVisible(bool(head.points))
         for name, button in self.points.items():
             button.setText(f"{name.capitalize()} {_TICK}" if name in head.points else name.capitalize())
 
@@ -97,7 +98,8 @@ class HeadCard(Card):
         self.points = {n: action_button(actions[f"head.{n}"], n.capitalize()) for n in FREE_POINTS}
         words = "By three points: move the crosshair to each, then say which it is."
         self.add(text_label(words, "hint", wrap=True))
-        self.add(_row(*self.points.values()))
+        self.forget_points = action_button(actions["head.forget_points"], "Take away")
+        self.add(_row(*self.points.values(), self.forget_points))
 
 
 def head_text(workspace: Workspace) -> str:
