@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
@@ -62,12 +63,19 @@ class AnatomicalFrame:
 
     def plane(self, name: str) -> SlicePlane:
         """Return the ``axial``, ``sagittal`` or ``coronal`` plane of this frame."""
-        right, down, normal = (self.axes @ direction for direction in _ON_SCREEN[name])
-        return SlicePlane(right, down, normal, self.origin)
+        return self._planes[name]
 
     def planes(self) -> dict[str, SlicePlane]:
         """Return all three planes by name."""
-        return {name: self.plane(name) for name in _ON_SCREEN}
+        return dict(self._planes)
+
+    @cached_property
+    def _planes(self) -> Mapping[str, SlicePlane]:
+        axes, origin = self.axes, self.origin
+        return {
+            name: SlicePlane(axes @ right, axes @ down, axes @ normal, origin)
+            for name, (right, down, normal) in _ON_SCREEN.items()
+        }
 
     def components(self, direction: ArrayLike) -> FloatArray:
         """Return the (3,) parts of a scan direction towards left, posterior and superior."""

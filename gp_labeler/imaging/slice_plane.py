@@ -111,7 +111,7 @@ class SlicePlane:
 
     def same_as(self, other: SlicePlane) -> bool:
         """Whether it is the same plane on the same screen."""
-        return all(
+        return self is other or all(
             bool(np.abs(getattr(self, name) - getattr(other, name)).max() < _SAME)
             for name in ("right", "down", "normal", "origin")
         )

@@ -6,6 +6,7 @@ them. A painter whose whole numbers are pixel corners adds half a pixel.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -77,10 +78,9 @@ class SliceViewport:
 
     def line_of(self, other: SlicePlane) -> FloatArray:
         """Return the (2,) unit direction, right and down, of the line in which a plane meets this one."""
-        line = np.cross(self.plane.normal, other.normal)
-        flat = np.array([line @ self.plane.right, line @ self.plane.down])
-        length = float(np.linalg.norm(flat))
-        return flat / length if length else np.array([1.0, 0.0])
+        right, down = float(other.normal @ self.plane.right), float(other.normal @ self.plane.down)
+        length = math.hypot(right, down)  # the line is at right angles to what the other normal shows here
+        return np.array([-down, right]) / length if length else np.array([1.0, 0.0])
 
     def image_corners(self, image: SliceImage) -> FloatArray:
         """Return the (2, 2) painter's coordinates (corners of pixels) between which an image is stretched."""

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 import mmap
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
-from contourpy import LineType, contour_generator
 from numpy.typing import ArrayLike, NDArray
 from vtkmodules.vtkCommonCore import VTK_IMAGE_SLAB_MAX, VTK_IMAGE_SLAB_MEAN, VTK_IMAGE_SLAB_MIN
 from vtkmodules.vtkCommonDataModel import vtkImageData
@@ -22,9 +22,10 @@ from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
+from gp_labeler.scene.level_lines import level_segments
 from gp_labeler.scene.window_level import WindowLevel
 
-__all__ = ["SliceImage", "VolumeSlicer", "level_segments"]
+__all__ = ["SliceImage", "VolumeSlicer"]
 
 _MOST_READ = 4e9
 """Bytes of a file that one slice may read."""
@@ -95,20 +96,13 @@ class SliceImage:
         return segments
 
 
-def level_segments(values: NDArray[Any], level: float) -> FloatArray:
-    """Return the (M, 2, 2) line segments, columns and rows, along which (h, w) values pass a level.
+class _Grid(NamedTuple):
+    """How slices of a plane lie in the voxels; worked out once, for it is asked for at every movement."""
 
-    Not VTK's flying edges: they share their threads with the meshing in the background, and make the window
-    wait for it.
-    """
-    found: Any = contour_generator(z=values, line_type=LineType.ChunkCombinedOffset).lines(level)
-    (points,), (offsets,) = found
-    if points is None:
-        return np.empty((0, 2, 2))
-    is_end = np.zeros(len(points), dtype=bool)
-    is_end[offsets[1:] - 1] = True
-    begins = np.flatnonzero(~is_end)
-    return np.stack([points[begins], points[begins + 1]], axis=1)
+    axes: tuple[int, int, int] | None
+    """Which voxel axes run across, right and down; None where none runs along the plane."""
+    step: float
+    limits: tuple[float, float]
 
 
 _VTK_SLABS = {"mean": VTK_IMAGE_SLAB_MEAN, "maximum": VTK_IMAGE_SLAB_MAX, "minimum": VTK_IMAGE_SLAB_MIN}
@@ -129,6 +123,7 @@ class VolumeSlicer:
         box = np.array([(i, j, k) for i in (0, nx) for j in (0, ny) for k in (0, nz)], dtype=np.float64) - 0.5
         self.corners = volume.voxel_to_scan(box)
         self._reslice: vtkImageReslice | None = None
+        self._grids: WeakKeyDictionary[SlicePlane, _Grid] = WeakKeyDictionary()
 
     def close(self) -> None:
         """Let go of the voxels."""
@@ -136,11 +131,11 @@ class VolumeSlicer:
 
     def is_oblique(self, plane: SlicePlane) -> bool:
         """Whether slices of a plane are resampled, because it does not lie along the grid of voxels."""
-        return self._grid_axes(plane) is None
+        return self._grid(plane).axes is None
 
     def step(self, plane: SlicePlane) -> float:
         """Return the distance from one slice to the next, mm."""
-        return self.step_along(plane.normal)
+        return self._grid(plane).step
 
     def step_along(self, direction: ArrayLike) -> float:
         """Return how long a step of one voxel is in a (3,) unit direction, mm."""
@@ -149,9 +144,7 @@ class VolumeSlicer:
 
     def limits(self, plane: SlicePlane) -> tuple[float, float]:
         """Return the first and last position of slices, mm."""
-        depths = plane.depth(self.corners)
-        half = 0.5 * self.step(plane)
-        return float(depths.min() + half), float(depths.max() - half)
+        return self._grid(plane).limits
 
     def snap(self, plane: SlicePlane, position: float) -> float:
         """Return the position of the slice that is shown for `position`, mm.
@@ -184,7 +177,7 @@ class VolumeSlicer:
         slab : Slab, optional
             What to take of a slab around the slice, in place of the slice; display only.
         """
-        there, grid_axes = self.snap(plane, position), self._grid_axes(plane)
+        there, grid_axes = self.snap(plane, position), self._grid(plane).axes
         if grid_axes is None:
             return self._resampled(plane, there, step or min(self.volume.spacing), slab)
         return self._voxels(plane, there, grid_axes, slab)
@@ -204,12 +197,16 @@ class VolumeSlicer:
             return voxel
         return float(voxel * 2.0 ** (0.5 * math.floor(2 * math.log2(mm_per_pixel / voxel))))
 
-    def _grid_axes(self, plane: SlicePlane) -> tuple[int, int, int] | None:
-        """Return which voxel axes run across, right and down; None where none runs along the plane."""
-        along = np.abs(self.volume.direction.T @ plane.axes)
-        right, down, across = (int(n) for n in along.argmax(axis=0))
-        along[[right, down, across], [0, 1, 2]] = 0.0
-        return None if along.max() > _STRAIGHT else (across, right, down)
+    def _grid(self, plane: SlicePlane) -> _Grid:
+        if plane not in self._grids:
+            along = np.abs(self.volume.direction.T @ plane.axes)
+            right, down, across = (int(n) for n in along.argmax(axis=0))
+            along[[right, down, across], [0, 1, 2]] = 0.0
+            step, depths = self.step_along(plane.normal), plane.depth(self.corners)
+            limits = float(depths.min() + step / 2), float(depths.max() - step / 2)
+            straight = along.max() <= _STRAIGHT
+            self._grids[plane] = _Grid((across, right, down) if straight else None, step, limits)
+        return self._grids[plane]
 
     def _voxels(
         self, plane: SlicePlane, position: float, grid_axes: tuple[int, int, int], slab: Slab | None

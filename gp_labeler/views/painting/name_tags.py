@@ -77,6 +77,8 @@ def place_names(
     halo : str
         Colour of the edge of the letters, ``#RRGGBB``.
     """
+    if not tags:
+        return []
     font = base_font()
     font.setPixelSize(round(text * ratio))
     font.setBold(True)

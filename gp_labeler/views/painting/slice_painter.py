@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -10,6 +11,7 @@ from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
 
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.anatomical_frame import AnatomicalFrame
 from gp_labeler.imaging.slab import denoised
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.models.workspace import Workspace
@@ -253,7 +255,7 @@ class SlicePainter:
 
     def _paint_letters(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         width, height = shown.size
-        left, right, top, bottom = self._workspace.view.frame.edge_letters(shown.plane)
+        left, right, top, bottom = _edge_letters(self._workspace.view.frame, shown.plane)
         inset = self._text * ratio
         for letter, x, y in (
             (left, inset, height / 2),
@@ -333,6 +335,11 @@ def _picture(image: SliceImage, window: object, preview: float | None) -> QImage
     rgb = np.ascontiguousarray(image.rgb(window, threshold=preview))  # type: ignore[arg-type]
     height, width, _ = rgb.shape
     return QImage(rgb.data, width, height, 3 * width, QImage.Format.Format_RGB888).copy()
+
+
+@lru_cache(maxsize=8)
+def _edge_letters(frame: AnatomicalFrame, plane: SlicePlane) -> tuple[str, str, str, str]:
+    return frame.edge_letters(plane)
 
 
 def _alike(one: SliceViewport, other: SliceViewport, source: VolumeSlicer) -> bool:

@@ -8,10 +8,13 @@ from scipy.spatial import cKDTree
 from vtkmodules.vtkCommonDataModel import vtkImageData
 from vtkmodules.vtkFiltersCore import vtkFlyingEdges2D
 
+from gp_labeler.imaging.surface import extract_isosurface
+from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import to_numpy, to_vtk
 from gp_labeler.scene.bone_edge import BoneEdge, nearest_on_segments
+from gp_labeler.scene.level_lines import level_segments
 from gp_labeler.scene.planes import Plane
-from gp_labeler.scene.slices import VolumeSlicer, level_segments
+from gp_labeler.scene.slices import VolumeSlicer
 
 
 def of_vtk(values: np.ndarray, level: float) -> np.ndarray:
@@ -31,13 +34,32 @@ def of_vtk(values: np.ndarray, level: float) -> np.ndarray:
 def test_the_edge_is_vtks(dtype: type) -> None:
     values = np.random.default_rng(3).uniform(0, 100, (30, 40)).astype(dtype)
     ours, vtks = level_segments(values, 49.5), of_vtk(values, 49.5)
-    for some, others in (
-        (ours, vtks),
-        (vtks, ours),
-    ):  # a square with two lines may join its points either way
+    for some, others in ((ours, vtks), (vtks, ours)):
         away, _ = cKDTree(others.reshape(-1, 2)).query(some.reshape(-1, 2))
         assert away.max() < 1e-4
     assert len(ours) == len(vtks)
+
+
+def test_lines_lie_on_the_mesh_of_the_same_level_in_noise_too() -> None:
+    """Where two corners of a cell that face each other lie above, the lines could join either way."""
+    values = np.random.default_rng(0).integers(0, 100, (4, 16, 18)).astype(np.uint16)
+    mesh = extract_isosurface(Volume.from_parts(values, [1.0] * 3), 50, smallest_mm=0)
+    for k, layer in enumerate(values):
+        middles = level_segments(layer, 49.5).mean(axis=1)
+        assert len(middles) > 200
+        away = [np.linalg.norm(mesh.project([x, y, k]).point - [x, y, k]) for x, y in middles]
+        assert max(away) < 1e-5
+
+
+def test_any_strides_and_missing_values() -> None:
+    values = np.random.default_rng(5).normal(size=(20, 31))
+    turned, ours = level_segments(values.T[::-1], 0.2), level_segments(values, 0.2)
+    placed = np.sort(np.stack([30 - turned[..., 1], turned[..., 0]], axis=-1).reshape(-1, 2), axis=0)
+    assert placed == pytest.approx(np.sort(ours.reshape(-1, 2), axis=0), abs=1e-12)
+    values[7, 11] = np.nan
+    lines = level_segments(values, 0.2)
+    assert np.isfinite(lines).all()
+    assert 0 < len(ours) - len(lines) <= 8
 
 
 def test_a_circle_is_a_closed_line_of_its_length() -> None:
