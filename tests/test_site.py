@@ -10,6 +10,7 @@ import pytest
 
 import gp_core
 from gp_labeler.cli.subcommands import SUBCOMMANDS
+from gp_labeler.scripting.script import make_script
 
 _ROOT = Path(__file__).resolve().parents[1]
 
@@ -24,6 +25,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
         generate.assemble(folder)
         sys.modules.pop("generate")
+        sys.modules.pop("landmark_atlas")
     return folder
 
 
@@ -39,6 +41,31 @@ def test_every_command_has_a_page_with_its_options(source: Path) -> None:
     assert {"gp-core", "gp-labeler", "gp-core-estimate", "gp-core-reliability"} <= pages.keys()
     assert "| `--shared-error MM` |" in pages["gp-core-estimate"]
     assert "gp-labeler mesh head.nrrd" in pages["gp-labeler-mesh"]
+
+
+def test_every_feature_has_a_page_from_the_one_table(source: Path) -> None:
+    pages = {path.stem: path.read_text() for path in (source / "reference" / "features").glob("*.md")}
+    assert pages.keys() == {*gp_core.CODES, "index"}
+    for row in gp_core.FEATURES:
+        assert row.definition in pages[row.code]
+        assert row.where in pages[row.code]
+        assert len(row.mistakes) > 40
+        assert row.mistakes in pages[row.code]
+    assert "| [LLI](LLI.md) Long limb of the incus | 0.5 | 0.10 |" in pages["RWA"]
+    assert "through the round window" in pages["RWA"]
+    assert "never placed by hand" in pages["CO"]
+
+
+def test_the_pictures_of_the_features_are_drawn_by_a_script_that_is_valid(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.syspath_prepend(_ROOT / "tools" / "site")
+    import landmark_atlas
+
+    steps = list(landmark_atlas.script())
+    make_script(steps, name="features")
+    drawn = [step["path"] for step in steps if step["do"] == "screenshot"]
+    assert sorted(drawn) == sorted(f"{code}.png" for code in gp_core.CODES)
 
 
 def test_every_page_is_in_the_navigation(source: Path) -> None:

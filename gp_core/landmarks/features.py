@@ -94,6 +94,8 @@ class Feature:
         Whether both sides have it in common (IN).
     computed : bool
         Whether it is computed from others (CO).
+    mistakes : str
+        What often goes wrong when it is placed, in this project's words; the paper lists no mistakes.
     """
 
     code: str
@@ -105,6 +107,7 @@ class Feature:
     on_bone: bool
     shared: bool
     computed: bool
+    mistakes: str
 
 
 @cache

@@ -13,6 +13,8 @@ import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
+import landmark_atlas
+
 import gp_core
 from gp_core.cli.entry import make_parser as core_parser
 from gp_labeler.cli.entry import make_parser as labeler_parser
@@ -158,6 +160,6 @@ def command_pages() -> Iterator[tuple[str, str]]:
 def assemble(folder: Path) -> None:
     """Write the source of the site into a folder."""
     shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
-    for path, text in [*first_pages(), *python_pages(), *command_pages()]:
+    for path, text in [*first_pages(), *python_pages(), *command_pages(), *landmark_atlas.pages()]:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")
