@@ -79,7 +79,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
         (
             "In the 3D view",
             (
-                ("Click on bone", "place the point that is to do"),
+                ("Click on bone", "place the active feature"),
                 ("Drag a point", "move it, on the bone"),
                 ("Left drag", "rotate (Ctrl: spin)"),
                 ("Middle drag, Shift+drag", "pan"),
@@ -88,14 +88,14 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
                 ("Shift+move", "move the crosshair"),
                 ("Drag an end of a ruler", "move it, on the bone"),
                 ("Arrow keys", "rotate"),
-                ("Right click on a point", "what else can be done"),
+                ("Right click on a point", "open the menu of the point"),
                 ("Double click", "maximise or restore"),
             ),
         ),
         (
             "On a slice",
             (
-                ("Click", "place the point that is to do"),
+                ("Click", "place the active feature"),
                 ("Drag a point", "move it, on bone if placed there (Alt: freely)"),
                 ("Drag an end of a ruler", "move it"),
                 ("Arrow keys", "move the point a voxel"),
@@ -103,7 +103,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
                 ("Right drag, Ctrl+wheel", "zoom"),
                 ("Middle drag, Shift+drag", "pan"),
                 ("Shift+move", "move the crosshair"),
-                ("Right click on a point", "what else can be done"),
+                ("Right click on a point", "open the menu of the point"),
                 ("Double click", "maximise or restore"),
             ),
         ),

@@ -34,7 +34,7 @@ def atlas_rows() -> Iterator[Action]:
         return Action(f"atlas.{id}", "Atlas", title, (), run, enabled, hint=hint, group=group, icon=icon)
 
     yield row("show", "Show the atlas", lambda w, ui: ui.show_step("atlas"), group="show", icon="atlas",
-              hint="Which one is in use, and how well the labels fit it")
+              hint="The atlas in use, and how well the labels fit it")
     yield row("published", "Use the published atlas", lambda w, ui: w.atlas.use_published(), _is_own)
     yield row("open", "Open atlas file…", lambda w, ui: ui.ask_open_atlas(), icon="file")
     yield row("fit_files", "Fit from landmark files…", lambda w, ui: ui.ask_fit_atlas(), group="fit",
@@ -46,10 +46,10 @@ def atlas_rows() -> Iterator[Action]:
               group="repeat", hint="Animals labelled more than once: specimens or landmarks", icon="file")
     yield row("reliability_folder", "Repeatability of labels, from a folder…",
               lambda w, ui: ui.ask_reliability(folder=True), group="repeat", icon="folder",
-              hint="It is searched, and the folders in it")
+              hint="Subfolders are searched too")
     yield row("save_reliability", "Save repeatability…", lambda w, ui: ui.ask_save_reliability(),
               lambda w: w.reliability.report is not None, group="repeat", icon="save",
-              hint="The table (.csv), everything (.json), or the picture (.png, .pdf, .svg)")
+              hint="Table (.csv), full result (.json), or plot (.png, .pdf, .svg)")
     yield row("try", "Leave-one-out", lambda w, ui: w.atlas.try_out(), _can_try, group="try", icon="play",
-              hint="How well each animal's cochlea is found from the others")
+              hint="Estimates each animal's cochlea from the other animals")
 # fmt: on

@@ -83,42 +83,43 @@ def frame_rows() -> Iterator[Action]:
         return Action(id, "View", title, keys, run, enabled, checked, hint, group)
 
     yield row("head.straighten", "Straighten the head", ("Ctrl+H",), lambda w, ui: w.head.straighten(),
-              _can_straighten, hint="Find how the head lies in its scan, from the symmetry of its bone")
+              _can_straighten, hint="Align the views with the head, found by the symmetry of its bone")
     yield row("head.by_landmarks", "Straighten by the placed landmarks", (),
               lambda w, ui: w.head.straighten_by_landmarks(), _can_straighten,
-              hint="By IN and a pair such as OI, or two pairs; then refined by the symmetry of the bone")
+              hint="Uses IN and a pair such as OI, or two pairs; refined by the symmetry of the bone")
     yield row("head.midline", "Straighten: the crosshair is on the midline", (), _mark("midline"),
-              hint="One of three points from which the head can be straightened")
+              hint="One of the three points that define the frame of the head")
     yield row("head.left", "Straighten: the crosshair is on the left of a pair", (), _mark("left"),
-              hint="The same place on both sides, such as the edge of the ear canal")
+              hint="The same anatomical point on both sides, such as the edge of the ear canal")
     yield row("head.right", "Straighten: the crosshair is on the right of a pair", (), _mark("right"),
-              hint="Once all three points are there, the head is straightened")
+              hint="When all three points are set, the head is straightened")
     yield row("head.forget_points", "Take the marked points away", (), lambda w, ui: w.head.forget_points(),
               _has_points, hint="Midline, left and right: no head is straightened by them")
     yield row("head.by_hand", "Turn the head by hand", ("Ctrl+Shift+H",), _turn_by_hand,
               checked=lambda w: w.interaction.tool == "turn",
-              hint="Drag over a slice: the head turns about the crosshair; in the sagittal slice, its pitch")
-    yield row("head.take_planes", "Take these planes for those of the head", (),
+              hint="Drag on a slice to rotate the head: pitch in the sagittal, roll in the coronal, "
+                   "yaw in the axial view")
+    yield row("head.take_planes", "Use these planes as the head frame", (),
               lambda w, ui: w.head.take_planes(), _can_take_planes,
-              hint="After the arms of the crosshair were dragged")
-    yield row("head.take_mid_plane", "Let the mid-plane go through the crosshair", (),
+              hint="After you have dragged the arms of the crosshair")
+    yield row("head.take_mid_plane", "Move the mid-plane to the crosshair", (),
               lambda w, ui: w.head.take_mid_plane(), _has_head)
-    yield row("head.confirm_left", "Left is left, as the file says", (), lambda w, ui: w.head.confirm_left(),
+    yield row("head.confirm_left", "Confirm that left is correct", (), lambda w, ui: w.head.confirm_left(),
               lambda w: _has_head(w) and w.head.asks_left,
-              hint="Nothing in a scan tells left from right: check it against a mark on the animal")
+              hint="A scan cannot prove which side is left: check it against a mark on the animal")
     yield row("head.left_is_right", "Left and right are exchanged in this scan…", (),
               lambda w, ui: ui.ask_reopen_mirrored(), _has_head,
-              hint="Read it again with the order of its slices reversed")
-    yield row("head.forget", "Forget how the head lies", (), lambda w, ui: w.head.forget(), _has_head)
-    yield row("view.frame", "Views in the frame of the head", ("Shift+F",), lambda w, ui: w.head.show(),
+              hint="Reload the scan with the order of its slices reversed")
+    yield row("head.forget", "Remove the head frame", (), lambda w, ui: w.head.forget(), _has_head)
+    yield row("view.frame", "Views in the head frame", ("Shift+F",), lambda w, ui: w.head.show(),
               _has_head, checked=lambda w: w.head.is_shown, group="planes",
-              hint="Off: in the axes of the scan. Positions are those of the scan in both")
-    yield row("view.straight_planes", "Straight planes again", ("0",),
+              hint="When off, views follow the axes of the scan. Positions are always in the scan frame")
+    yield row("view.straight_planes", "Reset the planes", ("0",),
               lambda w, ui: w.planes.straighten(), _is_turned, group="planes")
     for kind, title, key in _PLANES:
         yield row(f"view.plane_{kind.replace(' ', '_')}", title, (key,), _show(kind), _can_show(kind),
-                  group="planes", hint="Of the side that is worked on: as labelled, expected or estimated")
-    yield row("view.plane_of_feature", "The plane in which the feature is defined", ("2",), _show_for_feature,
+                  group="planes", hint="For the current side, as labelled, predicted or estimated")
+    yield row("view.plane_of_feature", "Plane in which the feature is defined", ("2",), _show_for_feature,
               _can_show_for_feature, group="planes",
-              hint="Needs the features that it goes through, or three others from which they are expected")
+              hint="Needs the features that define the plane, or three others that predict them")
 # fmt: on

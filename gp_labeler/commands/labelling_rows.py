@@ -56,10 +56,10 @@ def labelling_rows() -> Iterator[Action]:
     for key, certainty in zip("123", Certainty, strict=True):
         yield Action(f"point.{certainty.value}", "Landmarks", f"Certainty: {certainty.value}",
                      (f"Alt+{key}",), _mark(certainty), _can_annotate, _is_marked(certainty),
-                     group="certainty", hint="Of the chosen point, else of the one placed last")
+                     group="certainty", hint="For the selected point, or else the point placed last")
     yield Action("labelling.again", "Landmarks", "Label again, blind", (), _label_again, _has_labels,
-                 group="labelling", hint="Begins the next round: earlier points are hidden and kept")
+                 group="labelling", hint="Starts the next round; earlier points are kept, but hidden")
     yield Action("labelling.show", "Landmarks", "Observer and labellings…", (),
                  lambda w, ui: ui.show_labellings(), group="labelling",
-                 hint="Who labels; the rounds and observers of this specimen")
+                 hint="Choose who labels; list the observers and rounds of this specimen")
 # fmt: on

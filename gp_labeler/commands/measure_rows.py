@@ -47,13 +47,13 @@ def measure_rows() -> Iterator[Action]:
                   group="measure", icon=tool)
     yield row("measure.show", "Measurements and distances…", ("Ctrl+M",),
               lambda w, ui: ui.show_measurements(), group="list",
-              hint="The list of rulers and angles; distances between landmarks beside the published ones")
+              hint="List of rulers and angles; distances between landmarks compared with the published ones")
     yield row("measure.remove", "Remove the selected measurement", (), lambda w, ui: w.measure.remove(),
               lambda w: w.measure.selected is not None, group="list")
-    yield row("measure.clear_pair", "Stop drawing the distance of two landmarks", (),
+    yield row("measure.clear_pair", "Hide the distance of two landmarks", (),
               lambda w, ui: w.measure.clear_pair(), lambda w: w.measure.pair is not None, group="list")
     yield row("measure.import", "Import rulers and angles…", (), lambda w, ui: ui.ask_import_measurements(),
-              hint="Lines and angles of 3D Slicer, .mrk.json", group="exchange")
+              hint="Line and angle markups of 3D Slicer (.mrk.json)", group="exchange")
     yield row("measure.export", "Export rulers and angles…", (), lambda w, ui: ui.ask_export_measurements(),
-              _has_measurements, hint="As lines and angles of 3D Slicer, a file each", group="exchange")
+              _has_measurements, hint="As line and angle markups of 3D Slicer, a file each", group="exchange")
 # fmt: on

@@ -79,25 +79,25 @@ def pose_rows() -> Iterator[Action]:
         return Action(f"pose.{id}", "Estimate", title, keys, run, enabled, checked, hint, group, icon)
 
     yield row("open_touches", "Open touches…", ("Ctrl+Shift+I",), lambda w, ui: ui.ask_open_touches(),
-              hint="What was touched with the probe: .dat, .csv, .mrk.json, .fcsv", group="touches",
+              hint="Touches of a probe from a file: .dat, .csv, .mrk.json, .fcsv", group="touches",
               icon="import")
     yield row("touch", "Touch on the scan", ("I",), _toggle_touching, lambda w: w.scan.volume is not None,
               checked=lambda w: w.interaction.tool == "touch", group="touches",
-              hint="A dry run: a click on bone or a slice touches the feature asked for")
+              hint="Dry run: a click on bone or on a slice records the requested feature")
     yield row("skip", "Skip this feature", ("Shift+N",), lambda w, ui: w.pose.skip(), _has_target,
-              hint="It is asked for again after the others", group="touches", icon="skip")
+              hint="It is requested again after the others", group="touches", icon="skip")
     yield row("clear", "Clear touches", (),
               lambda w, ui: touching.clear_touches(w.document, w.pose.side), _is_touched,
-              hint="Of this side; undo brings them back", group="touches")
+              hint="Removes all touches of this side; undo restores them", group="touches")
     yield row("open_skull", "Skull features on the scan…", (), lambda w, ui: ui.ask_open_skull(),
-              hint="A landmark file that says where they are, to register the touches by", group="touches")
+              hint="Landmark file with the skull features, to register touches to the scan", group="touches")
     yield row("other_side", "Other side", ("Shift+Q",), lambda w, ui: w.pose.choose(side=w.pose.side.other),
               group="estimate")
     for name, title, methods in _METHODS:
         yield row(name, title, (), _set_method(methods), checked=_has_method(methods), group="estimate")
     yield row("touched_window", "Robot's y to the touched round window", (), _toggle_window,
               checked=_window_is_touched, group="estimate",
-              hint="Unticked: to the round window that the atlas expects, better where touches are rough")
+              hint="When off, y points to the round window predicted by the atlas: better for rough touches")
     yield row("overlay", "Estimate over bone and slices", ("Y",), _toggle_overlay,
               checked=lambda w: w.pose.overlay.visible, group="look", icon="eye")
     yield row("along_axis", "Look along the axis", ("A",), lambda w, ui: ui.look_along_axis(), _in_scan,
@@ -105,24 +105,24 @@ def pose_rows() -> Iterator[Action]:
     yield row("through_window", "Look through the round window", ("Shift+A",),
               lambda w, ui: ui.look_through_window(), _in_scan, group="look")
     yield row("tracker", "Tracked probe…", (), lambda w, ui: ui.show_tracker(), group="tracker",
-              hint="Connect a tracker over OpenIGTLink, find the probe's tip, send the pose back")
+              hint="Connect a tracker over OpenIGTLink, calibrate the tip, send the pose")
     yield row("record", "Record a touch", ("J",), lambda w, ui: w.tracker.press(), _is_tracked,
-              hint="With the tip held still on the feature asked for", group="tracker")
+              hint="While the tip rests on the requested feature", group="tracker")
     yield row("guide", "Guided touching", ("F9",), lambda w, ui: ui.show_guide(), group="tracker",
-              hint="One feature after the other, in large letters", icon="play")
+              hint="One feature at a time, in large letters", icon="play")
     yield row("export", "Export the pose…", ("Ctrl+Shift+E",), lambda w, ui: ui.ask_export_pose(), _has_pose,
-              hint="JSON, ITK and Slicer transform, 4 x 4 table, markups", group="out", icon="export")
+              hint="JSON, ITK or Slicer transform, 4 x 4 matrix, or markups", group="out", icon="export")
     yield row("report", "Report…", (), lambda w, ui: ui.ask_report(), _has_pose,
-              hint="One page with touches, estimate, errors and pictures, PDF or HTML", group="out")
+              hint="One page with touches, estimate, errors and pictures (PDF or HTML)", group="out")
     yield row("path", "Insertion path…", (), lambda w, ui: ui.ask_path(),
-              hint="A curve in the cochlea frame, carried to the estimate", group="out")
-    yield row("save_path", "Save the carried path…", (), lambda w, ui: ui.ask_save_path(),
+              hint="Transform a curve from the cochlea frame to the estimated pose", group="out")
+    yield row("save_path", "Save the transformed path…", (), lambda w, ui: ui.ask_save_path(),
               lambda w: _has_pose(w) and w.pose.path is not None,
               hint="In the frame of the touches, for a robot", group="out")
     yield row("physical", "Test against the scan…", (), lambda w, ui: ui.show_physical(),
               lambda w: _has_pose(w) and bool(w.document.state.skull),
-              hint="The paper's physical test: a touched skull compared with its own labelled scan",
+              hint="The paper's physical test: compare a touched skull with its labelled scan",
               group="out")
     yield row("accept", "Accept the estimate", (), _judge("accept"), _has_pose,
-              hint="Keeps the verdict in the specimen", group="verdict", icon="check")
+              hint="Stores the verdict in the specimen", group="verdict", icon="check")
     yield row("reject", "Reject the estimate", (), _judge("reject"), _has_pose, group="verdict")

@@ -224,15 +224,15 @@ def file_rows() -> Iterator[Action]:
         return Action(f"file.{id}", "File", title, keys, run, enabled, hint=hint, group=group, icon=icon)
 
     yield row("new", "New, without a scan", ("Ctrl+N",), lambda w, ui: ui.begin(),
-              hint="A specimen that is only touched; a scan can be opened for it later", group="open")
+              hint="A specimen with touches only; you can open its scan later", group="open")
     yield row("open", "Open…", ("Ctrl+O",), lambda w, ui: ui.ask_open_file(),
-              hint="A scan, or a specimen saved before", group="open", icon="file")
+              hint="A scan or a saved specimen", group="open", icon="file")
     yield row("open_folder", "Open folder…", ("Ctrl+Shift+O",), lambda w, ui: ui.ask_open_folder(),
               hint="A DICOM series or a stack of slices", group="open", icon="folder")
     yield row("demo", "Open the demo", (), lambda w, ui: ui.open_demo(),
-              hint="A synthetic guinea-pig head to try everything on", group="open", icon="play")
+              hint="A synthetic guinea-pig head for practice", group="open", icon="play")
     yield row("specimens", "Specimens…", ("Ctrl+Shift+L",), lambda w, ui: ui.show_specimens(),
-              hint="Those of your folders: progress, the next unfinished, contact sheets", group="open")
+              hint="Specimens in your folders: progress, next unfinished, contact sheets", group="open")
     yield row("next_specimen", "Next unfinished specimen", (), lambda w, ui: ui.open_next_specimen(),
               lambda w: bool(w.specimens.every), group="open")
     yield row("find_scan", "Find scan…", (), lambda w, ui: ui.ask_find_scan(), _lacks_scan, group="open")
@@ -247,12 +247,12 @@ def file_rows() -> Iterator[Action]:
               lambda w: bool(w.bone.surfaces), group="exchange")
     yield row("screenshot", "Save picture…", (), lambda w, ui: ui.ask_screenshot(), group="exchange")
     yield row("show_references", "Show reference points…", (), lambda w, ui: ui.ask_references(), _has_scan,
-              hint="Points of any landmark list, grey, to compare with: no part of the specimen",
+              hint="Points of any landmark list, shown in grey for comparison; not part of the specimen",
               group="references")
     yield row("clear_references", "Clear reference points", (), lambda w, ui: w.references.clear(),
               lambda w: bool(w.references.points), group="references")
     yield row("add_mesh", "Add mesh…", (), lambda w, ui: ui.ask_add_mesh(), _has_scan,
-              hint="Draw a surface from another program with the bone: no part of the specimen",
+              hint="Show a surface from another program with the bone; not part of the specimen",
               group="references")
     yield row("remove_meshes", "Remove added meshes", (), lambda w, ui: w.meshes.clear(),
               lambda w: bool(w.meshes.meshes), group="references")
@@ -271,7 +271,7 @@ def edit_rows() -> Iterator[Action]:
     yield row("redo", "Redo", ("Ctrl+Y", "Ctrl+Shift+Z"), lambda w, ui: w.document.redo(),
               lambda w: w.document.redo_text is not None, "redo")
     yield row("swap", "Exchange with…", (), lambda w, ui: ui.ask_swap(), _is_free, "swap",
-              "Exchange two points placed under each other's names")
+              "For two points placed under each other's names")
     yield row("swap_sides", "Exchange left and right", (), lambda w, ui: w.document.do(SwapSides()),
               _has_labels)
 
@@ -287,37 +287,37 @@ def view_rows() -> Iterator[Action]:
                   group="layout")
     yield row("view.fit_here", "Show everything in the view under the pointer", ("Ctrl+R",),
               lambda w, ui: ui.reset_view_here(), _has_scan, group="layout",
-              hint="The other views stay as they are")
+              hint="Does not change the other views")
     yield row("view.reset", "Show everything", ("R",), lambda w, ui: ui.reset_views(), _has_scan,
               group="show")
     yield row("view.go_to", "Go to position…", ("Ctrl+G",), lambda w, ui: ui.ask_position(), _has_scan,
-              group="show", hint="Such as L 4.6 P 9.1 S 12.4")
-    yield row("view.zoom_to_point", "Look closely at the point", ("E", "Shift+R"),
+              group="show", hint="For example L 4.6 P 9.1 S 12.4")
+    yield row("view.zoom_to_point", "Zoom to the point", ("E", "Shift+R"),
               lambda w, ui: ui.zoom_to_point(), _has_scan, group="show")
     for word, letter, keys in _VIEWPOINTS:
         yield row(f"view.from_{word}", f"Look from {word}", keys, _look_from(letter), group="from")
     for title, tool, key in _TOOLS:
         run = _let_place if tool == "place" else _set_tool(tool)
         yield row(f"tool.{tool}", title, (key,), run, checked=_has_tool(tool), group="tool",
-                  hint="What the left button does over a slice")
+                  hint="Sets what the left mouse button does on a slice")
     yield row("view.auto_window_level", "Automatic contrast", ("Shift+W",), _auto_window_level, _has_scan,
               group="tool")
     for title, field, key in _SHOWN:
         yield row(f"view.{field}", title, (key,), _toggle(field), checked=_is_on(field), group="what")
-    yield row("view.glyph_mm", "Points grow with the zoom", (), _toggle_glyphs,
+    yield row("view.glyph_mm", "Scale points with the zoom", (), _toggle_glyphs,
               checked=lambda w: w.view.state.glyph_mm is not None, group="what",
-              hint="Their size is in mm then, else the same on the screen at any zoom")
+              hint="When on, their size is in mm; otherwise it is constant on the screen")
     yield row("view.fainter", "Bone more transparent", ("[",), _change_opacity(-0.1), group="bone")
     yield row("view.solider", "Bone more solid", ("]",), _change_opacity(0.1), group="bone")
     yield row("view.projection", "Perspective on or off", ("5", "Num+5"),
               lambda w, ui: ui.toggle_projection(), group="bone")
     yield row("view.canvas", "3D canvas…", (), lambda d, ui: ui.ask_canvas(), group="theme",
-              hint="Painted or native: how the 3D view is drawn from the next start on")
+              hint="Painted or native drawing of the 3D view, from the next start on")
     yield row("view.theme", "Dark or light", ("Ctrl+T",), lambda w, ui: ui.toggle_theme(), group="theme",
               icon="moon")
     for title, id, step, keys in _TEXT_SIZES:
         yield row(f"view.text_{id}", title, keys, _change_text_size(step), group="text",
-                  hint="Of the whole window, with what is written on slices and in 3D")
+                  hint="In the whole window, including slices and the 3D view")
 
 
 _LAYOUTS = (
@@ -338,7 +338,8 @@ _TOOLS = (
 )
 _SHOWN = (
     ("Bone edge on slices", "outline_visible", "O"), ("Names of points", "labels_visible", "T"),
-    ("Expected places (ghosts)", "ghosts_visible", "G"), ("Axis and round window lines", "axis_visible", "M"),
+    ("Predicted positions (ghosts)", "ghosts_visible", "G"),
+    ("Axis and round window lines", "axis_visible", "M"),
 )
 
 
@@ -350,12 +351,13 @@ def landmark_rows() -> Iterator[Action]:
 
     yield row("point.accept_ghost", "Accept the ghost, confirm a suggestion", ("Return", "Enter"),
               _accept_or_confirm, _can_confirm, icon="check",
-              hint="An accepted ghost is a suggestion: it counts once it is confirmed where it can be judged")
+              hint="An accepted ghost becomes a suggestion. It counts when you confirm it in a close view")
     yield row("point.confirm", "Confirm the suggestion or ghost", ("Ctrl+Return", "Ctrl+Enter"), _confirm,
-              _can_confirm, hint="The view comes closer first where the point cannot be judged")
+              _can_confirm, hint="Zooms in first if the point cannot be judged in the current view")
     yield row("point.accept_all", "Accept all ghosts of this side", (),
               lambda w, ui: w.labels.accept_all_ghosts(),
-              lambda w: bool(w.labels.ghosts(w.labels.active.side)), hint="As suggestions to confirm")
+              lambda w: bool(w.labels.ghosts(w.labels.active.side)),
+              hint="They become suggestions, which you then confirm")
     yield row("point.suggest_like", "Suggest from my scans…", (), lambda w, ui: ui.ask_suggest_like(),
               lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
               hint="First labels from scans that are labelled, to confirm; again, to stop")
@@ -365,7 +367,7 @@ def landmark_rows() -> Iterator[Action]:
               lambda w, ui: w.interaction.arm_replacing(not w.interaction.replacing),
               lambda w: _has_scan(w) and _is_free(w) and _is_shown(w),
               checked=lambda w: w.interaction.replacing,
-              hint="One click moves the chosen point; without this, a click leaves it where it is")
+              hint="The next click moves the selected point; otherwise, clicks never move a placed point")
     yield row("point.skip", "Skip for now", ("N",), lambda w, ui: w.labels.skip(), _has_active,
               icon="skip")
     yield row("point.unseen", "Cannot be seen", ("X",), lambda w, ui: w.labels.mark_unseen(),
@@ -383,8 +385,8 @@ def landmark_rows() -> Iterator[Action]:
     yield row("point.previous", "Previous feature", (",",), _step_point(-1), group="go")
     yield row("point.other_side", "Same feature, other side", ("Q",), _other_side, _has_active, group="go")
     for title, field in (
-        ("Go on to the next after placing", "auto_advance"),
-        ("Show where the next is expected", "follow_ghost"),
+        ("Select the next feature after placing", "auto_advance"),
+        ("Show the predicted position of the next feature", "follow_ghost"),
     ):
         yield row(f"view.{field}", title, (), _toggle(field), checked=_is_on(field), group="how")
 
@@ -394,6 +396,6 @@ def help_rows() -> Iterator[Action]:
     yield Action("help.shortcuts", "Help", "Keyboard and mouse", ("?", "F1"),
                  lambda w, ui: ui.show_shortcuts())
     yield Action("help.record", "Help", "Record script…", (), lambda w, ui: ui.toggle_recording(),
-                 hint="Write down what you do, for gp-labeler --offscreen; once more ends it")
+                 hint="Records your actions as a script for gp-labeler --offscreen; choose it again to stop")
     yield Action("help.about", "Help", "About gp-labeler", (), lambda w, ui: ui.show_about())
 # fmt: on

@@ -89,15 +89,15 @@ def cut_rows() -> Iterator[Action]:
     for plane, key in (("axial", "Shift+Z"), ("sagittal", "Shift+S"), ("coronal", "Shift+C")):
         yield row(f"cut_{plane}", f"Cut bone: {plane}", (key,), _cut_by(plane), _has_bone,
                   checked=_is_cut_by(plane),
-                  hint=f"Take away what lies before the {plane} plane through the crosshair")
+                  hint=f"Remove the bone in front of the {plane} plane through the crosshair")
     yield row("cut_view", "Cut bone: across the view", ("Shift+V",), _cut_by("view"), _has_bone,
-              checked=_is_cut_by("view"), hint="Take away what lies nearer than the crosshair")
+              checked=_is_cut_by("view"), hint="Remove the bone between you and the crosshair")
     yield row("cut_open", "Cut bone: open at the feature", ("Shift+E",), lambda w, ui: ui.cut_open(),
               _has_place,
-              hint="By the plane in which the feature is best seen, looked at from the open side")
-    yield row("cut_flip", "Cut: leave the other side", ("Shift+X",), _flip)
+              hint="Cut in the best plane of the feature, viewed from the open side")
+    yield row("cut_flip", "Cut: keep the other side", ("Shift+X",), _flip)
     yield row("cut_here", "Cut: through the crosshair", ("Shift+H",), _cut_here,
-              hint="Bring the cut to where the crosshair is now")
+              hint="Move the cut to the crosshair")
     yield row("cut_deeper", "Cut: deeper", ("Shift+]",), _move(_STEP_MM), hint="By half a millimetre")
     yield row("cut_shallower", "Cut: less deep", ("Shift+[",), _move(-_STEP_MM),
               hint="By half a millimetre")

@@ -31,7 +31,7 @@ class SetHeadFrame:
 
 @dataclass(frozen=True)
 class ClearHeadFrame:
-    """Forget how the head lies in its scan."""
+    """Remove the head frame in its scan."""
 
     do: ClassVar[str] = "clear_head_frame"
 

@@ -62,7 +62,7 @@ def import_landmarks(
     near_bone : callable, optional
         Tells which points are near bone.
     accept_off_bone : bool
-        Import nevertheless.
+        Import anyway.
     replace_placed : bool
         Whether placed points give way; otherwise only what is still to do is filled.
 
@@ -145,12 +145,16 @@ def _check_bone(
     if contains is not None and not (inside := contains(points)).all():
         problem = f"{_listed(names, ~inside)} lie outside the scan"
         turned = bool(contains(points * _TURN_RAS).all())
-        remedy = "With x and y negated all lie inside: is the file RAS, called LPS?" if turned else ""
+        remedy = (
+            "With x and y negated, all are inside: the file may be RAS, although it says LPS."
+            if turned
+            else ""
+        )
     off = np.zeros(len(points), bool) if near_bone is None else ~near_bone(points)
     if not problem and off.mean() > 0.5:
         problem = f"{_listed(names, off)} lie off the bone"
     if problem and not accepted:
-        remedy = remedy or "Are they of another scan? Import them nevertheless only if you know why."
+        remedy = remedy or "They may belong to another scan. Import them only if you know why."
         raise OffBoneError(problem, specimen=document.state.specimen, remedy=remedy)
     warning = problem or (f"{_listed(names, off)} lie off the bone" if off.any() else "")
     return (warning,) if warning else ()

@@ -177,7 +177,7 @@ class RefitAtlas:
 
 @dataclass(frozen=True)
 class AtlasTrial:
-    """How well each animal's cochlea is found from the others.
+    """Estimates each animal's cochlea from the other animals.
 
     Parameters
     ----------

@@ -75,7 +75,7 @@ def open_scan_of(state: SpecimenState, progress: Progress) -> Volume:
         raise GpError(
             f"its scan is not at {reference.path}",
             specimen=state.specimen,
-            remedy="Open the specimen, and use File > Find scan.",
+            remedy="Open the specimen, and locate its scan with File > Find scan.",
         )
     from gp_labeler.imaging.readers import read_volume
 

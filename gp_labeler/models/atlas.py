@@ -333,7 +333,7 @@ class AtlasModel:
             self.use(recalled.fitted.atlas)
             self.problem = f"The atlas of {source.text} cannot be had any more: {recalled.problem}"
             self.details_changed.emit()
-            self._messages.say(f"{self.problem} The published one is in use.", "warning")
+            self._messages.say(f"{self.problem} The published atlas is used.", "warning")
         elif source.file is not None:
             self._take_read(recalled.fitted.atlas, source.file)
         else:

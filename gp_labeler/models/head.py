@@ -209,7 +209,7 @@ class HeadModel:
         self._take_by_hand(axes, origin, merge=merge)
 
     def take_mid_plane(self) -> None:
-        """Let the mid-plane go through the crosshair, in the directions of the views.
+        """Move the mid-plane to the crosshair, in the directions of the views.
 
         Raises
         ------
@@ -247,7 +247,7 @@ class HeadModel:
         self._document.do(ConfirmLeft())
 
     def forget(self) -> None:
-        """Forget how the head lies."""
+        """Remove the head frame."""
         self._document.do(ClearHeadFrame())
 
     # The views

@@ -123,7 +123,7 @@ class InteractionModel:
         if on:
             active, mark = self._labels.active, self.active_landmark()
             if active.code is None or mark is None or mark.shown_position is None:
-                raise GpError("no placed point is chosen to re-place", remedy="Choose one in the table.")
+                raise GpError("no placed point is selected", remedy="Choose one in the table.")
             require_free(self._document.state, [point_key(active.side, active.code)])
         if on != self.replacing:
             self.replacing = on
@@ -195,7 +195,7 @@ class InteractionModel:
         self._labels.choose(side, code)
         area.bring_close(where)
         self._messages.say(
-            f"Is {point_text(side, code)} right here? Confirm it, or drag it to where it belongs"
+            f"Is {point_text(side, code)} correct? Press Enter to confirm it, or drag it to its position"
         )
         return True
 

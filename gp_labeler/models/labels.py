@@ -214,7 +214,7 @@ class LabelsModel:
         ghost = self.ghosts(side).get(code)
         if ghost is None:
             raise GpError(
-                f"nothing says yet where {point_text(side, code)} should be",
+                f"the position of {point_text(side, code)} cannot be predicted yet",
                 landmark=code,
                 remedy="Place three features of this side first.",
             )
@@ -230,7 +230,7 @@ class LabelsModel:
         }
         if not ghosts:
             raise GpError(
-                f"nothing of the {side.word} side is to do and expected somewhere",
+                f"no feature of the {side.word} side has a ghost to accept",
                 remedy="Place three features of this side first.",
             )
         return self._suggest(side, ghosts)

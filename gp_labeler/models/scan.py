@@ -220,8 +220,9 @@ class ScanModel:
             self._jobs.submit(MakeDemo(seed, min(reference.spacing)), self._attach_demo, key="open")
             return
         if reference.path is None or self._document.volume_is_lost:
-            where = f"is not at {reference.path} any more" if reference.path else "was never in a file"
-            self._messages.say(f"The scan {reference.name} {where}. Use File > Find scan.", "warning")
+            where = f"is no longer at {reference.path}" if reference.path else "was never in a file"
+            lost = f"The scan {reference.name} {where}. Locate it with File > Find scan."
+            self._messages.say(lost, "warning")
             return
         job = InspectScan(reference.path, dict(self._document.state.import_choices))
         self._jobs.submit(job, self._read_known, key="open")

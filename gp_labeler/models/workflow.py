@@ -156,14 +156,14 @@ def click_text(state: SpecimenState, active: Active) -> str:
         left = any(
             not state.landmark(side, f.code).decided for side in Side for f in FEATURES if not f.computed
         )
-        return "Choose a feature to place" if left else "Everything is placed · drag a point to move it"
+        return "Choose a feature to place" if left else "All features are placed · drag a point to move it"
     point, landmark = point_text(active.side, active.code), state.landmark(active.side, active.code)
     if feature(active.code).shared:
         point += " (both sides)"
     if landmark.locked:
         return f"{point} is locked"
     if landmark.suggestion is not None:
-        return f"{point} is suggested · confirm it (Enter), or drag or re-place it to correct it"
+        return f"{point} is suggested · press Enter to confirm it, or drag or re-place it to correct it"
     if landmark.position is not None:
         return (
             f"{point} is placed; a click does not move it. Drag it, use the arrow keys, or Shift+P and click"

@@ -177,7 +177,7 @@ class Commands(QObject):
             entry.setToolTip(str(path))
             entry.triggered.connect(partial(self._open, path))
         if not files:
-            menu.addAction("Nothing was opened yet").setEnabled(False)
+            menu.addAction("No recent files").setEnabled(False)
 
     def _open(self, path: Path, *_: object) -> None:
         opener: Callable[[Path], None] = self._ui.open_path

@@ -190,8 +190,8 @@ class GuideWindow(QWidget):
         self.progress.setTextVisible(False)
         self.record = _big("Record", _RECORD_HINT, self._press)
         self.record.setProperty("role", "huge-primary")
-        self.redo = _big("Redo", "Backspace or Page up: touch the last one again", self._redo)
-        self.skip = _big("Skip", "S or Right: it comes again at the end", self._workspace.pose.skip)
+        self.redo = _big("Redo", "Backspace or Page up: repeat the previous touch", self._redo)
+        self.skip = _big("Skip", "S or Right: skip it; it comes again at the end", self._workspace.pose.skip)
         self.connect_button = _big("Connect…", "Choose the tracker", self.settings_asked.emit)
         self.leave = _big("Close", "Escape", self.close)
 
@@ -293,4 +293,4 @@ def _seventh(target: str, touched: Collection[str]) -> str:
     """Return what a feature far from the others is good for, while none such is touched."""
     if target not in _TELLS_SIDE or any(code in touched for code in _TELLS_SIDE):
         return ""
-    return "\n\nFar from the other points: it tells the side, and shows where MN was touched wrongly."
+    return "\n\nIt is far from the other points, so it determines the side and reveals a wrong touch of MN."

@@ -25,7 +25,7 @@ __all__ = ["PoseUi"]
 
 _TOUCHES = "Touches (*.dat *.csv *.mrk.json *.fcsv *.json *.txt);;All files (*)"
 _POINTS = "Landmarks (*.mrk.json *.json *.fcsv *.csv *.dat);;All files (*)"
-_WHICH_AXES = "Which of its axes are x (modiolar axis, to the apex), y (to the round window), z"
+_WHICH_AXES = "Which axes of the path are x (modiolar axis, towards the apex), y (round window), z"
 _AROUND_MM = 14.0
 _PATHS = "Insertion path (*.csv *.txt);;All files (*)"
 
@@ -78,14 +78,14 @@ class PoseUi(UiPart):
     def ask_path(self) -> None:
         """Ask for an insertion path with its units and side, and carry it to the estimate."""
         for path in self.prompts.open_files("Insertion path in the cochlea frame", self._folder, _PATHS):
-            units = self.prompts.item("Insertion path", "Its numbers are in", list(UNITS))
-            side = self.prompts.item("Insertion path", "It was drawn for", [s.word for s in Side])
+            units = self.prompts.item("Insertion path", "Unit of the path", list(UNITS))
+            side = self.prompts.item("Insertion path", "Side of the path", [s.word for s in Side])
             if units and side:
                 self._remember_folder(path)
                 carried = self._read_path(path, Side.parse(side[0].upper()), units)
                 if carried is not None:
                     self._workspace.pose.carry(carried)
-                    self._workspace.say(f"Carried {path.name}, {len(carried.points)} points")
+                    self._workspace.say(f"Transformed {path.name}, {len(carried.points)} points")
 
     def _read_path(self, file: Path, side: Side, units: str) -> InsertionPath | None:
         """Read a path; ask what its axes are, and whether all of it is path, where that is not clear."""
@@ -98,7 +98,7 @@ class PoseUi(UiPart):
         if path is None or n is None:
             return path
         first, whole = f"The first {n}", f"All {len(path.points)}"
-        text = f"Row {n + 1} is CO itself, where no path can be. Which rows are the path?"
+        text = f"Row {n + 1} is CO itself, which cannot be part of a path. Which rows are the path?"
         answer = self.prompts.choose("Insertion path", text, [first, whole])
         return {first: path.first(n), whole: path}.get(answer)
 
@@ -138,7 +138,9 @@ class PoseUi(UiPart):
     def _look_at_pose(self, placement: Callable[[DrawnPose], CameraPlacement]) -> None:
         estimate = self._workspace.pose.estimate
         if estimate is None or estimate.pose is None or estimate.registered is None:
-            raise GpError("no estimate lies in the scan yet", remedy="Touch features, and register them.")
+            raise GpError(
+                "no estimate is registered to the scan yet", remedy="Touch features, and register them."
+            )
         view = self._window.grid.scene_view
         pose = DrawnPose.of(estimate.pose, estimate.registered.T_scan_touches, label="")
         self._workspace.view.set_crosshair(pose.origin)

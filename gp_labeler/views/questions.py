@@ -35,7 +35,7 @@ def ask_about(plan: ImportPlan, prompts: Prompts) -> ImportPlan | None:
             plan = plan.with_options(spacing=given)
         elif "accept" in problem.resolved_by:
             if not prompts.choose(
-                "Look at this first", problem.text, ["Go on"], detail=problem.remedy, kind="warning"
+                "Check this first", problem.text, ["Go on"], detail=problem.remedy, kind="warning"
             ):
                 return None
             plan = plan.with_options(accept=plan.options.accept | {problem.code})
@@ -47,7 +47,7 @@ def ask_about(plan: ImportPlan, prompts: Prompts) -> ImportPlan | None:
             "Which side is left?",
             f"{plan.format} does not say which side is left.",
             ["Keep the order of the slices", "Reverse it"],
-            detail="Check a side that you know once it is open.",
+            detail="After opening, check a structure whose side you know.",
         )
         if not answer:
             return None
@@ -60,8 +60,8 @@ def import_asking(workspace: Workspace, files: Sequence[Path], prompts: Prompts,
     try:
         notes = import_landmarks(workspace.document, files, near_bone=workspace.scan.near_bone, **how)
     except OffBoneError as error:
-        answers = ["Import nevertheless"]
-        if prompts.choose("Do they belong here?", error.problem, answers, detail=error.remedy or ""):
+        answers = ["Import anyway"]
+        if prompts.choose("Do they belong to this scan?", error.problem, answers, detail=error.remedy or ""):
             import_asking(workspace, files, prompts, accept_off_bone=True)
         return
     words = ". ".join(notes) or f"Imported {', '.join(file.name for file in files)}"

@@ -32,7 +32,7 @@ def directory_to_use(wanted: Path, prompts: Prompts) -> Path | None:
         other = fallback_directory()
         answers = [] if other is None else [f"Use {other}"]
         answer = prompts.choose(
-            "Unsaved edits cannot be kept safe",
+            "Unsaved edits cannot be stored safely",
             f"The folder {directory} {problem}.",
             [*answers, _CHOOSE, _WITHOUT],
             detail="Every edit is written there at once, so that nothing is lost if the program or the "

@@ -57,7 +57,7 @@ class StatusLine(QWidget):
         self._role = "hint"
         self.where, self.next_click, self.frame = QLabel(), QLabel(), QLabel()
         self.frame.setProperty("role", "hint")
-        self.frame.setToolTip("Which frame the views are in; positions are always those of the scan (LPS)")
+        self.frame.setToolTip("Frame of the views; positions are always in the scan frame (LPS)")
         self.next_click.setAlignment(Qt.AlignmentFlag.AlignCenter)
         self.next_click.setSizePolicy(QSizePolicy.Policy.Ignored, QSizePolicy.Policy.Preferred)
         self.work = _Work(workspace)
@@ -127,18 +127,16 @@ class StatusLine(QWidget):
         workspace = self._workspace
         if workspace.interaction.drag is not None:
             point = point_text(workspace.interaction.drag.side, workspace.interaction.drag.code)
-            self._show(f"Let go to leave {point} here, or press Esc to take it back", "next")
+            self._show(f"Release to place {point} here, or press Esc to cancel", "next")
         elif workspace.scan.volume is None:
-            its_own = (
-                "File > Find scan says where the scan is now" if workspace.document.volume_is_lost else ""
-            )
+            its_own = "Locate the scan with File > Find scan" if workspace.document.volume_is_lost else ""
             self._show(self.without_scan or its_own or "Open a scan, or try the demo", "hint")
         elif workspace.interaction.replacing and workspace.labels.active.code is not None:
             point = point_text(workspace.labels.active.side, workspace.labels.active.code)
-            self._show(f"The next click moves {point} there · Esc leaves it where it is", "next")
+            self._show(f"Click the new position of {point} · Esc cancels", "next")
         elif workspace.measure.dragged is not None:
             name = workspace.measure.dragged[0]
-            self._show(f"Let go to leave {name} so, or press Esc to take it back", "next")
+            self._show(f"Release to place the end of {name}, or press Esc to cancel", "next")
         elif workspace.measure.kind is not None:
             self._show(workspace.measure.click_text, "next")
         elif workspace.interaction.tool == "touch":
@@ -149,11 +147,11 @@ class StatusLine(QWidget):
             else:
                 self._show("All features are touched", "next")
         elif workspace.interaction.tool == "look":
-            self._show("Drag over a slice to move the crosshair", "hint")
+            self._show("Drag on a slice to move the crosshair", "hint")
         elif workspace.interaction.tool == "turn":
-            self._show("Drag over a slice to turn the head about the crosshair · Esc ends it", "hint")
+            self._show("Drag on a slice to rotate the head about the crosshair · Esc ends this", "hint")
         elif workspace.interaction.tool == "grey":
-            self._show("Drag over a slice: sideways for contrast, up and down for brightness", "hint")
+            self._show("Drag on a slice: left or right for contrast, up or down for brightness", "hint")
         else:
             self._show(workspace.labels.click_text, "next")
 
@@ -223,8 +221,8 @@ class _Work(QWidget):
         self.text.setAlignment(Qt.AlignmentFlag.AlignRight | Qt.AlignmentFlag.AlignVCenter)
         self.bar.setTextVisible(False)
         self.stop.setProperty("role", "quiet")
-        self.stop.setToolTip("Stop this work")
-        self.stop.setAccessibleName("Stop the work in the background")
+        self.stop.setToolTip("Stop this task")
+        self.stop.setAccessibleName("Stop the background task")
         self._row = row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 0, 0)
         row.setSpacing(8)

@@ -82,7 +82,7 @@ class TopBar(QWidget):
         set_role(self.saved, "warning" if document.dirty or document.path is None else "good")
         kept = _SAVED if document.path is not None else _COPY if place else ""
         self.saved.setText(_UNSAVED if document.dirty else kept)
-        self.saved.setToolTip("Every edit is kept in a journal at once; Ctrl+S writes the specimen file")
+        self.saved.setToolTip("Every edit is written to a journal at once; Ctrl+S writes the specimen file")
         for button, id in self._working:
             is_edit = id.startswith("edit.") and self._workspace.document.in_use
             button.setVisible(document.state.volume is not None or is_edit)

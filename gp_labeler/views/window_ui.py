@@ -147,7 +147,7 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi, FirstLabelsUi):
         if not document.dirty:
             return True
         text = f"Save the changes to {document.state.specimen}?"
-        detail = "Without saving, they are lost when this specimen is closed."
+        detail = "Otherwise they are lost when this specimen is closed."
         answer = self.prompts.choose("Not saved", text, ["Save", "Do not save"], detail=detail)
         self.discarded = answer == "Do not save"
         if self.discarded:
@@ -242,7 +242,7 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi, FirstLabelsUi):
                 "Unsaved work was found",
                 recovery.text,
                 ["Recover", "Later", "Delete it"],
-                detail="The program ended before this was saved. Nothing of it is lost.",
+                detail="The program ended before this was saved. Nothing is lost.",
             )
             if answer == "Recover":
                 self._workspace.document.recover(recovery)
@@ -263,7 +263,7 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi, FirstLabelsUi):
         """Ask whether to go on with a scan that is not the one that was labelled."""
         detail = f"{'; '.join(error.differences).capitalize()}. {error.remedy or ''}"
         if self.prompts.choose(
-            "Another scan?", error.problem, ["Use it nevertheless"], detail=detail, kind="warning"
+            "Another scan?", error.problem, ["Use it anyway"], detail=detail, kind="warning"
         ):
             self._workspace.scan.accept(volume)
 
@@ -345,7 +345,9 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi, FirstLabelsUi):
         active, labels = self._workspace.labels.active, self._workspace.labels
         where = None if active.code is None else labels.place_of(active.side, active.code)
         if active.code is None or where is None:
-            raise GpError("nothing says yet where the feature is", remedy="Place it, or three others first.")
+            raise GpError(
+                "the position of the feature is not known yet", remedy="Place it, or three others first."
+            )
         best = feature(active.code).view.lower()
         self._window.grid.scene_view.cut_open(where, best if best in CUTS else "view", _OPEN_MM)
 
@@ -403,7 +405,7 @@ class WindowUi(AtlasUi, PoseUi, MeasureUi, FirstLabelsUi):
         self.prompts.tell(
             "About gp-labeler",
             f"{application()}\n\nLabels guinea-pig heads in micro-CT, and estimates the pose of the cochlea "
-            "from a few touched points.\n\nCoordinates are LPS, mm. Nothing is sent anywhere.",
+            "from a few touched points.\n\nCoordinates are LPS, mm. No usage data are collected.",
         )
 
     @property

@@ -31,13 +31,13 @@ class WorkStep:
 
 
 STEPS = (
-    WorkStep("scan", "Scan", "scan", "The scan: what it is, its grey window, where bone begins"),
+    WorkStep("scan", "Scan", "scan", "The scan: properties, grey window, bone threshold"),
     WorkStep("label", "Label", "label", "Place the 20 features on both sides"),
     WorkStep(
         "atlas",
         "Atlas",
         "atlas",
-        "What labels are compared with: the published atlas, or one fitted to your animals",
+        "The atlas: published, or fitted to your animals",
     ),
     WorkStep("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )

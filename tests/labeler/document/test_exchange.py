@@ -142,7 +142,7 @@ def test_a_flipped_file_is_recognised(editing, tmp_path):
     flipped.document.do(ImportLandmarks((shape(L).with_point("IN", (1, 0, 0)),), MARK))
     (file,) = export_landmarks(flipped.document.state, tmp_path).files
     editing.document.attach_volume(Octant())
-    with pytest.raises(OffBoneError, match="With x and y negated all lie inside: is the file RAS"):
+    with pytest.raises(OffBoneError, match="With x and y negated, all are inside"):
         import_landmarks(editing.document, [file])
 
 

@@ -242,7 +242,7 @@ def test_an_atlas_that_is_gone_gives_way_to_the_published_one(start, folder, tmp
     assert level == "warning"
     name = "own.json" if what == "file" else "animals"
     assert said.startswith(f"The atlas of {name} cannot be had any more: ")
-    assert said.endswith("The published one is in use.")
+    assert said.endswith("The published atlas is used.")
     assert workspace.atlas.problem in said
     workspace = start()
     assert workspace.said, "it may have been on a drive that was not there"

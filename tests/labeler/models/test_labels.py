@@ -38,7 +38,7 @@ def test_auto_advance_visits_everything_once():
         assert len(visited) == len(set(visited)) == 37  # 19 and 18: IN is shared
         assert {a.side for a in visited[:19]} == {L}
         assert [editing.labels.progress(side).text for side in Side] == ["20 of 20", "20 of 20"]
-        assert editing.labels.click_text == "Everything is placed · drag a point to move it"
+        assert editing.labels.click_text == "All features are placed · drag a point to move it"
         with pytest.raises(GpError, match=r"no feature is chosen. Choose one in the table"):
             editing.labels.place((0, 0, 0))
 
@@ -178,7 +178,7 @@ def test_ghosts_need_three_points_and_an_atlas():
     for code in ("CA", "RWP"):
         editing.document.do(PlacePoint(L, code, shape()[code] + [1, 2, 3], MARK))
         assert not editing.labels.ghosts(L)
-    with pytest.raises(GpError, match=r"nothing says yet where ZL left should be. Place three"):
+    with pytest.raises(GpError, match=r"the position of ZL left cannot be predicted yet. Place three"):
         editing.labels.accept_ghost(side=L, code="ZL")
     editing.document.do(PlacePoint(L, "OS", shape()["OS"] + [1, 2, 3], MARK))
     ghost = editing.labels.ghosts(L)["ZL"]

@@ -67,7 +67,7 @@ def test_all_ghosts_are_accepted_in_one_step() -> None:
     assert editing.labels.progress(L).n_suggested == 0
     editing.document.redo()
     assert editing.labels.progress(L).n_suggested == 16
-    with pytest.raises(GpError, match="nothing of the left side is to do and expected"):
+    with pytest.raises(GpError, match="no feature of the left side has a ghost"):
         editing.labels.accept_all_ghosts(side=L)
 
 

@@ -224,13 +224,13 @@ def test_the_guide_proposes_in_as_the_seventh_touch_and_says_what_for(qtbot, wor
     guide.show()
     touch(workspace, *PROBE)
     assert (guide.code.text(), guide.counter.text()) == ("IN", "Left ear · 6 touched, 1 to go")
-    assert "it tells the side" in guide.definition.text()
+    assert "it determines the side" in guide.definition.text()
     workspace.pose.skip()
     assert guide.code.text() == "ZL"
-    assert "it tells the side" in guide.definition.text()
+    assert "it determines the side" in guide.definition.text()
     touch(workspace, "IN")
     assert guide.counter.text() == "Left ear · 7 touched"
-    assert "it tells the side" not in guide.definition.text()
+    assert "it determines the side" not in guide.definition.text()
 
 
 def touch(workspace, *codes, noise=0.0):

@@ -114,7 +114,7 @@ def seen(parent: QWidget, widget: QWidget, width: int, height: int = 30) -> list
         (lambda: QLabel("Round window anterior"), 170),
         (lambda: text_label("Round window anterior and posterior", wrap=True), 270),
         (lambda: QPushButton("Place at crosshair"), 170),
-        (lambda: QCheckBox("Leave out parts"), 170),
+        (lambda: QCheckBox("Remove parts"), 170),
     ],
     ids=["label", "wrapped", "button", "check box"],
 )

@@ -92,7 +92,7 @@ def test_labels_are_compared_with_it_and_problems_flagged(workspace, panel, qtbo
     assert cell(panel, "OI", 2, DOUBTFUL_ROLE)
     assert not cell(panel, "CA", 2, DOUBTFUL_ROLE)
     assert cell(panel, "CA", 3) == "–"  # noqa: RUF001
-    assert panel.labels.verdict.text() == "1 of 7 labels should be looked at again."
+    assert panel.labels.verdict.text() == "1 of 7 labels should be reviewed."
     table = panel.labels.table
     index = table.rows.index(table.rows.codes.index("OI"), 2)
     qtbot.mouseClick(table.viewport(), CLICK, pos=table.visualRect(index).center())

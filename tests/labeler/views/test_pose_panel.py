@@ -397,12 +397,12 @@ def test_a_side_that_is_undecided_is_offered_with_its_odds(workspace, panel, qtb
     touch(workspace, "OS", "MN", "RWA")
     assert panel.result.verdict.label.text() == "Side undecided"
     assert panel.result.other_side.isVisible()
-    assert panel.result.other_side.text() == "Take as the right side  (3 % likely)"
+    assert panel.result.other_side.text() == "Use the right side  (3 % likely)"
     pose = workspace.pose.estimate.pose
     assert f"{pose.radius_95:.2f} mm" in panel.result.one.region.text()
     beside = panel.result.one.allowance.text()
     assert f"As named: {pose.plain_radius_95:.2f} mm" in beside
-    assert "several parts" in beside
+    assert "several hypotheses" in beside
     before = touches(workspace)
     qtbot.mouseClick(panel.result.other_side, CLICK)
     assert (workspace.pose.side, touches(workspace, Side.RIGHT)) == (Side.RIGHT, before)
@@ -450,7 +450,7 @@ def test_an_atlas_that_is_not_the_one_chosen_is_told_beside_the_estimate(workspa
     workspace.atlas.problem = "The atlas of own.json cannot be had any more: own.json: does not exist."
     workspace.atlas.details_changed.emit()
     assert panel.head.problem.isVisible()
-    assert "The published one is in use." in panel.head.problem.text()
+    assert "The published atlas is used." in panel.head.problem.text()
     workspace.atlas.use(ATLAS)
     assert not panel.head.problem.isVisible()
 
@@ -464,7 +464,7 @@ def test_a_verdict_is_not_taken_for_one_on_another_estimate(workspace, panel, qt
     QApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
     (said,) = panel.verdict.findChildren(Notice)
     assert said.level == "warning"
-    assert any("since then it moved by" in label.text() for label in said.findChildren(QLabel))
+    assert any("has moved since by" in label.text() for label in said.findChildren(QLabel))
 
 
 def test_two_methods_stand_side_by_side(workspace, panel, qtbot):
@@ -472,7 +472,7 @@ def test_two_methods_stand_side_by_side(workspace, panel, qtbot):
     workspace.atlas.use(ATLAS, [draw_animal(ATLAS, rng=rng, name=f"S{n}") for n in range(4)])
     touch(workspace, *PROBE)
     qtbot.mouseClick(panel.head.method.buttons["both"], CLICK)
-    assert "being made ready" in notices(panel)
+    assert "Preparing JRMPC" in notices(panel)
     deliver(workspace)
     poses = workspace.pose.estimate.poses
     first = [row[0].text() for row in panel.result.two.cells]

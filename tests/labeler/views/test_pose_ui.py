@@ -95,7 +95,7 @@ def test_a_file_named_for_the_other_side_is_believed_once_the_user_says_which_si
     file.write_text("\n".join(rows) + "\n")
     assert panel.take_file(file)
     assert "By its name GP7_Right.csv is of the right side." in told(panel)
-    assert panel.result.this_side.text() == "They are of the left side"
+    assert panel.result.this_side.text() == "Keep the left side"
     with pytest.raises(GpError, match=r"by its name GP7_Right.csv is of the right side"):
         window.workspace.pose.export(tmp_path / "pose.tfm")
     qtbot.mouseClick(panel.result.this_side, Qt.MouseButton.LeftButton)

@@ -238,7 +238,7 @@ def test_landmarks_are_exported_and_imported(window, make_window, tmp_path) -> N
     assert "right side is not labelled" in window.status.next_click.text()
     labels.clear(side=Side.LEFT, code="CA")
     window.ui.prompts.files = [folder / "ball_L.mrk.json"]
-    window.ui.prompts.answers = ["Import nevertheless"]
+    window.ui.prompts.answers = ["Import anyway"]
     window.commands.run("file.import")
     np.testing.assert_allclose(document.landmarks("L")["CA"], MIDDLE)
 
@@ -386,7 +386,7 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
     assert window.rail.step == "scan"
     window.ui.open_path(saved)
     assert window.rail.step == "label"
-    assert window.steps["label"].card.content.name == "Its scan is not open yet"
+    assert window.steps["label"].card.content.name == "The scan is not open"
     wait_until_idle(qtbot, window)
     assert window.steps["label"].card.content.code == "CA"
 
@@ -434,7 +434,7 @@ def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make
     wait_until_idle(qtbot, window)
     card = window.steps["label"].card
     window.set_step("label")
-    assert (card.content.name, card.primary.accessibleName()) == ("Its scan is not found", "Find scan…")
+    assert (card.content.name, card.primary.accessibleName()) == ("The scan was not found", "Find scan…")
     window.status.set_without_scan("")  # as once the message has gone
     assert "Find scan" in window.status.next_click.text()
     window.ui.prompts.files = [moved]

@@ -319,7 +319,7 @@ def test_a_point_is_re_placed_by_one_click_on_purpose(placed) -> None:
     assert hover(axial, AWAY) is Qt.CursorShape.ArrowCursor
     QTest.keyClick(placed, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
     assert axial.cursor().shape() is Qt.CursorShape.CrossCursor  # at once, under a pointer that rests
-    assert placed.status.next_click.text().startswith("The next click moves CA left there")
+    assert placed.status.next_click.text().startswith("Click the new position of CA left")
     click(axial, AWAY)
     np.testing.assert_allclose(position_of(placed), AWAY, atol=0.1)
     click(axial, INSIDE + np.array([0.0, 3.0, 0.0]))

@@ -43,7 +43,7 @@ OWN = ("GP-014", "GP01", LONG_NAME, "torn", "unnamed", "touches of", "animals", 
 
 _ABOUT = (
     "Labels guinea-pig heads in micro-CT, and estimates the pose of the cochlea from a few touched points."
-    "\n\nCoordinates are LPS, mm. Nothing is sent anywhere."
+    "\n\nCoordinates are LPS, mm. No usage data are collected."
 )
 
 Look = Callable[[str, QWidget], object]
@@ -85,7 +85,7 @@ def _wait(window: MainWindow) -> None:
 def _without_scan(window: MainWindow, look: Look) -> None:
     look("first page", window)
     window.set_step("atlas")
-    look("atlas, alone, being loaded", window)
+    look("atlas, alone, loading…", window)
     window.workspace.atlas.use(ATLAS)
     look("atlas, alone", window)
     window.set_step("pose")
@@ -310,10 +310,10 @@ def _questions(window: MainWindow, look: Look) -> None:
             "Not saved",
             "Save the changes to GP-014?",
             ["Save", "Do not save"],
-            detail="Without saving, they are lost when this specimen is closed.",
+            detail="Otherwise they are lost when this specimen is closed.",
         ),
         "question of the insertion path": lambda: prompts.item(
-            "Insertion path", "Its numbers are in", ["mm", "µm", "m"]
+            "Insertion path", "Unit of the path", ["mm", "µm", "m"]
         ),
         "number": lambda: prompts.number("Voxel size", "Voxel size of the slices, mm", 0.05),
         "about": lambda: prompts.tell("About gp-labeler", f"gp-labeler 1.0\n\n{_ABOUT}"),

@@ -27,7 +27,7 @@ class AgreementPlot(QWidget):
     def __init__(self, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._panels: tuple[AgreementPanel, ...] = ()
-        self.setAccessibleName("Bland and Altman's picture of the differences")
+        self.setAccessibleName("Bland-Altman plot of the differences")
         self.setToolTip(
             "Difference of two labels against their mean, mm; lines: mean and 95 % limits of agreement"
         )

@@ -35,8 +35,8 @@ _SIDES = (Side.LEFT, Side.RIGHT)
 _HEADINGS = ("Feature", "SD mm", "Left mm · SD", "Right mm · SD")
 _HINTS = (
     "",
-    "How much the feature varies between animals: standard deviation of a coordinate, mm",
-    "How far the label is from where the others make the atlas expect it: mm, and in standard deviations",
+    "Variation between animals: standard deviation of a coordinate, mm",
+    "Distance of the label from its prediction by the other labels, in mm and in standard deviations",
 )
 _ROW, _CHIP, _PAD = 22, 11, 8
 _WIDEST = ("0.00", "10.00 · 10.0", "10.00 · 10.0")
@@ -145,7 +145,7 @@ class FeatureTableModel(QAbstractTableModel):
             return f"{name}: {self._sd[code]:.2f} mm between animals"
         side = _SIDES[index.column() - 2].word
         if found is None:
-            return f"{name}, {side}: not placed, or too few others are"
+            return f"{name}, {side}: not placed, or too few other labels"
         return f"{name}, {side}: {found.text} ({found.n_sd:.1f} SD)"
 
 

@@ -145,7 +145,7 @@ class AtlasCard(Card):
         """Show which it is."""
         workspace, atlas = self._workspace, self._workspace.atlas.current
         self.name.set_words(_title(workspace))
-        remedy = "Choose another, or press Published and it is forgotten."
+        remedy = "Choose another atlas, or press Published to discard this one."
         self.notices.show_notices(
             [("warning", workspace.atlas.problem, remedy)] if workspace.atlas.problem else []
         )
@@ -168,15 +168,15 @@ class AtlasCard(Card):
 
 _BUTTONS = {
     "published": ("Published", "Use the atlas rebuilt from the paper's table of distances"),
-    "open": ("Open file…", "Use an atlas that was saved here, or made with gp-core fit"),
-    "save": ("Save…", "Save the atlas for gp-core, and for other machines"),
+    "open": ("Open file…", "Use an atlas saved here or made with gp-core fit"),
+    "save": ("Save…", "Save the atlas for gp-core or another computer"),
 }
 
 
 def _title(workspace: Workspace) -> str:
     atlas = workspace.atlas.current
     if atlas is None:
-        return "It is being loaded…"
+        return "Loading…"
     return "The published atlas" if workspace.atlas.is_published else atlas.name
 
 
@@ -211,20 +211,20 @@ class AtlasFittingCard(Card):
         row.setSpacing(6)
         self.files = action_button(actions["atlas.fit_files"], "From files…", "Choose all of them at once")
         self.folder = action_button(
-            actions["atlas.fit_folder"], "From a folder…", "It is searched, and the folders in it"
+            actions["atlas.fit_folder"], "From a folder…", "Subfolders are searched too"
         )
         for button in (self.files, self.folder):
             row.addWidget(button, 1)
         self.add(row)
-        self.keep_doubtful = QCheckBox("Believe doubtful labels too")
+        self.keep_doubtful = QCheckBox("Use doubtful labels too")
         self.keep_doubtful.setToolTip(
-            "Exchanged names and labels beyond 5 SD are left out, and their animals hardly count, unless you "
-            "tick this"
+            "By default, exchanged names and labels beyond 5 SD are left out, and their animals get little "
+            "weight"
         )
         self.keep_doubtful.toggled.connect(self._keep_doubtful)
         self.add(self.keep_doubtful)
         self.weigh_certainty = QCheckBox("Weigh labels by certainty")
-        self.weigh_certainty.setToolTip("A fair label counts half, a guess a fifth; all others count fully")
+        self.weigh_certainty.setToolTip("Weights: fair 1/2, guess 1/5, all others 1")
         self.weigh_certainty.toggled.connect(workspace.atlas.set_weigh_certainty)
         self.add(self.weigh_certainty)
         self._add_progress()
@@ -328,9 +328,9 @@ class LabelsCard(Card):
         """Say in a sentence what the table shows."""
         rows = self.table.rows
         if not rows.n_judged:
-            words = "Once four points of a side are placed, this shows how well they fit the atlas."
+            words = "When four features of a side are placed, this shows how well they fit the atlas."
         elif rows.n_doubtful:
-            words = f"{rows.n_doubtful} of {rows.n_judged} labels should be looked at again."
+            words = f"{rows.n_doubtful} of {rows.n_judged} labels should be reviewed."
         else:
             words = f"All {rows.n_judged} labels that can be checked fit the atlas."
         others = rows.with_other_problems
@@ -357,9 +357,7 @@ class LeaveOneOutCard(Card):
         self.findings = FindingList()
         self.add(self.findings)
         row = QHBoxLayout()
-        self.run = action_button(
-            actions["atlas.try"], "Run leave-one-out", "On the animals the atlas is fitted to"
-        )
+        self.run = action_button(actions["atlas.try"], "Run leave-one-out", "On the animals of the atlas")
         row.addWidget(self.run, 1)
         self.add(row)
         for signal in (workspace.atlas.changed, workspace.atlas.details_changed):
@@ -407,7 +405,7 @@ class LeaveOneOutCard(Card):
         workspace, trial = self._workspace, self._workspace.atlas.trial
         if not workspace.atlas.can_try:
             least = f"Fit to {FEWEST_ANIMALS} labelled animals or more"
-            return f"{least} to see how well each is found from the rest."
+            return f"{least} to see how well each is estimated from the others."
         if trial is None:
             return "Estimates each animal's cochlea from the touchable points and the other animals."
         report = trial.reports[0]

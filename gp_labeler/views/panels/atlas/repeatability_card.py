@@ -22,7 +22,7 @@ __all__ = ["RepeatabilityCard"]
 
 _HEADINGS = ("Feature", "Within mm", "Between mm", "TEM mm", "ICC(2,1)")
 _HINTS = (
-    "All is of all features together",
+    "All: all features together",
     "Mean distance of two labels by one observer, mm",
     "Mean distance of two labels by two observers, mm",
     "Technical error of measurement, mm: between observers, else within one",
@@ -68,12 +68,10 @@ class RepeatabilityCard(Card):
         self.findings.chosen.connect(self.disagreement_asked)
         self.add(self.findings)
         self.use = QCheckBox("Use this error in checks and regions")
-        self.use.setToolTip("In the place of 0.1 mm: in the check of labels, and where ghosts are expected")
+        self.use.setToolTip("Replaces 0.1 mm in the label check and in the regions of ghosts")
         self.use.toggled.connect(self._use)
         self.add(self.use)
-        self.save = action_button(
-            actions["atlas.save_reliability"], "Save…", "As a table, JSON, or a picture"
-        )
+        self.save = action_button(actions["atlas.save_reliability"], "Save…", "As a table, JSON or a plot")
         self.add(self.save)
         follow(self, workspace.reliability.changed, self.refresh)
         for signal in (
@@ -139,9 +137,7 @@ class RepeatabilityCard(Card):
         if model.is_measuring:
             words = "Comparing labels…"
         elif model.report is None:
-            words = (
-                "How far labels of the same points lie apart, of animals that were labelled more than once."
-            )
+            words = "Compares labels of animals that were labelled more than once."
         else:
             words = _summary(model.report)
         self.words.setText(words)

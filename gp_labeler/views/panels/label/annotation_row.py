@@ -29,7 +29,7 @@ class AnnotationRow(QWidget):
         self.note.setPlaceholderText("Note: fluid…")
         self.note.setAccessibleName("Note on this label")
         self.note.setToolTip(
-            "What was seen there: broken bulla, fluid, artefact; kept with the label in every file"
+            "What you saw there, such as a broken bulla, fluid or an artefact; stored with the label"
         )
         self.note.editingFinished.connect(self._keep_note)
         row = QHBoxLayout(self)

@@ -41,7 +41,7 @@ class CardContent:
     action, action_text : str
         Id and words of the one next action.
     plane, plane_text : str
-        The plane in which the feature is defined, one of `ANATOMICAL_PLANES` or ``straight``, and the words
+        Plane in which the feature is defined, one of `ANATOMICAL_PLANES` or ``straight``, and the words
         of the button that shows it; empty where that says no more than `where`.
     skip_text : str
         What the button says that goes on to the next feature.
@@ -132,7 +132,7 @@ _PLANES = {
     "straight": "Straight slices",
 }
 _SHARED = ("both sides", "One point, shared by both sides")
-_EXTERNAL = ("touchable", "The probe can touch it on an opened animal: it serves to estimate the pose")
+_EXTERNAL = ("touchable", "A probe can touch it; it can be used to estimate the pose")
 _VERBS = {
     PointState.TO_DO: "Place next",
     PointState.GHOST: "Place next",
@@ -167,7 +167,7 @@ def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tu
     """Return one sentence on how far the point is, and its look."""
     if state is PointState.GHOST:
         ghost = labels.ghosts(side)[code]
-        who = "The atlas expects it" if ghost.source == "atlas" else "The other side, mirrored, has it"
+        who = "The atlas predicts it" if ghost.source == "atlas" else "The mirrored other side predicts it"
         return f"{who} within {mm_text(ghost.radius_95)} (95 %).", "ghost"
     if state is PointState.SUGGESTED:
         said = suggestion_text(labels.document.landmarks(side).suggested[code])
@@ -178,11 +178,11 @@ def _status(labels: LabelsModel, side: Side, code: str, state: PointState) -> tu
         words = problem.text
         return f"{words[:1].upper()}{words[1:]}.", "danger"
     if state is PointState.CHECKED:
-        return "Placed, looked at again and found right.", "good"
+        return "Placed, and checked by a person.", "good"
     if state is PointState.PLACED:
         return f"{_status_words(labels, side, code)} Drag, nudge or re-place it to correct it.", "hint"
     if state is PointState.UNSEEN:
-        return "Looked for, not seen. Click to place it after all.", "hint"
+        return "Marked as not visible. Click to place it anyway.", "hint"
     return _first_ones(labels, side), "hint"
 
 
@@ -190,14 +190,14 @@ def _status_words(labels: LabelsModel, side: Side, code: str) -> str:
     """Return how a point came to be where it is, such as ``Placed on bone.``."""
     mark = labels.document.state.landmark(side, code)
     if mark.unseen:
-        return "Looked for, not seen."
+        return "Marked as not visible."
     how = mark.provenance.how.value if mark.provenance else ""
     by = _by_words(labels, mark)
     words = {
         "mesh": "Placed on bone.",
         "slice": "Placed on a slice.",
         "confirmed suggestion": "Suggested and confirmed.",
-        "nudged suggestion": "Suggested, then corrected by you: it counts.",
+        "nudged suggestion": "Suggested, then corrected by you.",
     }
     return words.get(how, f"{how.capitalize()}." if how else "Placed.") + by
 
@@ -217,15 +217,15 @@ def _first_ones(labels: LabelsModel, side: Side) -> str:
         return "Click on bone or a slice to place it."
     if len(missing) == n_short:
         names = " and ".join([", ".join(missing[:-1]), missing[-1]] if len(missing) > 1 else missing)
-        return f"After {names}, the atlas shows where to look."
-    return f"After {n_short} more of this side, the atlas shows where to look."
+        return f"After {names}, the atlas predicts the position."
+    return f"After {n_short} more on this side, the atlas predicts the position."
 
 
 def _without_scan() -> CardContent:
     return CardContent(
         "No scan yet",
         name="Open a scan to begin",
-        definition="The features are placed on the bone surface, or on slices of the scan.",
+        definition="You place the features on the bone surface or on slices.",
         action="open",
         action_text="Open scan…",
         can_skip=False,
@@ -239,8 +239,10 @@ def _without_its_scan(labels: LabelsModel) -> CardContent:
     lost, there = labels.document.volume_is_lost, breakable(str(reference.path))
     return CardContent(
         labels.document.state.specimen,
-        name="Its scan is not found" if lost else "Its scan is not open yet",
-        definition=f"It was at {there}. The labels are kept: say where the scan is now." if lost else "",
+        name="The scan was not found" if lost else "The scan is not open",
+        definition=f"It was at {there}. The labels are kept. Choose the new location of the scan."
+        if lost
+        else "",
         action="find",
         action_text="Find scan…",
         can_skip=False,
@@ -260,8 +262,8 @@ def _between(labels: LabelsModel) -> CardContent:
     if to_do:
         return CardContent(
             totals,
-            name="No feature is chosen",
-            definition="Choose one in the table, or go on with the next that is to do.",
+            name="No feature is selected",
+            definition="Select one in the table, or continue with the next one to place.",
             action="next",
             action_text="Next feature",
             can_skip=False,
@@ -271,11 +273,11 @@ def _between(labels: LabelsModel) -> CardContent:
         s is PointState.DOUBTFUL for side in Side for s in labels.point_states(side, wait=False).values()
     )
     many = "One point" if doubtful == 1 else f"{doubtful} points"
-    warning = f"{many} should be looked at again: see the red triangles. " if doubtful else ""
+    warning = f"{many} should be reviewed (red triangles). " if doubtful else ""
     return CardContent(
         totals,
         name="Everything is labelled",
-        definition=f"{warning}Export the landmarks of both sides when you are content with them.",
+        definition=f"{warning}When you are satisfied with them, export the landmarks of both sides.",
         status="Nothing is left to do.",
         status_role="good",
         state="checked",

@@ -11,8 +11,8 @@ __all__ = ["CERTAINTY_HINTS"]
 
 CERTAINTY_HINTS: Mapping[Certainty, str] = MappingProxyType(
     {
-        Certainty.SURE: "The feature is seen clearly, and the point is on it; Alt+1",
-        Certainty.FAIR: "The feature is seen, but its place is not sharp; Alt+2",
-        Certainty.GUESS: "The place is inferred from what lies around it; Alt+3",
+        Certainty.SURE: "The feature is clearly visible, and the point is on it (Alt+1)",
+        Certainty.FAIR: "The feature is visible, but its position is not sharp (Alt+2)",
+        Certainty.GUESS: "The position is inferred from the surrounding anatomy (Alt+3)",
     }
 )

@@ -39,7 +39,7 @@ __all__ = ["ExportDialog"]
 
 _WORDS: Mapping[str, str] = MappingProxyType(
     {
-        ".mrk.json": "Markups JSON: 3D Slicer, SlicerMorph and gp-core; says everything",
+        ".mrk.json": "Markups JSON: 3D Slicer, SlicerMorph and gp-core; complete",
         ".fcsv": "FCSV: older 3D Slicer",
         ".csv": "CSV: spreadsheets and R",
     }
@@ -85,7 +85,7 @@ class ExportDialog(QDialog):
             self._findings.addWidget(Notice(level, words))
         names, there = self._names(), self._there()
         self.files.setText(
-            breakable("   ".join(names)) if names else "Nothing is placed yet, or no format is chosen."
+            breakable("   ".join(names)) if names else "No feature is placed, or no format is selected."
         )
         n_suggested = sum(m.suggestion is not None for m in self._workspace.document.state.landmarks.values())
         self.suggested.setVisible(bool(n_suggested))
@@ -100,8 +100,8 @@ class ExportDialog(QDialog):
         self.browse = QPushButton("Browse…")
         self.browse.clicked.connect(self._browse)
         self.formats = {suffix: self._format_box(suffix) for suffix in FORMATS}
-        self.suggested = QCheckBox("Suggestions too, in files of their own, marked as not confirmed")
-        self.suggested.setToolTip("3D Slicer takes every point of a landmark file as observed")
+        self.suggested = QCheckBox("Also write suggestions, to separate files, marked as not confirmed")
+        self.suggested.setToolTip("3D Slicer treats every point of a landmark file as observed")
         self.suggested.toggled.connect(self.refresh)
         self.files = text_label("", "", wrap=True)
         self.replace = QCheckBox()
@@ -202,11 +202,11 @@ class ExportDialog(QDialog):
         words = [f"On the {side.word} side {problem.text}. {problem.remedy}" for problem in others]
         if far:
             many = (
-                "lie far from where the atlas expects them"
+                "are far from the positions that the atlas predicts"
                 if len(far) > 1
-                else "lies far from where the atlas expects it"
+                else "is far from the position that the atlas predicts"
             )
-            words.append(f"On the {side.word} side {' '.join(far)} {many}: look again, or mark as checked.")
+            words.append(f"On the {side.word} side {' '.join(far)} {many}: review, or mark as checked.")
         return [("warning", each) for each in words]
 
     def _suffixes(self) -> list[str]:

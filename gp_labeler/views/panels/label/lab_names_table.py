@@ -40,11 +40,11 @@ class LabNamesTable(QWidget):
         super().__init__(parent)
         self._boxes: dict[str, QComboBox] = {}
         self._sides: dict[str, QComboBox] = {}
-        self.leave_rest = QPushButton("Leave out all that are not chosen")
+        self.leave_rest = QPushButton("Leave out all names that are not assigned")
         self.leave_rest.setProperty("role", "link")
         self.leave_rest.clicked.connect(self._leave_rest)
         self.load = QPushButton("Load a table of names…")
-        self.load.setToolTip("A file of two columns: their name, our code (CA, or CA_L)")
+        self.load.setToolTip("File with two columns: their name, our code (CA or CA_L)")
         self.load.setProperty("role", "link")
         self.load.clicked.connect(lambda: self.load_asked.emit())
         self._rows = QGridLayout()

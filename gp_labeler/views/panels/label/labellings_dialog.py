@@ -27,8 +27,8 @@ __all__ = ["LabellingsDialog"]
 
 _HEADINGS = ("Observer", "Round", "Left", "Right", "Blind", "Last change")
 _HINT = (
-    "Labelling again shows how repeatable labels are. While you label blind, earlier points, the ghosts that "
-    "follow from them, and what other observers placed stay hidden."
+    "Repeated labelling measures how repeatable labels are. While you label blind, earlier points, "
+    "the ghosts that follow from them, and what other observers placed stay hidden."
 )
 
 

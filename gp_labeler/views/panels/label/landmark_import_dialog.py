@@ -79,8 +79,8 @@ class LandmarkImportDialog(QDialog):
         for side in Side:
             self.side.addItem(side.word, side)
         self.side.currentIndexChanged.connect(self._look)
-        self.keep = QCheckBox("Keep points that are placed already; fill only what is to do")
-        self.anyway = QCheckBox("Import nevertheless")
+        self.keep = QCheckBox("Keep placed points; import only features that are not placed")
+        self.anyway = QCheckBox("Import anyway")
         self.anyway.toggled.connect(self._refresh)
         self.show_only = QPushButton("Show as grey reference points instead")
         self.show_only.setAutoDefault(False)
@@ -149,9 +149,9 @@ class LandmarkImportDialog(QDialog):
             if unknown := unknown_labels(points):
                 n = len(unknown)
                 what = (
-                    "1 name is not known. Choose what it"
+                    "1 name is unknown. Choose what it"
                     if n == 1
-                    else f"{n} names are not known. Choose what they"
+                    else f"{n} names are unknown. Choose what they"
                 )
                 return "error", f"{file.name}: {what} {'stands' if n == 1 else 'stand'} for."
             side = self.side.currentData()
@@ -233,7 +233,7 @@ class LandmarkImportDialog(QDialog):
             self.accept()
             return
         self._objection = ""
-        self._title.set_words("Imported, but look at this")
+        self._title.set_words("Imported, with warnings")
         self._choices.hide()
         self.show_only.hide()
         self._show([("good", f"Now placed: {done}"), *(("warning", _sentence(note)) for note in notes)])

@@ -53,7 +53,7 @@ def _add_edits(add: Callable[..., None], workspace: Workspace, side: Side, code:
     )
     checked = mark.checked
     add(
-        "Take back the check" if checked else "Mark as checked",
+        "Remove the check mark" if checked else "Mark as checked",
         lambda: document.do(CheckPoint(side, code, not checked, document.author)),
         enabled=placed,
     )

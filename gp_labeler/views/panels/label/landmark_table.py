@@ -46,7 +46,7 @@ _CHIP, _PAD = 12, 8
 
 
 class LandmarkTable(QWidget):
-    """The table; a click or the arrow keys go to a point, a right click says what else can be done.
+    """The table; a click or the arrow keys go to a point, a right click says open the menu of the point.
 
     Parameters
     ----------

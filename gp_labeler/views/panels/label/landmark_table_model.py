@@ -149,7 +149,7 @@ class LandmarkTableModel(QAbstractTableModel):
     def _sentence(self, code: str, side: Side, state: PointState) -> str:
         text = f"{code} {side.word}: {state.value}"
         if feature(code).computed and state is PointState.TO_DO:
-            return f"{code} {side.word}: computed once CA, CB, RWA and RWP are placed"
+            return f"{code} {side.word}: computed when CA, CB, RWA and RWP are placed"
         if state is PointState.DOUBTFUL and (
             problem := self._workspace.labels.known_problems(side).get(code)
         ):

@@ -33,7 +33,7 @@ class ObserverRow(QWidget):
         self.name.setAccessibleName("Observer")
         self.name.returnPressed.connect(self._keep)
         self.keep = QPushButton("Keep")
-        self.keep.setToolTip("Remembered on this computer; the name of your account is never used")
+        self.keep.setToolTip("Stored on this computer; the name of your account is never used")
         self.keep.clicked.connect(self._keep)
         self._asked = QWidget()
         line = QHBoxLayout()
@@ -43,12 +43,12 @@ class ObserverRow(QWidget):
         question = QVBoxLayout(self._asked)
         question.setContentsMargins(12, 4, 12, 0)
         question.setSpacing(4)
-        words = "Who labels? It goes with each label into all files."
+        words = "Who labels? Every label stores this name."
         question.addWidget(text_label(words, "warning", wrap=True))
         question.addLayout(line)
         self.words = ElidedLabel("", "hint")
         self.labellings = action_button(
-            actions["labelling.show"], "Labellings…", "Label again, blind; other observers and rounds"
+            actions["labelling.show"], "Labellings…", "Label again (blind), other observers and rounds"
         )
         self._told = QWidget()
         told = QHBoxLayout(self._told)

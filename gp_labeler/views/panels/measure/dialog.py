@@ -78,8 +78,8 @@ class MeasureDialog(QDialog):
 
     def _show_hint(self) -> None:
         there = self._workspace.document.state.measurements
-        words = "A name can be typed over. A click on a row shows the measurement in the views."
-        self.hint.setText(words if there else "Nothing is measured yet: choose Ruler or Angle, then click.")
+        words = "Edit a name in place. Click a row to show the measurement in the views."
+        self.hint.setText(words if there else "No measurements yet: choose Ruler or Angle, then click.")
 
     def _open(self, pair: PairDistance) -> None:
         side = self.side.currentData()

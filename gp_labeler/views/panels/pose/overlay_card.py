@@ -17,15 +17,15 @@ __all__ = ["OverlayCard"]
 
 _PARTS = {
     "estimate": ("Origin and axis", "The estimated CO, and the modiolar axis as an arrow"),
-    "region": ("95 % region", "Where CO and axis are with 95 %: an ellipsoid and a cone"),
+    "region": ("95 % region", "Ellipsoid and cone that contain CO and the axis with 95 % probability"),
     "cochlea": ("Cochlea", "The outline of a cochlea in the estimated pose"),
-    "truth": ("Labelled", "The labelled CO and axis, and the errors against them"),
-    "features": ("Atlas features", "Where the atlas has its features in this pose"),
-    "vectors": ("Error vectors", "From there to where they are labelled"),
+    "truth": ("Labelled", "The labelled CO and axis, and the errors of the estimate"),
+    "features": ("Atlas features", "Features of the atlas in the estimated pose"),
+    "vectors": ("Error vectors", "From the atlas features to the labels"),
     "touches": ("Touches", "The touched points in the scan"),
     "tip": ("Probe", "The tracked probe"),
-    "path": ("Insertion path", "The path of an electrode, where one was loaded"),
-    "names": ("Names and errors", "In words beside what is drawn"),
+    "path": ("Insertion path", "Insertion path of an electrode, if one is loaded"),
+    "names": ("Names and errors", "Labels beside the drawn objects"),
 }
 
 

@@ -98,7 +98,7 @@ class PosePanel(QWidget):
 
     def _lay_out(self) -> None:
         self.left, self.right = QVBoxLayout(), QVBoxLayout()
-        out = Card("Hand on")
+        out = Card("Export")
         row = QHBoxLayout()
         row.setSpacing(6)
         row.addWidget(self.report, 1)

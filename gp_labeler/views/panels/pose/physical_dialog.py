@@ -60,7 +60,7 @@ class PhysicalDialog(QDialog):
         self.rows.setVerticalSpacing(4)
         self.findings = QVBoxLayout()
         self.figure = QLabel()
-        self.figure.setAccessibleName("Errors of this skull on those of simulated animals")
+        self.figure.setAccessibleName("Errors of this skull compared with simulated animals")
         self._lay_out()
         self._task = self._start()
         open_at(self, _FIGURE_WIDTH + 72, 640)
@@ -96,7 +96,7 @@ class PhysicalDialog(QDialog):
             method, colon, words = text.partition(": ")
             self.findings.addWidget(Notice("warning", f"{METHOD_NAMES.get(method, method)}{colon}{words}"))
         if len({row.method for row in result.report.rows}) == 1:
-            hint = "JRMPC takes part where the atlas was fitted from labelled animals (step Atlas)."
+            hint = "JRMPC needs an atlas fitted to labelled animals (step Atlas)."
             self.findings.addWidget(Notice("info", hint))
         self._show_figure(result.figure)
         for button in (self.save_figure, self.save_json):

@@ -25,11 +25,11 @@ __all__ = ["RegistrationCard"]
 _WAYS = {"auto": "Automatic", "features": "Features", "skull": "Skull"}
 _NO_SCAN = "No scan is open: the pose stays in the frame of the touches."
 _FACTS = ("Registered", "CO", "FRE", "TRE at CO", "From the labels")
-_NO_ESTIMATE = "Once there is an estimate, it is registered to the scan."
+_NO_ESTIMATE = "The estimate will be registered to the scan."
 _HINTS = {
-    "auto": "By the skull's features where three of them are touched and on the scan, else by the labels",
-    "features": "By the features that are both touched and labelled",
-    "skull": "By the skull's registration features, S1 and so on",
+    "auto": "By skull features if at least three are touched and on the scan, otherwise by labels",
+    "features": "By features that are both touched and labelled",
+    "skull": "By skull features (S1, S2, …)",
 }
 _FOUND = {
     "features": "by labelled features",
@@ -58,8 +58,10 @@ class RegistrationCard(Card):
         styled(self.facts["From the labels"], HEADING, bold=True)
         self.notices, self.waiting = Notices(), text_label("", "hint", wrap=True)
         self.skull = text_label("", "hint", wrap=True)
-        self.file = link("Load…", "Where the skull features are on the scan: a landmark file that names them")
-        self.mark = link("Mark skull point S1 at the crosshair", "Say that this skull feature is there")
+        self.file = link("Load…", "Load the skull features of the scan from a landmark file")
+        self.mark = link(
+            "Mark skull point S1 at the crosshair", "Set the position of this skull feature to the crosshair"
+        )
         self._lay_out()
         self.way.chosen.connect(self._choose)
         do_action(self.file, actions["pose.open_skull"])
@@ -142,8 +144,8 @@ class RegistrationCard(Card):
 
 
 _CAPTIONS = {
-    "FRE": "Fiducial registration error: how well the points of both lists meet",
-    "TRE at CO": "Target registration error to expect at the cochlea, from the registration alone",
+    "FRE": "Fiducial registration error: RMS distance between corresponding points",
+    "TRE at CO": "Expected target registration error at the cochlea, from the registration alone",
 }
 
 
@@ -184,8 +186,8 @@ def _notices(estimate: SideEstimate, has_scan: bool) -> Iterator[tuple[str, ...]
     elif estimate.registered is None and has_scan:
         yield (
             "info",
-            "The touches do not lie in this scan yet.",
-            "Label features that were touched, or say where the skull features are.",
+            "The touches are not registered to this scan yet.",
+            "Label features that were touched, or set the skull features.",
         )
     fiducials = None if estimate.registered is None else estimate.registered.fiducials
     for warning in () if fiducials is None else fiducials.warnings:

@@ -49,10 +49,10 @@ class ResultCard(Card):
         self.verdict, self.notices = QualityBadge(), Notices()
         self.waiting = text_label("", "title", wrap=True)
         self.one, self.two = _OnePose(), _TwoPoses()
-        self.next = link("", "Make it the next to touch")
-        self.swap = link("", "Give each the other's name; undo brings them back")
-        self.this_side = link("", "The names of files tell the other side; say that this one is right")
-        self.other_side = link("", "Move all touches to the other side; undo brings them back")
+        self.next = link("", "Request this feature next")
+        self.swap = link("", "Exchange the names of the two touches; undo restores them")
+        self.this_side = link("", "The file name indicates the other side; confirm this side")
+        self.other_side = link("", "Move all touches to the other side; undo restores them")
         self.add_to_heading(self.verdict)
         for what in (self.waiting, self.one, self.two, self.notices):
             self.add(what)
@@ -98,10 +98,10 @@ class ResultCard(Card):
         undecided = pose is not None and pose.side_state == "undecided"
         self.other_side.setVisible(wrong or undecided)
         self.this_side.setVisible(bool(model.misnamed))
-        self.this_side.setText(f"They are of the {model.side.word} side")
+        self.this_side.setText(f"Keep the {model.side.word} side")
         side = f"the {model.side.other.word} side"
         likely = _likely(pose, model.swapped)
-        self.other_side.setText(f"They are of {side}" if wrong else f"Take as {side}  ({likely[0]})")
+        self.other_side.setText(f"Use {side}" if wrong else f"Use {side}  ({likely[0]})")
         self.swap.setVisible(model.swapped is not None)
         names = f"Exchange {' and '.join(model.swapped or ())}"
         sure = pose is None or pose.names_state != "undecided"
@@ -154,7 +154,7 @@ class _OnePose(QWidget):
         self.region.setText(region_text(pose))
         self.allowance.setText(allowance_text(pose))
         self.allowance.setVisible(bool(self.allowance.text()))
-        self.region.setToolTip("The true origin and axis are in this ball and in this cone with 95 %")
+        self.region.setToolTip("Sphere and cone that contain the true origin and axis with 95 % probability")
 
 
 class _TwoPoses(QWidget):
@@ -185,7 +185,7 @@ class _TwoPoses(QWidget):
                 cell.setText(value)
         apart = estimate.apart()
         if apart is not None:
-            self.apart.setText(f"They lie {fine_mm(apart[0])} and {apart[1]:.1f}° apart")
+            self.apart.setText(f"They differ by {fine_mm(apart[0])} and {apart[1]:.1f}° apart")
 
 
 def _column(word: str, pose: CochleaPose) -> tuple[str, ...]:
@@ -217,9 +217,9 @@ def _notices(workspace: Workspace, estimate: SideEstimate) -> Iterator[tuple[str
         if method in estimate.problems:
             yield ("error", f"{METHOD_NAMES[method]}: {estimate.problems[method]}")
     if "jrmpc" in workspace.pose.settings.methods and not workspace.pose.joint_ready:
-        yield ("info", "JRMPC is being made ready; that takes some seconds once.")
+        yield ("info", "Preparing JRMPC; this takes a few seconds, once.")
     for reason in workspace.pose.file_warnings:
-        yield ("warning", sentence(reason.text), "Nothing is sent to a robot until you say which side it is.")
+        yield ("warning", sentence(reason.text), "Nothing is sent to a robot until you confirm the side.")
     said: set[str] = set()
     for pose in estimate.poses.values():
         for warning in pose.warnings:

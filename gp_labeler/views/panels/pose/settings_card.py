@@ -21,9 +21,9 @@ _METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmp
 _SHARED = "Error common to all touches, mm"
 _EACH = "Touches of each feature"
 _HINTS = {
-    "robust": "Uses the names of the touched points, and sets a wrong touch aside",
-    "jrmpc": "The published method; needs the labelled animals of an atlas fitted here",
-    "both": "Side by side",
+    "robust": "Uses the names of the touches, and down-weights a wrong one",
+    "jrmpc": "The published method; needs an atlas fitted here to labelled animals",
+    "both": "Both methods, side by side",
 }
 
 
@@ -42,7 +42,7 @@ class EstimateSettingsCard(Card):
         super().__init__("Estimate", parent)
         self._workspace = workspace
         hints = {side.value: f"The {side.word} ear was touched" for side in Side}
-        self.specimen, self.new = QLineEdit(), link("New", "Begin another specimen without a scan")
+        self.specimen, self.new = QLineEdit(), link("New", "Start a new specimen without a scan")
         self.specimen.setAccessibleName("Name of the specimen")
         self.specimen.setToolTip("Its name in reports and exports")
         self.side = Segments({side.value: side.word.capitalize() for side in Side}, hints)
@@ -51,7 +51,7 @@ class EstimateSettingsCard(Card):
         self.noise.step = 0.05
         self.noise.setPlaceholderText("automatic")
         self.noise.setToolTip(
-            "Ordinary error of a touch in mm a coordinate; empty: found from the touches themselves"
+            "Error of an ordinary touch, mm for each coordinate; if empty, estimated from the touches"
         )
         self.found = text_label("", "hint")
         self.shared = NumberField(_SHARED, widest="0.25")
@@ -68,7 +68,7 @@ class EstimateSettingsCard(Card):
         )
         self.atlas = ElidedLabel()
         self.problem = text_label("", "warning", wrap=True)
-        self.problem.setAccessibleName("Why the atlas chosen last is not in use")
+        self.problem.setAccessibleName("Why the atlas chosen last time is not in use")
         self.to_atlas = link("Change", "Choose or fit another atlas (step 3)")
         self._lay_out()
         self.side.chosen.connect(lambda side: self._choose(side=Side.parse(side)))
@@ -94,16 +94,16 @@ class EstimateSettingsCard(Card):
         self.shared.set_value(settings.shared_error)
         pose = None if estimate is None else estimate.poses.get("robust")
         is_found = settings.probe_noise is None and pose is not None and pose.probe_noise is not None
-        self.found.setText(f"mm, found {pose.probe_noise:.2f}" if is_found and pose is not None else "mm")
+        self.found.setText(f"mm, estimated {pose.probe_noise:.2f}" if is_found and pose is not None else "mm")
         state = self._workspace.document.state
         self._named.setVisible(state.volume is None)
         if not self.specimen.hasFocus() or not self.specimen.isModified():
             self.specimen.setText(state.specimen)
         atlas = self._workspace.atlas.current
         self.each.set_value(settings.touches_each)
-        self.atlas.set_words("being loaded" if atlas is None else atlas.name)
+        self.atlas.set_words("loading…" if atlas is None else atlas.name)
         problem = self._workspace.atlas.problem
-        self.problem.setText(breakable(f"{problem} The published one is in use.") if problem else "")
+        self.problem.setText(breakable(f"{problem} The published atlas is used.") if problem else "")
         self.problem.setVisible(bool(problem))
 
     def _lay_out(self) -> None:

@@ -195,7 +195,7 @@ class TouchTableModel(QAbstractTableModel):
     def _hint(self, row: TouchRow, column: int) -> str:
         if row.touch is not None and column == USE:
             return (
-                f"Take {row.name} in again" if row.touch.left_out else f"Leave {row.name} out of the estimate"
+                f"Include {row.name} again" if row.touch.left_out else f"Leave {row.name} out of the estimate"
             )
         if row.touch is not None and column == CLEAR:
             return f"Clear {row.name}"
@@ -203,9 +203,9 @@ class TouchTableModel(QAbstractTableModel):
 
 
 _HEADING_HINTS = (
-    "What can be touched; the next one is highlighted",
-    "Where it was touched; double-click, or type, to change it",
-    "How far the touch lies from where the others expect it",
-    "Whether the estimate uses it",
+    "Features to touch; the next one is highlighted",
+    "Position of the touch; double-click or type to change it",
+    "Distance of the touch from its prediction by the other touches",
+    "Whether the estimate uses the touch",
     None,
 )

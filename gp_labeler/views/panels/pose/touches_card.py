@@ -29,9 +29,9 @@ _LOOK_MS = 90
 """The pointer may pass over rows; only one it rests on is worth an estimate without it."""
 
 _WAYS = {
-    "file": ("File…", "Take the touches of a file (.dat, .csv, .mrk.json, .fcsv); or drop one here"),
-    "type": ("Type", "Type or paste x y z of one point after the other"),
-    "scan": ("On the scan", "A dry run: click where each feature is, on bone or on a slice"),
+    "file": ("File…", "Read touches from a file (.dat, .csv, .mrk.json, .fcsv), or drop one here"),
+    "type": ("Type", "Type or paste x y z, one point after the other"),
+    "scan": ("On the scan", "Dry run: click each feature on bone or on a slice"),
     "tracker": ("Tracker…", "Touch with a tracked probe (OpenIGTLink)"),
 }
 
@@ -54,13 +54,11 @@ class TouchesCard(Card):
         self.model = TouchTableModel(workspace, self.tell, self)
         self.table = TouchTable(self.model)
         self.notices, self.change = Notices(), ElidedLabel("", "hint")
-        self.change.setAccessibleName("What leaving a point out changes")
-        self.skull = link(
-            "+ skull point S1", "Touch a skull feature that serves the registration to the scan"
-        )
-        self.more = link("", "Rows of the skull's registration features; those that do not fit always show")
-        self.guide = link("Guide…", "One feature after the other in large type, with its picture")
-        self.clear = link("Clear all", "Forget all touches of this side; undo brings them back")
+        self.change.setAccessibleName("Effect of leaving the point out")
+        self.skull = link("+ skull point S1", "Touch a skull feature, for the registration to the scan")
+        self.more = link("", "Show or hide the skull features; those that do not fit are always shown")
+        self.guide = link("Guide…", "One feature at a time in large type, with its picture")
+        self.clear = link("Clear all", "Remove all touches of this side; undo restores them")
         self.ways = {name: self._way(name) for name in _WAYS}
         self._timer = QTimer(self, interval=_LOOK_MS, singleShot=True)
         self._timer.timeout.connect(self._show_change)
@@ -98,7 +96,7 @@ class TouchesCard(Card):
         if path is None:
             self._show_change()
         else:
-            self.change.set_words(f"Let go to take the touches of {path.name}")
+            self.change.set_words(f"Release to read the touches of {path.name}")
 
     def take_file(self, path: Path) -> bool:
         """Take the touches of a file; return whether it could be read."""
@@ -218,7 +216,7 @@ class TouchesCard(Card):
         menu.addAction("Touch next" if touch is None else "Touch again", lambda: pose.set_target(name))
         menu.addAction("Type position…", lambda: self.table.edit_position(name))
         if touch is not None:
-            word = "Take in again" if touch.left_out else "Leave out"
+            word = "Include again" if touch.left_out else "Leave out"
             menu.addAction(word, lambda: self._toggle_use(name))
             menu.addAction("Clear", lambda: self._do(lambda: self._clear(name)))
         menu.popup(where)

@@ -16,7 +16,7 @@ _N_SHOWN = 3
 _Moved = tuple[float, float]
 """How far an estimate is from the one that was judged, mm and degrees."""
 
-_WHY = "Why, in a few words"
+_WHY = "Reason, in a few words"
 _WORDS = {"accept": ("good", "Accepted"), "reject": ("error", "Rejected")}
 
 
@@ -34,15 +34,15 @@ class VerdictCard(Card):
         self._workspace = workspace
         self.initials, self.note = QLineEdit(), QLineEdit()
         self.initials.setPlaceholderText("Initials")
-        self.initials.setAccessibleName("Initials of who judges")
+        self.initials.setAccessibleName("Initials of the reviewer")
         self.initials.setMaxLength(24)
         fit(self.initials, lambda: self.initials.setFixedWidth(field_width(self.initials, "Initials")))
         self.note.setPlaceholderText(_WHY)
         fit(self.note, lambda: self.note.setMinimumWidth(field_width(self.note, _WHY)))
-        self.note.setAccessibleName("Note to the verdict")
+        self.note.setAccessibleName("Note on the verdict")
         self.accept, self.reject = QPushButton("Accept"), QPushButton("Reject")
-        self.accept.setToolTip("Keep in the specimen that this estimate was looked at and is good")
-        self.reject.setToolTip("Keep in the specimen that this estimate is not to be used")
+        self.accept.setToolTip("Record in the specimen that you reviewed and accepted this estimate")
+        self.reject.setToolTip("Record in the specimen that this estimate must not be used")
         self.said = QVBoxLayout()
         self.said.setSpacing(4)
         self._shown: tuple[tuple[PoseCheck, ...], tuple[_Moved | None, ...]] | None = None
@@ -85,7 +85,7 @@ class VerdictCard(Card):
         )
         if done:
             self.note.clear()
-            self._workspace.say(f"{_WORDS[verdict][1]}; it is kept in the specimen")
+            self._workspace.say(f"{_WORDS[verdict][1]}; stored in the specimen")
         return done
 
     def _on_session(self, *_: object) -> None:
@@ -103,5 +103,5 @@ def _said(check: PoseCheck, moved: _Moved | None) -> Notice:
     by = f" by {check.by}" if check.by else ""
     since = ""
     if moved is not None:
-        level, since = "warning", f"since then it moved by {moved[0]:.2f} mm, {moved[1]:.1f}°"
+        level, since = "warning", f"has moved since by {moved[0]:.2f} mm, {moved[1]:.1f}°"
     return Notice(level, f"{word}{by}, {when} UTC", "  ·  ".join(filter(None, (check.note, about, since))))

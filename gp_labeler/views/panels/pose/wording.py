@@ -101,7 +101,7 @@ def allowance_text(pose: CochleaPose) -> str:
     if not pose.is_multimodal:
         return text
     plain = f"{fine_mm(pose.plain_radius_95)}  ·  cone {degrees_text(pose.plain_cone_95)}"
-    return f"As named: {plain}\nThe region above is of several parts. {text}"
+    return f"As named: {plain}\nThe region above covers several hypotheses. {text}"
 
 
 def likely_text(probability: float) -> str:
@@ -112,7 +112,7 @@ def likely_text(probability: float) -> str:
 def gain_text(gain: TouchGain) -> str:
     """Return what a touch would gain, such as ``Touch IN next: 0.52 → 0.41 mm, 9.3 → 7.6°``."""
     if gain.worth < _LITTLE_MM:
-        return f"More touches gain little now; {gain.code} the most"
+        return f"More touches gain little; {gain.code} gains most"
     now, then = (math.degrees(angle) for angle in (gain.cone_95_now, gain.cone_95))
     return (
         f"Touch {gain.code} next:  {gain.radius_95_now:.2f} \N{RIGHTWARDS ARROW} {gain.radius_95:.2f} mm,  "
@@ -147,10 +147,10 @@ def touch_text(name: str, touch: Touch | None, estimate: SideEstimate | None) ->
     for method, pose in () if estimate is None else estimate.poses.items():
         if name in pose.residuals:
             lines.append(
-                f"{METHOD_NAMES[method]}: {fine_mm(pose.residuals[name])} from where the atlas has it"
+                f"{METHOD_NAMES[method]}: {fine_mm(pose.residuals[name])} from the position in the atlas"
             )
         if name in pose.suspects:
-            lines.append("It does not fit the other points")
+            lines.append("Does not fit the other points")
     return "\n".join(lines)
 
 

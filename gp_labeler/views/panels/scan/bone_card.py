@@ -25,7 +25,7 @@ class BoneCard(Card):
     """
 
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
-        super().__init__("Bone begins at", parent)
+        super().__init__("Bone threshold", parent)
         self._workspace = workspace
         self.slider = HistogramSlider()
         self.slider.previewed.connect(self._on_previewed)
@@ -33,7 +33,7 @@ class BoneCard(Card):
         self.box = NumberField("Bone threshold, grey value")
         self.box.value_chosen.connect(self._choose)
         self.propose = QPushButton("Propose")
-        self.propose.setToolTip("Find the threshold from the histogram")
+        self.propose.setToolTip("Propose a threshold from the histogram")
         self.propose.clicked.connect(self._propose)
         self.add(self.slider)
         row = QHBoxLayout()
@@ -41,20 +41,22 @@ class BoneCard(Card):
         row.addWidget(self.box, 1)
         row.addWidget(self.propose)
         self.add(row)
-        self.smallest = NumberField("Smallest part of the bone that is kept, mm", widest="100.00")
+        self.smallest = NumberField("Smallest bone part to keep, mm", widest="100.00")
         self.smallest.step = 0.1
-        self.smallest.setToolTip("Specks of noise are smaller than ossicles, which are more than 1 mm across")
+        self.smallest.setToolTip("Removes noise. Ossicles are more than 1 mm across")
         self.smallest.value_chosen.connect(self._choose_smallest)
         row = QHBoxLayout()
         row.setSpacing(8)
-        row.addWidget(text_label("Leave out parts below", "hint"))
+        row.addWidget(text_label("Remove parts below", "hint"))
         row.addWidget(self.smallest)
         row.addWidget(text_label("mm", "hint"))
         row.addStretch(1)
         self.add(row)
         self.add(
             text_label(
-                "Thin bone should be just closed. The slices show it while you drag.", "hint", wrap=True
+                "Thin bone should just close. The slices show the threshold while you drag.",
+                "hint",
+                wrap=True,
             )
         )
         follow(self, workspace.scan.opened, self._on_volume)

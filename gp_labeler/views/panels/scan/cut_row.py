@@ -49,7 +49,7 @@ class CutRow(QWidget):
         more.setContentsMargins(0, 0, 0, 0)
         more.setSpacing(4)
         more.addWidget(self.where)
-        more.addWidget(text_label("Alt+wheel over the 3D view moves the cut.", "hint"))
+        more.addWidget(text_label("Alt+wheel in the 3D view moves the cut.", "hint"))
         more.addLayout(changes)
         whole = QVBoxLayout(self)
         whole.setContentsMargins(0, 0, 0, 0)

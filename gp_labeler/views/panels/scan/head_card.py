@@ -40,7 +40,7 @@ class HeadCard(Card):
         self.exchanged = action_button(actions["head.left_is_right"], "They are exchanged…")
         self._answers = _row(self.confirm, self.exchanged)
         self.add(self._answers)
-        self.shown = QCheckBox("Views in the frame of the head")
+        self.shown = QCheckBox("Views in the head frame")
         do_action(self.shown, actions["view.frame"])
         self.add(self.shown)
         self.straighten = action_button(actions["head.straighten"], "Straighten")

@@ -42,7 +42,7 @@ class HistogramSlider(QWidget):
         self.setFocusPolicy(Qt.FocusPolicy.StrongFocus)
         self.setSizePolicy(QSizePolicy.Policy.Expanding, QSizePolicy.Policy.Fixed)
         self.setAccessibleName("Bone threshold")
-        self.setToolTip("Drag to where bone begins; arrow keys move it finely")
+        self.setToolTip("Drag to set the bone threshold; use the arrow keys for small steps")
         self.setCursor(Qt.CursorShape.SplitHCursor)
         fit(self, self.updateGeometry)
 

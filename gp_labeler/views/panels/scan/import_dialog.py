@@ -93,7 +93,7 @@ class ImportDialog(QDialog):
         self.spacing = SpacingFields()
         self.spacing.changed.connect(self._update)
         self.stride = QComboBox()
-        self.stride.setAccessibleName("How many voxels to load")
+        self.stride.setAccessibleName("Voxels to load")
         self.stride.currentIndexChanged.connect(self._update)
         self.reverse = QCheckBox("Reverse the order of the slices: exchanges left and right")
         self.reverse.toggled.connect(self._on_reverse)
@@ -155,8 +155,8 @@ class ImportDialog(QDialog):
         column.setSpacing(6)
         column.addWidget(text_label("Which side is left?", "heading"))
         words = (
-            "The file does not say it for sure. Look for something that you know to be on one side, "
-            "and reverse the slices if it is on the wrong one. The choice is kept with the specimen."
+            "The file does not determine it. Find a structure whose side you know, and reverse the slices "
+            "if it is on the wrong side. The choice is stored with the specimen."
         )
         column.addWidget(text_label(words, "hint", wrap=True))
         pictures = QHBoxLayout()
@@ -221,7 +221,7 @@ class ImportDialog(QDialog):
                 self._findings.addWidget(self._accept_box(problem, problem.code in accepted))
 
     def _accept_box(self, problem: Problem, checked: bool) -> QCheckBox:
-        box = QCheckBox("It is right all the same: go on")
+        box = QCheckBox("It is correct: continue")
         box.setChecked(checked)
         box.toggled.connect(self._update_later)
         self.accepts[problem.code] = box
@@ -238,7 +238,7 @@ class ImportDialog(QDialog):
         if chosen == self._plan.choice:
             return
         self.load.setEnabled(False)
-        self.why.setText("Looking into it…")
+        self.why.setText("Reading the header…")
         options: dict[str, Any] = self._plan.options.as_json() | {"series": chosen}
         options.pop("spacing", None)
         options.pop("accept", None)
@@ -266,7 +266,7 @@ class ImportDialog(QDialog):
     def _on_failed(self, task: Task[Any]) -> None:
         if task.key == "import preview":
             for picture in self.pictures:
-                picture.show_plane(None, "No preview: it cannot be read")
+                picture.show_plane(None, "No preview: the file cannot be read")
         elif task.key == "import look":
             self.why.setText(breakable(task.message))
 

@@ -46,7 +46,7 @@ def facts_of(plan: ImportPlan) -> dict[str, str]:
         "Format": f"{plan.format}{files}",
         "Voxels": f"{size_text(plan.size)}, {plan.stored_dtype}"
         + (f", {spacing_text(spacing)} each" if spacing else ", of unknown size"),
-        "Size": size or "not known before the voxel size is",
+        "Size": size or "unknown until the voxel size is given",
         "Memory": _memory(plan),
         "Where": str(plan.path),
     }
@@ -62,7 +62,9 @@ def _memory(plan: ImportPlan) -> str:
 def remedy(problem: Problem) -> str:
     """Return what to do in this window; the remedies of `Problem` are for the command as well."""
     if "spacing" in problem.resolved_by:
-        return "Type the true voxel size below. It stands in the scanner's log, or ask who made the scan."
+        return (
+            "Type the true voxel size below. Look in the scanner's log, or ask the person who made the scan."
+        )
     return _OPTION.sub("", problem.remedy)
 
 
@@ -75,7 +77,7 @@ def why_not(errors: tuple[Problem, ...]) -> str:
     if any("series" in problem.resolved_by for problem in errors):
         return "Choose a scan first."
     if any("accept" in problem.resolved_by for problem in errors):
-        return "Look at what was found, and accept it to go on."
+        return "Review the problems, and accept them to continue."
     return "It cannot be loaded." if errors else ""
 
 

@@ -22,9 +22,9 @@ __all__ = ["MeshCard"]
 _SAVED_AS = "As PLY, STL, VTP, OBJ or glTF, in LPS mm"
 
 _SHOWN = {
-    "outline_visible": ("Outline on slices", "The edge of bone, drawn on the slices"),
-    "hidden_visible": ("Points behind bone", "Show points faintly where bone hides them"),
-    "slices_visible": ("Slices in the 3D view", "The three slices as pictures among the bone"),
+    "outline_visible": ("Outline on slices", "Outline of the bone surface on the slices"),
+    "hidden_visible": ("Points behind bone", "Show points behind bone faintly"),
+    "slices_visible": ("Slices in the 3D view", "Show the three slices in the 3D view"),
 }
 
 
@@ -79,7 +79,11 @@ class MeshCard(Card):
     def _words(self) -> str:
         surfaces = self._workspace.bone.surfaces
         if not surfaces:
-            return "There is no surface yet." if self._workspace.scan.volume is None else "It is being made…"
+            return (
+                "There is no surface yet."
+                if self._workspace.scan.volume is None
+                else "Extracting the surface…"
+            )
         n = sum(surface.n_triangles for surface in surfaces)
         finest, coarsest = (f(s.voxel_mm for s in surfaces) for f in (min, max))
         voxels = mm_text(coarsest) if finest == coarsest else f"{mm_text(coarsest)}, ears {mm_text(finest)}"
@@ -142,9 +146,7 @@ class MeshCard(Card):
         self._workspace.bone.mesh_ears()
         if not any(task.key == "mesh ears" for task in self._workspace.jobs.running):
             where = labels.active.side.word
-            self._workspace.say(
-                f"Place a feature first (such as CA {where}): it tells where the ear is.", "warning"
-            )
+            self._workspace.say(f"Place a feature first (such as CA {where}) to locate the ear.", "warning")
 
     def _on_progress(self, task: Task[Any]) -> None:
         if task.key.startswith("mesh"):

@@ -30,7 +30,7 @@ class NotesCard(Card):
         self._continues = False
         self.text = QPlainTextEdit()
         self.text.setAccessibleName("Notes on the specimen")
-        self.text.setPlaceholderText("Animal, weight, scanner, what is damaged…")
+        self.text.setPlaceholderText("Animal, weight, scanner, damage…")
         self.text.setTabChangesFocus(True)
         self.text.setFixedHeight(84)
         self.text.textChanged.connect(self._on_typed)

@@ -74,9 +74,7 @@ class ScanPanel(QWidget):
         volume = self._workspace.scan.volume
         self._empty.setVisible(volume is None)
         lost = self._workspace.document.volume_is_lost
-        self._empty.setText(
-            "Its scan is not found: File > Find scan says where it is now." if lost else _NONE
-        )
+        self._empty.setText("The scan was not found. Locate it with File > Find scan." if lost else _NONE)
         self.facts.setVisible(volume is not None)
         self.facts.show_facts({} if volume is None else facts_of(volume))
         emptied(self._notes)

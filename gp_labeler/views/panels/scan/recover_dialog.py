@@ -62,7 +62,7 @@ class RecoverDialog(QDialog):
         self.delete = QPushButton("Delete…")
         self.recover.setProperty("role", "primary")
         self.recover.setDefault(True)
-        self.later.setToolTip("Leave it; it is offered again at the next start")
+        self.later.setToolTip("Keep it; it is offered again at the next start")
         self.recover.clicked.connect(self._recover)
         self.later.clicked.connect(self.reject)
         self.delete.clicked.connect(self._delete)
@@ -72,7 +72,7 @@ class RecoverDialog(QDialog):
         words = QVBoxLayout()
         words.setSpacing(2)
         words.addWidget(text_label("Nothing is lost", "title"))
-        hint = "The program ended before this was saved. Every edit was kept: take it up where you were."
+        hint = "The program ended before this was saved. Every edit was kept, and you can continue."
         words.addWidget(text_label(hint, "hint", wrap=True))
         top.addLayout(words, 1)
         foot = QHBoxLayout()
@@ -107,7 +107,7 @@ class RecoverDialog(QDialog):
             return
         if not self._confirming:
             self._confirming = True
-            self.delete.setText("Delete it for good?")
+            self.delete.setText("Delete it permanently?")
             return
         recovery: Recovery = item.data(Qt.ItemDataRole.UserRole)
         recovery.discard()

@@ -31,7 +31,7 @@ class SlabCard(Card):
         self._workspace = workspace
         self.mode, self.denoise = QComboBox(), QComboBox()
         self.mode.addItems(list(_MODES))
-        self.mode.setAccessibleName("What the slices show of a slab")
+        self.mode.setAccessibleName("Slab projection")
         self.denoise.addItems(list(_KINDS))
         self.denoise.setAccessibleName("How the slices are denoised")
         self.thickness = NumberField("Thickness of the slab, mm")
@@ -46,9 +46,7 @@ class SlabCard(Card):
         grid.setColumnStretch(1, 2)
         grid.setColumnStretch(3, 1)
         self.add(grid)
-        self.add(
-            text_label("Only what is seen: values, bone edge and clicks take the slice.", "hint", wrap=True)
-        )
+        self.add(text_label("Display only: values, bone edge and clicks use the slice.", "hint", wrap=True))
         self.mode.activated.connect(self._on_slab)
         self.thickness.value_chosen.connect(self._on_slab)
         self.denoise.activated.connect(self._on_denoise)

@@ -33,7 +33,7 @@ class SpacingFields(QWidget):
         self.unit.addItems(list(UNITS))
         self.unit.setAccessibleName("Unit of the voxel size")
         self.unit.currentTextChanged.connect(self._on_unit)
-        self.same = QCheckBox("The same along all axes")
+        self.same = QCheckBox("Isotropic (the same along all axes)")
         self.same.setChecked(True)
         self.same.toggled.connect(self._on_same)
         self.suggestion = QPushButton()
@@ -73,7 +73,7 @@ class SpacingFields(QWidget):
             field.setPlaceholderText(text)
         self.suggestion.setVisible(suggested is not None and not from_file)
         if suggested is not None:
-            self.suggestion.setText(f"Perhaps {spacing_text(suggested)}: use it")
+            self.suggestion.setText(f"Use {spacing_text(suggested)} instead")
 
     def spacing(self) -> Spacing | None:
         """Return what was typed, mm; None where nothing was; raises `GpError` where it makes no sense."""

@@ -121,15 +121,15 @@ class SpecimenListDialog(QDialog):
             made.clicked.connect(run)
             return made
 
-        self.add_folder = button("Add folder…", "It is searched, and the folders in it", self._add)
-        self.forget = button("Clear folders", "The files stay where they are", self._clear)
-        self.export = button("Export…", "Landmarks of all that are shown, or chosen", self._export)
-        hint = "Fit the atlas to all that are shown, or chosen"
+        self.add_folder = button("Add folder…", "Subfolders are searched too", self._add)
+        self.forget = button("Clear folders", "The files are not deleted", self._clear)
+        self.export = button("Export…", "Export landmarks of the shown or selected specimens", self._export)
+        hint = "Fit the atlas to the shown or selected specimens"
         self.fit_atlas = button("Fit atlas", hint, self._fit)
         self.sheets = button(
-            "Contact sheets…", "Every label on its best slice and on bone, PDF", self._sheets
+            "Contact sheets…", "PDF with every label on its best slice and on bone", self._sheets
         )
-        self.next = button("Next unfinished", "Open the next with something to do", self._next)
+        self.next = button("Next unfinished", "Open the next unfinished specimen", self._next)
         self.next.setProperty("role", "primary")
 
     def _lay_out(self) -> None:

@@ -20,13 +20,13 @@ __all__ = ["COLUMNS", "SpecimenTableModel"]
 COLUMNS = ("", "Specimen", "Left", "Right", "In doubt", "Labellings", "Last change", "Notes")
 _HINTS = (
     "",
-    "Double-click opens it",
+    "Double-click to open",
     "Placed or not seen, of 20",
     "Placed or not seen, of 20",
-    "Labels that the check finds doubtful, by the atlas in use",
+    "Labels that the check with the current atlas finds doubtful",
     "Observers, with the number of rounds",
     "When the file was last written",
-    "Notes on the specimen; labels with a note or a guess",
+    "Notes on the specimen; number of labels with a note or the certainty guess",
 )
 
 Index = QModelIndex | QPersistentModelIndex

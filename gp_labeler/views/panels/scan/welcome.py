@@ -34,9 +34,9 @@ _STEPS = (
     (
         "label",
         "Place three features",
-        "CA, RWP and OS. From then on the atlas shows where the others should be.",
+        "CA, RWP and OS. Then the atlas predicts the others.",
     ),
-    ("export", "Export both sides", "Landmark files that open in 3D Slicer and feed the atlas."),
+    ("export", "Export both sides", "Landmark files for 3D Slicer and for atlases."),
     ("pose", "Estimate a cochlea", "From a few touched points of another animal, with or without a scan."),
 )
 _N_RECENT, _AROUND = 7, 24
@@ -76,9 +76,7 @@ class Welcome(QWidget):
         for path in paths:
             self._recent.addWidget(self._recent_button(path))
         if not paths:
-            self._recent.addWidget(
-                _text("Nothing yet. What you open will be listed here.", "hint", wrap=True)
-            )
+            self._recent.addWidget(_text("No recent files.", "hint", wrap=True))
         self._recent.addStretch(1)
         self._tint()
 
@@ -99,7 +97,7 @@ class Welcome(QWidget):
         self._lower.setSpacing(24)
         self._recent = QVBoxLayout()
         self._recent.setSpacing(2)
-        for name, below in (("Recent", self._recent), ("How it goes", self._tutorial())):
+        for name, below in (("Recent", self._recent), ("How it works", self._tutorial())):
             part = QVBoxLayout()
             part.addWidget(_text(name, "heading"))
             part.addLayout(below)
@@ -143,11 +141,9 @@ class Welcome(QWidget):
     def _buttons(self) -> FlowLayout:
         row = FlowLayout(spacing=8)
         self.open_scan = self._big("Open scan…", "scan", "primary", "A file or folder with a micro-CT")
-        self.open_specimen = self._big("Open specimen…", "file", "", "Go on with a labelled specimen")
-        self.specimens = self._big(
-            "All specimens…", "layout", "", "The list of your folders, and what comes next"
-        )
-        self.demo = self._big("Try a demo head", "play", "", "A synthetic head to practise on; takes seconds")
+        self.open_specimen = self._big("Open specimen…", "file", "", "Continue with a saved specimen")
+        self.specimens = self._big("All specimens…", "layout", "", "List of the specimens in your folders")
+        self.demo = self._big("Try a demo head", "play", "", "A synthetic head for practice; takes seconds")
         for button, id in (
             (self.open_scan, "file.open"),
             (self.open_specimen, "file.open"),

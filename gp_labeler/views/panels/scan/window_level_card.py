@@ -13,11 +13,11 @@ from gp_labeler.views.signals import attempt, follow
 __all__ = ["WindowLevelCard"]
 
 _HINTS = {
-    "Auto": "The window that suits the whole scan",
+    "Auto": "Grey window for the whole scan",
     "Full": "From the darkest to the brightest value",
     "Bone": "Shades within bone",
     "Soft": "Shades below bone",
-    "Edge": "Steep around the threshold: where bone begins",
+    "Edge": "Narrow window around the bone threshold",
 }
 
 

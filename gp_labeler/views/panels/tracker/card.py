@@ -51,7 +51,7 @@ class TrackerCard(Card):
         self.progress.setFixedHeight(6)
         self.record = QPushButton()
         self.record.setProperty("role", "primary")
-        self.record.setToolTip("Hold the tip still; half a second is averaged")
+        self.record.setToolTip("Hold the tip still; samples of half a second are averaged")
         self.record.clicked.connect(lambda: attempt(workspace, workspace.tracker.press))
         self.dwell = QCheckBox("Record when the tip is held still")
         self.dwell.toggled.connect(workspace.tracker.set_dwell)

@@ -42,11 +42,11 @@ _GATE = "largest region sent"
 _SEND_PORT = 18945
 _HINTS: Mapping[str, tuple[str, str]] = {
     "host": ("Host", "127.0.0.1, or the name of the computer that runs PLUS or Slicer"),
-    "port": ("Port", f"{DEFAULT_PORT} by custom"),
+    "port": ("Port", f"{DEFAULT_PORT} by convention"),
     "probe": ("Probe", "device name of its TRANSFORM, such as StylusToTracker"),
-    "reference": ("Head marker", "device name; empty where the head cannot move"),
-    "button": ("Foot switch", "device name of STRING messages; empty where there is none"),
-    "tip": ("Tip", "x y z in the probe's frame, mm; 0 0 0 where the tracker tells the tip itself"),
+    "reference": ("Head marker", "device name; empty if the head is fixed"),
+    "button": ("Foot switch", "device name of STRING messages; empty if there is none"),
+    "tip": ("Tip", "x y z in the frame of the marker, mm; 0 0 0 if the tracker reports the tip"),
 }
 
 
@@ -87,7 +87,7 @@ class TrackerDialog(QDialog):
         for set_it in (self.connect_button.setAutoDefault, self.connect_button.setDefault):
             set_it(not tracker.on)  # Return in a field must not end a link
         collecting = tracker.pivot is not None
-        self.pivot.setText("Stop" if collecting else "Find the tip by turning…")
+        self.pivot.setText("Stop" if collecting else "Calibrate the tip…")
         self.pivot.setEnabled(tracker.on)
         self.finish.setVisible(collecting)
         self.turned.setVisible(collecting)
@@ -109,7 +109,7 @@ class TrackerDialog(QDialog):
         if tracker.calibration is not None:
             found = tracker.calibration
             return f"Tip found from {found.n_frames} poses; residual {found.rms_mm:.2f} mm."
-        return "Set the tip in a small hollow and tilt the probe about it to all sides."
+        return "Rest the tip in a small hollow and tilt the probe in all directions."
 
     # What it does
 
@@ -272,12 +272,12 @@ class TrackerDialog(QDialog):
         self.cone = NumberField("Largest 95 % cone of a pose that is sent, degrees", widest="10.00")
         for field in (self.radius, self.cone):
             field.value_chosen.connect(self._use_gate)
-        self.still = QCheckBox("Readings may stand still: a robot arm or a simulation")
+        self.still = QCheckBox("Allow identical readings: robot arm or simulation")
         self.still.setToolTip(
             "For a device without noise, whose readings repeat to the last digit. Leave it off for a camera: "
             "some\ngo on telling the last position of a covered marker, which would then be recorded."
         )
-        self.audible = QCheckBox("A sound for every touch: one recorded, two refused")
+        self.audible = QCheckBox("Sound for every touch: one beep recorded, two rejected")
 
     def _make_buttons(self) -> None:
         self.connect_button, self.pivot = QPushButton(), QPushButton()
@@ -342,7 +342,7 @@ class TrackerDialog(QDialog):
         return card
 
     def _send_card(self) -> Card:
-        card = Card("Pose back out")
+        card = Card("Send the pose")
         row = QHBoxLayout()
         row.setSpacing(8)
         row.addWidget(self.send)
