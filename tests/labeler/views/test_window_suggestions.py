@@ -64,7 +64,7 @@ def test_enter_from_afar_brings_the_view_there_and_only_then_confirms(qtbot, sug
     assert axial.voxel_pixels(INSIDE, voxel) < 2.0
     QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.SUGGESTED
-    assert "Is MN left right here?" in suggested.status.next_click.text()
+    assert "Is MN left correct?" in suggested.status.next_click.text()
     assert axial.voxel_pixels(INSIDE, voxel) >= 2.0
     wait_until_idle(qtbot, suggested)
     QTest.keyClick(axial, Qt.Key.Key_Return)
