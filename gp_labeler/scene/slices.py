@@ -23,6 +23,7 @@ from gp_labeler.imaging.threshold import surface_level
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.vtk_arrays import matrix_of, to_numpy, to_vtk, vtk_ready
 from gp_labeler.scene.level_lines import level_segments
+from gp_labeler.scene.oblique_slab import MOST_BYTES, ObliqueSlab, PixelGrid, pixel_grid
 from gp_labeler.scene.window_level import WindowLevel
 
 __all__ = ["SliceImage", "VolumeSlicer"]
@@ -32,6 +33,9 @@ _MOST_READ = 4e9
 
 _STRAIGHT = 1e-4
 """Off-axis part of a direction below which voxel rows run along a plane: 0.1 voxel in a thousand."""
+
+_SLABS_KEPT = 3
+"""One for each slice view."""
 
 _EDGES = np.array([(a, b) for a in range(8) for b in range(a + 1, 8) if (a ^ b).bit_count() == 1])
 """The 12 edges of a box, as pairs of its 8 corners."""
@@ -124,10 +128,12 @@ class VolumeSlicer:
         self.corners = volume.voxel_to_scan(box)
         self._reslice: vtkImageReslice | None = None
         self._grids: WeakKeyDictionary[SlicePlane, _Grid] = WeakKeyDictionary()
+        self._slabs: dict[object, ObliqueSlab] = {}
 
     def close(self) -> None:
         """Let go of the voxels."""
         self._reslice = None
+        self.forget_slabs()
 
     def is_oblique(self, plane: SlicePlane) -> bool:
         """Whether slices of a plane are resampled, because it does not lie along the grid of voxels."""
@@ -182,9 +188,17 @@ class VolumeSlicer:
             return self._resampled(plane, there, step or min(self.volume.spacing), slab)
         return self._voxels(plane, there, grid_axes, slab)
 
+    def forget_slabs(self) -> None:
+        """Let go of the layers of slabs that were shown."""
+        self._slabs.clear()
+
     def _layer(self, plane: SlicePlane, step: float | None) -> float:
         """Return the distance of the layers of a slab, mm."""
-        return max(self.step(plane), step or 0.0) if self.is_oblique(plane) else self.step(plane)
+        return self.step(plane) * (self._n_between(plane, step) if self.is_oblique(plane) else 1)
+
+    def _n_between(self, plane: SlicePlane, step: float | None) -> int:
+        """Return how many slices apart the layers of an oblique slab are: not much finer than its pixels."""
+        return max(1, math.floor((step or 0.0) / self.step(plane) + 1e-9))
 
     def sampling_step(self, plane: SlicePlane, mm_per_pixel: float) -> float:
         """Return how fine an oblique slice needs to be sampled for a screen, mm.
@@ -256,21 +270,75 @@ class VolumeSlicer:
         self, plane: SlicePlane, position: float, step: float, slab: Slab | None = None
     ) -> SliceImage:
         """Interpolate on a square grid over the part of the plane that lies in the volume."""
-        section = self.section(plane, position)
-        first = np.floor(section.min(axis=0) / step + 0.5)  # the same grid for all slices: nothing trembles
-        width, height = (int(n) for n in np.maximum(np.ceil(section.max(axis=0) / step - 0.5) - first + 1, 1))
-        low = first * step
-        origin = plane.scan(low[None], position)[0]
-        layer = self._layer(plane, step)
-        n_layers = 1 if slab is None else slab.n_layers(layer)
+        grid = pixel_grid(self.section(plane, position), step)
+        if slab is None or slab.n_layers(self._layer(plane, step)) == 1:
+            values = self._sampled(plane, position, grid, step)
+        else:
+            values = self._slab_values(plane, position, grid, step, slab)
+        return SliceImage(values, plane, position, step * np.array(grid[:2]), np.array([step, step]))
+
+    def _slab_values(
+        self, plane: SlicePlane, position: float, grid: PixelGrid, step: float, slab: Slab
+    ) -> NDArray[Any]:
+        """Return what an oblique slab shows; from the second slice of a plane on, its layers are kept."""
+        key = (plane.axes.tobytes(), plane.origin.tobytes(), step, slab)
+        before = self._slabs.pop(key, None)
+        kept = before or self._slab(plane, slab, step, pixel_grid(plane.flat(self.corners), step))
+        self._slabs[key] = kept
+        while len(self._slabs) > _SLABS_KEPT:
+            del self._slabs[next(iter(self._slabs))]
+        if before is not None and kept.n_bytes <= MOST_BYTES:
+            return kept.values(position, grid)
+        return self._slab_at_once(plane, position, grid, step, slab)
+
+    def _slab(self, plane: SlicePlane, slab: Slab, step: float, grid: PixelGrid) -> ObliqueSlab:
+        return ObliqueSlab(
+            self.volume,
+            plane,
+            slab,
+            step=step,
+            scroll=self.step(plane),
+            n_between=self._n_between(plane, step),
+            grid=grid,
+            sample=lambda at, of, beyond: self._sampled(plane, at, of, step, beyond),
+        )
+
+    def _sampled(
+        self, plane: SlicePlane, position: float, grid: PixelGrid, step: float, beyond: float | None = None
+    ) -> NDArray[Any]:
+        """Return the (rows, columns) grey values of one layer, `beyond` the scan by default its least one."""
+        left, top, width, height = grid
+        outside = self.volume.intensity_range[0] if beyond is None else beyond
+        origin = plane.scan(step * np.array([[left, top]]), position)[0]
+        array = self.volume.voxels.uncopied()
+        if array is None:
+            return _interpolated(self.volume, origin, plane, step, (height, width), outside)
+        return self._by_vtk(array, plane, origin, (width, height), (step, step, step), outside)
+
+    def _slab_at_once(
+        self, plane: SlicePlane, position: float, grid: PixelGrid, step: float, slab: Slab
+    ) -> NDArray[Any]:
+        """Return what an oblique slab shows, and keep no layers: it turns, or is too large."""
         if (array := self.volume.voxels.uncopied()) is None:
-            offsets = (np.arange(n_layers) - n_layers // 2) * layer
-            layers = [
-                _interpolated(self.volume, origin + offset * plane.normal, plane, step, (height, width))
-                for offset in offsets
-            ]
-            values = layers[0] if slab is None else reduced(np.stack(layers), 0, slab.mode)
-            return SliceImage(values, plane, position, low, np.array([step, step]))
+            return self._slab(plane, slab, step, grid).values(position, grid)
+        layer = self._layer(plane, step)
+        low, origin = self.volume.intensity_range[0], plane.scan(step * np.array([grid[:2]]), position)[0]
+        return self._by_vtk(
+            array, plane, origin, grid[2:], (step, step, layer), low, slab.n_layers(layer), slab.mode
+        )
+
+    def _by_vtk(
+        self,
+        array: NDArray[Any],
+        plane: SlicePlane,
+        origin: FloatArray,
+        size: tuple[int, int],
+        spacing: tuple[float, float, float],
+        beyond: float,
+        n_layers: int = 1,
+        mode: str = "mean",
+    ) -> NDArray[Any]:
+        """Let `vtkImageReslice` interpolate, columns by rows from an origin (3,), one or several layers."""
         if self._reslice is None:
             self._reslice = _reslice(self.volume, array)
         T_scan_screen = np.eye(4)
@@ -278,14 +346,14 @@ class VolumeSlicer:
         to_voxel = vtkMatrixToLinearTransform()
         to_voxel.SetInput(matrix_of(self.volume.T_voxel_scan @ T_scan_screen))
         self._reslice.SetResliceTransform(to_voxel)
-        self._reslice.SetOutputSpacing(step, step, layer)
+        self._reslice.SetOutputSpacing(*spacing)
         self._reslice.SetSlabNumberOfSlices(n_layers)
-        self._reslice.SetSlabMode(_VTK_SLABS["mean" if slab is None else slab.mode])
-        self._reslice.SetOutputExtent(0, width - 1, 0, height - 1, 0, 0)
+        self._reslice.SetSlabMode(_VTK_SLABS[mode])
+        self._reslice.SetOutputExtent(0, size[0] - 1, 0, size[1] - 1, 0, 0)
+        self._reslice.SetBackgroundLevel(beyond)
         self._reslice.Update()
         scalars = self._reslice.GetOutput().GetPointData().GetScalars()
-        values = to_numpy(scalars).reshape(height, width).copy()
-        return SliceImage(values, plane, position, low, np.array([step, step]))
+        return np.asarray(to_numpy(scalars).reshape(size[1], size[0]).copy())
 
     def section(self, plane: SlicePlane, position: float) -> FloatArray:
         """Return the (N, 2) coordinates right and down of where a plane meets the edges of the volume, mm."""
@@ -298,7 +366,12 @@ class VolumeSlicer:
 
 
 def _interpolated(
-    volume: Volume, origin: FloatArray, plane: SlicePlane, step: float, shape: tuple[int, int]
+    volume: Volume,
+    origin: FloatArray,
+    plane: SlicePlane,
+    step: float,
+    shape: tuple[int, int],
+    beyond: float,
 ) -> NDArray[Any]:
     """Interpolate linearly between voxels that must be converted, as `vtkImageReslice` does others."""
     down, right = np.indices(shape).reshape(2, -1)
@@ -312,7 +385,7 @@ def _interpolated(
         weight = np.where(corner, index - first, 1 - (index - first)).prod(axis=1)
         i, j, k = np.minimum(first + corner, last).T
         total += weight * volume.voxels.at(k, j, i)
-    values = np.full(shape[0] * shape[1], volume.intensity_range[0], volume.dtype)
+    values = np.full(shape[0] * shape[1], beyond, volume.dtype)
     values[inside] = np.rint(total) if volume.dtype.kind in "iu" else total
     return values.reshape(shape)
 
@@ -326,5 +399,4 @@ def _reslice(volume: Volume, array: NDArray[Any]) -> vtkImageReslice:
     reslice.SetInterpolationModeToLinear()
     reslice.SetOutputDimensionality(2)
     reslice.SetOutputOrigin(0.0, 0.0, 0.0)
-    reslice.SetBackgroundLevel(volume.intensity_range[0])
     return reslice

@@ -201,6 +201,8 @@ class SlicePainter:
         state = self._workspace.view.state
         wanted = (state.slab, state.denoise)
         assert self._slice is not None
+        if state.slab is None:
+            where[0].forget_slabs()
         if wanted == (None, None) or self._preview is not None:
             return self._slice
         if self._filtered is None or self._filtered[0] != wanted:

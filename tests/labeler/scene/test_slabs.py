@@ -11,6 +11,7 @@ from gp_core.errors import GpError
 from gp_labeler.imaging.anatomical_frame import SCAN_FRAME
 from gp_labeler.imaging.slab import DENOISERS, SLAB_MODES, Slab, denoised
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.scene.oblique_slab import ObliqueSlab, pixel_grid
 from gp_labeler.scene.slices import VolumeSlicer
 
 REDUCE = {"mean": np.mean, "maximum": np.max, "minimum": np.min}
@@ -58,6 +59,58 @@ def test_an_oblique_slab_is_that_of_the_slices_in_it(mode):
     assert np.abs(shown.values[down.ravel(), right.ravel()] - expected).max() < 3
     single = source.image(plane, middle)  # the next slice is a single one again
     assert not np.array_equal(single.values, shown.values)
+
+
+@pytest.mark.parametrize("mode", SLAB_MODES)
+def test_an_oblique_slab_is_the_same_whether_its_layers_were_kept_or_not(mode):
+    volume = noise_scan(np.eye(3))
+    scrolled, plane = VolumeSlicer(volume), SCAN_FRAME.plane("axial").rotated([1.0, 0.4, 0.2], 0.5, MIDDLE)
+    step, slab = scrolled.step(plane), Slab(mode, 5 * scrolled.step(plane))
+    low, high = scrolled.limits(plane)
+    where = [*np.arange(low, high, step), low + 3.3 * step, low + 4.3 * step, high - 0.2 * step]
+    for position in where:  # up to both ends, where layers lie beyond the scan, and between slices
+        kept = scrolled.image(plane, position, slab=slab)
+        fresh = VolumeSlicer(volume).image(plane, position, slab=slab)
+        assert np.array_equal(kept.origin, fresh.origin)
+        assert kept.values.shape == fresh.values.shape
+        off = np.abs(kept.values.astype(float) - fresh.values)
+        assert (off > 1).mean() < 0.02  # of pixels on the very edge
+
+
+def test_a_step_through_an_oblique_slab_samples_one_layer():
+    volume = noise_scan(np.eye(3))
+    plane = SCAN_FRAME.plane("axial").rotated([1.0, 0.4, 0.2], 0.5, MIDDLE)
+    asked = []
+
+    def sample(position, grid, beyond):
+        asked.append(position)
+        return np.full((grid[3], grid[2]), 100 * len(asked), np.uint16)
+
+    slab = ObliqueSlab(
+        volume,
+        plane,
+        Slab("mean", 1.0),
+        step=0.1,
+        scroll=0.1,
+        n_between=2,
+        grid=pixel_grid(plane.flat([MIDDLE]) + np.array([[-1.0], [1.0]]), 0.1),
+        sample=sample,
+    )
+    middle, part = (
+        plane.position_of(MIDDLE),
+        pixel_grid(plane.flat([MIDDLE]) + np.array([[-0.2], [0.1]]), 0.1),
+    )
+    shown = slab.values(middle, part)
+    assert asked == pytest.approx(middle + 0.2 * np.arange(-2, 3))
+    assert shown.shape == (part[3], part[2])
+    assert np.all(shown == 300)
+    for n in (1, 2, 3, 4):
+        del asked[:]
+        slab.values(middle + 0.1 * n, part)
+        assert len(asked) == (5 if n == 1 else 1)  # those in between, and then one for each slice
+    del asked[:]
+    slab.values(middle + 0.437, part)
+    assert len(asked) == 5  # it lies between the others
 
 
 def test_a_slab_thinner_than_a_voxel_is_the_slice_itself():
