@@ -1,7 +1,8 @@
 """The demo: a phantom labelled, exported and checked, and a cochlea estimated from touches.
 
 On the left, suggestions are judged one by one: confirmed where they lie within a voxel of the truth, else
-re-placed by a click. On the right, everything is placed by clicks. Some features are labelled again, blind,
+re-placed by a click. On the right, everything is placed by clicks. A ruler and an angle are measured on a
+thick slab. Some features are labelled again, blind,
 to show how repeatable labels are, and a contact sheet shows all of them.
 """
 
@@ -63,6 +64,7 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "view", "plane": "along"}
     yield {"do": "screenshot", "path": "modiolus.png", "what": "views", "size": [1400, 1000]}
     yield {"do": "view", "plane": "straight", "frame": "scan"}
+    yield from _measured()
     for side in (Side.RIGHT, Side.LEFT):
         files = [f"pose_{side.value}.json", *(["pose.json"] if side is Side.LEFT else [])]
         yield {"do": "estimate", "side": side.value, "noise": 0.1, "seed": seed, "path": files}
@@ -72,6 +74,18 @@ def _tables(seed: int, voxel_mm: float) -> Iterator[dict[str, Any]]:
     yield {"do": "view", "opacity": 1.0}
     yield {"do": "overlay", "visible": False}
     yield from _again(voxel_mm)
+
+
+def _measured() -> Iterator[dict[str, Any]]:
+    """Measure the round window and the modiolar axis on a thick slab; write distances beside the paper's."""
+    yield {"do": "view", "slab": {"mean": 1.0}}
+    yield {"do": "measure", "tool": "ruler", "at": ["RWA L", "RWP L"], "name": "round window"}
+    yield {"do": "measure", "tool": "angle", "at": ["CA L", "CB L", "RWA L"], "name": "axis and window"}
+    yield {"do": "view", "go_to": "CB L"}
+    yield {"do": "screenshot", "path": "measured.png", "what": "views", "size": [1400, 1000]}
+    yield {"do": "export_measurements"}
+    yield {"do": "distances", "side": "L", "path": "distances.json"}
+    yield {"do": "view", "slab": "off"}
 
 
 def _again(voxel_mm: float) -> Iterator[dict[str, Any]]:

@@ -10,7 +10,7 @@ from gp_core.io import read_landmarks
 from gp_labeler.scripting.demo import demo_script
 from gp_labeler.scripting.runner import run_script
 
-PICTURES = ("window.png", "mesh.png", "slices.png", "overlay.png")
+PICTURES = ("window.png", "mesh.png", "slices.png", "measured.png", "overlay.png")
 
 
 @pytest.mark.slow
@@ -35,6 +35,10 @@ def test_the_demo_leaves_everything_it_promises(qapp, tmp_path) -> None:
     (again,) = first["other_labellings"]
     assert (again["round"], again["blind"], len(again["landmarks"]["L"])) == (2, True, 4)
     assert content(tmp_path / "reliability.json")["overall"]["intra"]["n_pairs"] == 4
+    ruler, angle = first["measurements"]
+    assert (ruler["name"], angle["name"]) == ("round window", "axis and window")
+    assert (tmp_path / "distances.json").exists()
+    assert len(list(tmp_path.glob("*round*window*.mrk.json"))) == 1
     assert (tmp_path / "contact.pdf").read_bytes().count(b"/Type /Page ") == 2
     assert content(tmp_path / "specimens.json")[0]["finished"]
     for name in PICTURES:

@@ -125,6 +125,7 @@ def test_the_demo_labels_everything_and_uses_every_kind_of_file() -> None:
     assert does[:again].count("place") + does.count("confirm") == 37  # 19 on the left, 18 right: IN is shared
     assert does.count("confirm") == 16  # suggested once three are placed, then judged one by one
     assert {"export", "check", "save", "estimate", "overlay", "screenshot"} <= set(does)
+    assert {"measure", "export_measurements", "distances"} <= set(does)
 
 
 def test_the_manual_has_every_step_and_key() -> None:
