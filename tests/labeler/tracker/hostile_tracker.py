@@ -43,6 +43,8 @@ class Made:
     segment: int
     flagged_at_once: bool
     flagged: bool = False
+    held_back: bool = False
+    """Whether another touch of its session is doubtful, so that no pose is sent."""
 
 
 @dataclass
@@ -70,7 +72,12 @@ class Tally:
             f"{sum(m.flagged_at_once for m in self.wrong)} called doubtful at once, "
             f"{len(self.wrong) - len(self.silent)} by the end, {len(self.silent)} never",
         ]
-        return "\n".join([*lines, *(f"  never: {m.error_mm:.1f} mm at {m.hertz:g} Hz" for m in self.silent)])
+        return "\n".join([*lines, *(self._silent_line(made) for made in self.silent)])
+
+    @staticmethod
+    def _silent_line(made: Made) -> str:
+        sent = "no pose is sent: another touch is doubtful" if made.held_back else "a pose may be sent"
+        return f"  never: {made.error_mm:.1f} mm at {made.hertz:g} Hz; {sent}"
 
 
 class Session:
@@ -237,6 +244,9 @@ def run(touches: int, seed: int = 0, *, smallest_mm: float = 3.0, per_session: i
             if isinstance(outcome, RecordedTouch):
                 error = float(np.linalg.norm(outcome.position - truth))
                 session.made.append(Made(session.hertz, error, outcome.segment, outcome.segment != 0))
+        doubtful = any(made.flagged or made.flagged_at_once for made in session.made)
+        for made in session.made:
+            made.held_back = doubtful
         tally.made += session.made
     return tally
 
