@@ -31,6 +31,7 @@ except ImportError:  # Windows locks open files
     fcntl = None  # type: ignore[assignment]
 
 __all__ = [
+    "FREE_SPACE",
     "MAX_BYTES",
     "atomic_file",
     "check_file",
@@ -53,7 +54,10 @@ AnyPath = str | PathLike[str]
 MAX_BYTES = 50_000_000
 """Size of the largest text or JSON file that is read."""
 
-_DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+)?", re.DOTALL)
+FREE_SPACE = "Free some space, or choose another folder. The file is as it was."
+"""Remedy of a file that was not written whole."""
+
+_DRAFT = re.compile(r"\.(?P<name>.*)\.[0-9a-f]{8}\.tmp(\.\w+){0,2}", re.DOTALL)
 _CHUNK_BYTES = 1 << 20
 _LONGEST_NAME = 200  # bytes of the name in that of its temporary file; systems allow 255
 _FORGOTTEN_SECONDS = 3600.0  # after which any temporary file counts as abandoned
@@ -330,7 +334,7 @@ def _check_target(target: Path, path: AnyPath) -> None:
 def _locked_draft(target: Path) -> Iterator[Path]:
     """Create a temporary file that `remove_drafts` ignores while this program runs."""
     name = os.fsdecode(os.fsencode(target.name)[:_LONGEST_NAME])
-    draft = target.with_name(f".{name}.{os.urandom(4).hex()}.tmp{target.suffix[:20]}")
+    draft = target.with_name(f".{name}.{os.urandom(4).hex()}.tmp{_ending(target)[:20]}")
     descriptor = os.open(draft, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666)
     try:
         if fcntl is None:
@@ -344,6 +348,11 @@ def _locked_draft(target: Path) -> Iterator[Path]:
         draft.unlink(missing_ok=True)
         if descriptor >= 0:
             os.close(descriptor)
+
+
+def _ending(path: Path) -> str:
+    """Return the suffix, of a compressed file with the one before: writers choose the format by it."""
+    return "".join(path.suffixes[-2:]) if path.suffix.lower() == ".gz" else path.suffix
 
 
 def _remove_unless_locked(draft: Path) -> None:
@@ -371,7 +380,7 @@ def _reason(error: Exception) -> object:
 
 def _remedy(error: Exception) -> str:
     if getattr(error, "errno", None) in _FULL:
-        return "Free some space, or choose another folder. The file is as it was."
+        return FREE_SPACE
     return "Check the folder and its permissions."
 
 
@@ -410,7 +419,7 @@ def _temporary_draft(path: AnyPath) -> Iterator[Path]:
     import tempfile
 
     with tempfile.TemporaryDirectory() as folder:
-        yield Path(folder, f"draft{Path(path).suffix}")
+        yield Path(folder, f"draft{_ending(Path(path))}")
 
 
 def _send(path: AnyPath, content: bytes) -> None:

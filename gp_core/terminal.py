@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, TextIO
 
-__all__ = ["leave_output", "plain_terminal", "printable"]
+__all__ = ["leave_output", "plain_terminal", "printable", "silent_libraries"]
 
 # C0 and C1 control characters, line separators, bidirectional controls, lone surrogates
 _UNSEEN = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029\u200e\u200f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
@@ -70,6 +70,30 @@ def plain_terminal() -> Iterator[None]:
 def leave_output() -> None:
     """Stop writing to stdout after its reader has closed it; otherwise Python would complain on exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def silent_libraries() -> Iterator[None]:
+    """Discard what compiled libraries print to stderr meanwhile: the caller says what is wrong, once.
+
+    Yields
+    ------
+    None
+        While nothing of this process reaches stderr.
+    """
+    try:
+        before = os.dup(2)
+    except OSError:  # there is no stderr, as under pythonw
+        yield
+        return
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(before, 2)
+        os.close(before)
+        os.close(nowhere)
 
 
 class _PlainStream:

@@ -10,7 +10,7 @@ from typing import Any
 
 from vtkmodules.vtkCommonDataModel import vtkPolyData
 
-from gp_core.disk import atomic_file
+from gp_core.disk import FREE_SPACE, atomic_file
 from gp_core.errors import FileFormatError, GpError
 
 __all__ = ["OBJ_COMMENT", "check_mesh_name", "write_mesh"]
@@ -110,8 +110,7 @@ def write_mesh(mesh: vtkPolyData, path: Path) -> None:
         if done and suffix == ".obj":
             _say_space(draft, mesh)
         if not done or not _IS_WHOLE[suffix](draft, mesh):
-            remedy = "Free some space, or choose another folder. The file is as it was."
-            raise GpError("the mesh cannot be written whole", file=path, remedy=remedy)
+            raise GpError("the mesh cannot be written whole", file=path, remedy=FREE_SPACE)
 
 
 def _say_space(file: Path, mesh: vtkPolyData) -> None:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import os
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gp_core.disk import atomic_file, write_text
+from gp_core.disk import FREE_SPACE, atomic_file, write_text
 from gp_core.errors import GpError
 from gp_core.io.markups import write_markups
 from gp_core.landmarks.features import Side
+from gp_core.terminal import silent_libraries
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.phantom.phantom import Phantom
 
@@ -68,9 +70,9 @@ def save_phantom(phantom: Phantom, path: str | PathLike[str], *, labelled: bool 
     name = scan.name[: -len(ending)]
     try:
         scan.parent.mkdir(parents=True, exist_ok=True)
-        _write_volume(phantom.volume, scan)
-    except (OSError, RuntimeError) as error:
-        raise GpError(f"the phantom cannot be written ({error})", file=scan) from None
+    except OSError as error:
+        raise GpError(f"cannot be made ({error.strerror})", file=scan.parent) from None
+    _write_volume(phantom.volume, scan)
     about = _about(phantom.volume, scan)
     truth = scan.with_name(f"{name}.truth.json")
     write_text(truth, json.dumps(_truth(phantom, about), indent=1) + "\n")
@@ -135,8 +137,17 @@ def _write_volume(volume: Volume, path: Path) -> None:
     image.SetSpacing(volume.spacing)
     image.SetOrigin(volume.origin.tolist())
     image.SetDirection(volume.direction.ravel().tolist())
-    with atomic_file(path) as draft:
+    with atomic_file(path) as draft, silent_libraries():
         try:
             SimpleITK.WriteImage(image, str(draft), useCompression=True)
-        except RuntimeError as error:
-            raise OSError(str(error).strip().splitlines()[-1]) from None
+            _require_space(draft)
+        except (RuntimeError, OSError):
+            raise GpError("the scan cannot be written whole", file=path, remedy=FREE_SPACE) from None
+
+
+def _require_space(draft: Path) -> None:
+    """Raise OSError where the disk takes not one byte more; not every format of ITK says that."""
+    size = draft.stat().st_size
+    with draft.open("ab") as file:
+        file.write(b"\0")
+    os.truncate(draft, size)

@@ -129,11 +129,14 @@ def test_a_link_stays_a_link_and_modes_are_kept(tmp_path: Path) -> None:
     assert target.stat().st_mode & 0o777 == 0o640
 
 
-def test_drafts_of_killed_programs_are_cleaned_up_and_those_of_living_ones_are_not(tmp_path: Path) -> None:
+@pytest.mark.parametrize("name", ["a.json", "head.nii.gz"])
+def test_drafts_of_killed_programs_are_cleaned_up_and_those_of_living_ones_are_not(
+    tmp_path: Path, name: str
+) -> None:
     code = f"""
 import sys, time
 from gp_core import disk
-with disk.atomic_file({str(tmp_path / "a.json")!r}) as draft:
+with disk.atomic_file({str(tmp_path / name)!r}) as draft:
     draft.write_text("half")
     print("ready", flush=True)
     time.sleep(60)
@@ -141,12 +144,13 @@ with disk.atomic_file({str(tmp_path / "a.json")!r}) as draft:
     writer = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE)
     assert writer.stdout is not None
     writer.stdout.readline()
-    disk.write_text(tmp_path / "a.json", "whole")
+    disk.write_text(tmp_path / name, "whole")
     assert len(contents(tmp_path)) == 2
+    assert all(file.endswith("".join(Path(name).suffixes)) for file in contents(tmp_path))
     writer.kill()
     writer.communicate()
-    disk.write_text(tmp_path / "a.json", "whole again")
-    assert contents(tmp_path) == {"a.json": b"whole again"}
+    disk.write_text(tmp_path / name, "whole again")
+    assert contents(tmp_path) == {name: b"whole again"}
 
 
 # Devices and pipes
