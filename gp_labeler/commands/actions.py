@@ -81,6 +81,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
             (
                 ("Click on bone", "place the active feature"),
                 ("Drag a point", "move it, on the bone"),
+                ("Ctrl+click", "move the chosen point here"),
                 ("Left drag", "rotate (Ctrl: spin)"),
                 ("Middle drag, Shift+drag", "pan"),
                 ("Wheel, right drag", "zoom"),
@@ -97,6 +98,7 @@ def gestures() -> tuple[tuple[str, tuple[tuple[str, str], ...]], ...]:
             (
                 ("Click", "place the active feature"),
                 ("Drag a point", "move it, on bone if placed there (Alt: freely)"),
+                ("Ctrl+click", "move the chosen point here"),
                 ("Drag an end of a ruler", "move it"),
                 ("Arrow keys", "move the point a voxel"),
                 ("Wheel, F and B", "next and previous slice"),

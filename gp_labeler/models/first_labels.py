@@ -128,7 +128,7 @@ class FirstLabelsModel:
         self.changed.emit()
 
     def _choose_first(self, proposal: Proposal) -> None:
-        """Make the least certain suggestion of the proposal the active point."""
+        """Make the least certain suggestion of the proposal the active point, and show it closely."""
         radii = {
             (side, code): suggestion.radius_95 or np.inf
             for side, suggestions in proposal.suggestions().items()
@@ -137,7 +137,7 @@ class FirstLabelsModel:
         }
         if radii:
             side, code = max(radii, key=lambda key: radii[key])
-            self._labels.choose(side, code)
+            self._labels.look_closely(side, code)
 
     def _on_reset(self) -> None:
         self.proposal = None

@@ -350,6 +350,12 @@ class LabelsModel:
         if self.place_of(Side.parse(side), code) is not None:
             self._view.show_point(self._view.crosshair)
 
+    def look_closely(self, side: Side | str, code: str) -> None:
+        """Choose a point, and show it, or where it is suggested or expected, closely enough to judge it."""
+        self.choose(side, code)
+        if self.place_of(Side.parse(side), code) is not None:
+            self._view.look_closely(self._view.crosshair)
+
     def swap(self, side: Side, code: str, other: str) -> None:
         """Exchange two points of a side, and say which suggestions that drops."""
         swap = SwapPoints(side, code, other)
@@ -409,10 +415,15 @@ class LabelsModel:
             self._go_to_next(self.active)
 
     def _go_to_next(self, after: Active) -> None:
+        """Make the next point active, and show where it is expected: a suggestion from close by."""
         upcoming = next_point(self.document.state, after, self.ghosts)
         self.set_active(upcoming)
         where = None if upcoming.code is None else self.place_of(upcoming.side, upcoming.code)
-        if where is not None and self._view.state.follow_ghost:
+        if where is None or not self._view.state.follow_ghost:
+            return
+        if upcoming.code in self.document.landmarks(upcoming.side).suggested:
+            self._view.look_closely(where)
+        else:
             self._view.set_crosshair(where)
 
     def _begin(self) -> None:

@@ -158,6 +158,8 @@ class ViewModel:
     point_shown = Signal(object)
     """(3,) scan position that every view shall bring into view, mm."""
 
+    close_look_asked = Signal(object)
+    """(3,) scan position that every view shall show so closely that it can be judged, mm."""
     reset_asked = Signal()
     """Every view shall show everything again."""
 
@@ -281,6 +283,11 @@ class ViewModel:
         """Move the crosshair to a (3,) position, and bring it into view in every view; mm, scan frame."""
         self.set_crosshair(position)
         self.point_shown.emit(self._crosshair)
+
+    def look_closely(self, position: ArrayLike) -> None:
+        """Set the crosshair, and show the (3,) scan position closely enough in every view to judge it."""
+        self.set_crosshair(position)
+        self.close_look_asked.emit(self._crosshair)
 
     def _on_reset(self) -> None:
         """Keep how the user likes to look at things; whoever listens to `reset` reads the rest again."""

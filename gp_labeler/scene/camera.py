@@ -187,6 +187,11 @@ class SceneCamera:
         half = np.maximum(np.abs(across) * height / width, np.abs(along)) + growth * nearer
         self._scale(float(half.max()) * _FIT)
 
+    @property
+    def across_mm(self) -> float:
+        """How much is seen from top to bottom, at the depth of the middle, mm."""
+        return 2 * self._half_height()
+
     def focus_on(self, point: ArrayLike, *, across_mm: float | None = None) -> None:
         """Bring a (3,) scan position to the middle; show `across_mm` from top to bottom where given."""
         self._aim(np.asarray(point, dtype=np.float64))

@@ -16,15 +16,16 @@ _LEFT = Qt.MouseButton.LeftButton
 _NO_KEYS = Qt.KeyboardModifier.NoModifier
 
 
-def click(widget: QWidget, x: float, y: float) -> None:
-    """Click with the left button at a logical pixel of a widget.
+def click(widget: QWidget, x: float, y: float, *, ctrl: bool = False) -> None:
+    """Click with the left button at a logical pixel of a widget, Ctrl held or not.
 
     Raises
     ------
     GpError
         The pixel lies outside the widget.
     """
-    QTest.mouseClick(widget, _LEFT, _NO_KEYS, _inside(widget, x, y))
+    held = Qt.KeyboardModifier.ControlModifier if ctrl else _NO_KEYS
+    QTest.mouseClick(widget, _LEFT, held, _inside(widget, x, y))
 
 
 def drag(widget: QWidget, start: tuple[float, float], end: tuple[float, float]) -> None:

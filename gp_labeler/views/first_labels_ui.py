@@ -6,10 +6,10 @@ from pathlib import Path
 
 from gp_labeler.views.ui_part import UiPart
 
-__all__ = ["FirstLabelsUi"]
+__all__ = ["AS_THE_FILE", "FOLDER", "FirstLabelsUi"]
 
-_LISTED, _FOLDER, _FILES = "From the list of specimens", "From a folder…", "From files…"
-_AS_THE_FILE, _MIRRORED = "Left is as the file says", "The scan is mirrored…"
+LISTED, FOLDER, FILES = "From the list of specimens", "From a folder…", "From files…"
+AS_THE_FILE, MIRRORED = "Left is as the file says", "The scan is mirrored…"
 _LABELLED = "Labelled scans (*.gpspecimen.json *.mrk.json *.fcsv);;All files (*)"
 
 
@@ -39,7 +39,7 @@ class FirstLabelsUi(UiPart):
             for row in self._workspace.specimens.every
             if sum(row.placed.values()) and row.path != open_now
         ]
-        answers = [_LISTED, _FOLDER, _FILES] if listed else [_FOLDER, _FILES]
+        answers = [LISTED, FOLDER, FILES] if listed else [FOLDER, FILES]
         answer = self.prompts.choose(
             "Suggest from my scans",
             "Which labelled scans shall the landmarks be suggested from?",
@@ -47,12 +47,12 @@ class FirstLabelsUi(UiPart):
             detail="Three to five heads of the same species are enough. The first time, each is prepared, "
             "which takes some minutes. Suggestions count once you have confirmed them.",
         )
-        if answer == _FOLDER:
+        if answer == FOLDER:
             folder = self.prompts.folder("A folder of labelled scans", self._folder)
             return [] if folder is None else [folder]
-        if answer == _FILES:
+        if answer == FILES:
             return self.prompts.open_files("Labelled scans", self._folder, _LABELLED, many=True)
-        return listed if answer == _LISTED else []
+        return listed if answer == LISTED else []
 
     def _knows_left(self) -> bool:
         """Return whether left is known, if need be by asking."""
@@ -61,11 +61,11 @@ class FirstLabelsUi(UiPart):
         answer = self.prompts.choose(
             "Left and right",
             "Is the animal's left side on the left of the scan, as the file says?",
-            [_AS_THE_FILE, _MIRRORED],
+            [AS_THE_FILE, MIRRORED],
             detail="Nothing in a scan can prove it: a head and its mirror image look alike. Check it against "
             "a mark on the animal. A mirrored scan is read again, the right way round.",
         )
-        if answer == _MIRRORED:
+        if answer == MIRRORED:
             self.ask_reopen_mirrored()
             return False
         if answer and self._workspace.head.asks_left:

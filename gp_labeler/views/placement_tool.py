@@ -92,12 +92,17 @@ class PlacementTool:
         self._workspace.measure.end_drag(keep=False)
         return True
 
-    def click(self, position: FloatArray | None, how: How, mark: str | None) -> None:
+    def click(
+        self, position: FloatArray | None, how: How, mark: str | None, *, replace: bool = False
+    ) -> None:
         """Take a click at a scan position (None: it missed) and on a mark (None: on none).
 
         A point that is to do is placed, one that shall be re-placed moves here; else a mark is chosen, or the
-        crosshair comes here. A click never moves a placed or suggested point just because its row is chosen.
+        crosshair comes here. A click never moves a placed or suggested point just because its row is chosen;
+        with Ctrl held (`replace`) it does.
         """
+        if replace and not self._armed():
+            return
         effect, workspace = self._effect(mark), self._workspace
         if effect == "measure":
             self._measure(position)
@@ -113,6 +118,21 @@ class PlacementTool:
             except GpError as error:
                 workspace.say(str(error), "warning")
             workspace.interaction.arm_replacing(False)
+
+    def _armed(self) -> bool:
+        """Let this click move the chosen point, if that has a place; False where it must not be moved."""
+        mark = self._chosen()
+        if (
+            self._workspace.interaction.tool == "place"
+            and mark is not None
+            and mark.shown_position is not None
+        ):
+            try:
+                self._workspace.interaction.arm_replacing()
+            except GpError as error:
+                self._workspace.say(str(error), "warning")
+                return False
+        return True
 
     def _effect(self, mark: str | None) -> str:
         """Return what a click does: ``place``, ``measure``, ``touch``, ``choose`` or ``look``."""

@@ -169,6 +169,11 @@ class SceneView(QWidget):
             self.scene.camera.focus_on(position)
             self.redraw()
 
+    @property
+    def across_mm(self) -> float:
+        """How much it shows from top to bottom, at the depth of its middle, mm."""
+        return self.scene.camera.across_mm
+
     def zoom_to(self, position: FloatArray, across_mm: float) -> None:
         """Show so many mm, from top to bottom, around a (3,) scan position."""
         self.scene.camera.focus_on(position, across_mm=across_mm)
@@ -488,7 +493,7 @@ class SceneView(QWidget):
         clicked = self._placement.is_click if self._placement.holds else self.scene.control.release(x, y)
         mark = self._placement.release()
         if event.button() == Qt.MouseButton.LeftButton and clicked:
-            self._click(x, y, mark)
+            self._click(x, y, mark, replace=modifiers_of(event) == Modifier.CTRL)
         elif event.button() == Qt.MouseButton.RightButton and clicked:
             self._placement.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
         self._look_at(x, y, Modifier.NONE)
@@ -529,9 +534,9 @@ class SceneView(QWidget):
         self._placement.take_focus(self)
         super().enterEvent(event)
 
-    def _click(self, x: float, y: float, mark: str | None) -> None:
+    def _click(self, x: float, y: float, mark: str | None, *, replace: bool) -> None:
         point, how = self._aim(x, y)
-        self._placement.click(point, how, mark)
+        self._placement.click(point, how, mark, replace=replace)
 
     def _aim(self, x: float, y: float) -> tuple[FloatArray | None, How]:
         """Return what a pixel shows, bone or a slice's picture: the (3,) scan position, and which it is."""

@@ -111,6 +111,11 @@ class SliceView(QWidget):
         if self.shown is not None:
             self._take(self.shown.showing(position, 0.2))
 
+    @property
+    def across_mm(self) -> float:
+        """How much it shows across its shorter side, mm; infinite without a scan."""
+        return np.inf if self.shown is None else self.shown.mm_per_pixel * min(self.shown.size)
+
     def zoom_to(self, position: FloatArray, across_mm: float) -> None:
         """Show so many mm, across the shorter side, around a (3,) scan position."""
         if self.shown is not None:
@@ -311,7 +316,8 @@ class SliceView(QWidget):
         mark = self._placement.release()
         if clicked and event.button() == Qt.MouseButton.RightButton:
             self._placement.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
-        plain = event.button() == Qt.MouseButton.LeftButton and not modifiers_of(event)
+        held = modifiers_of(event)
+        plain = event.button() == Qt.MouseButton.LeftButton and held in (Modifier.NONE, Modifier.CTRL)
         here = self.shown.pixel_to_scan([[x, y]])[0]
         if (
             clicked
@@ -319,7 +325,8 @@ class SliceView(QWidget):
             and not dragged
             and (self._workspace.interaction.tool != "grey" or mark or self._workspace.interaction.replacing)
         ):
-            self._placement.click(here if self._is_inside(here) else None, How.SLICE, mark)
+            where = here if self._is_inside(here) else None
+            self._placement.click(where, How.SLICE, mark, replace=held == Modifier.CTRL)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
         if event.button() == Qt.MouseButton.LeftButton:

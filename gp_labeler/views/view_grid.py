@@ -248,13 +248,14 @@ class ViewGrid(QWidget):
         return any(view.is_up_to_date for view in self._close_views(position))
 
     def bring_close(self, position: FloatArray) -> None:
-        """Show a (3,) scan position in every view so closely that it can be judged."""
+        """Show a (3,) scan position in every view closely enough to judge it; a closer view stays so."""
         volume = self._workspace.scan.volume
         if volume is None:
             return
         for view in self.views:
             side = min(view.width(), view.height())
-            view.zoom_to(position, min(CLOSE_MM, side * min(volume.spacing) / (2 * JUDGED_PIXELS)))
+            close = min(CLOSE_MM, side * min(volume.spacing) / (2 * JUDGED_PIXELS))
+            view.zoom_to(position, min(close, view.across_mm))
         if not self._close_views(position):  # such as what bone hides in the 3D view, shown alone
             self._workspace.view.update(layout="four-up")
 
@@ -290,6 +291,7 @@ class ViewGrid(QWidget):
             view.moved.connect(lambda mm, p=plane: self._say_where(p, mm))
         follow(self, self._workspace.view.changed, self._on_view_changed)
         follow(self, self._workspace.view.reset_asked, self.reset)
+        follow(self, self._workspace.view.close_look_asked, self.bring_close)
         follow(self, self._workspace.view.planes_changed, self._say_titles)
         follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
         follow(self, self._workspace.document.reset, self._on_reset)

@@ -12,7 +12,7 @@ from qtpy.QtTest import QTest
 from qtpy.QtWidgets import QApplication
 from window_cases import MIDDLE, wait_until_idle
 
-from gp_core.landmarks.features import Side
+from gp_core.landmarks.features import FEATURES, Side
 from gp_labeler.document.state import How
 from gp_labeler.models.workflow import PointState
 from gp_labeler.scene.planes import Plane
@@ -86,6 +86,29 @@ def test_enters_without_a_picture_in_between_confirm_nothing(qtbot, suggested) -
         QTest.keyClick(axial, Qt.Key.Key_Return)
     assert status_of(suggested, "MN") is PointState.PLACED
     assert status_of(suggested, "ZL") is PointState.SUGGESTED
+
+
+def test_the_next_suggestion_comes_up_close_and_one_enter_confirms_it(qtbot, suggested) -> None:
+    workspace, axial = suggested.workspace, axial_of(suggested)
+    for code in (row.code for row in FEATURES if row.code not in ("CO", "MN")):
+        at, radius = (AWAY, 2.0) if code == "ZL" else (INSIDE, 0.5)
+        workspace.labels.suggest(at, radius_95=radius, source="atlas", side=L, code=code)
+    workspace.labels.go_to(L, "MN")
+    axial.setFocus()
+    QTest.keyClick(axial, Qt.Key.Key_X)  # cannot be seen: goes on too
+    assert workspace.labels.active.code == "ZL"
+    assert axial.across_mm <= 12.0
+    np.testing.assert_allclose(axial.pixel_at(AWAY), (axial.width() / 2, axial.height() / 2), atol=1.0)
+    wait_until_idle(qtbot, suggested)
+    QTest.keyClick(axial, Qt.Key.Key_Return)
+    assert status_of(suggested, "ZL") is PointState.PLACED
+
+
+def test_a_closer_view_stays_as_close(suggested) -> None:
+    axial = axial_of(suggested)
+    axial.zoom_to(INSIDE, 5.0)
+    suggested.grid.bring_close(AWAY)
+    assert axial.across_mm == pytest.approx(5.0)
 
 
 def test_another_point_than_the_one_that_is_chosen_is_shown_first(qtbot, suggested) -> None:
@@ -202,6 +225,28 @@ def test_a_nudge_and_re_placing_place_it_and_a_mere_click_or_space_does_not(qtbo
     QTest.keyClick(suggested, Qt.Key.Key_P, Qt.KeyboardModifier.ShiftModifier)
     click(axial, elsewhere)
     assert status_of(suggested, "MN") is PointState.PLACED
+    np.testing.assert_allclose(workspace.document.landmarks(L)["MN"], elsewhere, atol=0.1)
+
+
+def test_ctrl_and_click_corrects_a_suggestion_and_looks_in_another_step(qtbot, suggested) -> None:
+    workspace, axial = suggested.workspace, axial_of(suggested)
+    axial.zoom_to(INSIDE, 10.0)
+    elsewhere = INSIDE + np.array([1.0, 1.0, 0.0])
+    x, y = (int(n) for n in axial.pixel_at(elsewhere))
+    ctrl = Qt.KeyboardModifier.ControlModifier
+    suggested.set_step("scan")
+    QTest.mouseClick(axial, Qt.MouseButton.LeftButton, ctrl, QPoint(x, y))
+    assert status_of(suggested, "MN") is PointState.SUGGESTED
+    suggested.set_step("label")
+    QTest.mouseClick(axial, Qt.MouseButton.LeftButton, ctrl, QPoint(x, y))
+    assert status_of(suggested, "MN") is PointState.PLACED
+    np.testing.assert_allclose(workspace.document.landmarks(L)["MN"], elsewhere, atol=0.1)
+    assert workspace.document.state.landmark(L, "MN").provenance.how is How.SLICE
+    workspace.labels.go_to(L, "MN")
+    workspace.labels.lock(side=L, code="MN")
+    x, y = (int(n) for n in axial.pixel_at(AWAY))
+    QTest.mouseClick(axial, Qt.MouseButton.LeftButton, ctrl, QPoint(x, y))
+    assert "locked" in suggested.status.next_click.text()
     np.testing.assert_allclose(workspace.document.landmarks(L)["MN"], elsewhere, atol=0.1)
 
 

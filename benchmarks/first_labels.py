@@ -1,0 +1,266 @@
+"""Count what a user does for all 37 landmarks of a head, with and without first labels, and the error left.
+
+Run from the top of a checkout: ``python benchmarks/first_labels.py [--heads 201 202 203] [--labelled 5]``. It
+needs no display: the real window is driven by real clicks, wheel notches and keys, and nothing else.
+
+The labelled scans are synthetic heads with the seeds 1 to 5, the new heads those of other seeds. The
+simulated user sees each feature where it truly is, and knows where to look:
+
+- *without*, the user takes the features in the order that the window proposes. From the third on, ghosts say
+  where to look. The user goes to the feature's slice in the view where that takes the fewest notches of the
+  wheel, zooms in until a voxel is four pixels wide, and clicks.
+- *with*, the user asks for suggestions. Each that is off by more than a voxel is corrected, by Ctrl+click on
+  its slice; the others are confirmed by Enter.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import sys
+import tempfile
+import time
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
+ROOT = Path(__file__).resolve().parents[1]
+sys.path[:0] = [str(ROOT)]
+
+import numpy as np  # noqa: E402
+
+from gp_core.errors import GpError  # noqa: E402
+from gp_core.landmarks.features import FEATURES, Side  # noqa: E402
+from gp_labeler.phantom import make_phantom, save_phantom  # noqa: E402
+from gp_labeler.scene.planes import Plane  # noqa: E402
+from gp_labeler.scripting.events import click, press_keys, turn_wheel  # noqa: E402
+from gp_labeler.scripting.steps.scan import Open  # noqa: E402
+from gp_labeler.scripting.window_driver import WindowDriver  # noqa: E402
+from gp_labeler.views.first_labels_ui import AS_THE_FILE, FOLDER  # noqa: E402
+from gp_labeler.views.panels.label.suggest_row import SuggestRow  # noqa: E402
+
+_VOXEL_PIXELS = 4.0
+_ZOOM_PER_NOTCH = 1.15
+_MOST = 200
+CODES = [row.code for row in FEATURES if not row.computed]
+
+
+@dataclass
+class Hand:
+    """Mouse and keys of the simulated user, which count what is done."""
+
+    driver: WindowDriver
+    done: Counter[str] = field(default_factory=Counter)
+
+    def key(self, keys: str) -> None:
+        """Press a key in the view under the pointer."""
+        view = self.driver.view("axial")
+        view.setFocus()
+        press_keys(view, keys)
+        self._rest("keys")
+
+    def click(self, widget, x: float, y: float, *, ctrl: bool = False) -> None:
+        """Click with the left button."""
+        click(widget, x, y, ctrl=ctrl)
+        self._rest("clicks")
+
+    def wheel(self, widget, x: float, y: float, notches: int, *, ctrl: bool = False) -> None:
+        """Turn the wheel; every notch counts, and every stroke."""
+        if notches:
+            turn_wheel(widget, x, y, notches, ctrl=ctrl)
+            self._rest("notches", abs(notches))
+            self.done["strokes"] += 1
+
+    def _rest(self, kind: str, n: int = 1) -> None:
+        self.done[kind] += n
+        self.driver.wait_until_idle(in_passing=False)
+
+    def place(self, position: np.ndarray, *, replace: bool) -> None:
+        """Go to a (3,) scan position where that is nearest, zoom in, and click."""
+        name = min((plane.value for plane in Plane), key=lambda n: abs(self._slices_to(n, position)))
+        view = self.driver.view(name)
+        middle = view.width() / 2, view.height() / 2
+        self.wheel(view, *middle, self._slices_to(name, position))
+        x, y = view.pixel_at(position)
+        if not (2 <= x < view.width() - 2 and 2 <= y < view.height() - 2):
+            self.key("R")  # the whole head
+            x, y = view.pixel_at(position)
+        across = self.driver.voxel / _VOXEL_PIXELS / (view.across_mm / min(view.width(), view.height()))
+        zoom = max(0, int(np.ceil(-np.log(across) / np.log(_ZOOM_PER_NOTCH))))
+        self.wheel(view, x, y, zoom, ctrl=True)
+        self.click(view, *view.pixel_at(position), ctrl=replace)
+
+    def _slices_to(self, name: str, position: np.ndarray) -> int:
+        view = self.driver.window.grid.slice_views[Plane(name)]
+        source, shown = view.source, view.slice_plane
+        here = source.snap(shown, shown.position_of(self.driver.workspace.view.crosshair))
+        return round((source.snap(shown, shown.position_of(position)) - here) / source.step(shown))
+
+
+@dataclass
+class Labelled:
+    """What a head cost, and how far its labels lie from the truth, mm."""
+
+    done: Counter[str]
+    errors: np.ndarray
+    n_confirmed: int = 0
+    suggested: np.ndarray | None = None
+    cpu: float = 0.0
+    peak_mb: float = 0.0
+
+
+def open_head(driver: WindowDriver, seed: int, spacing: float) -> Hand:
+    """Open a fresh head in the step Label."""
+    Open(phantom=seed, spacing=spacing, discard=True).run(driver)
+    driver.window.set_step("label")
+    driver.wait_until_idle()
+    return Hand(driver)
+
+
+def errors_of(driver: WindowDriver) -> np.ndarray:
+    """Return how far each label lies from the truth, mm; both labels of IN are one."""
+    off = []
+    for side in Side:
+        for code in CODES:
+            if side is Side.RIGHT and code == "IN":
+                continue
+            there = driver.placed(side, code)
+            if there is None:
+                raise GpError(f"{code} {side.word} was not labelled")
+            off.append(float(np.linalg.norm(there - driver.truth(side, code))))
+    return np.array(off)
+
+
+def without(driver: WindowDriver, seed: int, spacing: float) -> Labelled:
+    """Label a head as it was before there were first labels."""
+    hand = open_head(driver, seed, spacing)
+    for _ in range(_MOST):
+        active = driver.workspace.labels.active
+        if active.code is None:
+            break
+        hand.place(driver.truth(active.side, active.code), replace=False)
+    return Labelled(hand.done, errors_of(driver))
+
+
+def suggest(hand: Hand, library: Path) -> tuple[float, float]:
+    """Ask for first labels; return CPU seconds and the peak of memory, MB, that it took."""
+    driver = hand.driver
+    begun = cpu_seconds()
+    driver.prompts.prepare(files=[library], answers=(FOLDER, AS_THE_FILE))
+    button = driver.window.findChild(SuggestRow).button
+    hand.click(button, button.width() / 2, button.height() / 2)
+    hand.done["clicks"] += 3  # the folder, its name, and which side is left
+    driver.wait_until_idle()
+    if driver.workspace.first_labels.proposal is None:
+        raise GpError(driver.trouble(0) or "nothing was suggested")
+    usage = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return cpu_seconds() - begun, sum(usage) / 1024
+
+
+def cpu_seconds() -> float:
+    """Return the CPU seconds of this process and of those that it has ended."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(each.ru_utime + each.ru_stime for each in used)
+
+
+def with_first_labels(driver: WindowDriver, seed: int, spacing: float, library: Path) -> Labelled:
+    """Label a head that has first labels."""
+    hand = open_head(driver, seed, spacing)
+    cpu, peak = suggest(hand, library)
+    suggested = np.array(
+        [
+            np.linalg.norm(np.array(found.position) - driver.truth(side, code))
+            for side in Side
+            for code, found in driver.workspace.document.landmarks(side).suggested.items()
+            if not (side is Side.RIGHT and code == "IN")
+        ]
+    )
+    n_confirmed = 0
+    for _ in range(_MOST):
+        active = driver.workspace.labels.active
+        if active.code is None:
+            break
+        truth = driver.truth(active.side, active.code)
+        found = driver.workspace.document.landmarks(active.side).suggested.get(active.code)
+        if found is None or np.linalg.norm(np.array(found.position) - truth) > driver.voxel:
+            hand.place(truth, replace=True)
+        else:
+            hand.key("Return")
+            n_confirmed += driver.placed(active.side, active.code) is not None
+    return Labelled(hand.done, errors_of(driver), n_confirmed, suggested, cpu, peak)
+
+
+def tell(name: str, found: Labelled) -> None:
+    """Print a row."""
+    kinds = [found.done[kind] for kind in ("keys", "clicks", "notches", "strokes")]
+    middle, most = np.percentile(found.errors, [50, 90])
+    counts = "".join(f"{n:>9}" for n in (*kinds, every(found), presses(found)))
+    print(f"{name:<16}{counts}{middle:>9.3f}{most:>7.3f}{found.errors.max():>7.2f}", flush=True)
+
+
+def every(found: Labelled) -> int:
+    """Return the number of actions, each notch of the wheel one."""
+    return sum(found.done[kind] for kind in ("keys", "clicks", "notches"))
+
+
+def presses(found: Labelled) -> int:
+    """Return the number of actions, each stroke of the wheel one, however far it goes."""
+    return sum(found.done[kind] for kind in ("keys", "clicks", "strokes"))
+
+
+def make_library(folder: Path, n: int, spacing: float) -> Path:
+    """Make labelled heads, as ``gp-labeler phantom --labelled`` does, where they are not there yet."""
+    for seed in range(1, n + 1):
+        path = folder / f"phantom-{seed}.nrrd"
+        if not path.exists():
+            save_phantom(make_phantom(seed, spacing=spacing), path, labelled=True)
+    return folder
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else "")
+    parser.add_argument("--heads", type=int, nargs="+", default=[201, 202, 203], metavar="SEED")
+    parser.add_argument("--labelled", type=int, default=5, metavar="N")
+    parser.add_argument("--spacing", type=float, default=0.2)
+    parser.add_argument(
+        "--folder", type=Path, help="where scans and templates are kept; thrown away by default"
+    )
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as thrown_away:
+        folder = options.folder or Path(thrown_away)
+        os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
+        scans = folder / f"labelled-{options.labelled}-{options.spacing:g}"
+        library = make_library(scans, options.labelled, options.spacing)
+        driver = WindowDriver(folder, folder)
+        print(
+            f"{'':<16}{'keys':>9}{'clicks':>9}{'notches':>9}{'strokes':>9}{'all':>9}{'presses':>9}"
+            f"{'median':>9}{'90 %':>7}{'most':>7}"
+        )
+        for seed in options.heads:
+            report(driver, seed, options.spacing, library)
+        driver.close()
+
+
+def report(driver: WindowDriver, seed: int, spacing: float, library: Path) -> None:
+    """Print the rows of one head."""
+    started = time.monotonic()
+    bare, helped = without(driver, seed, spacing), with_first_labels(driver, seed, spacing, library)
+    tell(f"{seed} without", bare)
+    tell(f"{seed} with", helped)
+    assert helped.suggested is not None
+    within = int((helped.suggested <= driver.voxel).sum())
+    print(
+        f"{'':<16}{within} of {len(helped.suggested)} suggestions within a voxel (median "
+        f"{np.median(helped.suggested):.3f} mm, most {helped.suggested.max():.2f}), "
+        f"{helped.n_confirmed} confirmed; all actions {every(helped) / every(bare):.2f} of those without, "
+        f"presses {presses(helped) / presses(bare):.2f}; suggesting took {helped.cpu:.0f} CPU s, "
+        f"peak {helped.peak_mb:.0f} MB; {time.monotonic() - started:.0f} s",
+        flush=True,
+    )
+
+
+if __name__ == "__main__":
+    main()
