@@ -16,7 +16,7 @@ __all__ = ["make_check_library_parser", "run_check_library"]
 
 _EXAMPLE = """examples:
   gp-labeler check-library labelled/
-  gp-labeler check-library GP-0*.gpspecimen.json --json library.json
+  gp-labeler check-library GP-0*.gpspecimen.json --json library.json --pictures library.pdf
 
 Every labelled scan is predicted from the others; labels that lie far from there, or fit under each other's
 names, are named. The status is 1 where something was found.
@@ -35,6 +35,13 @@ def make_check_library_parser() -> argparse.ArgumentParser:
         "labelled", type=Path, nargs="+", metavar="LABELLED", help="labelled scans, or folders of them"
     )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found")
+    parser.add_argument(
+        "--pictures",
+        type=Path,
+        metavar="PDF|DIR",
+        help="draw each label that was found, and where it is expected: a .pdf file, or a folder for one "
+        "file each",
+    )
     add_library_options(parser)
     return parser
 
@@ -58,6 +65,7 @@ def run_check_library(arguments: Sequence[str]) -> int:
     from gp_labeler.autolabel.cross_check import check_predictions
     from gp_labeler.autolabel.registration import COARSER, engine_named
     from gp_labeler.autolabel.registration_process import HereRegistration
+    from gp_labeler.jobs.library_sheet import draw_library_check
 
     engine = engine_named(args.engine)
     if engine == "demons":
@@ -67,7 +75,8 @@ def run_check_library(arguments: Sequence[str]) -> int:
         raise GpError(f"three labelled scans or more are needed, got {len(library.scans)}")
     with protected_inputs(args.labelled), open_executor(args.workers, args.scheduler) as executor:
         prepare(library, engine, executor)
-        check = check_predictions(library.scans, library.held_out(HereRegistration(engine)))
+        predictions = library.held_out(HereRegistration(engine))
+        check = check_predictions(library.scans, predictions)
         if args.json is not None:
             content = {
                 "schema": "gp-labeler library check",
@@ -77,10 +86,13 @@ def run_check_library(arguments: Sequence[str]) -> int:
                 "findings": [finding.as_json() for finding in check.findings],
             }
             write_text(args.json, json.dumps(content, indent=1) + "\n")
+        drawn = draw_library_check(check, library.scans, predictions, args.pictures) if args.pictures else ()
     for name in check.checked:
         found = check.of(name)
         sys.stdout.write(f"{name}: {f'{len(found)} to look at' if found else 'agrees with the others'}\n")
         sys.stdout.write("".join(f"  {finding.text}\n" for finding in found))
     for name in check.unchecked:
         sys.stdout.write(f"{name}: the head was not found, so its labels were not checked\n")
+    if drawn:
+        sys.stdout.write(f"pictures: {', '.join(map(str, drawn))}\n")
     return 1 if check.findings else 0

@@ -15,23 +15,24 @@ from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.close_up import PICTURE_AXES, CloseUp
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.picture_page import (
+    PIXELS,
+    PageLayout,
+    PictureBlock,
+    PictureMark,
+    bone_picture,
+    grey_picture,
+    picture_page,
+)
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 __all__ = ["FeaturePictures", "contact_page", "feature_pictures"]
 
 _ACROSS_MM = 12.0
-_PIXELS = 150
-_COLUMNS, _ROWS = 5, 4
-_GAP, _CAPTION = 8, 50
-"""Pixels between the pictures, and above each pair for its words."""
-
-_A4_INCHES = (11.69, 8.27)
-_BONE = np.array([0.93, 0.88, 0.78])
-_PAPER, _EMPTY = 1.0, 0.94
-_MARK = "#D65A00"
+_LAYOUT = PageLayout(columns=5, rows=4, n_pictures=2)
+_LEGEND = "Left: the slice through the label. Right: bone from the {}; what hides the label is cut away."
 _WORDS = {"fair": "fair", "guess": "GUESS", "sure": "sure"}
 
 
@@ -70,14 +71,10 @@ def feature_pictures(
             yield FeaturePictures(row.code, heading, note)
             continue
         plane = row.view if row.view in ("axial", "coronal", "sagittal") else "axial"
-        near = CloseUp(volume, landmarks[row.code], _ACROSS_MM, _PIXELS)
-        grey = np.nan_to_num(
-            (near.slice(PICTURE_AXES[plane].turned(turn)) - low) / max(high - low, 1e-9)
-        ).clip(0, 1)
-        bone = near.bone(PICTURE_AXES[side.value].turned(turn), threshold)
-        tinted = np.where(bone[..., None] > 0, bone[..., None] * _BONE, _EMPTY)
-        pictures = np.concatenate([np.repeat(grey[..., None], 3, axis=2), tinted], axis=1)
-        yield FeaturePictures(row.code, heading, note, plane, pictures.astype(np.float32))
+        near = CloseUp(volume, landmarks[row.code], _ACROSS_MM, PIXELS)
+        grey = grey_picture(near.slice(PICTURE_AXES[plane].turned(turn)), low, high)
+        bone = bone_picture(near.bone(PICTURE_AXES[side.value].turned(turn), threshold))
+        yield FeaturePictures(row.code, heading, note, plane, np.concatenate([grey, bone], axis=1))
 
 
 def _turn(state: SpecimenState) -> FloatArray:
@@ -103,51 +100,27 @@ def _note(state: SpecimenState, side: Side, row: Feature) -> str:
 
 def contact_page(state: SpecimenState, side: Side, features: list[FeaturePictures], scan: str) -> Figure:
     """Lay out the pictures of one side as a page, A4 landscape."""
-    from matplotlib.figure import Figure  # here: Matplotlib loads slowly
-
-    figure = Figure(figsize=_A4_INCHES, dpi=150)
-    axes = figure.add_axes((0.02, 0.015, 0.96, 0.93))
-    width, height = 2 * _PIXELS + _GAP, _PIXELS + _CAPTION + _GAP
-    page = np.full((_ROWS * height, _COLUMNS * width, 3), _PAPER, np.float32)
-    for n, each in enumerate(features):
-        x, y = n % _COLUMNS * width, n // _COLUMNS * height + _CAPTION
-        shown = each.pictures
-        block = np.full((_PIXELS, 2 * _PIXELS, 3), _EMPTY, np.float32) if shown is None else shown
-        page[y : y + _PIXELS, x : x + 2 * _PIXELS] = block
-    axes.imshow(page, interpolation="nearest", aspect="equal")
-    axes.set_axis_off()
-    axes.set_anchor("N")
-    for n, each in enumerate(features):
-        _write(axes, each, n % _COLUMNS * width, n // _COLUMNS * height)
-    _head(figure, state, side, scan)
-    return figure
-
-
-def _write(axes: Axes, each: FeaturePictures, x: int, y: int) -> None:
-    axes.text(x, y + 20, each.heading, fontsize=7.5, fontweight="bold", color="#1b1f24")
-    note = each.note if len(each.note) <= _LONGEST else each.note[: _LONGEST - 1] + "…"
-    axes.text(x, y + 42, note, fontsize=6.5, color="#B3261E" if "GUESS" in note else "#4a525b")
-    if each.pictures is None:
-        return
-    middle = y + _CAPTION + (_PIXELS - 1) / 2
-    for column in (0, 1):
-        centre = x + column * _PIXELS + (_PIXELS - 1) / 2
-        axes.plot([centre], [middle], "o", markersize=7, markerfacecolor="none", markeredgecolor=_MARK)
-        axes.plot([centre], [middle], ".", markersize=1.6, color=_MARK)
-    axes.text(x + 4, y + _CAPTION + _PIXELS - 6, each.plane, fontsize=5.5, color="white")
-
-
-_LONGEST = 46
-_LEGEND = "Left: the slice through the label. Right: bone from the {}; what hides the label is cut away."
-
-
-def _head(figure: Figure, state: SpecimenState, side: Side, scan: str) -> None:
     n = len(state.side(side).placed)
     who = labelling_text(state.labeller, state.round) + (", blind" if state.blind else "")
-    words = f"{state.specimen}   {side.word} side"
-    figure.text(0.025, 0.965, words, fontsize=12, fontweight="bold", color="#1b1f24")
     about = (
         f"{n} of {len(FEATURES)} placed   ·   {who}   ·   {scan}   ·   pictures are {_ACROSS_MM:g} mm wide"
     )
-    figure.text(0.025, 0.02, _LEGEND.format(side.word), fontsize=7.5, color="#4a525b")
-    figure.text(0.975, 0.965, about, fontsize=7.5, color="#4a525b", ha="right")
+    return picture_page(
+        [_block(each) for each in features],
+        _LAYOUT,
+        title=f"{state.specimen}   {side.word} side",
+        about=about,
+        legend=_LEGEND.format(side.word),
+    )
+
+
+def _block(each: FeaturePictures) -> PictureBlock:
+    middle = (PIXELS - 1) / 2
+    return PictureBlock(
+        each.heading,
+        each.note,
+        each.pictures,
+        tuple(PictureMark(n, middle, middle) for n in range(_LAYOUT.n_pictures)),
+        (each.plane,),
+        alarming="GUESS" in each.note,
+    )

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gp_core.disk import atomic_file
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_file import SUFFIX, read_specimen
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.jobs.contact_page import contact_page, feature_pictures
 from gp_labeler.jobs.loading import load_modules
+from gp_labeler.jobs.picture_page import pdf_file
 from gp_labeler.jobs.runner import Progress
 from gp_labeler.jobs.scan import MakeDemo, phantom_seed
 
@@ -113,7 +111,7 @@ class MakeContactSheets:
 
     def _in_one(self, progress: Progress) -> tuple[tuple[Path, ...], int, tuple[str, ...]]:
         problems: list[str] = []
-        with _pdf(self.where) as pages:
+        with pdf_file(self.where) as pages:
             n_made = sum(self._try(n, pages, progress, problems) for n in range(len(self.files)))
             _require(n_made, problems)
         return (self.where,), n_made, tuple(problems)
@@ -124,7 +122,7 @@ class MakeContactSheets:
         for n, file in enumerate(self.files):
             target = self.where / contact_sheet_name(file.name.removesuffix(SUFFIX))
             try:
-                with _pdf(target) as pages:
+                with pdf_file(target) as pages:
                     if not self._try(n, pages, progress, problems):
                         raise _NothingMadeError
             except _NothingMadeError:
@@ -171,16 +169,3 @@ class _NothingMadeError(Exception):
 def _require(n_made: int, problems: list[str]) -> None:
     if not n_made:
         raise GpError(f"no contact sheet could be made. {' '.join(problems[:3])}")
-
-
-@contextmanager
-def _pdf(target: Path) -> Iterator[PdfPages]:
-    """Write a PDF page by page, and put it in its place once it is whole."""
-    from matplotlib.backends.backend_pdf import PdfPages
-
-    try:
-        target.parent.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GpError(f"cannot be made ({error.strerror})", file=target.parent) from None
-    with atomic_file(target) as draft, PdfPages(draft) as pages:
-        yield pages

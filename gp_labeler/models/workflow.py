@@ -163,7 +163,7 @@ def click_text(state: SpecimenState, active: Active) -> str:
     if landmark.locked:
         return f"{point} is locked"
     if landmark.suggestion is not None:
-        return f"{point} is suggested · press Enter to confirm it, or drag or re-place it to correct it"
+        return f"{point} is suggested · press Enter to confirm it, or drag it or Ctrl+click to correct it"
     if landmark.position is not None:
         return (
             f"{point} is placed; a click does not move it. Drag it, use the arrow keys, or Shift+P and click"

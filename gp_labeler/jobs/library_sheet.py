@@ -1,0 +1,225 @@
+"""What the check of a library found, as pictures: each label, and where the other scans expect it, as PDF."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.labels import parse_label
+from gp_core.validation import FloatArray
+from gp_labeler.autolabel.confidence import centre_of
+from gp_labeler.autolabel.cross_check import LibraryCheck, LibraryFinding
+from gp_labeler.autolabel.labelled_scan import LabelledScan, side_and_code
+from gp_labeler.autolabel.prediction import Prediction
+from gp_labeler.imaging.close_up import PICTURE_AXES, CloseUp
+from gp_labeler.imaging.threshold import propose_threshold
+from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.picture_page import (
+    PIXELS,
+    PageLayout,
+    PictureBlock,
+    bone_picture,
+    grey_picture,
+    marked,
+    pdf_file,
+    picture_page,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+__all__ = ["draw_library_check", "finding_blocks", "library_sheet_name"]
+
+_LAYOUT = PageLayout(columns=3, rows=4, n_pictures=3)
+_LEAST_MM, _MOST_MM = 12.0, 60.0
+_AROUND = 1.6
+"""Width of a picture, as so many times the distance between label and expected place."""
+
+_WORST = 4
+"""Labels that are shown where a finding concerns all."""
+
+_LEGEND = (
+    "Ring: the label. Diamond: where the other scans expect it; faint where it lies off the slice. Left: the "
+    "slice through the label. Middle: through the expected place. Right: bone, cut away before the label."
+)
+
+
+@dataclass(frozen=True, eq=False)
+class _Place:
+    """A label, and where the other scans expect it."""
+
+    name: str
+    label: FloatArray
+    expected: FloatArray
+
+    @property
+    def distance(self) -> float:
+        return float(np.linalg.norm(self.label - self.expected))
+
+
+def library_sheet_name(specimen: str) -> str:
+    """Return the name of the file of one specimen."""
+    return f"{specimen}_check.pdf"
+
+
+def draw_library_check(
+    check: LibraryCheck,
+    scans: Sequence[LabelledScan],
+    predictions: Mapping[str, Prediction],
+    where: Path,
+    tell: Callable[[str], object] = lambda name: None,
+) -> tuple[Path, ...]:
+    """Draw what was found; scans are opened one at a time.
+
+    Parameters
+    ----------
+    check : LibraryCheck
+    scans : sequence of LabelledScan
+    predictions : mapping of str to Prediction
+        Each scan predicted from the others, by name.
+    where : Path
+        A ``.pdf`` file for all specimens, or a folder for one file each.
+    tell : callable, optional
+        Told the name of each specimen before its scan is opened.
+
+    Returns
+    -------
+    tuple of Path
+        What was written; nothing where nothing was found.
+
+    Raises
+    ------
+    GpError
+        A scan cannot be read, or a file cannot be written.
+    """
+    wrong = [scan for scan in scans if check.of(scan.name)]
+    if not wrong:
+        return ()
+    together = where.suffix.lower() == ".pdf"
+    files = [where] if together else [where / library_sheet_name(scan.name) for scan in wrong]
+    for n, file in enumerate(files):
+        with pdf_file(file) as pages:
+            for scan in wrong if together else [wrong[n]]:
+                tell(scan.name)
+                for page in _pages(scan, check.of(scan.name), predictions[scan.name]):
+                    pages.savefig(page)  # type: ignore[no-untyped-call]
+    return tuple(files)
+
+
+def _pages(
+    scan: LabelledScan, findings: Sequence[LibraryFinding], prediction: Prediction
+) -> Iterator[Figure]:
+    volume = scan.load()
+    blocks = finding_blocks(scan, findings, prediction, volume, propose_threshold(volume))
+    each_page = _LAYOUT.columns * _LAYOUT.rows
+    many = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
+    for first in range(0, len(blocks), each_page):
+        yield picture_page(
+            blocks[first : first + each_page],
+            _LAYOUT,
+            title=f"{scan.name}   labels that the other scans contradict",
+            about=f"{many}   ·   {volume.name}   ·   views along the axes of the scan",
+            legend=_LEGEND,
+        )
+
+
+def finding_blocks(
+    scan: LabelledScan,
+    findings: Sequence[LibraryFinding],
+    prediction: Prediction,
+    volume: Volume,
+    threshold: float,
+) -> list[PictureBlock]:
+    """Return the pictures of all labels that are named, or of the worst where a finding concerns all.
+
+    Parameters
+    ----------
+    scan : LabelledScan
+    findings : sequence of LibraryFinding
+        Of this scan.
+    prediction : Prediction
+        From the other scans.
+    volume : Volume
+        The scan itself.
+    threshold : float
+        Where its bone begins.
+    """
+    places = {
+        name: _Place(name, scan.points[name], centre_of(prediction.of(name)))
+        for name in prediction.names
+        if name in scan.points
+    }
+    middle = float(np.mean(scan.array[:, 0]))
+    blocks = []
+    for finding in findings:
+        worst = sorted(places, key=lambda name: -places[name].distance)[:_WORST]
+        for name in finding.names or worst:
+            side = _side_of(places[name], middle)
+            blocks.append(_block(places[name], side, _note(finding, places[name]), volume, threshold))
+    return blocks
+
+
+def _note(finding: LibraryFinding, place: _Place) -> str:
+    others = " and ".join(_short(name) for name in finding.names if name != place.name)
+    kind = {
+        "exchanged": f"exchanged with {others}?",
+        "sides exchanged": "left and right exchanged?",
+        "other scan": "labels of another scan?",
+    }.get(finding.kind, f"usually {finding.expected:.2f} mm")
+    return f"{place.distance:.2f} mm from where it is expected · {kind}"
+
+
+def _heading(name: str) -> str:
+    known = side_and_code(name)
+    return name if known is None else f"{_short(name)}  {feature(known[1]).name}"
+
+
+def _short(name: str) -> str:
+    """Return a label's name with its side in words, such as ``RWA left``."""
+    known = side_and_code(name)
+    return name if known is None or feature(known[1]).shared else f"{known[1]} {known[0].word}"
+
+
+def _side_of(place: _Place, middle: float) -> Side:
+    """Return from which side a label is looked at: as its name says, else where it lies."""
+    said = parse_label(place.name).side
+    return said or (Side.LEFT if place.label[0] >= middle else Side.RIGHT)
+
+
+def _plane_of(name: str) -> str:
+    known = side_and_code(name)
+    view = "axial" if known is None else feature(known[1]).view
+    return view if view in ("axial", "coronal", "sagittal") else "axial"
+
+
+def _block(place: _Place, side: Side, note: str, volume: Volume, threshold: float) -> PictureBlock:
+    across = float(np.clip(_AROUND * place.distance, _LEAST_MM, _MOST_MM))
+    plane = _plane_of(place.name)
+    low, high = volume.intensity_range
+    pictures, marks = [], []
+    views = ((plane, place.label), (plane, place.expected), (side.value, place.label))
+    for n, (look, through) in enumerate(views):
+        axes = PICTURE_AXES[look]
+        middle = (place.label + place.expected) / 2
+        centre = middle + axes.away * float((through - middle) @ axes.away)
+        near = CloseUp(volume, centre, across, PIXELS)
+        is_slice = n < 2
+        picture = (
+            grey_picture(near.slice(axes), low, high)
+            if is_slice
+            else bone_picture(near.bone(axes, threshold))
+        )
+        pictures.append(picture)
+        thick = min(volume.spacing)
+        for mark, at in (("label", place.label), ("expected", place.expected)):
+            off = abs(float((at - centre) @ axes.away))
+            marks.append(marked(n, at, centre, axes, across, mark, faint=is_slice and off > thick))
+    captions = (f"{plane}, label", f"{plane}, expected", f"{PICTURE_AXES[side.value].name}, {across:.0f} mm")
+    return PictureBlock(
+        _heading(place.name), note, np.concatenate(pictures, axis=1), tuple(marks), captions, alarming=True
+    )
