@@ -26,6 +26,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
         generate.assemble(folder)
         sys.modules.pop("generate")
         sys.modules.pop("landmark_atlas")
+        sys.modules.pop("pictures")
     return folder
 
 
@@ -56,16 +57,20 @@ def test_every_feature_has_a_page_from_the_one_table(source: Path) -> None:
     assert "never placed by hand" in pages["CO"]
 
 
-def test_the_pictures_of_the_features_are_drawn_by_a_script_that_is_valid(
-    monkeypatch: pytest.MonkeyPatch,
+def test_every_picture_is_drawn_by_a_script_that_is_valid(
+    source: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.syspath_prepend(_ROOT / "tools" / "site")
-    import landmark_atlas
+    import pictures
 
-    steps = list(landmark_atlas.script())
-    make_script(steps, name="features")
-    drawn = [step["path"] for step in steps if step["do"] == "screenshot"]
-    assert sorted(drawn) == sorted(f"{code}.png" for code in gp_core.CODES)
+    steps = list(pictures.script())
+    make_script(steps, name="pictures")
+    drawn = {step["path"] for step in steps if step["do"] == "screenshot"}
+    assert {f"reference/features/{code}.png" for code in gp_core.CODES} <= drawn
+    asked = {name for page in (_ROOT / "docs").rglob("*.md") for name in pictures.wanted(page.read_text())}
+    assert asked == pictures.SCREENSHOTS.keys()
+    assert {f"pictures/{name}.png" for name in asked} <= drawn
+    assert "(/pictures/tracker.png)" in (source / "tutorials" / "tracker.md").read_text()
 
 
 def test_every_page_is_in_the_navigation(source: Path) -> None:

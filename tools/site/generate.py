@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import landmark_atlas
+import pictures
 
 import gp_core
 from gp_core.cli.entry import make_parser as core_parser
@@ -160,6 +161,8 @@ def command_pages() -> Iterator[tuple[str, str]]:
 def assemble(folder: Path) -> None:
     """Write the source of the site into a folder."""
     shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
+    for page in folder.rglob("*.md"):
+        page.write_text(pictures.with_screenshots(page.read_text(encoding="utf-8")), encoding="utf-8")
     for path, text in [*first_pages(), *python_pages(), *command_pages(), *landmark_atlas.pages()]:
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")

@@ -6,11 +6,7 @@ a display, over the synthetic head: no page is written by hand, and no picture i
 
 from __future__ import annotations
 
-import json
-import subprocess
-import sys
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
@@ -20,7 +16,6 @@ from gp_labeler.models.anatomical_planes import ANATOMICAL_PLANES, FEATURE_PLANE
 
 FOLDER = "reference/features"
 SIZE = (1400, 1000)
-SPACING_MM = 0.2
 ZOOM = 1.5
 N_NEAREST = 4
 
@@ -115,25 +110,6 @@ def nearest(row: Feature) -> Iterator[str]:
         yield f"| {name} | {mean[here, other]:.1f} | {sd[here, other]:.2f} |"
 
 
-def draw(folder: Path, work: Path) -> None:
-    """Draw the picture of each feature into a folder, by the window without a display.
-
-    Parameters
-    ----------
-    folder : Path
-        Where the pages are.
-    work : Path
-        For the synthetic head and the script.
-    """
-    work.mkdir(parents=True, exist_ok=True)
-    program = [sys.executable, "-m", "gp_labeler"]
-    head = ["phantom", "-o", "head.nrrd", "--spacing", f"{SPACING_MM}", "--labelled"]
-    subprocess.run([*program, *head], cwd=work, check=True, stdout=subprocess.DEVNULL)
-    (work / "features.json").write_text(json.dumps(list(script())), encoding="utf-8")
-    drawn = ["--offscreen", "features.json", "--output", str(folder.resolve())]
-    subprocess.run([*program, *drawn], cwd=work, check=True, stdout=subprocess.DEVNULL)
-
-
 def script() -> Iterator[dict[str, object]]:
     """Yield the steps that draw all pictures; features that need no cut come first, since a cut stays."""
     yield {"do": "open", "path": "head.nrrd"}
@@ -153,4 +129,4 @@ def steps(row: Feature) -> Iterator[dict[str, object]]:
     if row.code not in FROM_OUTSIDE:
         yield {"do": "action", "id": "view.cut_open"}
     yield {"do": "view", "go_to": f"{row.code} L", "zoom": ZOOM}
-    yield {"do": "screenshot", "path": f"{row.code}.png", "what": "views", "size": SIZE}
+    yield {"do": "screenshot", "path": f"{FOLDER}/{row.code}.png", "what": "views", "size": SIZE}
