@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import mmap
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from typing import Any
@@ -13,11 +14,24 @@ from numpy.typing import NDArray
 from gp_core.errors import GeometryError
 from gp_labeler.imaging.fill import Fill
 from gp_labeler.imaging.mapped_file import MappedFile
+from gp_labeler.imaging.memory import available_memory
+from gp_labeler.imaging.progress import Report
 
 __all__ = ["ArrayVoxels", "GreyArray", "MappedVoxels", "Voxels"]
 
 GreyArray = NDArray[Any]
 _Index = NDArray[np.intp]
+
+_MOST_READ = 4e9
+"""Bytes of a file that one slice may read."""
+
+_MOST_AT_ONCE = 1 << 28
+"""Bytes that a slice may read for the first time while the window waits for it."""
+
+_GLANCE = 1 << 22
+"""Bytes that are read in place of more: a thousand pages, from all over the file."""
+
+_LAYERS_AT_A_TIME = 16
 
 
 class Voxels(ABC):
@@ -67,6 +81,29 @@ class Voxels(ABC):
     def uncopied(self) -> GreyArray | None:
         """Return all of them as one C-contiguous (z, y, x) array, or None where that would need a copy."""
         return None
+
+    def rows_apart(self, x: int, *, at_once: bool = False) -> int:
+        """Return every how many-th row and layer a slice of one x takes: it has one voxel of each row.
+
+        To read a voxel of a file is to read its page: in a scan that is larger than the memory, such a slice
+        would read it all.
+
+        Parameters
+        ----------
+        x : int
+            Column of voxels.
+        at_once : bool
+            Where much of the file is still to be read for it, take so few rows that nobody waits for them.
+        """
+        return 1
+
+    def is_unread(self, x: int) -> bool:
+        """Whether a slice of one x takes long: much is to be read for it, and was not by `read_ahead`."""
+        return False
+
+    def read_ahead(self, x: int, report: Report) -> None:
+        """Read what a slice of one x needs, so that the next ones there come at once."""
+        report(1.0)
 
     def whole(self) -> GreyArray:
         """Return all of them as one (z, y, x) array."""
@@ -163,6 +200,10 @@ class MappedVoxels(Voxels):
     ) -> None:
         self._stored, self._fills, self._below, self._file = stored, fills, below, file
         self.shape, self.dtype = stored.shape, stored.dtype.newbyteorder("=")
+        nz, ny, _ = stored.shape
+        self._slice_bytes = min(self.nbytes, nz * ny * mmap.PAGESIZE)
+        self._apart = _apart(self._slice_bytes, min(_MOST_READ, available_memory() / 2))
+        self._pages_read: set[int] = set()
 
     @property
     def in_file(self) -> bool:
@@ -178,6 +219,26 @@ class MappedVoxels(Voxels):
         """Return the map, where its values are shown as they are stored, but for some that are not finite."""
         as_they_are = all(np.isnan(fill.value) for fill in self._fills) and self._stored.dtype.isnative
         return self._stored if as_they_are and self._stored.flags.c_contiguous else None
+
+    def rows_apart(self, x: int, *, at_once: bool = False) -> int:
+        """Return every how many-th row and layer a slice of one x takes."""
+        return _apart(self._slice_bytes, _GLANCE) if at_once and self.is_unread(x) else self._apart
+
+    def is_unread(self, x: int) -> bool:
+        """Whether a slice of one x takes long."""
+        return self._slice_bytes > _MOST_AT_ONCE and self._page_of(x) not in self._pages_read
+
+    def read_ahead(self, x: int, report: Report) -> None:
+        """Read what a slice of one x needs; the interpreter is free while NumPy copies."""
+        n, step = _LAYERS_AT_A_TIME * self._apart, slice(None, None, self._apart)
+        for k in range(0, self.shape[0], n):
+            report(k / self.shape[0])
+            self._stored[k : k + n, :, x][step, step].copy()
+        self._pages_read.add(self._page_of(x))
+
+    def _page_of(self, x: int) -> int:
+        """Return in which page of its row a voxel lies: whoever reads it has its neighbours, too."""
+        return x * self.dtype.itemsize // mmap.PAGESIZE
 
     def read(self, k: slice, j: slice, i: slice) -> GreyArray:
         """Return the values of a box: a view of the map where nothing has to be changed."""
@@ -197,3 +258,8 @@ class MappedVoxels(Voxels):
             return native
         nothing = np.logical_or.reduce([fill.where(native) for fill in fills])
         return np.where(nothing, self.dtype.type(self._below), native)
+
+
+def _apart(n_bytes: float, most: float) -> int:
+    """Return every how many-th row and layer is read, where all of them are so many bytes."""
+    return max(1, math.ceil(math.sqrt(n_bytes / most)))

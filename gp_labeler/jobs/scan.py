@@ -17,7 +17,16 @@ from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
-__all__ = ["CheckScan", "Demo", "InspectScan", "MakeDemo", "ProposeThreshold", "ReadScan", "phantom_seed"]
+__all__ = [
+    "CheckScan",
+    "Demo",
+    "InspectScan",
+    "MakeDemo",
+    "ProposeThreshold",
+    "ReadScan",
+    "ReadSlice",
+    "phantom_seed",
+]
 
 
 @dataclass(frozen=True)
@@ -70,6 +79,24 @@ class CheckScan:
     def run(self, progress: Progress) -> str:
         """Read all of it once."""
         return self.volume.find_checksum(Report(progress, progress.cancelled))
+
+
+@dataclass(frozen=True)
+class ReadSlice:
+    """Read what slices of one x need of a scan that stays in its file, all over which they lie."""
+
+    volume: Volume
+    x: int
+
+    @property
+    def title(self) -> str:
+        """What the user reads."""
+        return f"Reading a slice of {self.volume.name}"
+
+    def run(self, progress: Progress) -> None:
+        """Read it."""
+        self.volume.voxels.read_ahead(self.x, Report(progress, progress.cancelled))
+        self.volume.check()
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ from gp_labeler.jobs.scan import (
     MakeDemo,
     ProposeThreshold,
     ReadScan,
+    ReadSlice,
     phantom_seed,
 )
 from gp_labeler.models.messages import Messages
@@ -39,6 +40,7 @@ from gp_labeler.models.view import ViewModel
 __all__ = ["ScanModel"]
 
 _CHECKING = "check scan"
+_READING_SLICE = "read slice"
 _PROPOSING = "mesh threshold"
 """Key of the job that looks for a threshold: the first part of making a mesh."""
 
@@ -66,6 +68,8 @@ class ScanModel:
     """The threshold in effect, set or proposed; None while there is none."""
     threshold_previewed = Signal(object)
     """A threshold that is being tried out on the slices; None when that is over."""
+    slice_read = Signal()
+    """Slices that were shown coarsely can be shown whole; see `read_slice`."""
     import_asked = Signal(object)
     """An `ImportPlan` that needs answers: change its options, then `read` it."""
     differs = Signal(object, object)
@@ -204,7 +208,7 @@ class ScanModel:
     def _on_reset(self) -> None:
         self.truth = self._proposed = self._unchecked = None
         for task in self._jobs.running:
-            if task.key in (_PROPOSING, _CHECKING):
+            if task.key in (_PROPOSING, _CHECKING, _READING_SLICE):
                 task.cancel()
 
     def _on_loaded(self, _: tuple[str, ...]) -> None:
@@ -252,6 +256,12 @@ class ScanModel:
         self.opened.emit(volume)
 
     # A scan that stays in its file
+
+    def read_slice(self, x: int) -> None:
+        """Read in the background what slices of one x need, unless that is being done; `slice_read` tells."""
+        reading = (task for task in self._jobs.running if task.key == _READING_SLICE)
+        if self.volume is not None and all(task.progress.cancelled() for task in reading):
+            self._jobs.submit(ReadSlice(self.volume, x), lambda _: self.slice_read.emit(), key=_READING_SLICE)
 
     def _on_job(self, _: object) -> None:
         """Check a new scan as soon as nothing else is to be done: it is read as a whole for that."""

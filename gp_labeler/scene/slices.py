@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import mmap
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
@@ -16,7 +15,6 @@ from vtkmodules.vtkCommonTransforms import vtkMatrixToLinearTransform
 from vtkmodules.vtkImagingCore import vtkImageReslice
 
 from gp_core.validation import FloatArray
-from gp_labeler.imaging.disk_cache import available_memory
 from gp_labeler.imaging.slab import Slab, reduced
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.threshold import surface_level
@@ -27,9 +25,6 @@ from gp_labeler.scene.oblique_slab import MOST_BYTES, ObliqueSlab, PixelGrid, pi
 from gp_labeler.scene.window_level import WindowLevel
 
 __all__ = ["SliceImage", "VolumeSlicer"]
-
-_MOST_READ = 4e9
-"""Bytes of a file that one slice may read."""
 
 _STRAIGHT = 1e-4
 """Off-axis part of a direction below which voxel rows run along a plane: 0.1 voxel in a thousand."""
@@ -57,6 +52,8 @@ class SliceImage:
         Coordinates right and down, mm, of the centre of pixel [0, 0].
     step : (2,) float array
         Size of a pixel, right and down, mm.
+    unread : int, optional
+        Of a coarse picture that was made at once: the x to give to `Voxels.read_ahead` for a whole one.
     """
 
     values: NDArray[Any]
@@ -64,6 +61,7 @@ class SliceImage:
     position: float
     origin: FloatArray
     step: FloatArray
+    unread: int | None = None
 
     @property
     def edges(self) -> FloatArray:
@@ -169,7 +167,13 @@ class VolumeSlicer:
         return slab.n_layers(layer) * layer
 
     def image(
-        self, plane: SlicePlane, position: float, step: float | None = None, slab: Slab | None = None
+        self,
+        plane: SlicePlane,
+        position: float,
+        step: float | None = None,
+        slab: Slab | None = None,
+        *,
+        at_once: bool = False,
     ) -> SliceImage:
         """Return the slice nearest to a position along the plane's normal, mm.
 
@@ -182,11 +186,14 @@ class VolumeSlicer:
             How fine an oblique slice is sampled, mm; by default as fine as the voxels. See `sampling_step`.
         slab : Slab, optional
             What to take of a slab around the slice, in place of the slice; display only.
+        at_once : bool
+            Do not keep a window waiting: where much of a file must be read first, the picture is coarse, and
+            its `unread` says what to read.
         """
         there, grid_axes = self.snap(plane, position), self._grid(plane).axes
         if grid_axes is None:
             return self._resampled(plane, there, step or min(self.volume.spacing), slab)
-        return self._voxels(plane, there, grid_axes, slab)
+        return self._voxels(plane, there, grid_axes, slab, at_once)
 
     def forget_slabs(self) -> None:
         """Let go of the layers of slabs that were shown."""
@@ -223,48 +230,41 @@ class VolumeSlicer:
         return self._grids[plane]
 
     def _voxels(
-        self, plane: SlicePlane, position: float, grid_axes: tuple[int, int, int], slab: Slab | None
+        self,
+        plane: SlicePlane,
+        position: float,
+        grid_axes: tuple[int, int, int],
+        slab: Slab | None,
+        at_once: bool,
     ) -> SliceImage:
         """Take the voxels as they are, turned and flipped for the screen."""
         volume, (across, right, down) = self.volume, grid_axes
         index = volume.scan_to_voxel(plane.moved_to(self.corners.mean(axis=0), position)[None])
         index[0, across] = np.rint(index[0, across])
+        layer, voxels = int(index[0, across]), volume.voxels
+        is_glance = at_once and across == 0 and voxels.is_unread(layer)
+        apart = voxels.rows_apart(layer, at_once=at_once) if across == 0 else 1
         flips = []
         for axis, direction in ((down, plane.down), (right, plane.right)):
             forward = volume.direction[:, axis] @ direction > 0
             flips.append(1 if forward else -1)
-            index[0, axis] = 0 if forward else volume.size[axis] - 1
-        cut = self._cut(plane, across, int(index[0, across]), slab)
-        apart = self._rows_apart(across)
-        down_by, right_by = apart * flips[0], apart * flips[1]
-        values = (cut if down > right else cut.T)[::down_by, ::right_by]  # its axes are z, y, x
+            index[0, axis] = 0 if forward else (volume.size[axis] - 1) // apart * apart
+        cut = self._cut(plane, across, layer, None if is_glance else slab, apart)
+        values = (cut if down > right else cut.T)[:: flips[0], :: flips[1]]  # its axes are z, y, x
         if cut.strides[-1] > cut.itemsize:  # single voxels all over the scan
             values = np.ascontiguousarray(values)  # read once, and not again for each use
         corner = volume.voxel_to_scan(index)
         step = apart * np.array([volume.spacing[right], volume.spacing[down]])
-        return SliceImage(values, plane, plane.position_of(corner), plane.flat(corner)[0], step)
+        unread = layer if is_glance else None
+        return SliceImage(values, plane, plane.position_of(corner), plane.flat(corner)[0], step, unread)
 
-    def _rows_apart(self, across: int) -> int:
-        """Return every how many-th row and layer a slice shows that takes one voxel of each row.
-
-        To read a voxel of a file is to read its page: in a scan that is larger than the memory, such a slice
-        would read it all, and keep the window waiting.
-        """
-        voxels = self.volume.voxels
-        if across != 0 or not voxels.in_file:
-            return 1
-        nz, ny, _ = voxels.shape
-        n_bytes = min(voxels.nbytes, nz * ny * mmap.PAGESIZE)
-        return math.ceil(math.sqrt(n_bytes / min(_MOST_READ, available_memory() / 2)))
-
-    def _cut(self, plane: SlicePlane, across: int, index: int, slab: Slab | None) -> NDArray[Any]:
+    def _cut(self, plane: SlicePlane, across: int, index: int, slab: Slab | None, apart: int) -> NDArray[Any]:
         """Return one layer of voxels, or what a slab shows of those around it."""
         half = 0 if slab is None else slab.n_layers(self.step(plane)) // 2
-        if slab is None or not half:
-            return self.volume.voxels.plane(across, index)
-        kji = [slice(None)] * 3
+        kji = [slice(None, None, apart)] * 3
         kji[2 - across] = slice(max(index - half, 0), index + half + 1)
-        return reduced(self.volume.voxels.read(*kji), 2 - across, slab.mode)
+        layers = self.volume.voxels.read(*kji)
+        return reduced(layers, 2 - across, slab.mode) if slab and half else layers.squeeze(2 - across)
 
     def _resampled(
         self, plane: SlicePlane, position: float, step: float, slab: Slab | None = None

@@ -25,6 +25,7 @@ from qtpy.QtWidgets import QWidget
 from gp_core.validation import FloatArray
 from gp_labeler.document.state import How
 from gp_labeler.imaging.mesh import SurfaceHit
+from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.models.interaction import PointDrag
 from gp_labeler.models.view import Cut
 from gp_labeler.models.workspace import Workspace
@@ -33,7 +34,7 @@ from gp_labeler.scene.gestures import Button, Modifier
 from gp_labeler.scene.marks import GlyphSize
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.scene3d import Scene3D
-from gp_labeler.scene.slices import VolumeSlicer
+from gp_labeler.scene.slices import SliceImage, VolumeSlicer
 from gp_labeler.views.canvas import Canvas
 from gp_labeler.views.canvas_choice import make_canvas
 from gp_labeler.views.drawn import (
@@ -255,6 +256,7 @@ class SceneView(QWidget):
         follow(self, workspace.measure.pointed, self._repaint_pointer)
         follow(self, workspace.view.crosshair_changed, self._on_crosshair)
         follow(self, workspace.view.planes_changed, self._on_planes)
+        follow(self, workspace.scan.slice_read, self._show_slices)
         follow(self, workspace.view.point_shown, self.go_to)
         follow(self, workspace.interaction.dragged, self._on_dragged)
         follow(self, workspace.view.changed, self._on_view_changed)
@@ -290,11 +292,18 @@ class SceneView(QWidget):
             self._source = None
         elif self._source is None or self._source.volume is not volume:
             self._source = VolumeSlicer(volume)
-        source, middle = self._source, self._workspace.view.crosshair
-        planes = self._workspace.view.planes.values() if source else ()
-        images = [source.image(plane, plane.position_of(middle)) for plane in planes] if source else []
-        colours = [Plane(name).colour for name in self._workspace.view.planes] if source else []
+        planes = self._workspace.view.planes if self._source is not None else {}
+        images = [self._slice_of(plane) for plane in planes.values()]
+        colours = [Plane(name).colour for name in planes]
         self.scene.slices.show(images, window_level_of(self._workspace), colours)
+
+    def _slice_of(self, plane: SlicePlane) -> SliceImage:
+        """Return the slice through the crosshair, coarse where much of a file is to be read for it first."""
+        assert self._source is not None
+        image = self._source.image(plane, plane.position_of(self._workspace.view.crosshair), at_once=True)
+        if image.unread is not None:
+            self._workspace.scan.read_slice(image.unread)
+        return image
 
     def _on_crosshair(self, position: FloatArray) -> None:
         self._show_slices()

@@ -94,6 +94,7 @@ class SlicePainter:
         self._ground: tuple[SliceViewport, VolumeSlicer, object, QPixmap] | None = None
         self._points: SlicePoints | None = None
         follow(view, workspace.scan.threshold_previewed, self._on_preview)
+        follow(view, workspace.scan.slice_read, self._on_slice_read)
 
     @property
     def points(self) -> SlicePoints:
@@ -162,6 +163,12 @@ class SlicePainter:
     def _on_preview(self, threshold: float | None) -> None:
         self._preview = threshold
 
+    def _on_slice_read(self) -> None:
+        """Cut a slice again that is shown coarsely."""
+        if self._slice is not None and self._slice.unread is not None:
+            self._slice = self._where = self._ground = None
+            self._view.update()
+
     def _paint_ground(
         self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport, ratio: float
     ) -> None:
@@ -186,8 +193,10 @@ class SlicePainter:
         position = source.snap(shown.plane, shown.position)
         where = (source, shown.plane, position, source.sampling_step(shown.plane, shown.mm_per_pixel))
         if self._slice is None or self._slice_is_old(where):
-            self._slice = source.image(*where[1:])
+            self._slice = source.image(*where[1:], at_once=True)
             self._where = where
+            if self._slice.unread is not None:
+                self._workspace.scan.read_slice(self._slice.unread)
             self._picture = self._outline = self._filtered = None
         window, state = self._view.window_level(), self._workspace.view.state
         wanted = (window, self._preview, state.slab, state.denoise)
@@ -203,7 +212,7 @@ class SlicePainter:
         assert self._slice is not None
         if state.slab is None:
             where[0].forget_slabs()
-        if wanted == (None, None) or self._preview is not None:
+        if wanted == (None, None) or self._preview is not None or self._slice.unread is not None:
             return self._slice
         if self._filtered is None or self._filtered[0] != wanted:
             source, plane, position, step = where
@@ -220,6 +229,9 @@ class SlicePainter:
     def _paint_outline(self, painter: QPainter, shown: SliceViewport, ratio: float) -> None:
         threshold = self._workspace.scan.threshold if self._preview is None else self._preview
         if threshold is None or self._slice is None or not self._workspace.view.state.outline_visible:
+            return
+        if self._slice.unread is not None:  # so few voxels have no edge that is worth showing
+            self._outline = None
             return
         if self._outline is None or self._outline[0] != threshold:
             self._outline = (threshold, segments_path(self._slice.outline(threshold)))

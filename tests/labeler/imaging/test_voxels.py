@@ -14,15 +14,15 @@ import SimpleITK
 import tifffile
 
 from gp_core.errors import GpError
-from gp_labeler.imaging import readers
+from gp_labeler.imaging import readers, voxels
 from gp_labeler.imaging.bone_distance import bone_distances
 from gp_labeler.imaging.histogram import histogram_of
+from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers import VolumeError, read_volume
 from gp_labeler.imaging.surface import extract_isosurface
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.imaging.voxels import ArrayVoxels, GreyArray, MappedVoxels
-from gp_labeler.scene import slices
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scene.slices import VolumeSlicer
 
@@ -265,7 +265,8 @@ def test_a_slice_of_a_scan_larger_than_the_memory_reads_few_of_its_rows(
         plane: VolumeSlicer(volume).image(plane.in_scan, float(middle @ plane.in_scan.normal))
         for plane in Plane
     }
-    monkeypatch.setattr(slices, "_MOST_READ", array.nbytes / 4)
+    monkeypatch.setattr(voxels, "_MOST_READ", array.nbytes / 4)
+    volume = read_volume(volume.path, mapped=True)
     for plane, before in whole.items():
         image = VolumeSlicer(volume).image(plane.in_scan, float(middle @ plane.in_scan.normal))
         if plane is Plane.SAGITTAL:
@@ -274,6 +275,31 @@ def test_a_slice_of_a_scan_larger_than_the_memory_reads_few_of_its_rows(
         else:
             np.testing.assert_array_equal(image.values, before.values)
         np.testing.assert_allclose(image.origin, before.origin)
+
+
+def test_a_slice_that_takes_long_is_coarse_at_first_and_whole_once_it_was_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    array = ball("int16")  # some of it was not measured: whole slices are looked through for that
+    monkeypatch.setattr(voxels, "_MOST_AT_ONCE", 1)
+    monkeypatch.setattr(voxels, "_GLANCE", array.nbytes / 25)
+    volume = read_volume(written(tmp_path / "ball.nrrd", array), mapped=True)
+    slicer, middle = VolumeSlicer(volume), volume.extent.mean(axis=0)
+    planes = {plane: (plane.in_scan, float(middle @ plane.in_scan.normal)) for plane in Plane}
+    whole = {plane: slicer.image(*where) for plane, where in planes.items()}
+    first = {plane: slicer.image(*where, at_once=True) for plane, where in planes.items()}
+    assert [plane for plane, image in first.items() if image.unread is not None] == [Plane.SAGITTAL]
+    coarse, fine = first[Plane.SAGITTAL], whole[Plane.SAGITTAL]
+    assert coarse.values.size < fine.values.size / 16
+    at = fine.plane.scan(coarse.origin + coarse.step * np.indices((5, 5)).T.reshape(-1, 2), fine.position)
+    np.testing.assert_array_equal(volume.values_at(at).reshape(5, 5), coarse.values[:5, :5])
+    with pytest.raises(Cancelled):
+        volume.voxels.read_ahead(coarse.unread, Report(None, lambda: True))
+    assert volume.voxels.is_unread(coarse.unread)
+    volume.voxels.read_ahead(coarse.unread, Report())
+    after = slicer.image(*planes[Plane.SAGITTAL], at_once=True)
+    assert after.unread is None
+    np.testing.assert_array_equal(after.values, fine.values)
 
 
 class InParts(ArrayVoxels):

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from window_cases import MIDDLE, wait_until_idle
+from window_cases import MIDDLE, wait_until_idle, write_ball
 
 from gp_core import Atlas, Side
 from gp_labeler.document.edits import CheckPoint
 from gp_labeler.document.state import How
+from gp_labeler.imaging import readers, voxels
+from gp_labeler.imaging.readers import read_volume
 from gp_labeler.models.workflow import Active
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.colours import DARK
+from gp_labeler.scene.planes import Plane
 from gp_labeler.views.drawn import drawn_ghosts, drawn_marks, drawn_segments
 from gp_labeler.views.painting import slice_painter
 
@@ -113,3 +116,25 @@ def test_a_doubtful_point_shows_where_it_should_be(window, qtbot, monkeypatch) -
     workspace.labels.set_active(Active(Side.LEFT, "RWL"))
     workspace.document.do(CheckPoint(Side.LEFT, "RWL", True))
     assert drawn_ghosts(workspace) == [], "nor one that a person found right"
+
+
+def test_a_slice_that_takes_long_to_read_is_coarse_first_and_whole_as_soon_as_it_is_there(
+    window, qtbot, tmp_path, monkeypatch
+) -> None:
+    view = window.grid.slice_views[Plane.SAGITTAL]
+    window.workspace.view.update(outline_visible=False)
+    wait_until_idle(qtbot, window)
+    wanted = view.grab().toImage()
+    monkeypatch.setattr(readers, "MAPPED_FROM", 1)
+    monkeypatch.setattr(voxels, "_MOST_AT_ONCE", 1)
+    monkeypatch.setattr(voxels, "_GLANCE", 64**3 * 4 / 400)
+    volume = read_volume(write_ball(tmp_path / "ball.nrrd"))
+    window.workspace.scan.begin(volume)
+    window.workspace.view.update(slices_visible=True)
+    view.reset()
+    coarse = view.grab().toImage()
+    assert "Reading a slice of ball" in [task.job.title for task in window.workspace.jobs.running]
+    wait_until_idle(qtbot, window)
+    assert coarse != wanted
+    assert view.grab().toImage() == wanted
+    assert all(image.unread is None for image in window.grid.scene_view.scene.slices.images)
