@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -51,10 +52,11 @@ def recorded_touches(
     GpError
         The tip offset is not three numbers.
     GeometryError
-        The number of rests differs from the number of names.
+        The number of rests differs from the number of names, or only the inverted poses rest as often.
     """
     places = resting_places(recording, tip_offset)
     if len(places) != len(names):
+        _check_direction(recording, tip_offset, len(names))
         where = "; ".join(f"{x:.1f} {y:.1f} {z:.1f}" for x, y, z in places[:12])
         raise GeometryError(
             f"the tip rested {len(places)} times ({where} mm), but {len(names)} touches are named",
@@ -67,6 +69,19 @@ def recorded_touches(
         name: np.squeeze(positions, 0) if len(positions) == 1 else np.array(positions)
         for name, positions in touched.items()
     }
+
+
+def _check_direction(recording: Recording, tip_offset: ArrayLike, n_touches: int) -> None:
+    """Reject poses of the tracker in the marker's frame: inverted, they have the tip at rest in every touch."""
+    inverted = np.full_like(recording.poses, np.nan)
+    seen = np.isfinite(recording.poses).all(axis=(1, 2))
+    inverted[seen] = np.linalg.inv(recording.poses[seen])
+    if len(resting_places(replace(recording, poses=inverted), tip_offset)) == n_touches:
+        raise GeometryError(
+            f"the tip rests {n_touches} times only if every pose is inverted: "
+            "the poses seem to be those of the tracker in the marker's frame",
+            remedy="Give marker to tracker: invert each matrix.",
+        )
 
 
 def resting_places(recording: Recording, tip_offset: ArrayLike) -> FloatArray:

@@ -260,6 +260,20 @@ def test_more_or_fewer_rests_than_names_are_said() -> None:
         recorded_touches(_touching(_PLACES), _TIP, list("ABCDEF"))
 
 
+def test_poses_the_wrong_way_round_are_named_by_how_the_tip_rests() -> None:
+    """A hand tilts the probe by some degrees while its tip rests a metre from the tracker."""
+    recording = _touching(_PLACES + [30.0, -20.0, -1000.0])
+    tilts = 0.05 * np.sin(np.arange(len(recording.poses))[:, None] / [17.0, 11.0, 7.0])
+    tips = recording.poses[:, :3, :3] @ _TIP + recording.poses[:, :3, 3]
+    recording.poses[:, :3, :3] = Rotation.from_rotvec(tilts).as_matrix()
+    recording.poses[:, :3, 3] = tips - recording.poses[:, :3, :3] @ _TIP
+    names = ["CL", "MN", "OS", "RWA", "RWP"]
+    assert len(recorded_touches(recording, _TIP, names)) == 5
+    inverted = Recording(np.linalg.inv(recording.poses), recording.times)
+    with pytest.raises(GeometryError, match=r"only if every pose is inverted.*invert each matrix"):
+        recorded_touches(inverted, _TIP, names)
+
+
 def test_two_features_that_lie_close_are_two_touches_where_the_tip_was_away_between() -> None:
     away = np.array([0.0, 0.0, 30.0])
     places = np.array([[0.0, 0, 0], [1.4, 0, 0], [1.4, 0.5, 0]])
