@@ -72,7 +72,7 @@ def recorded_touches(
 
 
 def _check_direction(recording: Recording, tip_offset: ArrayLike, n_touches: int) -> None:
-    """Reject poses of the tracker in the marker's frame: inverted, they have the tip at rest in every touch."""
+    """Reject poses of the tracker in the marker's frame: only inverted they keep the tip at rest."""
     inverted = np.full_like(recording.poses, np.nan)
     seen = np.isfinite(recording.poses).all(axis=(1, 2))
     inverted[seen] = np.linalg.inv(recording.poses[seen])

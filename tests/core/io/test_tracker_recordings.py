@@ -262,7 +262,7 @@ def test_more_or_fewer_rests_than_names_are_said() -> None:
 
 def test_poses_the_wrong_way_round_are_named_by_how_the_tip_rests() -> None:
     """A hand tilts the probe by some degrees while its tip rests a metre from the tracker."""
-    recording = _touching(_PLACES + [30.0, -20.0, -1000.0])
+    recording = _touching(_PLACES + np.array([30.0, -20.0, -1000.0]))
     tilts = 0.05 * np.sin(np.arange(len(recording.poses))[:, None] / [17.0, 11.0, 7.0])
     tips = recording.poses[:, :3, :3] @ _TIP + recording.poses[:, :3, 3]
     recording.poses[:, :3, :3] = Rotation.from_rotvec(tilts).as_matrix()
