@@ -40,13 +40,13 @@ class CommandParser(argparse.ArgumentParser):
             "--verbose",
             action="store_true",
             default=argparse.SUPPRESS,
-            help="print what is read and written",
+            help="print the files that are read and written",
         )
         messages.add_argument(
             "--log-file",
             metavar="FILE",
             default=argparse.SUPPRESS,
-            help="append all messages, with their times, to this file",
+            help="append all messages, with time stamps, to this file",
         )
 
     def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -123,7 +123,7 @@ def add_completion(
         action=_PrintCompletion,
         whole=whole,
         choices=("bash", "zsh", "tcsh"),
-        help="print what makes a shell complete this command, then exit",
+        help="print the completion script for this shell, then exit",
     )
 
 

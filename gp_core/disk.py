@@ -193,7 +193,7 @@ def _check_kind(status: os.stat_result, path: AnyPath, what: str, max_bytes: int
     if stat.S_ISDIR(status.st_mode):
         raise FileFormatError(f"is a folder, not {_a(what)}", file=path, remedy="Name a file in it.")
     if not stat.S_ISREG(status.st_mode):
-        raise FileFormatError("is no plain file but a device or a pipe", file=path, remedy=remedy)
+        raise FileFormatError("is a device or a pipe, not a regular file", file=path, remedy=remedy)
     if status.st_size > max_bytes:
         raise _too_large(path, what, max_bytes)
 

@@ -149,5 +149,5 @@ class Extensions(Generic[Thing]):
             return error
         return GpError(
             f"{self.described(name)} failed ({type(error).__name__}: {error})",
-            remedy="Tell its authors, or uninstall it.",
+            remedy="Report this to its authors, or uninstall it.",
         )

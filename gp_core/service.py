@@ -101,7 +101,7 @@ def answer_request(content: Any, atlas: Atlas, specimens: Sequence[Specimen] = (
 def _again(content: Mapping[str, Any]) -> CochleaPose:
     """Estimate again what a pose file holds."""
     if content.get("inputs") is None:
-        raise GpError("the pose does not hold what it was estimated from", remedy="Send the touches.")
+        raise GpError("the pose does not contain its inputs", remedy="Send the touches.")
     try:
         made = inputs_from(content["inputs"])
     except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
@@ -303,7 +303,7 @@ class _Handler(BaseHTTPRequestHandler):
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:
         """Report what is no HTTP, or another method, as JSON too."""
         status = _NO_METHOD if code == 501 else code
-        self._send(status, _error(message or "this is no request"))
+        self._send(status, _error(message or "this is not a valid request"))
 
     def log_message(self, format: str, *args: Any) -> None:
         """Print nothing."""
@@ -321,18 +321,18 @@ class _Handler(BaseHTTPRequestHandler):
         except (ConnectionError, TimeoutError):
             self.close_connection = True
         except Exception:  # a fault of this program; the client is told, and the service goes on
-            self._send(_FAULT, _error("the service has a fault", remedy="Report it with this request."))
+            self._send(_FAULT, _error("internal error of the service", remedy="Report it with this request."))
 
     def _check_local(self) -> None:
         """Refuse web pages: a browser of this machine could be led here."""
         host = self.headers.get("Host", "127.0.0.1").rsplit(":", 1)[0]
         if host not in _LOCAL or self.headers.get("Origin") is not None:
             self.close_connection = True
-            raise _RefusedError(_FORBIDDEN, "requests of web pages are refused")
+            raise _RefusedError(_FORBIDDEN, "requests from web pages are rejected")
 
     def _about(self) -> tuple[int, str]:
         if self.path != "/":
-            raise _RefusedError(_NOT_FOUND, "there is nothing here", "GET / or POST /estimate.")
+            raise _RefusedError(_NOT_FOUND, "no such path or method", "GET / or POST /estimate.")
         known = self.server.known
         content = {
             "service": "gp-core",
@@ -347,7 +347,7 @@ class _Handler(BaseHTTPRequestHandler):
     def _pose(self) -> tuple[int, str]:
         body = self._body()
         if self.path != "/estimate":
-            raise _RefusedError(_NOT_FOUND, "there is nothing here", "GET / or POST /estimate.")
+            raise _RefusedError(_NOT_FOUND, "no such path or method", "GET / or POST /estimate.")
         known = self.server.known
         content = _parsed(body)
         with self.server.estimating:  # one at a time: answers do not depend on who else asks
@@ -391,7 +391,7 @@ def _parsed(body: bytes) -> Any:
 
 
 def _no_number(word: str) -> float:
-    raise GpError(f"{word} is no number of JSON", remedy="Leave out what was not seen.")
+    raise GpError(f"{word} is not a JSON number", remedy="Leave out what was not seen.")
 
 
 def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

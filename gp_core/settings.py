@@ -55,7 +55,7 @@ class Key:
 
 
 KEYS = (
-    Key("verbose", "true or false", "Print what is read and written."),
+    Key("verbose", "true or false", "Print the files that are read and written."),
     Key("log_file", "a path", "Append all messages, with their times, to this file."),
     Key("workers", "a whole number", "Processes of a study; by default one for each core.", most=4096),
     Key("state", "a path", "Folder where the window keeps unsaved edits and what it remembers."),
@@ -133,7 +133,7 @@ def _configuration_folder() -> Path:
 def _read(file: Path) -> Mapping[str, Any]:
     try:
         if file.stat().st_size > _MAX_BYTES:
-            raise GpError("is no file of settings: it is too large", file=file)
+            raise GpError("is too large for a settings file", file=file)
         values: Mapping[str, Any] = _toml_loader()(file.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         remedy = "Correct it, or delete it: it holds settings only."
@@ -141,7 +141,7 @@ def _read(file: Path) -> Mapping[str, Any]:
     unknown = sorted(values.keys() - _BY_NAME.keys())
     if unknown:
         known = ", ".join(_BY_NAME)
-        raise GpError(f"there is no setting {unknown[0]!r}", file=file, remedy=f"There are: {known}.")
+        raise GpError(f"unknown setting {unknown[0]!r}", file=file, remedy=f"There are: {known}.")
     return values
 
 

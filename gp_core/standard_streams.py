@@ -220,9 +220,7 @@ def _text_kind(head: bytes) -> str:
 
 
 def _unknown() -> GpError:
-    return FileFormatError(
-        "is of no kind that can be told from its content", file=_INPUT, remedy="Give a file."
-    )
+    return FileFormatError("is of an unknown kind", file=_INPUT, remedy="Give a file.")
 
 
 def _send(file: Path) -> None:

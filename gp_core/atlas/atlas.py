@@ -112,7 +112,7 @@ class Atlas:
         """Check magnitude, symmetry and positive definiteness."""
         size = np.abs(matrix).max()
         if size > _LARGEST_VARIANCE_MM2:
-            raise GpError(f"the {name} of atlas {self.name!r} is larger than any animals differ")
+            raise GpError(f"the {name} of atlas {self.name!r} is implausibly large")
         if np.abs(matrix - matrix.T).max() > 1e-9 * size:
             raise GpError(f"the {name} of atlas {self.name!r} is not symmetric")
         if np.linalg.eigvalsh(matrix).min() < least * size or not matrix.diagonal().min() > 0:
@@ -185,7 +185,7 @@ class Atlas:
             raise FileFormatError(f"is a damaged atlas: {error.problem}", file=path, remedy=remedy) from None
         except (TypeError, ValueError, AttributeError, OverflowError, np.linalg.LinAlgError):
             raise FileFormatError(
-                "is a damaged atlas: numbers or names are not where they should be", file=path, remedy=remedy
+                "is a damaged atlas: numbers or names are missing or misplaced", file=path, remedy=remedy
             ) from None
 
     @checks_arguments

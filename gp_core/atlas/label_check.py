@@ -120,10 +120,10 @@ class Deviation:
 
     @property
     def text(self) -> str:
-        """Such as ``2.6 mm from where the atlas expects it``."""
+        """Such as ``2.6 mm from the position that the atlas predicts``."""
         if self.distance > HEAD_MM:
-            return "nowhere near where the other points put it: check names, side and units"
-        return f"{self.word} from where the atlas expects it"
+            return "far from any plausible position: check names, side and units"
+        return f"{self.word} from the position that the atlas predicts"
 
     def as_dict(self) -> dict[str, Any]:
         """Return the deviation for a JSON file.
@@ -409,7 +409,7 @@ def far_finding(side: Side, away: Deviation) -> Finding:
         Of kind ``far``.
     """
     text = f"{away.text} ({away.n_sd:.0f} SD)" if away.distance <= HEAD_MM else away.text
-    remedy = f"Look at {away.code} again; move it, or mark it as checked."
+    remedy = f"Review {away.code}: move it, or mark it as checked."
     return Finding("", side, "far", (away.code,), text, remedy, deviations=(away,))
 
 
@@ -454,7 +454,7 @@ def _found_by_checks(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
         try:
             found = list(CHECKS.get(name)(landmarks, atlas))
             if not all(isinstance(finding, Finding) for finding in found):
-                raise TypeError("it gave something else than findings")
+                raise TypeError("it did not return findings")
         except Exception as error:
             failure = CHECKS.failure(name, error)
             yield _finding(landmarks, "unchecked", (), failure.problem, failure.remedy or "")
@@ -492,8 +492,9 @@ def _require_enough(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]
     )
     if width < _LEAST_WIDTH * expected:
         raise GpError(
-            "the placed features lie at one place or on one line, and do not tell how the head is turned",
-            remedy="Place one that lies apart, and check that the labels are in mm.",
+            "the placed features are at one position or on a line, so they do not determine the "
+            "orientation of the head",
+            remedy="Place a feature away from them, and check that the labels are in mm.",
         )
 
 
@@ -560,11 +561,13 @@ def _shared_points(specimen: Specimen) -> Iterator[Finding]:
         if row.shared and row.code in left and row.code in right:
             apart = float(np.linalg.norm(left[row.code] - right[row.code]))
             if apart > SHARED_MM:
-                text = f"{row.code} is one point of both sides, but its labels are {apart:.2f} mm apart"
-                kind, what = "shared point differs", "takes the mean"
+                text = (
+                    f"{row.code} is one point shared by both sides, but its labels are {apart:.2f} mm apart"
+                )
+                kind, what = "shared point differs", "uses the mean"
                 if apart > SHARED_WRONG_MM:
                     text += ": one of them is wrong"
                     kind, what = "shared point wrong", "leaves it out"
-                remedy = f"Place {row.code} once more; a fit {what}."
+                remedy = f"Place {row.code} again; a fit {what}."
                 found = Finding(specimen.name, Side.LEFT, kind, (row.code,), text, remedy)
                 yield _as_checked(found, left, right)

@@ -156,7 +156,7 @@ class LabellingError:
             n, observers = int(report["n_animals"]), len(report["observers"])
         except (KeyError, TypeError, ValueError, IndexError):
             raise GpError(
-                "is no report on repeated labels",
+                "is not a reliability report",
                 remedy="Make it with: gp-core reliability SPECIMENS --json FILE",
             ) from None
         who = f"{observers} observer{'' if observers == 1 else 's'}"

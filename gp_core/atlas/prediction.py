@@ -103,8 +103,9 @@ def _check_rotation(information: FloatArray) -> None:
     )
     if not np.linalg.eigvalsh(about_middle)[0] > UNKNOWN_ANGLE_SD**-2:
         raise GeometryError(
-            "the placed features lie at one place or on one line, and do not tell how the head is turned",
-            remedy="Place one that lies apart, and check that the labels are in mm.",
+            "the placed features are at one position or on a line, so they do not determine the "
+            "orientation of the head",
+            remedy="Place a feature away from them, and check that the labels are in mm.",
         )
 
 

@@ -127,4 +127,4 @@ def _verdict(findings: list[Finding]) -> str:
     absent = sum(f.kind in ("missing", "suggested", "unseen") for f in findings)
     if not findings:
         return "all labels placed, none doubtful"
-    return f"{doubtful} to look at, {absent} not placed"
+    return f"{doubtful} to review, {absent} not placed"

@@ -33,9 +33,11 @@ def add(commands: Subparsers) -> None:
     parser.add_argument("-n", type=int, default=8, metavar="N", help="how many animals; default: 8")
     parser.add_argument("-o", "--output", metavar="DIR", help="folder for their landmark files")
     parser.add_argument("--atlas", metavar="FILE", help="an atlas file; default: the published atlas")
-    parser.add_argument("--observers", nargs="+", default=[], metavar="NAME", help="who labels each animal")
     parser.add_argument(
-        "--rounds", type=int, default=1, metavar="N", help="how often each observer does; default: 1"
+        "--observers", nargs="+", default=[], metavar="NAME", help="observers who label each animal"
+    )
+    parser.add_argument(
+        "--rounds", type=int, default=1, metavar="N", help="how often each observer labels it; default: 1"
     )
     parser.add_argument(
         "--label-error",
@@ -44,7 +46,7 @@ def add(commands: Subparsers) -> None:
         metavar="MM",
         help="SD of a coordinate of each label; default: 0",
     )
-    parser.add_argument("--replace", action="store_true", help="replace files of the same names")
+    parser.add_argument("--replace", action="store_true", help="replace existing files")
     parser.add_argument(
         "--csv",
         metavar="FILE",

@@ -151,7 +151,7 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--both-ears",
         action="store_true",
-        help="make one axis of both ears, where they agree (needs --other-ear)",
+        help="combine the axes of both ears if they agree (needs --other-ear)",
     )
     group.add_argument(
         "--accept-warnings",
@@ -162,18 +162,20 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_path(parser: argparse.ArgumentParser) -> None:
-    group = parser.add_argument_group("insertion path, carried to where the cochlea is")
+    group = parser.add_argument_group("insertion path, transformed to the estimated pose")
     group.add_argument(
         "--path", metavar="CSV", help="three columns, in the cochlea frame: origin CO, x towards CA"
     )
-    group.add_argument("--path-units", choices=tuple(UNITS), help="what its numbers are in; must be said")
-    group.add_argument("--path-side", choices=("L", "R"), help="the ear it was drawn for; must be said")
+    group.add_argument("--path-units", choices=tuple(UNITS), help="unit of its numbers; required with --path")
+    group.add_argument(
+        "--path-side", choices=("L", "R"), help="the ear for which it was planned; required with --path"
+    )
     group.add_argument(
         "--path-axes",
         metavar="AXES",
-        help="which of its axes are x, y and z of the cochlea frame, such as z,-y,x; default: x,y,z",
+        help="the axes of the file that are x, y and z of the cochlea frame, such as z,-y,x; default: x,y,z",
     )
-    group.add_argument("--path-rows", type=int, metavar="N", help="only its first rows; default: all")
+    group.add_argument("--path-rows", type=int, metavar="N", help="read only the first N rows; default: all")
     group.add_argument(
         "--path-out",
         metavar="FILE",
@@ -220,7 +222,7 @@ def run(args: argparse.Namespace) -> int:
         say(f"  {'' if ears.agrees else '! '}{ears.text}")
     if taken is not None:
         odds = f"{100 * taken.probability:.1f} %"
-        say(f"  ! used as {taken.label}, which is likelier than the given names and side ({odds})")
+        say(f"  ! used as {taken.label}, which is more likely than the given names and side ({odds})")
     for line in _remarks(args, touches, pose, path, held_back=held_back):
         say(f"  {line}")
     if held_back:
@@ -294,7 +296,7 @@ def _given_pose(args: argparse.Namespace) -> _Given:
     made = pose.inputs
     if made is None:
         raise GpError(
-            "does not hold the touches and the atlas that it was estimated from",
+            "does not contain the touches and the atlas from which it was estimated",
             file=args.touches,
             remedy="It is of an earlier version: estimate it from the file of touches.",
         )
@@ -353,7 +355,7 @@ def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:
     """Say how an estimate differs from that of the file which it was made from."""
     name = Path(file).name
     if np.array_equal(pose.transform, stored.transform) and pose.as_dict() == stored.as_dict():
-        return f"the same as in {name}, to the last bit"
+        return f"identical to {name}"
     mm = float(np.linalg.norm(pose.origin - stored.origin))
     degrees = float(angle_between_deg(pose.axis, stored.axis))
     return f"CO lies {mm:.2g} mm from that of {name}, the axis {degrees:.2g} deg"
@@ -392,7 +394,7 @@ def _what_was_held_back(args: argparse.Namespace, ambiguities: Sequence[str]) ->
     files = [file for name in _FOR_ROBOTS if (file := getattr(args, name))]
     what = f"not written: {' '.join(files)}, as {why}" if files else why
     if old := [file for file in files if Path(file).exists()]:
-        what += f". Still there from before, and of another estimate: {' '.join(old)}"
+        what += f". Files of an earlier estimate are still there: {' '.join(old)}"
     return f"{what}. Check side and names, or give --accept-warnings"
 
 
@@ -488,7 +490,7 @@ def pose_table(pose: CochleaPose, source: str, next_touches: Sequence[TouchGain]
     yield ""
     yield from _position_lines(pose)
     yield ""
-    yield "  touch   from the mean, mm"
+    yield "  touch   residual, mm"
     for code, distance in pose.residuals.items():
         doubtful = "   doubtful" if code in pose.suspects else ""
         yield f"  {code:<7} {distance:6.2f}{_repeats_of(pose, code)}{doubtful}"
@@ -516,10 +518,10 @@ def _position_lines(pose: CochleaPose) -> Iterator[str]:
     yield f"  axis CB->CA   {x:10.4f} {y:10.4f} {z:10.4f}      {within} {np.degrees(pose.cone_95):.1f} deg"
     yield f"  state         {pose.state}"
     if pose.shared_error is not None:
-        yield f"  shared error  {pose.shared_error:g} mm, which the regions allow for"
+        yield f"  shared error  {pose.shared_error:g} mm, included in the regions"
     if pose.is_multimodal:
         plain = f"{pose.plain_radius_95:.2f} mm and {np.degrees(pose.plain_cone_95):.1f} deg"
-        yield f"  as named      95 % within {plain}; the region above is of several parts:"
+        yield f"  as named      95 % within {plain}; the region above covers several hypotheses:"
         yield f"    {pose.probability:6.1%}  as named"
         for other in pose.hypotheses:
             x, y, z = other.origin
@@ -529,8 +531,8 @@ def _position_lines(pose: CochleaPose) -> Iterator[str]:
 def _advice(best: TouchGain) -> str:
     """Return what the best next touch gains, or that it gains little."""
     if best.worth < _NEGLIGIBLE_GAIN * (best.radius_95_now + MM_PER_DEGREE * np.degrees(best.cone_95_now)):
-        return "no other touch would gain much"
+        return "no other touch would reduce the region much"
     return (
-        f"touching {best.code} too would gain most: 95 % within about {best.radius_95:.2f} mm "
+        f"touching {best.code} as well would help most: 95 % within about {best.radius_95:.2f} mm "
         f"and {np.degrees(best.cone_95):.1f} deg"
     )

@@ -32,7 +32,7 @@ def add(commands: Subparsers) -> None:
     parser.add_argument("left", metavar="CC_L.mat", help="sets of the left side, variable cc_L")
     parser.add_argument("right", metavar="CC_R.mat", help="sets of the right side, variable cc_R")
     parser.add_argument("-o", "--output", required=True, metavar="DIR", help="folder to write to")
-    parser.add_argument("--replace", action="store_true", help="replace files of the same names")
+    parser.add_argument("--replace", action="store_true", help="replace existing files")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -120,7 +120,7 @@ def _offset_lines(report: ReliabilityReport) -> Iterator[str]:
     if not certain:
         least = min(2.0 ** (1 - n), 1.0)
         few = f" ({n} animals cannot show one below p = {least:.2g})" if least > 0.05 else ""
-        yield f"No systematic offset between observers is certain{few}. The largest:"
+        yield f"No systematic offset between observers is significant{few}. The largest:"
     else:
         yield "Systematic offsets between observers (p, corrected for the number of features, below 0.05):"
     shown = certain or sorted(report.offsets, key=lambda row: -row.length_mm)

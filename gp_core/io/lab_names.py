@@ -44,7 +44,7 @@ def read_lab_names(path: str | PathLike[str]) -> LabelNames:
     names = [name for name, _ in pairs]
     double = next((name for name in names if names.count(name) > 1), None)
     if double is not None:
-        raise FeatureError("stands twice", file=path, landmark=double[:40], remedy="Keep one of them.")
+        raise FeatureError("occurs twice", file=path, landmark=double[:40], remedy="Keep one of them.")
     try:
         return LabelNames(dict(pairs))
     except FeatureError as error:

@@ -59,7 +59,7 @@ def _touches(content: dict[str, Any], side: Side) -> LandmarkSet:
     once = {name: rows[0] if len(rows) == 1 else rows for name, rows in points.items()}
     known = {name: at for name, at in once.items() if name in CODES or is_skull_feature(name)}
     if others := once.keys() - known.keys():
-        raise GpError(f"{shown(min(others))} stands for a touched feature")
+        raise GpError(f"expected a touched feature, got {shown(min(others))}")
     touches = LandmarkSet.from_touches(known, side, frame=str(content["frame"]))
     return replace(touches, unseen=frozenset(map(str, content["not_seen"])))
 

@@ -64,7 +64,7 @@ def read_pose(path: str | PathLike[str]) -> CochleaPose:
         raise FileFormatError(f"is a damaged pose: {error.problem}", file=path, remedy=_REMEDY) from None
     except (TypeError, ValueError, AttributeError, OverflowError):
         raise FileFormatError(
-            "is a damaged pose: numbers or names are not where they should be", file=path, remedy=_REMEDY
+            "is a damaged pose: numbers or names are missing or misplaced", file=path, remedy=_REMEDY
         ) from None
     return pose
 
@@ -156,7 +156,7 @@ def _repeated(content: dict[str, Any]) -> RepeatedTouches:
 def _stamp(value: Any) -> str:
     text = _text(value)
     if text and datetime.fromisoformat(text).tzinfo is None:
-        raise GpError("its stamp says no time zone")
+        raise GpError("its stamp has no time zone")
     return text
 
 
@@ -173,14 +173,14 @@ def _hypothesis(content: dict[str, Any], frame: str) -> Hypothesis:
 def _covariance(content: dict[str, Any]) -> FloatArray:
     covariance = _numbers(content, "covariance", (6, 6))
     if not np.array_equal(covariance, covariance.T) or np.linalg.eigvalsh(covariance)[0] < -_AGREE:
-        raise GpError("its covariance is none")
+        raise GpError("its covariance is not valid")
     return covariance
 
 
 def _probability(value: Any) -> float:
     number = _number(value)
     if not 0 <= number <= 1:
-        raise GpError(f"{shown(value)} stands for a probability")
+        raise GpError(f"expected a probability, got {shown(value)}")
     return number
 
 
@@ -193,19 +193,19 @@ def _numbers(content: dict[str, Any], key: str, shape: tuple[int, ...]) -> Float
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
-        raise GpError(f"{shown(value)} stands for a number")
+        raise GpError(f"expected a number, got {shown(value)}")
     return float(value)
 
 
 def _text(value: Any) -> str:
     if not isinstance(value, str):
-        raise GpError(f"{shown(value)} stands for a name")
+        raise GpError(f"expected a name, got {shown(value)}")
     return value
 
 
 def _texts(value: Any) -> tuple[str, ...]:
     if not isinstance(value, list):
-        raise GpError(f"{shown(value)} stands for a list")
+        raise GpError(f"expected a list, got {shown(value)}")
     return tuple(_text(text) for text in value)
 
 
@@ -214,5 +214,5 @@ def _pair(value: Any) -> tuple[str, str] | None:
         return None
     names = _texts(value)
     if len(names) != 2:
-        raise GpError(f"{shown(value)} stands for two names")
+        raise GpError(f"expected two names, got {shown(value)}")
     return names[0], names[1]

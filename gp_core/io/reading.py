@@ -75,7 +75,7 @@ def _suffix(path: str | PathLike[str]) -> str:
     if found is None:
         check_file(path)
         raise FileFormatError(
-            "is no kind of landmark file that is known",
+            "is not a known kind of landmark file",
             file=path,
             remedy=f"Give {', '.join(f'.{ending}' for ending in FORMATS.names())}.",
         )
@@ -97,7 +97,9 @@ def _read_as(suffix: str, path: str | PathLike[str]) -> PointList:
         except Exception as error:
             raise FORMATS.failure(ending, error) from error
         if not isinstance(points, PointList):
-            raise GpError(f"{FORMATS.described(ending)} gave no PointList", remedy="Tell its authors.")
+            raise GpError(
+                f"{FORMATS.described(ending)} gave no PointList", remedy="Report this to its authors."
+            )
     return points
 
 
@@ -385,10 +387,10 @@ def _one_side(points: PointList, side: Side) -> PointList:
     lost = next((label for label in without if not feature(label).shared), None)
     if lost is not None:
         raise FeatureError(
-            "tells no side, although other points of the file do",
+            "gives no side, although other points of the file do",
             file=points.source,
             landmark=lost,
-            remedy=f"Call it {lost}_L or {lost}_R.",
+            remedy=f"Name it {lost}_L or {lost}_R.",
         )
     return points.of_side(side)
 

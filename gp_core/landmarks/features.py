@@ -237,7 +237,7 @@ def check_codes(
             raise FeatureError(f"{name} names {code} twice", landmark=code)
         if code not in permitted:
             raise FeatureError(
-                f"{name} may not hold {code}; allowed are {' '.join(permitted)}", landmark=code
+                f"{name} must not contain {code}; allowed are {' '.join(permitted)}", landmark=code
             )
     if len(found) < at_least:
         raise FeatureError(

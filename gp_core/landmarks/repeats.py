@@ -156,11 +156,11 @@ def repeat_warnings(repeats: Mapping[str, RepeatedTouches]) -> Iterator[str]:
             off = float(np.linalg.norm(one.points[number - 1] - one.mean))
             yield (
                 f"touch {number} of {len(one.points)} of {code} lies {off:.1f} mm from the others and is "
-                "left out: check that they are of the same place"
+                "left out: check that all are of the same point"
             )
         if one.n_used == 2 and (apart := 2 * one.spread_mm) > _APART_MM:
             yield (
-                f"the two touches of {code} lie {apart:.1f} mm apart, and nothing says which one is wrong: "
+                f"the two touches of {code} lie {apart:.1f} mm apart, so one of them is wrong: "
                 "touch it a third time"
             )
 

@@ -151,7 +151,7 @@ def estimate_again(pose: CochleaPose) -> CochleaPose:
     made = pose.inputs
     if made is None:
         raise GpError(
-            "the pose does not hold the touches and the atlas that it was estimated from",
+            "the pose does not contain the touches and the atlas from which it was estimated",
             remedy="Its file is of an earlier version: estimate it from the file of touches.",
         )
     return estimate_from(made)
@@ -248,7 +248,9 @@ def _estimated(method: str, given: EstimatorInput) -> CochleaPose:
     except Exception as error:
         raise ESTIMATORS.failure(method, error) from error
     if not isinstance(pose, CochleaPose):
-        raise GpError(f"{ESTIMATORS.described(method)} gave no CochleaPose", remedy="Tell its authors.")
+        raise GpError(
+            f"{ESTIMATORS.described(method)} gave no CochleaPose", remedy="Report this to its authors."
+        )
     return replace(pose, method=method)
 
 

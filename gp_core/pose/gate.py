@@ -145,14 +145,14 @@ def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
             "side undecided",
             f"the touches may be those of the {other} ear ({100 * pose.other_side_probability:.1f} %)",
         ),
-        "unchecked": ("side unchecked", "nothing has checked the side"),
+        "unchecked": ("side unchecked", "the side has not been checked"),
     }
     if pose.side_state in words:
         yield GateReason(*words[pose.side_state])
     words = {
         "wrong": ("wrong names", f"{_pair(pose)} look exchanged"),
         "undecided": ("names undecided", f"{_pair(pose)} may be exchanged"),
-        "unchecked": ("names unchecked", "nothing has checked the names"),
+        "unchecked": ("names unchecked", "the names have not been checked"),
     }
     if pose.names_state in words:
         yield GateReason(*words[pose.names_state])

@@ -96,7 +96,7 @@ def hypothesis_warnings(pose: CochleaPose) -> Iterator[str]:
         yield f"the {other} side fits these points better than the {this}: check the side"
     elif pose.side_state == "undecided":
         yield (
-            f"these points may be of the {other} side ({100 * pose.other_side_probability:.1f} %): "
+            f"these points may belong to the {other} side ({100 * pose.other_side_probability:.1f} %): "
             "touch one more feature away from their plane"
         )
 

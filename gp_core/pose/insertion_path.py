@@ -119,7 +119,7 @@ def carry_path(path: ArrayLike, pose: CochleaPose, *, path_side: Side | str) -> 
     wound = winding_side(points)
     if wound not in (None, side):
         raise GpError(
-            f"the path is said to be of a {side.word} ear, but winds as in a {side.other.word} one",
+            f"the path is declared as that of a {side.word} ear, but winds as in a {side.other.word} ear",
             remedy="Check its side, which way its axes point, and that it runs from the base to the apex.",
         )
     return pose.transform_to_touches.apply(points if side is pose.side else points * _MIRROR_Z)
@@ -216,7 +216,7 @@ def _as_rotation(axes: str) -> FloatArray:
     if rotation.shape != (3, 3) or round(float(np.linalg.det(rotation))) != 1:
         raise GpError(
             f"axes must name x, y and z once each, right-handed, such as 'z,-y,x', got {axes!r}",
-            remedy="Turn one about: a path of the other ear is mirrored by its side, not by its axes.",
+            remedy="Reverse one of them. To mirror a path for the other ear, state its side instead.",
         )
     return rotation
 
@@ -248,8 +248,7 @@ def _check_axis(points: FloatArray, file: str | PathLike[str]) -> None:
         raise GpError(
             "the path winds about another axis than x, the modiolar axis of the cochlea frame",
             file=file,
-            remedy="Say which of its axes is which, such as 'z,-y,x' where its z is the modiolar axis and "
-            "the round window lies at its -y.",
+            remedy="Give its axes, such as 'z,-y,x' if z is the modiolar axis and the round window is at -y.",
         )
 
 

@@ -63,16 +63,16 @@ def pose_quality(pose: CochleaPose) -> PoseQuality:
         return found
     radius, cone = pose.radius_95, float(np.degrees(pose.cone_95))
     if radius > _POOR_MM or cone > _POOR_DEG:
-        return PoseQuality("danger", "Poor", "The true cochlea may lie well beside this one.")
+        return PoseQuality("danger", "Poor", "The true cochlea may be far from this estimate.")
     if pose.warnings or pose.suspects:
         return PoseQuality(
-            "warning", "Look twice", "The pose is usable only if what is said below is all right."
+            "warning", "Check first", "Use this pose only if none of the warnings below applies."
         )
     if radius > _GOOD_MM or cone > _GOOD_DEG:
         return PoseQuality(
-            "warning", "Fair", "Less sure than six careful touches make it; touch more features."
+            "warning", "Fair", "Less certain than with six careful touches; touch more features."
         )
-    return PoseQuality("good", "Good", "The touches agree, and are as many as a sure pose needs.")
+    return PoseQuality("good", "Good", "The touches agree, and there are enough of them.")
 
 
 def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
@@ -80,9 +80,9 @@ def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
     if pose.side_state == "wrong":
         return PoseQuality("danger", "Check the side", "The touches look like those of the other ear.")
     if pose.names_state == "wrong":
-        return PoseQuality("danger", "Check the names", "Two touches look as if each had the other's name.")
+        return PoseQuality("danger", "Check the names", "The names of two touches look exchanged.")
     if pose.names_state == "undecided":
-        return PoseQuality("danger", "Names undecided", "Two touches may each have the other's name.")
+        return PoseQuality("danger", "Names undecided", "The names of two touches may be exchanged.")
     if pose.side_state == "undecided":
         return PoseQuality(
             "warning",

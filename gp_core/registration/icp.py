@@ -109,7 +109,7 @@ def icp(
     ]
     if not results:
         raise GeometryError(
-            "the points nearest to the source lie on one line and leave the signed_permutation about it open",
+            "the points nearest to the source lie on one line, so the rotation about it is undetermined",
             remedy="Start nearer to the answer, or touch points farther apart.",
         )
     return min(results, key=lambda result: result.rms)

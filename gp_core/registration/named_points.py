@@ -212,7 +212,7 @@ class NamedFit:
 
     @cached_property
     def squared_residuals(self) -> FloatArray:
-        """(n,) squared distance of each touch from the mean, mm^2."""
+        """(n,) squared distance of each touch residual, mm^2."""
         squared: FloatArray = (self.residual**2).reshape(-1, 3).sum(axis=1)
         return squared
 
@@ -304,7 +304,7 @@ def fit_named_points(model: TouchModel, touches: FloatArray) -> NamedFit:
     if not math.isfinite(solution.neg_log_posterior):
         weighted_procrustes(model.mean, touches, names=model.codes)
         raise GeometryError(
-            "no pose brings these points near the atlas", remedy="Check units, names and coordinates."
+            "no pose fits these points to the atlas", remedy="Check units, names and coordinates."
         )
     n = len(touches)
     if n > 3 and solution.weights.min() < _OUTLIER_WEIGHT:

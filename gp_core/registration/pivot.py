@@ -89,7 +89,7 @@ class PivotCalibration:
             found.append(f"the tip moved by {self.rms_mm:.1f} mm rms: it may have slipped")
         length = float(np.linalg.norm(self.tip_offset))
         if length < _SHORTEST_PROBE_MM:
-            found.append(f"the tip lies only {length:.2g} mm from its marker: are the poses in mm?")
+            found.append(f"the tip lies only {length:.2g} mm from its marker: check that the poses are in mm")
         return tuple(found)
 
     def as_dict(self) -> dict[str, Any]:

@@ -74,7 +74,7 @@ def save_figure(figure: Figure, path: str | PathLike[str]) -> None:
     """
     name = str(path)
     if not name.lower().endswith(_SUFFIXES):
-        raise GpError("is no kind of figure that can be written", file=path, remedy="Use .png, .pdf or .svg.")
+        raise GpError("is not a supported figure format", file=path, remedy="Use .png, .pdf or .svg.")
     drawn = io.BytesIO()
     figure.savefig(drawn, dpi=_DPI, format=name.lower().rpartition(".")[2])
     write_bytes(path, drawn.getvalue())

@@ -242,6 +242,6 @@ def _warnings(registrations: Sequence[RegistrationResult], poses: Sequence[Cochl
         for name in by_names.suspects
     ]
     if by_icp.fre_mm > 2 * by_names.fre_mm and not by_names.suspects:
-        found.append("ICP pairs features otherwise than their names do")
+        found.append("ICP pairs skull features differently from their names")
     found += [f"{pose.method}: {warning}" for pose in poses for warning in pose.warnings]
     return found

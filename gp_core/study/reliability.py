@@ -389,7 +389,7 @@ def reliability(
     if not labels:
         name = landmark_file_name("GP01", Side.LEFT, observer="AB", round_=2)
         raise GpError(
-            "no side was labelled twice, so nothing can be said of how repeatable labels are",
+            "no side was labelled twice, so repeatability cannot be measured",
             remedy=f"Label some animals again, and name the files {name} (observer, round).",
         )
     placed = {target: _registered(target, sittings) for target, sittings in labels.items()}

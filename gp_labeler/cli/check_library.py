@@ -1,4 +1,4 @@
-"""The command ``gp-labeler check-library``: labels that the other labelled scans contradict."""
+"""The command ``gp-labeler check-library``: labels that contradict the other labelled scans."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def make_check_library_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler check-library``."""
     parser = CommandParser(
         prog="gp-labeler check-library",
-        description="Find labels that the other labelled scans contradict.",
+        description="Find labels that contradict the other labelled scans.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

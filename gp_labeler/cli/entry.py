@@ -23,15 +23,15 @@ _EXAMPLE = """examples:
   gp-labeler --demo                   the window with a synthetic head
   gp-labeler --offscreen demo --output out    the demo without a display
   gp-labeler mesh head.nrrd -o head.ply      the bone surface; see gp-labeler mesh --help
-  gp-labeler phantom -o head.nrrd            a synthetic head with its truth; see gp-labeler phantom --help
-  gp-labeler straighten head.nrrd            how the head lies in its scan; see gp-labeler straighten --help
+  gp-labeler phantom -o head.nrrd            a synthetic head with known truth; see gp-labeler phantom --help
+  gp-labeler straighten head.nrrd            pose of the head in its scan; see gp-labeler straighten --help
   gp-labeler propose head.nrrd --like labelled/ -o suggested/    first labels; see gp-labeler propose --help
-  gp-labeler check-library labelled/         labels that the other labelled scans contradict
+  gp-labeler check-library labelled/         labels that contradict the other labelled scans
   gp-labeler export GP-014.gpspecimen.json -o landmarks    landmark files; see gp-labeler export --help
-  gp-labeler list scans/              all specimens, and how far each is; see gp-labeler list --help
+  gp-labeler list scans/              specimens and their progress; see gp-labeler list --help
   gp-labeler contact-sheet scans/ -o sheets  every label for review; see gp-labeler contact-sheet --help
   gp-labeler simulate-tracker         a simulated probe over OpenIGTLink, to practise with
-  gp-labeler doctor                   what this machine has, and what it lacks
+  gp-labeler doctor                   check this machine and report problems
 """
 
 
@@ -45,32 +45,40 @@ def make_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"gp-labeler {__version__}")
     add_completion(parser, lambda: with_subcommands(make_parser()))
-    parser.add_argument("path", nargs="?", type=Path, metavar="VOLUME|SPECIMEN", help="what to open")
+    parser.add_argument(
+        "path",
+        nargs="?",
+        type=Path,
+        metavar="VOLUME|SPECIMEN",
+        help="scan, folder of slices, or specimen to open",
+    )
     parser.add_argument("--demo", action="store_true", help="open a synthetic head")
     parser.add_argument(
         "--state",
         type=Path,
         metavar="DIR",
-        help="where unsaved edits are kept; by default a folder of the user",
+        help="folder for unsaved edits; default: a folder of the user",
     )
     parser.add_argument(
-        "--observer", metavar="NAME", help="who labels, from now on; by default who said so in the window"
+        "--observer",
+        metavar="NAME",
+        help="name or initials of the person who labels; default: as set in the window",
     )
     offscreen = parser.add_argument_group("without a display")
     offscreen.add_argument(
-        "--offscreen", metavar="SCRIPT|demo", help="do what a script says, in the same window, unseen"
+        "--offscreen", metavar="SCRIPT|demo", help="run a script in the window, without a display"
     )
-    offscreen.add_argument("--output", type=Path, metavar="DIR", help="where what it makes goes")
+    offscreen.add_argument("--output", type=Path, metavar="DIR", help="folder for the results of the script")
     offscreen.add_argument(
-        "--specimens", nargs="+", default=(), metavar="S", help="what {specimen} in the script stands for"
+        "--specimens", nargs="+", default=(), metavar="S", help="names to use for {specimen} in the script"
     )
     desktop = parser.add_argument_group("on the desktop")
     desktop.add_argument(
         "--install-desktop",
         action="store_true",
-        help="add gp-labeler to the menu of programs, and open specimens and NRRD scans with it (Linux)",
+        help="add gp-labeler to the desktop's menu and open specimens and NRRD scans with it (Linux)",
     )
-    desktop.add_argument("--remove-desktop", action="store_true", help="take that away again")
+    desktop.add_argument("--remove-desktop", action="store_true", help="undo --install-desktop")
     return parser
 
 

@@ -38,9 +38,9 @@ def make_export_parser() -> argparse.ArgumentParser:
         metavar="SUFFIX",
         help=".mrk.json (the default), .fcsv or .csv; may be given several times",
     )
-    parser.add_argument("--suggested", action="store_true", help="write suggestions too, apart")
-    parser.add_argument("--measurements", action="store_true", help="write rulers and angles too")
-    parser.add_argument("--replace", action="store_true", help="replace files of the same names")
+    parser.add_argument("--suggested", action="store_true", help="also write suggestions, to separate files")
+    parser.add_argument("--measurements", action="store_true", help="also write rulers and angles")
+    parser.add_argument("--replace", action="store_true", help="replace existing files")
     return parser
 
 

@@ -22,7 +22,7 @@ _EXAMPLE = """examples:
   gp-labeler mesh - -o - < head.nrrd > head.ply
   gp-labeler mesh dicom/ -o head.vtp --series bone --accept gap --threshold 1200
 
-Where a scan does not say all that is needed, the error names the option that states it.
+If the scan lacks information, the error message names the option that supplies it.
 """
 
 
@@ -37,47 +37,48 @@ def make_mesh_parser() -> argparse.ArgumentParser:
     parser.add_argument("volume", type=Path, metavar="VOLUME", help="file, or folder of slices")
     formats = ".ply, .stl, .vtp, .obj, .glb or .gltf; - writes PLY to standard output"
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="MESH", help=formats)
-    _add_surface(parser.add_argument_group("the surface"))
-    add_import_options(parser.add_argument_group("how the scan is read"))
+    _add_surface(parser.add_argument_group("surface"))
+    add_import_options(parser.add_argument_group("reading the scan"))
     return parser
 
 
 def _add_surface(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
-        "--threshold", type=float, metavar="T", help="grey value where bone begins; by default proposed"
+        "--threshold",
+        type=float,
+        metavar="T",
+        help="bone threshold, grey value; default: proposed from the histogram",
     )
     group.add_argument(
-        "--smallest", type=float, metavar="MM", help="leave out parts smaller than this across, by default 1"
+        "--smallest", type=float, metavar="MM", help="remove parts smaller than this; default: 1"
     )
     group.add_argument(
         "--method",
         choices=("flying-edges", "marching-cubes", "skimage"),
         default="flying-edges",
-        help="how the surface is found; all give the same, flying edges on all cores (default)",
+        help="algorithm; all give the same surface, flying-edges (default) uses all cores",
     )
-    group.add_argument("--largest", type=int, metavar="N", help="keep only so many parts, the largest")
+    group.add_argument("--largest", type=int, metavar="N", help="keep only the N largest parts")
 
 
 def add_import_options(group: argparse._ArgumentGroup) -> None:
     """Add the options that say how a scan is read."""
     group.add_argument(
-        "--spacing", type=float, nargs="+", metavar="MM", help="voxel size: one number, or x y z"
+        "--spacing", type=float, nargs="+", metavar="MM", help="voxel size in mm: one number, or x y z"
     )
     group.add_argument(
-        "--series", metavar="NAME", help="which series or stack of a folder: its name, or part of it"
+        "--series", metavar="NAME", help="series or stack to read from a folder: its name, or part of it"
     )
+    group.add_argument("--channel", type=int, metavar="N", help="colour channel, from 0; default: luminance")
     group.add_argument(
-        "--channel", type=int, metavar="N", help="which colour channel, from 0; else luminance"
-    )
-    group.add_argument(
-        "--reverse", action="store_true", help="the slices run the other way; mirrors the head"
+        "--reverse", action="store_true", help="reverse the order of the slices, which mirrors the head"
     )
     group.add_argument(
         "--accept",
         action="append",
         default=[],
         metavar="CODE",
-        help="go on in spite of a problem, such as gap; may be given several times",
+        help="continue in spite of a problem, such as gap; may be repeated",
     )
     group.add_argument(
         "--stride", type=int, default=1, metavar="N", help="read every N-th voxel along each axis"
@@ -87,7 +88,7 @@ def add_import_options(group: argparse._ArgumentGroup) -> None:
         type=int,
         nargs=6,
         metavar=("X0", "X1", "Y0", "Y1", "Z0", "Z1"),
-        help="read these voxels only",
+        help="read only this range of voxels",
     )
 
 

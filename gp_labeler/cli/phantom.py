@@ -21,8 +21,8 @@ _EXAMPLE = """examples:
   gp-labeler phantom -o head.nrrd --seed 7 --varied --turn --crop 0.3:A
   gp-labeler phantom --seeds 1-5 --labelled --varied -o library/
 
-A switch without a value is drawn by the seed. Give a negative value after "=": --turn=-20,0,45.
-The truth is written beside each scan, as <name>.truth.json: what was done, the landmarks, the head's pose.
+The seed determines the value of a switch without a value. Write negative values after "=": --turn=-20,0,45.
+The truth is written beside each scan, as <name>.truth.json: all switches, the landmarks, the pose.
 """
 _DRAWN = "drawn by the seed"
 _MOST = 1000
@@ -32,7 +32,7 @@ def make_phantom_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler phantom``."""
     parser = CommandParser(
         prog="gp-labeler phantom",
-        description="Make synthetic scans of guinea-pig heads, with the truth about each.",
+        description="Make synthetic scans of guinea-pig heads with known truth.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -46,17 +46,23 @@ def make_phantom_parser() -> argparse.ArgumentParser:
     )
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--seed", type=int, default=0, metavar="N", help="the animal and all chance, by default 0"
+        "--seed",
+        type=int,
+        default=0,
+        metavar="N",
+        help="random seed of the animal and of the noise; default: 0",
     )
-    which.add_argument("--seeds", metavar="N-M", help="several: 1-5, or 2,4,9")
+    which.add_argument("--seeds", metavar="N-M", help="several seeds, such as 1-5 or 2,4,9")
+    parser.add_argument("--labelled", action="store_true", help="also write the true landmarks (.mrk.json)")
+    parser.add_argument("--spacing", type=float, default=0.2, metavar="MM", help="voxel size; default: 0.2")
     parser.add_argument(
-        "--labelled", action="store_true", help="write the true landmarks as landmark JSON too"
+        "--noise",
+        type=float,
+        default=900.0,
+        metavar="GREY",
+        help="standard deviation of the noise; default: 900",
     )
-    parser.add_argument("--spacing", type=float, default=0.2, metavar="MM", help="voxel size, by default 0.2")
-    parser.add_argument(
-        "--noise", type=float, default=900.0, metavar="GREY", help="standard deviation, by default 900"
-    )
-    group = parser.add_argument_group("how heads and scans differ")
+    group = parser.add_argument_group("variation between heads and scans")
     group.add_argument("--varied", action="store_true", help=f"draw {', '.join(map(_option, USUAL))}")
     for name, switch in SWITCHES.items():
         group.add_argument(

@@ -62,7 +62,7 @@ def make_propose_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--replace", action="store_true", help="do again what an earlier run has written")
     add_library_options(parser)
-    add_import_options(parser.add_argument_group("how the scans are read"))
+    add_import_options(parser.add_argument_group("reading the scans"))
     return parser
 
 

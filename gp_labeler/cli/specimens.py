@@ -29,7 +29,7 @@ _SHEET_EXAMPLE = """examples:
   gp-labeler contact-sheet scans/ -o review.pdf    all in one file
 
 A page for each side: every feature on its best slice and on the bone, with certainty, check and note.
-Scans are opened one at a time.
+Each scan is opened once, one at a time.
 """
 
 
@@ -37,13 +37,13 @@ def make_list_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler list``."""
     parser = CommandParser(
         prog="gp-labeler list",
-        description="List the specimens of folders, and how far each is. No scan is opened.",
+        description="List the specimens in folders and their progress. No scan is opened.",
         epilog=_LIST_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    what = "folders, searched with the folders in them, or .gpspecimen.json files"
+    what = "folders (searched with their subfolders), or .gpspecimen.json files"
     parser.add_argument("places", type=Path, nargs="+", metavar="DIR", help=what)
-    parser.add_argument("--unfinished", action="store_true", help="only those with something left to do")
+    parser.add_argument("--unfinished", action="store_true", help="list unfinished specimens only")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the list here")
     return parser
 

@@ -31,7 +31,7 @@ _EXAMPLE = """examples:
   gp-labeler straighten head.nrrd --midline 1 -40 2 --left 12 0 5 --right -11 1 5
   gp-labeler straighten two-heads.nrrd --box -20 -60 -20 20 10 20
 
-The scan is not changed. Nothing in it tells left from right: that is the file's orientation.
+The scan is not changed. Left and right are those of the file; a scan cannot prove them.
 """
 
 
@@ -45,11 +45,11 @@ def make_straighten_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("volume", type=Path, metavar="VOLUME", help="file, or folder of slices")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the whole result")
-    parser.add_argument("--threshold", type=float, metavar="T", help="grey value where bone begins")
+    parser.add_argument("--threshold", type=float, metavar="T", help="bone threshold, grey value")
     parser.add_argument(
-        "--box", type=float, nargs=6, metavar="MM", help="look here only: x y z of two corners, LPS"
+        "--box", type=float, nargs=6, metavar="MM", help="search only this box: x y z of two corners, LPS"
     )
-    points = parser.add_argument_group("from points, where the symmetry of the bone does not suffice")
+    points = parser.add_argument_group("from points, if the symmetry of the bone is not sufficient")
     points.add_argument(
         "--landmarks",
         type=Path,
@@ -59,7 +59,7 @@ def make_straighten_parser() -> argparse.ArgumentParser:
     )
     for name in ("midline", "left", "right"):
         points.add_argument(f"--{name}", type=float, nargs=3, metavar=("X", "Y", "Z"), help="LPS mm")
-    add_import_options(parser.add_argument_group("how the scan is read"))
+    add_import_options(parser.add_argument_group("reading the scan"))
     return parser
 
 

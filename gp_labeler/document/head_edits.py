@@ -1,4 +1,4 @@
-"""Edits of how the head lies in its scan; see `edits` for what an edit is."""
+"""Edits of orientation of the head in its scan; see `edits` for what an edit is."""
 
 from __future__ import annotations
 

@@ -181,7 +181,7 @@ class Journal:
             with contextlib.suppress(OSError):
                 self._handle().truncate(self._end)
             raise GpError(
-                f"the edit cannot be kept safe: {error.strerror}",
+                f"the edit cannot be stored safely: {error.strerror}",
                 file=self.path,
                 remedy="It was not made. Free some disk space, then repeat it.",
             ) from None

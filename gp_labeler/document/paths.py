@@ -38,7 +38,7 @@ def absolute_path(path: str | PathLike[str]) -> Path:
     try:
         return Path(path).resolve()
     except (OSError, ValueError, RuntimeError) as error:
-        raise GpError(f"is no path that can be ({error})", file=path, remedy="Give another.") from None
+        raise GpError(f"is not a valid path ({error})", file=path, remedy="Give another.") from None
 
 
 def journal_folder(directory: Path) -> Path:

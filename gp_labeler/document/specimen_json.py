@@ -255,7 +255,7 @@ def _landmarks_in(document: Mapping[str, Any]) -> dict[PointKey, Landmark]:
             key = point_key(side or Side.LEFT, code)
             if (key[0] is None) != (side is None):
                 raise FileFormatError(
-                    f"{where} is not where it belongs: IN is under {BOTH!r}, all else under L or R"
+                    f"{where} is under the wrong key: IN belongs under {BOTH!r}, all else under L or R"
                 )
             found[key] = _landmark_in(_typed(mark, dict, where), where)
     return found

@@ -300,7 +300,8 @@ class SpecimenState:
         name = self.specimen.strip()
         if not name or set(name) & set('/\\:*?"<>|\n\t') or name.startswith("."):
             raise GpError(
-                f"a specimen's name must do as a file name, got {self.specimen!r}", remedy="Such as GP-014."
+                f"a specimen's name must be a valid file name, got {self.specimen!r}",
+                remedy="Such as GP-014.",
             )
         kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
         sets = {

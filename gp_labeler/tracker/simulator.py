@@ -205,29 +205,33 @@ def make_parser(prog: str = _PROG) -> argparse.ArgumentParser:
         epilog=_COMMANDS,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="0: any that is free")
+    parser.add_argument("--port", type=int, default=DEFAULT_PORT, help="port; 0: any free port")
     head = parser.add_argument_group("the head")
-    head.add_argument("--touches", type=Path, metavar="FILE", help="points to touch; else a drawn animal's")
+    head.add_argument(
+        "--touches", type=Path, metavar="FILE", help="points to touch; default: those of a simulated animal"
+    )
     head.add_argument("--side", default="L", help="side of the head")
-    head.add_argument("--seed", type=int, default=0, help="of the drawn animal and of the noise")
-    head.add_argument("--truth", type=Path, metavar="JSON", help="write where the points truly are")
+    head.add_argument("--seed", type=int, default=0, help="seed of the simulated animal and of the noise")
+    head.add_argument("--truth", type=Path, metavar="JSON", help="write the true positions to this file")
     devices = parser.add_argument_group("the devices")
     devices.add_argument("--probe", default="ProbeToTracker", metavar="NAME")
     devices.add_argument(
-        "--reference", metavar="NAME", help="a marker on the head; without it, the head rests"
+        "--reference", metavar="NAME", help="marker on the head; without it, the head does not move"
     )
     devices.add_argument("--button", default="Button", metavar="NAME")
     devices.add_argument("--tip", type=float, nargs=3, default=(0.0, 0.0, -120.0), metavar=("X", "Y", "Z"))
     devices.add_argument("--noise", type=float, default=0.1, metavar="MM")
     devices.add_argument("--noise-deg", type=float, default=0.02, metavar="DEG")
-    devices.add_argument("--sway", type=float, default=0.0, metavar="MM", help="how far the head moves")
+    devices.add_argument("--sway", type=float, default=0.0, metavar="MM", help="amplitude of head motion")
     devices.add_argument("--rate", type=float, default=60.0, metavar="HZ")
-    devices.add_argument("--hidden", choices=HIDDEN_BY, default="status", help="how a covered marker is told")
+    devices.add_argument(
+        "--hidden", choices=HIDDEN_BY, default="status", help="how a hidden marker is reported"
+    )
     devices.add_argument(
         "--messages", choices=POSE_KINDS, default="TRANSFORM", help="type of the messages; default: TRANSFORM"
     )
-    parser.add_argument("--script", type=Path, metavar="FILE", help="commands, done again and again")
-    parser.add_argument("--live", action="store_true", help="take commands typed; ends with the input")
+    parser.add_argument("--script", type=Path, metavar="FILE", help="file with commands, repeated in a loop")
+    parser.add_argument("--live", action="store_true", help="read commands from standard input")
     return parser
 
 

@@ -106,7 +106,7 @@ GOOD: dict[str, Any] = {"side": "L", "touches": {"CL": [1, 2, 3], "MN": [9, 2, 3
         (b"{", "is not JSON"),
         (b"[" * 200_000, "is not JSON"),
         (b"\xff\xfe\x00", "is not JSON"),
-        (b'{"side": "L", "touches": {"MN": [NaN, 1, 2]}}', "NaN is no number"),
+        (b'{"side": "L", "touches": {"MN": [NaN, 1, 2]}}', "NaN is not a JSON number"),
         (b'{"side": "L", "touches": {"MN": [1, 1, 2], "MN": [1, 1, 2]}}', "'MN' is given twice"),
         ([], "must be a JSON object"),
         ({"touches": {}}, "lacks 'side'"),
@@ -128,7 +128,7 @@ GOOD: dict[str, Any] = {"side": "L", "touches": {"CL": [1, 2, 3], "MN": [9, 2, 3
         ({**GOOD, "accept_warnings": 1}, "must be true or false"),
         ({**GOOD, "atlas": {"gpAtlas": 1}}, "atlas"),
         ({**GOOD, "atlas": 7}, "atlas must be"),
-        ({"gpPose": 1}, "does not hold"),
+        ({"gpPose": 1}, "does not contain"),
         ({"gpPose": 1, "inputs": {"touches": 1}}, "damaged"),
     ],
 )

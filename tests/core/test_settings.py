@@ -37,7 +37,7 @@ def test_the_file_says_and_the_variable_overrules(file: Path, monkeypatch: pytes
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("wrokers = 3", "there is no setting 'wrokers'. There are: verbose, log_file"),
+        ("wrokers = 3", "unknown setting 'wrokers'. There are: verbose, log_file"),
         ("workers = 0", "workers must be a whole number from 1 to 4096, got 0"),
         ("workers = true", "workers must be a whole number"),
         ("workers = 2.5", "workers must be a whole number"),

@@ -114,7 +114,7 @@ def test_a_file_keeps_every_bit(animals: list[Specimen], tmp_path: Path) -> None
         (lambda c: c.update(units="in"), "says units 'in'"),
         (lambda c: c.update(specimens="abc"), "not a list of names"),
         (lambda c: c.update(features=c["features"][::-1]), "out of order"),
-        (lambda c: c["features"].__setitem__(2, "CO"), "may not hold CO"),
+        (lambda c: c["features"].__setitem__(2, "CO"), "must not contain CO"),
         (lambda c: c.update(scatter_mm2=(-np.array(c["scatter_mm2"])).tolist()), "scatter .* not positive"),
         (lambda c: c["covariance_mm2"][0].__setitem__(1, 5.0), "covariance .* not symmetric"),
         (lambda c: c.update(mean_mm=(np.array(c["mean_mm"]) / 1000).tolist()), "look like metres"),

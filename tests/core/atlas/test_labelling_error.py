@@ -168,4 +168,4 @@ def test_the_commands_take_both(tmp_path, capsys) -> None:
     assert main(["fit", str(tmp_path), "-o", str(atlas), "--certainty-weights", "guess"]) == 2
     assert "such as guess=0.2" in capsys.readouterr().err
     assert main(["check", str(tmp_path), "--labelling-error", str(atlas)]) == 2
-    assert "is no report on repeated labels" in capsys.readouterr().err
+    assert "is not a reliability report" in capsys.readouterr().err

@@ -37,7 +37,7 @@ def test_check_judges_each_labelling_and_says_who_looked_again(folder: Path, tmp
     assert main(["check", str(folder), "--json", str(tmp_path / "check.json")]) == 1, "it silences nothing"
     said = capsys.readouterr().out
     assert "GP1 (AB, round 1): all labels placed, none doubtful" in said
-    assert "from where the atlas expects it (11 SD). Checked by CD." in said
+    assert "from the position that the atlas predicts (11 SD). Checked by CD." in said
     assert "Look at OS again" not in said
     found = json.loads((tmp_path / "check.json").read_text())
     assert [(f["landmarks"], f["checked_by"]) for f in found["GP1 (CD, round 1)"]] == [(["OS"], "CD")]

@@ -53,7 +53,7 @@ def test_touches_in_a_pose_out_and_that_again_into_the_next_command(core: Core, 
     ("words", "given", "said"),
     [
         (("estimate", "-", "--side", "L"), b"", "standard input: is empty"),
-        (("estimate", "-", "--side", "L"), b"\x00\x01\x02", "standard input: is of no kind"),
+        (("estimate", "-", "--side", "L"), b"\x00\x01\x02", "standard input: is of an unknown kind"),
         (("estimate", "-", "--side", "L", "--atlas", "-"), b"x", "only one file can be standard input"),
         (("estimate", str(TOUCHES), "--side", "L", "--json", "-", "--tfm", "-"), b"", "standard output"),
         (("import-mat", "a", "b", "-o", "-"), b"", "--output cannot be a stream"),
@@ -107,5 +107,5 @@ def test_the_kind_is_told_from_the_content(head: bytes, kind: str) -> None:
 
 @pytest.mark.parametrize("head", [b"\x1f\x8bxxxx", b"\x00\x00", b""])
 def test_what_is_of_no_kind_is_refused(head: bytes) -> None:
-    with pytest.raises(FileFormatError, match="of no kind"):
+    with pytest.raises(FileFormatError, match="of an unknown kind"):
         kind_of(head)

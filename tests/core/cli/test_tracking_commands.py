@@ -70,7 +70,7 @@ def test_estimate_writes_for_robot_and_slicer(tmp_path: Path, capsys: pytest.Cap
         np.loadtxt(files["out.csv"], delimiter=","), carry_path(path, pose, path_side="L")
     )
     text = capsys.readouterr().out
-    assert text.count("would gain most: 95 % within about") == 1
+    assert text.count("as well would help most: 95 % within about") == 1
 
 
 def test_estimate_says_when_nothing_is_left_to_gain(
@@ -78,7 +78,7 @@ def test_estimate_says_when_nothing_is_left_to_gain(
 ) -> None:
     touches = _table(tmp_path / "touches.csv", _touched(tuple(c for c in gp_core.EXTERNAL if c != "RWL")))
     assert main(["estimate", str(touches), "--side", "L"]) == 0
-    assert "no other touch would gain much" in capsys.readouterr().out
+    assert "no other touch would reduce the region much" in capsys.readouterr().out
     touches = _table(tmp_path / "touches.csv", _touched(gp_core.EXTERNAL))
     assert main(["estimate", str(touches), "--side", "L"]) == 0
     assert "gain" not in capsys.readouterr().out
@@ -96,7 +96,7 @@ def test_estimate_says_when_nothing_is_left_to_gain(
         ),
         (
             ["--path", "PATH", "--path-units", "mm", "--path-side", "R", "--path-out", "o.csv"],
-            "path.csv: the path is said to be of a right ear, but winds as in a left one",
+            "path.csv: the path is declared as that of a right ear, but winds as in a left ear",
         ),
     ],
 )

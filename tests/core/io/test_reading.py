@@ -65,7 +65,7 @@ def test_what_is_no_file_to_read(tmp_path, reader):
         ("none_L.mrk.json", "does not exist"),
         ("none.xyz", "does not exist"),
         ("scan.nrrd", r"an image, or a recording of a tracker.*gp-core touches"),
-        ("notes.doc", r"no kind of landmark file.*\.mrk\.json, .*\.dat"),
+        ("notes.doc", r"not a known kind of landmark file.*\.mrk\.json, .*\.dat"),
         ("x\0.dat", "does not exist|cannot be read"),
         ("x" * 5000 + ".dat", "does not exist|cannot be read"),
     ]:
@@ -95,7 +95,7 @@ def test_a_disk_that_refuses(tmp_path, monkeypatch):
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
 def test_a_pipe_is_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "x.dat")
-    with pytest.raises(FileFormatError, match="no plain file"):
+    with pytest.raises(FileFormatError, match="a device or a pipe"):
         read_landmarks(tmp_path / "x.dat")
 
 

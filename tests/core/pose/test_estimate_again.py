@@ -93,7 +93,7 @@ def test_a_file_of_an_earlier_version_says_what_it_lacks(
     file = tmp_path / "pose.json"
     file.write_text(json.dumps(estimate_pose(_touches("L", animals[0]), "L").as_dict()))
     old = read_pose(file)
-    with pytest.raises(GpError, match="does not hold the touches"):
+    with pytest.raises(GpError, match="does not contain the touches"):
         estimate_again(old)
     assert main(["estimate", str(file)]) == 2
     assert "earlier version" in capsys.readouterr().err

@@ -133,8 +133,8 @@ def test_the_shell_reads_touches_as_they_are_likeliest_meant(
         np.testing.assert_allclose(pose.transform, straight.transform, atol=1e-6)
         assert pose.side.value == "L"
     said = capsys.readouterr().out
-    assert said.count("! used as the left ear, which is likelier than the given names and side") == 1
-    assert said.count("exchanged, which is likelier") == 1
+    assert said.count("! used as the left ear, which is more likely than the given names and side") == 1
+    assert said.count("exchanged, which is more likely") == 1
 
 
 @pytest.mark.parametrize(

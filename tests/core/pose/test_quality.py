@@ -33,7 +33,7 @@ def test_few_touches_and_a_mistouch_ask_for_a_second_look():
     few = estimate_pose({code: ANIMAL[code] for code in ("CL", "MN", "OS")}, "L", ATLAS)
     off = estimate_pose({**ANIMAL, "MN": ANIMAL["MN"] + [3, 0, 0]}, "L", ATLAS)
     assert (pose_quality(few).word, pose_quality(few).level) == ("Side undecided", "warning")
-    assert (pose_quality(off).word, pose_quality(off).level) == ("Look twice", "warning")
+    assert (pose_quality(off).word, pose_quality(off).level) == ("Check first", "warning")
 
 
 @pytest.mark.parametrize(("scale", "word"), [(1, "Good"), (4, "Fair"), (16, "Poor")])

@@ -69,13 +69,13 @@ def damaged(**changes):
         (damaged(version=5), "saved by a newer program .version 5, this one reads up to 4.. Update"),
         (damaged(version="1"), "version must be a whole number from 1, got '1'"),
         (damaged(specimen=3), "specimen must be text, got 3"),
-        (damaged(specimen=""), "must do as a file name"),
+        (damaged(specimen=""), "must be a valid file name"),
         (damaged(landmarks=[]), "landmarks must be an object"),
         (damaged(landmarks={"X": {}}), "side must be L or R, got 'X'"),
         (damaged(landmarks={"L": {"XX": {}}}), "landmark XX: unknown feature 'XX'"),
         (damaged(landmarks={"L": {"CO": {"position": [1, 2, 3]}}}), "landmark CO: CO is computed"),
-        (damaged(landmarks={"L": {"IN": {"position": [1, 2, 3]}}}), "IN is not where it belongs"),
-        (damaged(landmarks={"both": {"CA": {"position": [1, 2, 3]}}}), "CA is not where it belongs"),
+        (damaged(landmarks={"L": {"IN": {"position": [1, 2, 3]}}}), "IN is under the wrong key"),
+        (damaged(landmarks={"both": {"CA": {"position": [1, 2, 3]}}}), "CA is under the wrong key"),
         (damaged(landmarks={"L": {"CA": {"position": [1, 2]}}}), r"L\.CA\.position must be three numbers"),
         (
             damaged(landmarks={"L": {"CA": {"position": [1, 2, "3"]}}}),
@@ -183,7 +183,7 @@ def test_paths_and_notes_of_any_kind_are_kept(tmp_path):
     assert read_specimen(tmp_path / "a") == state
     document = SpecimenDocument(state)
     for do in (document.save, open_specimen):
-        with pytest.raises(GpError, match="is no path that can be"):
+        with pytest.raises(GpError, match="is not a valid path"):
             do("a\0b")
 
 

@@ -349,7 +349,7 @@ def test_a_mistouch_is_marked_by_shape_and_called_out(workspace, panel):
     rows = {row.name: row for row in panel.touches.model.rows}
     assert (rows["MN"].state, rows["MN"].suspect, rows["OS"].state) == ("doubtful", True, "placed")
     assert "MN does not fit the other points" in notices(panel)
-    assert panel.result.verdict.label.text() == "Look twice"
+    assert panel.result.verdict.label.text() == "Check first"
 
 
 def test_the_wrong_side_is_called_out_and_right_on_the_other(workspace, panel, qtbot):
