@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from gp_core.frames import RigidTransform
+from gp_labeler.imaging.anatomical_frame import AnatomicalFrame
 from gp_labeler.imaging.volume import Volume
 
-__all__ = ["PreviewPlane", "preview_planes"]
+__all__ = ["PreviewPlane", "preview_planes", "straight_preview_planes"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,13 +40,44 @@ class PreviewPlane:
 def preview_planes(volume: Volume) -> tuple[PreviewPlane, PreviewPlane]:
     """Return the middle axial and coronal slice, the patient's right at the left as slices are shown."""
     array, (dx, dy, dz) = _along_lps(volume)
-    low, high = volume.intensity_range
-    above = np.subtract(array, low, dtype=np.float64)
-    grey = (above * (255 / max(high - low, 1e-6))).clip(0, 255).astype(np.uint8)
+    grey = _grey(array, volume)
     nz, ny, _ = grey.shape
     axial = PreviewPlane("axial", np.ascontiguousarray(grey[nz // 2]), dy / dx, "RLPA")
     coronal = PreviewPlane("coronal", np.ascontiguousarray(grey[::-1, ny // 2]), dz / dx, "RLIS")
     return axial, coronal
+
+
+def straight_preview_planes(volume: Volume, T_head_scan: RigidTransform) -> tuple[PreviewPlane, PreviewPlane]:
+    """Return the axial and the coronal slice of a head that lies tilted, through its own zero."""
+    frame = AnatomicalFrame("head", T_head_scan)
+    axial, coronal = (_turned(volume, frame, name) for name in ("axial", "coronal"))
+    return PreviewPlane("axial", axial, 1.0, "RLPA"), PreviewPlane("coronal", coronal, 1.0, "RLIS")
+
+
+def _turned(volume: Volume, frame: AnatomicalFrame, name: str) -> NDArray[np.uint8]:
+    """Return a slice in a plane of the head's frame, as it appears on a screen."""
+    from scipy.ndimage import map_coordinates
+
+    plane, step = frame.plane(name), min(volume.spacing)
+    corners = np.array(list(np.ndindex(2, 2, 2))) * (np.array(volume.size) - 1)
+    reach = np.ceil(np.abs(plane.flat(volume.voxel_to_scan(corners))).max(axis=0) / step)
+    right, down = np.meshgrid(*(step * np.arange(-n, n + 1) for n in reach))
+    index = volume.scan_to_voxel(plane.scan(np.stack([right.ravel(), down.ravel()], axis=1), 0.0))
+    low = volume.intensity_range[0]
+    values = map_coordinates(volume.array, index[:, ::-1].T, order=1, cval=low, output=np.float64)
+    grey = _grey(values.reshape(right.shape), volume)
+    rows, columns = (np.flatnonzero((grey > 0).any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return grey
+    part: NDArray[np.uint8] = grey[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+    return np.ascontiguousarray(part)
+
+
+def _grey(values: NDArray[Any], volume: Volume) -> NDArray[np.uint8]:
+    low, high = volume.intensity_range
+    above = np.subtract(values, low, dtype=np.float64)
+    grey: NDArray[np.uint8] = (above * (255 / max(high - low, 1e-6))).clip(0, 255).astype(np.uint8)
+    return grey
 
 
 def _along_lps(volume: Volume) -> tuple[NDArray[np.generic], tuple[float, float, float]]:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.head_pose import HeadPose
+from gp_labeler.imaging.preview import PreviewPlane, straight_preview_planes
+from gp_labeler.imaging.readers import ImportPlan, read_preview
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
-__all__ = ["Straighten", "StraightenByLandmarks", "StraightenByPoints"]
+__all__ = ["StraightPreview", "Straighten", "StraightenByLandmarks", "StraightenByPoints"]
 
 _MODULES = ("scipy.ndimage", "scipy.optimize", "scipy.spatial", "SimpleITK", "gp_labeler.phantom")
 
@@ -87,3 +90,23 @@ class StraightenByPoints:
             right=self.right,
             threshold=self.threshold,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class StraightPreview:
+    """Lay the preview of a scan straight along its head, where the symmetry of the bone tells how."""
+
+    plan: ImportPlan
+    title: str = "Straightening the preview"
+
+    def run(self, progress: Progress) -> tuple[PreviewPlane, PreviewPlane] | None:
+        """Return its axial and coronal slice; None where the head cannot be straightened by itself."""
+        load_modules(*_MODULES)
+        from gp_labeler.head_pose import straighten
+
+        volume = read_preview(self.plan, cancel=progress.cancelled)
+        try:
+            pose = straighten(volume, progress=progress, cancel=progress.cancelled)
+        except GpError:
+            return None
+        return straight_preview_planes(volume, pose.T_head_scan)

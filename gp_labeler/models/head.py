@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any
 
@@ -13,6 +13,7 @@ from psygnal import Signal
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side, feature
+from gp_core.landmarks.sets import LandmarkSet
 from gp_core.validation import FloatArray, check_option
 from gp_labeler.document.edits import as_position, point_text
 from gp_labeler.document.head_edits import ClearHeadFrame, ConfirmLeft, SetHeadFrame
@@ -124,22 +125,29 @@ class HeadModel:
         points : set of (Side, str), optional
             Which are looked at; by default all.
         """
-        if self.frame is None:
-            return []
         found = []
         for side in Side:
             landmarks = self._document.landmarks(side)
-            for code in landmarks.placed:
-                wanted = points is None or (side, code) in points
-                if not wanted or feature(code).shared or feature(code).computed:
-                    continue
-                left = float(self.frame.heights(landmarks[code][None])[0])
-                beyond = -left if side is Side.LEFT else left
-                if beyond > _WRONG_SIDE_MM:
-                    other = side.other.word
-                    found.append(
-                        f"{point_text(side, code)} lies {beyond:.1f} mm on the {other} of the mid-plane"
-                    )
+            asked = [code for code in landmarks.placed if points is None or (side, code) in points]
+            found += self._wrong_sides_of(landmarks, asked)
+        return found
+
+    def wrong_sides_in(self, landmarks: LandmarkSet) -> list[str]:
+        """Return a sentence for each point that lies on the other side, of landmarks not taken over yet."""
+        return self._wrong_sides_of(landmarks, landmarks.placed)
+
+    def _wrong_sides_of(self, landmarks: LandmarkSet, codes: Iterable[str]) -> list[str]:
+        if self.frame is None:
+            return []
+        found, side = [], landmarks.side
+        for code in codes:
+            if feature(code).shared or feature(code).computed:
+                continue
+            left = float(self.frame.heights(landmarks[code][None])[0])
+            beyond = -left if side is Side.LEFT else left
+            if beyond > _WRONG_SIDE_MM:
+                text, other = point_text(side, code), side.other.word
+                found.append(f"{text} lies {beyond:.1f} mm on the {other} of the mid-plane")
         return found
 
     # Straightening
@@ -296,8 +304,10 @@ class HeadModel:
             )
         )
         self._points.clear()
-        words = f"The head lies {pose.tilt_deg:.0f}° off the axes of its scan; the views are straight now"
-        self._messages.say("; ".join((words, *pose.warnings)), "warning" if pose.warnings else "info")
+        words = [f"The head lies {pose.tilt_deg:.0f}° off the axes of its scan; the views are straight now"]
+        if self.asks_left:
+            words.append("say which side is left: 1 Scan > Head")
+        self._messages.say("; ".join((*words, *pose.warnings)), "warning" if pose.warnings else "info")
         self._say_wrong_sides(None)
         self.changed.emit()
 

@@ -137,13 +137,14 @@ class LandmarkImportDialog(QDialog):
         unknown = self._unknown()
         self.names.show_names(unknown)
         self.show_only.setVisible(bool(unknown))
-        findings = [self._read(file) for file in self._files]
+        findings = [finding for file in self._files for finding in self._read(file)]
         self._n_wrong = sum(level == "error" for level, _ in findings)
         n = len(self._files)
         self._title.set_words(self._files[0].name if n == 1 else f"{n} landmark files")
         self._show(findings)
 
-    def _read(self, file: Path) -> tuple[str, str]:
+    def _read(self, file: Path) -> list[tuple[str, str]]:
+        """Return what a file holds, or why it cannot be taken over, and what to know about its sides."""
         try:
             points = read_points(file, names=LabelNames(self._codes()))
             if unknown := unknown_labels(points):
@@ -153,12 +154,18 @@ class LandmarkImportDialog(QDialog):
                     if n == 1
                     else f"{n} names are unknown. Choose what they"
                 )
-                return "error", f"{file.name}: {what} {'stands' if n == 1 else 'stand'} for."
+                return [("error", f"{file.name}: {what} {'stands' if n == 1 else 'stand'} for.")]
             side = self.side.currentData()
             sets = sides_of(points) if side is None else (landmarks_of(points, side=side),)
         except GpError as error:
-            return "error", str(error)
-        return "info", f"{file.name}: {' and '.join(_words(landmarks) for landmarks in sets)}"
+            return [("error", str(error))]
+        found = [("info", f"{file.name}: {' and '.join(_words(landmarks) for landmarks in sets)}")]
+        wrong = [text for landmarks in sets for text in self._workspace.head.wrong_sides_in(landmarks)]
+        if wrong:
+            rest = f", and {len(wrong) - 1} more on the other side too" if len(wrong) > 1 else ""
+            left = self._workspace.head.left_text
+            found.append(("warning", f"{wrong[0]}{rest}. Are left and right exchanged? {left}"))
+        return found
 
     def _ask_table(self) -> None:
         """Ask for a file that says what the names stand for, and choose what it says."""

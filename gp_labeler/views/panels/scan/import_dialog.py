@@ -19,6 +19,7 @@ from qtpy.QtWidgets import (
 
 from gp_labeler.imaging.preview import PreviewPlane
 from gp_labeler.imaging.readers import ImportPlan, Problem
+from gp_labeler.jobs.head import StraightPreview
 from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
@@ -164,6 +165,8 @@ class ImportDialog(QDialog):
         for picture in self.pictures:
             pictures.addWidget(picture, 1)
         column.addLayout(pictures)
+        self.straight = text_label("", "hint", wrap=True)
+        column.addWidget(self.straight)
         column.addWidget(self.reverse)
         return self.sides
 
@@ -257,9 +260,26 @@ class ImportDialog(QDialog):
             return
         for picture in self.pictures:
             picture.show_plane(None)
+        self.straight.setText("")
         self._workspace.jobs.submit(PreviewScan(self._plan), self._show_preview, key="import preview")
 
     def _show_preview(self, planes: tuple[PreviewPlane, PreviewPlane]) -> None:
+        self._show_planes(planes)
+        self.straight.setText("As stored. The head is being straightened…")
+        job = StraightPreview(self._plan)
+        self._workspace.jobs.submit(job, self._show_straight, key="import straight preview")
+
+    def _show_straight(self, planes: tuple[PreviewPlane, PreviewPlane] | None) -> None:
+        if planes is None:
+            self.straight.setText("As stored: the bone does not show how the head lies.")
+            return
+        self._show_planes(planes)
+        self.straight.setText(
+            "The head as its bone lies, straightened. Left and right are those of the file: a head and its "
+            "mirror image look alike, so nothing in the scan can prove them."
+        )
+
+    def _show_planes(self, planes: tuple[PreviewPlane, PreviewPlane]) -> None:
         for picture, plane in zip(self.pictures, planes, strict=True):
             picture.show_plane(plane)
 
@@ -267,6 +287,8 @@ class ImportDialog(QDialog):
         if task.key == "import preview":
             for picture in self.pictures:
                 picture.show_plane(None, "No preview: the file cannot be read")
+        elif task.key == "import straight preview":
+            self.straight.setText("As stored.")
         elif task.key == "import look":
             self.why.setText(breakable(task.message))
 
@@ -288,5 +310,5 @@ class ImportDialog(QDialog):
 
     def _stop(self) -> None:
         for task in self._workspace.jobs.running:
-            if task.key in ("import preview", "import look"):
+            if task.key in ("import preview", "import straight preview", "import look"):
                 task.cancel()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
+import numpy as np
+
 from gp_labeler.imaging.preview import PreviewPlane, preview_planes
 from gp_labeler.imaging.readers import MAPPED_FROM, ImportPlan, Problem, read_preview
 from gp_labeler.imaging.readers.options import Spacing
@@ -14,6 +16,9 @@ from gp_labeler.views.formatting import TIMES, size_text, spacing_text
 __all__ = ["MB", "PreviewScan", "bare", "facts_of", "remedy", "sentence", "why_not"]
 
 MB = 2**20
+_AXES = ("columns", "rows", "slices")
+"""What the voxel axes i, j and k count."""
+
 _OPTION = re.compile(r" \(--[^)]*\)")
 
 
@@ -48,8 +53,17 @@ def facts_of(plan: ImportPlan) -> dict[str, str]:
         + (f", {spacing_text(spacing)} each" if spacing else ", of unknown size"),
         "Size": size or "unknown until the voxel size is given",
         "Memory": _memory(plan),
+        **({"Left": _left(plan)} if plan.sides_known else {}),
         "Where": str(plan.path),
     }
+
+
+def _left(plan: ImportPlan) -> str:
+    """Say where left is according to the file."""
+    to_left = plan.T_scan_voxel()[0, :3]
+    axis = int(np.abs(to_left).argmax())
+    order = "later" if to_left[axis] > 0 else "earlier"
+    return f"towards {order} {_AXES[axis]}, as the file says; nothing in the scan can prove it"
 
 
 def _memory(plan: ImportPlan) -> str:
