@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.loading import load_modules
@@ -14,10 +15,36 @@ from gp_labeler.jobs.runner import Progress
 
 if TYPE_CHECKING:
     from gp_labeler.autolabel import Proposal
+    from gp_labeler.head_pose import HeadPose
 
-__all__ = ["SuggestFromScans"]
+__all__ = ["FirstLabels", "SuggestFromScans"]
 
-_MODULES = ("scipy.ndimage", "scipy.spatial", "scipy.fft", "SimpleITK", "skimage.filters")
+_MODULES = (
+    "scipy.ndimage",
+    "scipy.spatial",
+    "scipy.fft",
+    "scipy.optimize",
+    "SimpleITK",
+    "skimage.filters",
+    "gp_labeler.phantom",
+)
+_PROPOSED = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class FirstLabels:
+    """What was found.
+
+    Parameters
+    ----------
+    proposal : Proposal
+        The suggestions.
+    head : HeadPose, optional
+        How the head lies by the symmetry of its bone, where that was asked for and found.
+    """
+
+    proposal: Proposal
+    head: HeadPose | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +65,10 @@ class SuggestFromScans:
         Landmarks that are placed in the scan, LPS mm: three of them say how the head lies.
     most : int
         Labelled scans to suggest from.
+    straighten : bool
+        Whether to find how the head lies, too, so that suggestions can be looked at in straight views.
+    threshold : float, optional
+        Where its bone begins, for that.
     """
 
     volume: Volume
@@ -45,13 +76,15 @@ class SuggestFromScans:
     folder: Path
     placed: Mapping[str, FloatArray] = field(default_factory=dict)
     most: int = 5
+    straighten: bool = False
+    threshold: float | None = None
 
     @property
     def title(self) -> str:
         """What the user reads."""
         return "Suggesting from labelled scans"
 
-    def run(self, progress: Progress) -> Proposal:
+    def run(self, progress: Progress) -> FirstLabels:
         """Read the labelled scans, prepare them where they are not yet, and guess.
 
         Raises
@@ -69,12 +102,23 @@ class SuggestFromScans:
         found = read_labelled_scans(self.labelled)
         library = TemplateLibrary(found.scans, self.folder, most=self.most)
         with ProcessRegistration(engine_named()) as registration:
-            return propose(
+            proposal = propose(
                 self.volume,
                 library,
                 placed=self.placed,
                 stored="as it is",
                 registration=registration,
-                progress=lambda fraction: progress(fraction, "Registering"),
+                progress=lambda fraction: progress(_PROPOSED * fraction, "Registering"),
                 cancel=progress.cancelled,
             )
+        return FirstLabels(proposal, self._head(progress) if self.straighten else None)
+
+    def _head(self, progress: Progress) -> HeadPose | None:
+        """Return how the head lies; None where its symmetry does not tell, for the views can stay then."""
+        from gp_labeler.head_pose import straighten
+
+        progress(_PROPOSED, "Straightening the head")
+        try:
+            return straighten(self.volume, threshold=self.threshold, cancel=progress.cancelled)
+        except GpError:
+            return None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,8 +18,9 @@ from gp_labeler.autolabel.labelled_scan import flat_points
 from gp_labeler.document.edits import SuggestPoints, point_text
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How
-from gp_labeler.jobs.first_labels import SuggestFromScans
+from gp_labeler.jobs.first_labels import FirstLabels, SuggestFromScans
 from gp_labeler.jobs.runner import Jobs, Task
+from gp_labeler.models.head import HeadModel
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.scan import ScanModel
@@ -43,6 +45,8 @@ class FirstLabelsModel:
         The scan that is open.
     labels : LabelsModel
         The least certain suggestion becomes its active point.
+    head : HeadModel
+        It is straightened too, unless it is already.
     jobs : Jobs
         Where the search runs.
     messages : Messages
@@ -59,11 +63,12 @@ class FirstLabelsModel:
         document: SpecimenDocument,
         scan: ScanModel,
         labels: LabelsModel,
+        head: HeadModel,
         jobs: Jobs,
         messages: Messages,
         directory: Path | None = None,
     ) -> None:
-        self._document, self._scan, self._labels = document, scan, labels
+        self._document, self._scan, self._labels, self._head = document, scan, labels, head
         self._jobs, self._messages = jobs, messages
         self._folder = (directory or user_cache_path("gp-labeler", appauthor=False)) / "templates"
         self.proposal: Proposal | None = None
@@ -89,15 +94,18 @@ class FirstLabelsModel:
             for code in self._document.landmarks(side).placed
         )
 
-    def suggest(self, labelled: Iterable[str | PathLike[str]]) -> None:
+    def suggest(self, labelled: Iterable[str | PathLike[str]], *, left_confirmed: bool = False) -> None:
         """Suggest landmarks from labelled scans; what is placed or unseen stays.
 
-        Left and right are taken as the scan has them: ask the user first, unless `knows_left`.
+        Left and right are taken as the scan has them: ask the user first, unless `knows_left`. The views are
+        turned into the frame of the head, unless they were before, or its symmetry does not tell.
 
         Parameters
         ----------
         labelled : iterable of path
             Specimen files, landmark files beside their scans, and folders of them.
+        left_confirmed : bool
+            Whether a person has just said that left is as the scan has it.
 
         Raises
         ------
@@ -108,8 +116,15 @@ class FirstLabelsModel:
             raise GpError("there is no scan to suggest landmarks in", remedy="Open one first.")
         placed = flat_points({side: self._document.landmarks(side) for side in Side})
         known = placed if len(placed) >= _FEWEST_PLACED else {}
-        job = SuggestFromScans(self._scan.volume, tuple(map(Path, labelled)), self._folder, known)
-        self._jobs.submit(job, self._take, key=_KEY)
+        job = SuggestFromScans(
+            self._scan.volume,
+            tuple(map(Path, labelled)),
+            self._folder,
+            known,
+            straighten=self._head.frame is None,
+            threshold=self._document.state.threshold,
+        )
+        self._jobs.submit(job, partial(self._take, left_confirmed), key=_KEY)
 
     def cancel(self) -> None:
         """Stop; nothing is suggested."""
@@ -118,8 +133,10 @@ class FirstLabelsModel:
                 task.cancel()
         self.changed.emit()
 
-    def _take(self, proposal: Proposal) -> None:
-        self.proposal = proposal
+    def _take(self, left_confirmed: bool, found: FirstLabels) -> None:
+        if found.head is not None and self._head.frame is None:
+            self._head.take(found.head, left_confirmed=left_confirmed)
+        self.proposal = proposal = found.proposal
         for side, suggestions in proposal.suggestions().items():
             if suggestions:
                 self._document.do(SuggestPoints(side, suggestions, self._document.provenance(How.GHOST)))

@@ -254,6 +254,28 @@ class HeadModel:
         """Keep that a person knows left to be left."""
         self._document.do(ConfirmLeft())
 
+    def take(self, pose: HeadPose, *, left_confirmed: bool = False) -> None:
+        """Turn the views into the frame of a head that was found.
+
+        Parameters
+        ----------
+        pose : HeadPose
+        left_confirmed : bool
+            Whether a person has just said which side is left.
+        """
+        left_is_known = left_confirmed or self._left_is_known
+        frame = HeadFrame.of(pose.T_head_scan)
+        self._document.do(
+            SetHeadFrame(HeadFrame(frame.matrix, pose.found_by, pose.pitch, pose.left, left_is_known))
+        )
+        self._points.clear()
+        words = [f"The head lies {pose.tilt_deg:.0f}° off the axes of its scan; the views are straight now"]
+        if self.asks_left:
+            words.append("say which side is left: 1 Scan > Head")
+        self._messages.say("; ".join((*words, *pose.warnings)), "warning" if pose.warnings else "info")
+        self._say_wrong_sides(None)
+        self.changed.emit()
+
     def forget(self) -> None:
         """Remove the head frame."""
         self._document.do(ClearHeadFrame())
@@ -289,27 +311,7 @@ class HeadModel:
 
     def _submit(self, job: Job[HeadPose]) -> None:
         self.refusal = ""
-        self._jobs.submit(job, self._take, key=_KEY)
-
-    def _take(self, pose: HeadPose) -> None:
-        self._document.do(
-            SetHeadFrame(
-                HeadFrame(
-                    HeadFrame.of(pose.T_head_scan).matrix,
-                    pose.found_by,
-                    pose.pitch,
-                    pose.left,
-                    self._left_is_known,
-                )
-            )
-        )
-        self._points.clear()
-        words = [f"The head lies {pose.tilt_deg:.0f}° off the axes of its scan; the views are straight now"]
-        if self.asks_left:
-            words.append("say which side is left: 1 Scan > Head")
-        self._messages.say("; ".join((*words, *pose.warnings)), "warning" if pose.warnings else "info")
-        self._say_wrong_sides(None)
-        self.changed.emit()
+        self._jobs.submit(job, self.take, key=_KEY)
 
     def _take_by_hand(self, axes: FloatArray, origin: FloatArray, *, merge: bool) -> None:
         T_head_scan = RigidTransform.from_parts(axes, -axes @ origin, dst="head", src="scan")

@@ -85,7 +85,9 @@ class Workspace:
         self.measure = MeasureModel(document, self.interaction, self.labels, self.view, messages)
         self.bone = BoneModel(document, self.scan, self.labels, jobs, messages)
         self.head = HeadModel(document, self.view, self.scan, jobs, messages)
-        self.first_labels = FirstLabelsModel(document, self.scan, self.labels, jobs, messages, directory)
+        self.first_labels = FirstLabelsModel(
+            document, self.scan, self.labels, self.head, jobs, messages, directory
+        )
         document.picture = self._thumbnail
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)
         self.planes = AnatomicalPlanesModel(self.labels, self.pose, self.view)

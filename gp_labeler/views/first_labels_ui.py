@@ -26,10 +26,9 @@ class FirstLabelsUi(UiPart):
         if model.is_running:
             model.cancel()
             return
-        labelled = self._ask_labelled()
-        if not labelled or not self._knows_left():
-            return
-        model.suggest(labelled)
+        labelled, asks_left = self._ask_labelled(), not model.knows_left
+        if labelled and self._knows_left():
+            model.suggest(labelled, left_confirmed=asks_left)
 
     def _ask_labelled(self) -> list[Path]:
         """Return the labelled scans that the user chooses; none where the user thinks better of it."""

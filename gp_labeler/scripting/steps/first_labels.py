@@ -37,7 +37,8 @@ class SuggestLike(Step):
                 remedy="Say left_confirmed = true if left is as the file says.",
             )
         before = model.proposal
-        model.suggest([driver.to_read(each) for each in self.labelled])
+        labelled = [driver.to_read(each) for each in self.labelled]
+        model.suggest(labelled, left_confirmed=self.left_confirmed)
         driver.wait_until_idle()
         if model.proposal is None or model.proposal is before:
             raise GpError("suggest_like: nothing was suggested")

@@ -1,9 +1,12 @@
 """The step Label offers first labels before anything is placed, and asks what no scan can tell."""
 
+import numpy as np
 from small_heads import TURN, save_markups, save_volume, small_head
 from window_cases import Answers, wait_until_idle
 
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
+from gp_labeler.head_pose import HeadPose
 from gp_labeler.views.panels.label.suggest_row import SuggestRow
 
 
@@ -16,7 +19,10 @@ def labelled_head(folder):
     return folder
 
 
-def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path):
+def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path, monkeypatch):
+    lies = RigidTransform.from_parts(TURN.T, np.zeros(3), dst="head", src="scan")
+    found = HeadPose(lies, "symmetry", None, "the teeth", "the file")
+    monkeypatch.setattr("gp_labeler.head_pose.straighten", lambda volume, **options: found)
     window = make_window()
     window.workspace.scan.begin(small_head(7, turn=TURN)[0])
     wait_until_idle(qtbot, window)
@@ -32,3 +38,8 @@ def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path)
     suggested = [window.workspace.document.landmarks(side).suggested for side in Side]
     assert [len(each) for each in suggested] == [4, 5]
     assert not button.isVisible()
+    np.testing.assert_allclose(window.workspace.view.frame.axes, TURN, atol=1e-9)  # columns: the head's axes
+    assert window.workspace.head.frame.left_confirmed  # it was asked
+    active = window.workspace.labels.active
+    where = window.workspace.labels.place_of(active.side, active.code)
+    assert window.grid.can_judge(where)  # the least certain is shown closely
