@@ -143,3 +143,12 @@ def test_files_of_tests_have_names_of_their_own() -> None:
     """Pytest imports test files and their helpers by their mere names: of two it would collect neither."""
     files = [path.name for path in (_ROOT / "tests").rglob("*.py") if path.name != "conftest.py"]
     assert sorted(files) == sorted(set(files))
+
+
+def test_scripts_without_an_ending_are_linted_too() -> None:
+    scripts = [path for path in (_ROOT / "tools").rglob("*") if path.is_file() and not path.suffix]
+    python = [path for path in scripts if "python" in path.read_text(encoding="utf-8").partition("\n")[0]]
+    settings = (_ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    assert python
+    for path in python:
+        assert f'"{path.relative_to(_ROOT).as_posix()}"' in settings

@@ -88,3 +88,18 @@ def test_the_habits_of_a_project_are_there() -> None:
     citation = (_ROOT / "CITATION.cff").read_text()
     assert "cff-version: 1.2.0" in citation
     assert "doi: 10.1097/MAO.0000000000003250" in citation
+
+
+def test_the_invented_addresses_stand_in_one_place() -> None:
+    folders = ("gp_core", "gp_labeler", "docs", "tools", "resources", "integrations", "benchmarks", ".github")
+    files = [path for folder in folders for path in (_ROOT / folder).rglob("*") if path.is_file()]
+    files += [path for path in _ROOT.iterdir() if path.is_file()]
+    address = "gp-labeler.github.io", "github.com/gp-labeler"
+    named = {
+        path.name
+        for path in files
+        if path.suffix in (".py", ".md", ".json", ".toml", ".cff", ".yml", ".yaml", "")
+        and any(each in path.read_text(encoding="utf-8") for each in address)
+    }
+    assert named == {"pyproject.toml"}
+    assert "[tool.hatch.metadata.hooks.custom]" in (_ROOT / "CONTRIBUTING.md").read_text()

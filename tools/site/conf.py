@@ -1,6 +1,12 @@
 """Configuration of the site for Sphinx, which tools/site/build runs."""
 
+import sys
+from pathlib import Path
+
 import gp_core
+
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from generate import REPOSITORY
 
 project = "gp-labeler"
 author = "gp-labeler developers"
@@ -33,7 +39,7 @@ html_logo = html_favicon = "../../resources/icons/gp-labeler.svg"
 html_static_path = []
 html_show_sphinx = False
 html_theme_options = {
-    "source_repository": "https://github.com/gp-labeler/gp-labeler",
+    "source_repository": REPOSITORY,
     "source_branch": "main",
     "source_directory": "docs/",
 }

@@ -11,6 +11,7 @@ import inspect
 import re
 import shutil
 from collections.abc import Iterator
+from importlib.metadata import metadata
 from pathlib import Path
 
 import landmark_atlas
@@ -22,7 +23,9 @@ from gp_labeler.cli.entry import make_parser as labeler_parser
 from gp_labeler.cli.subcommands import SUBCOMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
-SOURCE = "https://github.com/gp-labeler/gp-labeler/blob/main"
+REPOSITORY = dict(
+    line.split(", ", 1) for line in metadata("gp-labeler").get_all("Project-URL") or [] if ", " in line
+)["Source"]
 AT_TOP = ("CHANGELOG", "CONTRIBUTING", "CODE_OF_CONDUCT")
 NAVIGATION = ROOT / "tools" / "site" / "navigation.md"
 
@@ -44,7 +47,7 @@ def in_site(text: str) -> str:
     text = re.sub(r"\]\(docs/", "](", text)
     for name in AT_TOP:
         text = text.replace(f"]({name}.md", f"]({name.lower()}.md")
-    return text.replace("](CITATION.cff)", f"]({SOURCE}/CITATION.cff)")
+    return text.replace("](CITATION.cff)", f"]({REPOSITORY}/blob/main/CITATION.cff)")
 
 
 def first_pages() -> Iterator[tuple[str, str]]:
