@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.errors import GpError
 
-__all__ = ["check_fields", "checks_arguments", "checks_arguments_but"]
+__all__ = ["check_fields", "checks_arguments", "checks_arguments_but", "is_scalar_array"]
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -190,13 +190,29 @@ def _fits_class(value: Any, hint: Any) -> bool:
 
 def _fits_iterable(value: Any, origin: type, element: Any) -> bool:
     """Whether it may be gone through, and holds what it should; a text is no list of letters."""
-    if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+    if isinstance(value, str | bytes) or not isinstance(value, Iterable) or is_scalar_array(value):
         return False
     if issubclass(origin, Sequence) and not isinstance(value, Sequence):
         return False
     if isinstance(value, Collection):
         return all(_fits(one, element) for _, one in zip(range(_MANY), value, strict=False))
     return True  # a generator, which can be gone through but once
+
+
+def is_scalar_array(value: Any) -> bool:
+    """Whether a value is an array of no dimension, which has the methods of a list, but is none.
+
+    Parameters
+    ----------
+    value : object
+        Any value.
+
+    Returns
+    -------
+    bool
+        True for such as ``np.array(1.0)``.
+    """
+    return isinstance(value, np.ndarray) and value.ndim == 0
 
 
 def _is_number(value: Any, kind: type) -> bool:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import FrameError
-from gp_core.validation import FloatArray, as_points
+from gp_core.validation import FloatArray, as_points, as_vectors
 
 __all__ = ["FRAMES", "RigidTransform", "angle_between_deg", "cross_matrix", "mirror_x", "quaternion_xyzw"]
 
@@ -149,7 +149,7 @@ class RigidTransform:
         (..., 3) array
             Vectors in frame `dst`.
         """
-        turned: FloatArray = np.asarray(vectors, dtype=np.float64) @ self.rotation.T
+        turned: FloatArray = as_vectors(vectors, "vectors") @ self.rotation.T
         return turned
 
     def inverse(self) -> RigidTransform:

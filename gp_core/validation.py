@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from gp_core.errors import GpError
 
-__all__ = ["FloatArray", "as_points", "check_option", "freeze_arrays", "near_matches"]
+__all__ = ["FloatArray", "as_points", "as_vectors", "check_option", "freeze_arrays", "near_matches"]
 
 FloatArray = NDArray[np.float64]
 
@@ -52,19 +52,57 @@ def as_points(value: ArrayLike, name: str, *, missing_allowed: bool = False) -> 
     return points
 
 
+def as_vectors(value: ArrayLike, name: str) -> FloatArray:
+    """Return `value` as a (..., 3) float64 array; NaN, for what is missing, stays.
+
+    Parameters
+    ----------
+    value : (..., 3) array_like
+        Vectors.
+    name : str
+        What the message calls them.
+
+    Returns
+    -------
+    (..., 3) array
+        Vectors.
+
+    Raises
+    ------
+    GpError
+        Not numbers, or not three in the last dimension.
+    """
+    try:
+        vectors = np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        raise GpError(f"{name} must be numbers in (..., 3), got {type(value).__name__}") from None
+    if vectors.ndim < 1 or vectors.shape[-1] != 3:
+        raise GpError(f"{name} must have the shape (..., 3), got {vectors.shape}")
+    return vectors
+
+
 def freeze_arrays(instance: Any) -> None:
     """Give a frozen dataclass arrays of its own that cannot be written to; call it in ``__post_init__``.
 
     Parameters
     ----------
     instance : dataclass
+        Its fields that are arrays, and those that are a dict of arrays.
     """
     for one in fields(instance):
         value = getattr(instance, one.name)
         if isinstance(value, np.ndarray):
-            own = value.copy()
-            own.setflags(write=False)
-            object.__setattr__(instance, one.name, own)
+            object.__setattr__(instance, one.name, _own(value))
+        elif isinstance(value, dict) and any(isinstance(each, np.ndarray) for each in value.values()):
+            object.__setattr__(instance, one.name, {key: _own(each) for key, each in value.items()})
+
+
+def _own(value: Any) -> Any:
+    if not isinstance(value, np.ndarray):
+        return value
+    own = value.copy()
+    own.setflags(write=False)
+    return own
 
 
 def check_option(value: Any, name: str, allowed: Iterable[Any]) -> None:

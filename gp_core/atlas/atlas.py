@@ -199,6 +199,7 @@ class Atlas:
         title = f"Atlas {self.name}, {self.n_samples} sides"
         return html_table(title, [("feature", "x mm", "y mm", "z mm", "SD mm"), *rows])
 
+    @checks_arguments
     def save(self, path: str | PathLike[str]) -> None:
         """Write the atlas as JSON, with full precision.
 
@@ -238,6 +239,7 @@ class Atlas:
         return content
 
     @classmethod
+    @checks_arguments
     def from_dict(cls, content: Mapping[str, Any]) -> Atlas:
         """Make an atlas of what `as_dict` returned.
 

@@ -197,6 +197,7 @@ class Finding:
         """For a cell of a table, such as ``2.6 mm`` or ``exchanged``."""
         return self.deviations[0].word if self.kind == "far" else self.kind
 
+    @checks_arguments
     def deviation_of(self, code: str) -> Deviation | None:
         """Return the deviation of one of the landmarks, where it is known.
 

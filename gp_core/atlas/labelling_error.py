@@ -56,6 +56,8 @@ class LabellingError:
     source: str = ""
 
     def __post_init__(self) -> None:
+        if not isinstance(self.sd_mm, Mapping):
+            raise GpError(f"labelling errors must be a mapping of features to mm, got {self.sd_mm!r:.40}")
         named = {feature(code).code: _length(sd, f"of {code}") for code, sd in self.sd_mm.items()}
         object.__setattr__(self, "sd_mm", MappingProxyType(named))
         object.__setattr__(self, "other_mm", _length(self.other_mm, "of other features"))
@@ -68,6 +70,7 @@ class LabellingError:
         """Return a hash by content."""
         return hash((tuple(self.sd_mm.items()), self.other_mm, self.source))
 
+    @checks_arguments
     def of(self, codes: Iterable[str]) -> FloatArray:
         """Return the standard deviations of features.
 
@@ -80,8 +83,15 @@ class LabellingError:
         -------
         (n,) array, mm
             Of one coordinate.
+
+        Raises
+        ------
+        FeatureError
+            A feature is unknown.
         """
-        return np.array([self.sd_mm.get(code, self.other_mm) for code in codes], dtype=np.float64)
+        return np.array(
+            [self.sd_mm.get(feature(code).code, self.other_mm) for code in codes], dtype=np.float64
+        )
 
     @property
     def text(self) -> str:
@@ -199,6 +209,6 @@ def _length(value: Any, what: str) -> float:
         raise GpError(f"the labelling error {what} must be a number, got {value!r:.40}")
     if not 0 < value <= _LARGEST_MM:
         raise GpError(
-            f"the labelling error {what} must be above 0 and at most {_LARGEST_MM:g} mm, got {value:g}"
+            f"the labelling error {what} must be above 0 and at most {_LARGEST_MM:g} mm, got {value!r:.40}"
         )
     return float(value)

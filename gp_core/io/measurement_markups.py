@@ -110,6 +110,7 @@ def write_measurements(
     return tuple(paths)
 
 
+@checks_arguments
 def read_measurements(path: str | PathLike[str]) -> tuple[Measurement, ...]:
     """Read the rulers and angles of a markups file.
 

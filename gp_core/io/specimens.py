@@ -106,6 +106,7 @@ def load_specimens(
     return [_mean_of(labellings) for labellings in of_animals.values()]
 
 
+@checks_arguments
 def load_labellings(
     paths: str | PathLike[str] | Iterable[str | PathLike[str]],
     *,

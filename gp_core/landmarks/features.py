@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 
+from gp_core.argument_types import is_scalar_array
 from gp_core.errors import FeatureError
 from gp_core.resources import resource_path
 from gp_core.validation import near_matches
@@ -228,7 +229,7 @@ def check_codes(
     FeatureError
         Unknown, named twice, not allowed here, or too few.
     """
-    if isinstance(codes, str | bytes) or not isinstance(codes, Iterable):
+    if isinstance(codes, str | bytes) or not isinstance(codes, Iterable) or is_scalar_array(codes):
         raise FeatureError(f"{name} must be a list of features, got {codes!r}")
     found = tuple(feature(code).code for code in codes)
     permitted = tuple(CODES if allowed is None else allowed)

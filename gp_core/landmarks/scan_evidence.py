@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
 
@@ -43,6 +44,7 @@ class ScanEvidence:
     positions: Mapping[str, Position] = field(default_factory=dict)
     threshold: float | None = None
 
+    @checks_arguments
     def of(self, points: Mapping[str, FloatArray]) -> ScanEvidence | None:
         """Return the evidence that still holds: of points that are where they were measured.
 
@@ -68,6 +70,7 @@ class ScanEvidence:
         positions = {code: place for code, place in self.positions.items() if code in kept}
         return replace(self, bone_distances=distances, positions=positions, outside=self.outside & kept)
 
+    @checks_arguments
     def moved(self, T_dst_src: RigidTransform) -> ScanEvidence:
         """Return the evidence for labels that were moved as a whole into another frame.
 

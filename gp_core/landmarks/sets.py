@@ -148,6 +148,7 @@ class LandmarkSet:
         )
 
     @classmethod
+    @checks_arguments
     def empty(cls, side: Side | str, *, frame: str = "scan") -> LandmarkSet:
         """Make a set with no landmark placed.
 
@@ -391,6 +392,7 @@ class LandmarkSet:
         cleared = self.with_point(code, None)
         return replace(cleared, unseen=cleared.unseen | {feature(code).code})
 
+    @checks_arguments
     def with_provenance(self, provenance: Mapping[str, LabelProvenance]) -> LandmarkSet:
         """Return a copy with provenance added to features, where they are placed or unseen.
 

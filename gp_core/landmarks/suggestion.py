@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 
@@ -39,7 +40,7 @@ class Suggestion:
     def __post_init__(self) -> None:
         try:
             x, y, z = (float(value) for value in self.position)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             x = y = z = math.nan
         if not all(map(math.isfinite, (x, y, z))):
             raise GpError(
@@ -50,6 +51,7 @@ class Suggestion:
         if self.radius_95 is not None:
             object.__setattr__(self, "radius_95", _radius(self.radius_95))
 
+    @checks_arguments
     def moved(self, T_dst_src: RigidTransform) -> Suggestion:
         """Return the suggestion in another frame.
 
@@ -70,7 +72,7 @@ class Suggestion:
 def _radius(value: object) -> float:
     try:
         radius = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         radius = math.nan
     if not (math.isfinite(radius) and radius > 0):
         raise GpError(

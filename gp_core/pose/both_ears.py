@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from gp_core.argument_types import checks_arguments
 from gp_core.constants import CHI2_3_95
@@ -20,7 +21,7 @@ from gp_core.frames import RigidTransform, angle_between_deg, cross_matrix
 from gp_core.landmarks.features import EXTERNAL, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.cochlea_pose import CochleaPose
-from gp_core.validation import FloatArray
+from gp_core.validation import FloatArray, as_points, as_vectors, freeze_arrays
 
 __all__ = ["EarCheck", "MirrorPlane", "check_ears", "fuse_ears", "mirror_plane"]
 
@@ -60,12 +61,15 @@ class MirrorPlane:
     normal_sd_deg: float
     offset_sd_mm: float
 
-    def mirror(self, points: FloatArray) -> FloatArray:
+    def __post_init__(self) -> None:
+        freeze_arrays(self)
+
+    def mirror(self, points: ArrayLike) -> FloatArray:
         """Return points mirrored in the plane.
 
         Parameters
         ----------
-        points : (N, 3) array
+        points : (N, 3) array_like
             In the frame of the touches, mm.
 
         Returns
@@ -73,23 +77,25 @@ class MirrorPlane:
         (N, 3) array
             Their mirror images, mm.
         """
-        off: FloatArray = points - 2 * np.outer(points @ self.normal - self.offset, self.normal)
-        return off
+        rows = as_points(points, "points", missing_allowed=True)
+        mirrored: FloatArray = rows - 2 * np.outer(rows @ self.normal - self.offset, self.normal)
+        return mirrored
 
-    def mirror_direction(self, vector: FloatArray) -> FloatArray:
+    def mirror_direction(self, vector: ArrayLike) -> FloatArray:
         """Return a direction mirrored in the plane.
 
         Parameters
         ----------
-        vector : (3,) array
+        vector : (..., 3) array_like
             In the frame of the touches.
 
         Returns
         -------
-        (3,) array
+        (..., 3) array
             Of the same length.
         """
-        mirrored: FloatArray = vector - 2 * float(vector @ self.normal) * self.normal
+        given = as_vectors(vector, "a direction")
+        mirrored: FloatArray = given - 2 * (given @ self.normal)[..., None] * self.normal
         return mirrored
 
 

@@ -105,8 +105,10 @@ class CochleaPose:
     inputs: EstimateInputs | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.covariance, np.ndarray) or self.covariance.shape != (6, 6):
-            raise GpError(f"the covariance of a pose must be a (6, 6) array, got {np.shape(self.covariance)}")
+        given = self.covariance
+        shape = given.shape if isinstance(given, np.ndarray) else type(given).__name__
+        if shape != (6, 6):
+            raise GpError(f"the covariance of a pose must be a (6, 6) array, got {shape}")
         freeze_arrays(self)
         check_option(self.side_state, "state of the side", HYPOTHESIS_STATES)
         check_option(self.names_state, "state of the names", HYPOTHESIS_STATES)
@@ -269,6 +271,7 @@ class CochleaPose:
         """
         write_text(path, pose_text(self.content()))
 
+    @checks_arguments
     def save_tfm(self, path: str | PathLike[str]) -> None:
         """Write the pose as an ITK transform file; see `gp_core.io.tfm.write_tfm`.
 
@@ -284,6 +287,7 @@ class CochleaPose:
         """
         write_tfm(path, self.transform_to_touches)
 
+    @checks_arguments
     def save_csv(self, path: str | PathLike[str]) -> None:
         """Write the 4x4 matrix as plain numbers; see `gp_core.io.pose_export.write_csv`.
 
@@ -299,6 +303,7 @@ class CochleaPose:
         """
         write_csv(path, self)
 
+    @checks_arguments
     def save_landmarks(self, path: str | PathLike[str]) -> None:
         """Write CO and axis as Slicer markups; see `gp_core.io.pose_export.write_landmarks`.
 

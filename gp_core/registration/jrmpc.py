@@ -115,6 +115,7 @@ class JrmpcResult:
     def __post_init__(self) -> None:
         freeze_arrays(self)
 
+    @checks_arguments
     def moved(self, point_sets: Sequence[ArrayLike]) -> list[FloatArray]:
         """Return the points of each set in the common frame.
 

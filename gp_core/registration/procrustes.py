@@ -265,7 +265,8 @@ def certainly_not_collinear(points: FloatArray) -> bool:
     moments = centred.T @ centred
     total = float(moments[0, 0] + moments[1, 1] + moments[2, 2])
     pairs = (total * total - float((moments * moments).sum())) / 2
-    rounding = 1e-12 * float(np.abs(points).max()) ** 2
+    largest = float(np.abs(points).max())
+    rounding = 1e-12 * largest * largest
     return pairs > 10 * COLLINEAR**2 * total**2 and total > rounding
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from gp_core.argument_types import checks_arguments
 from gp_core.frames import RigidTransform
 from gp_core.stats import NORMAL_95, chi_square_share
 from gp_core.validation import FloatArray, as_points, freeze_arrays
@@ -84,6 +85,7 @@ class RegistrationResult:
             )
         return tuple(found)
 
+    @checks_arguments
     def tre_mm(self, points: ArrayLike) -> FloatArray:
         """Return the expected target registration error (root mean square) at points of the scan.
 
@@ -113,6 +115,7 @@ class RegistrationResult:
         """
         return self.fle_mm * self._tre_over_fle(points)
 
+    @checks_arguments
     def tre_95_mm(self, points: ArrayLike) -> FloatArray:
         """Return `tre_mm` with FLE at its upper 95 % confidence bound, `fle_95_mm`.
 

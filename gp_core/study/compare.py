@@ -134,6 +134,7 @@ class ComparisonReport:
             "rows": [row.as_dict() for row in self.rows],
         }
 
+    @checks_arguments
     def save_csv(self, path: str | PathLike[str]) -> None:
         """Write one line per row, with full precision.
 

@@ -83,6 +83,7 @@ class DistanceCheck:
         found = [pair for pair in self.pairs if pair.disagrees]
         return tuple(sorted(found, key=lambda pair: -abs(pair.deviation_sd or 0.0)))
 
+    @checks_arguments
     def suspect(self, pair: PairDistance) -> str:
         """Return which landmark of a pair to look at first: that with more distances that disagree.
 

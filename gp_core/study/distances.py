@@ -86,6 +86,7 @@ class DistanceTable:
         """
         return {"n_sides": self.n_sides, "pairs": self.pairs(), "typical_sd_mm": self.typical_sd()}
 
+    @checks_arguments
     def save_csv(self, path: str | PathLike[str]) -> None:
         """Write one line for each pair: features, mean and SD in mm, number of sides; with full precision.
 

@@ -213,6 +213,8 @@ def leave_one_out(
 def _checked_names(specimens: Sequence[Specimen], held_out: Iterable[str] | None) -> tuple[str, ...]:
     known = tuple(specimen.name for specimen in specimens)
     names = known if held_out is None else tuple(held_out)
+    if not names:
+        raise GpError("no animal is held out", remedy=f"Name one or more of {' '.join(known)}.")
     for name in names:
         if name not in known:
             raise GpError("is not among the animals", specimen=name, remedy=f"These are {' '.join(known)}.")

@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.disk import write_text
 from gp_core.errors import GeometryError, GpError
@@ -314,6 +315,7 @@ class ReliabilityReport:
             "disagreements": [row.as_dict() for row in self.disagreements],
         }
 
+    @checks_arguments
     def save_csv(self, path: str | PathLike[str]) -> None:
         """Write one line for each feature, and one for all; with full precision.
 
@@ -353,6 +355,7 @@ def _cell(part: object, name: str) -> object:
     return "" if part is None else getattr(part, name)
 
 
+@checks_arguments
 def reliability(
     labellings: Iterable[Labelling],
     *,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from enum import Enum
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 import gp_core
 from gp_core import PROBE, Atlas, GpError, LandmarkSet, Specimen, estimate_pose
@@ -18,6 +21,7 @@ ATLAS = Atlas.published()
 TOUCHES = {code: ATLAS[code] for code in PROBE}
 POSE = estimate_pose(TOUCHES, "L", ATLAS)
 SIDE = LandmarkSet.from_mapping(TOUCHES, "L", frame="tracker")
+PLANE = gp_core.MirrorPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, ("CL",), 1.0, 0.1)
 ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(0))
 OTHER = object()
 
@@ -34,6 +38,8 @@ ODD: dict[str, Any] = {
     "an unknown feature": {"XX": [1, 2, 3]},
     "an array": np.full((3, 3), np.nan),
     "an array of texts": np.array(["a"]),
+    "an array of no dimension": np.array(1.0),
+    "lists of different lengths": [[1, 2, 3], [1, 2]],
     "an object": OTHER,
     "a complex number": 1 + 2j,
     "a pose": POSE,
@@ -77,6 +83,22 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "leave_one_out": lambda x: gp_core.leave_one_out(x),
     "conditions": lambda x: gp_core.conditions([] if x is None else x, rng=np.random.default_rng(0)),
     "Atlas.load": lambda x: Atlas.load(x),
+    "Atlas.save": lambda x: ATLAS.save("/" if isinstance(x, str) else x),
+    "rows of an atlas": lambda x: ATLAS.rows(x),
+    "tfm": lambda x: POSE.save_tfm("/" if isinstance(x, str) else x),
+    "load_labellings": lambda x: gp_core.load_labellings(x),
+    "names": lambda x: gp_core.load_labellings("/nowhere", names=object() if x is None else x),
+    "read_measurements": lambda x: gp_core.read_measurements(x),
+    "reliability": lambda x: gp_core.reliability(x),
+    "labelling errors": lambda x: gp_core.LabellingError(x),
+    "labelling error": lambda x: gp_core.LabellingError({}, -1 if isinstance(x, float) else x),
+    "features of a labelling error": lambda x: gp_core.LabellingError().of(x),
+    "suggestion": lambda x: gp_core.Suggestion((1, 2, x)),
+    "radius": lambda x: gp_core.Suggestion((1, 2, 3), -1 if x is None else x),
+    "vectors": lambda x: POSE.transform_to_touches.apply_vector(x),
+    "mirrored points": lambda x: PLANE.mirror(x),
+    "mirrored direction": lambda x: PLANE.mirror_direction(x),
+    "held_out": lambda x: gp_core.leave_one_out([ANIMAL] * 3, held_out=[] if x is None else x),
 }
 
 _FINE = {
@@ -89,6 +111,17 @@ _FINE = {
     ("position", "numbers"),
     ("unseen", "a mapping of nothing"),  # gone through, it is a list of codes
     ("codes", "a mapping of nothing"),
+    ("rows of an atlas", "a mapping of nothing"),
+    ("features of a labelling error", "a mapping of nothing"),
+    ("suggestion", "a number"),
+    ("suggestion", "an array of no dimension"),
+    ("radius", "a number"),
+    ("radius", "an array of no dimension"),
+    ("vectors", "numbers"),
+    ("vectors", "an array"),  # of NaN, which is missing
+    ("mirrored points", "an array"),
+    ("mirrored direction", "numbers"),
+    ("mirrored direction", "an array"),
 }
 
 
@@ -128,6 +161,95 @@ def test_results_own_their_arrays_and_do_not_let_them_be_written() -> None:
     ):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1
+
+
+_CHECK_THEMSELVES = {
+    "DistanceCheck.suspect",
+    "LabellingError.from_dict",
+    "LabellingError.from_reliability",
+    "LandmarkSet.__contains__",
+    "MirrorPlane.mirror",
+    "MirrorPlane.mirror_direction",
+    "RigidTransform.apply",
+    "RigidTransform.apply_vector",
+    "RigidTransform.from_parts",
+    "RigidTransform.identity",
+    "ScanEvidence.from_json",
+}
+"""They take anything, or are called too often for a check by annotations; `CALLS` has most of them."""
+
+
+def test_every_public_function_and_method_checks_its_arguments() -> None:
+    unchecked = set()
+    for name in gp_core.__all__:
+        value = getattr(gp_core, name)
+        if inspect.isfunction(value) and not hasattr(value, "__wrapped__"):
+            unchecked.add(name)
+        if inspect.isclass(value) and value.__module__.startswith("gp_core"):
+            unchecked |= {f"{value.__name__}.{method}" for method in _unchecked_methods(value)}
+    assert unchecked - _CHECK_THEMSELVES == set()
+
+
+def _unchecked_methods(cls: type) -> Iterator[str]:
+    if issubclass(cls, Exception | Enum):
+        return
+    for name, value in vars(cls).items():
+        method = value.__func__ if isinstance(value, classmethod | staticmethod) else value
+        if name.startswith("_") and name not in ("__getitem__", "__contains__", "__matmul__"):
+            continue
+        is_checked = not inspect.isfunction(method) or hasattr(method, "__wrapped__")
+        if not is_checked and len(inspect.signature(method).parameters) > 1:
+            yield name
+
+
+def _results() -> Iterator[Any]:
+    """Return one of every public result that holds arrays, and of those that hold such results."""
+    rng = np.random.default_rng(0)
+    animals = [draw_animal(ATLAS, rng=rng, name=name) for name in "abcd"]
+    right = LandmarkSet.from_touches(animals[0].side("R").as_mapping(PROBE), "R")
+    left = LandmarkSet.from_touches(animals[0].side("L").as_mapping(PROBE), "L")
+    repeated = {code: [left[code], left[code] + 0.1, left[code] - 0.1] for code in PROBE}
+    poses = estimate_pose(left, "L"), estimate_pose(right, "R"), estimate_pose(repeated, "L", times={})
+    yield estimate_pose({code: TOUCHES[code] for code in ("OS", "MN", "RWA")}, "L").hypotheses[0]
+    plane = gp_core.mirror_plane(left, right)
+    frames = np.repeat(np.eye(4)[None], 12, axis=0)
+    frames[:, :3, :3] = Rotation.random(len(frames), random_state=0).as_matrix()
+    frames[:, :3, 3] = [100, 200, 300] - frames[:, :3, :3] @ [10, 20, 150]
+    marked = animals[0].side("L").with_point("MN", animals[0].side("L")["MN"] + 5)
+    yield from (*poses, poses[0].inputs, plane, gp_core.check_ears(*poses[:2], plane))
+    yield from (ATLAS, gp_core.fit_atlas(animals), *animals, gp_core.check_side(marked, ATLAS))
+    yield gp_core.jrmpc([side.array(PROBE) for side in (left, right)])
+    yield gp_core.register_fiducials(left.as_mapping(), left.as_mapping())
+    yield gp_core.calibrate_pivot(frames)
+    yield from (gp_core.distances(animals), gp_core.check_distances(left), *gp_core.gains(left, ATLAS))
+    yield gp_core.leave_one_out(animals, method="robust")
+    yield gp_core.conditions(animals, repeats=1, rng=rng, cases=gp_core.touch_conditions()[:1])
+    yield gp_core.simulate(animals, n=2, rng=rng)
+
+
+def test_no_array_of_a_public_result_can_be_written_to() -> None:
+    seen: set[type] = set()
+    writeable = {path for result in _results() for path in _writeable(result, type(result).__name__, seen)}
+    assert writeable == set()
+    classes = {value for name in gp_core.__all__ if is_dataclass(value := getattr(gp_core, name))}
+    holders = {cls for cls in classes if any("Array" in str(field.type) for field in fields(cls))}
+    assert holders - seen == set()  # a new class with arrays: let _results return one
+
+
+def _writeable(value: Any, path: str, seen: set[type]) -> Iterator[str]:
+    if isinstance(value, np.ndarray):
+        if value.flags.writeable:
+            yield path
+    elif is_dataclass(value) and not isinstance(value, type):
+        seen.add(type(value))
+        for field in fields(value):
+            yield from _writeable(getattr(value, field.name), f"{path}.{field.name}", seen)
+    elif isinstance(value, Mapping):
+        for each in value.values():
+            yield from _writeable(each, f"{path}[]", seen)
+    elif isinstance(value, tuple | list):
+        for each in value:
+            yield from _writeable(each, f"{path}[]", seen)
 
 
 def test_the_message_names_the_argument_what_it_must_be_and_what_it_was() -> None:
