@@ -128,12 +128,16 @@ class AtlasModel:
         return atlas if error is None else atlas.with_labelling_error(error)
 
     @property
+    def labelling_error_in_use(self) -> LabellingError:
+        """The error of labels that checks and regions allow for: the measured one, else that of the atlas."""
+        if self.labelling_error is not None:
+            return self.labelling_error
+        return LabellingError() if self._atlas is None else self._atlas.labelling_error
+
+    @property
     def labelling_error_text(self) -> str:
-        """Which error of labels checks and regions allow for, in words."""
-        error = self.labelling_error
-        if error is None:
-            error = LabellingError() if self._atlas is None else self._atlas.labelling_error
-        return error.text
+        """The same in words."""
+        return self.labelling_error_in_use.text
 
     def set_labelling_error(self, error: LabellingError | None) -> None:
         """Let checks and regions allow for a measured error of labels, or again for the one of the atlas."""

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
-from gp_core.atlas.labelling_error import LABELLING_NOISE_MM
+from gp_core.atlas.labelling_error import LABELLING_NOISE_MM, LabellingError
 from gp_core.constants import CHI2_3_95, DEFINING_FEATURES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import FEATURES
@@ -81,10 +81,12 @@ class Expectations:
     ----------
     predict : callable, optional
         The atlas; None expects nothing.
+    error : LabellingError, optional
+        Of the labels, for those that are mirrored; the atlas has its own.
     """
 
-    def __init__(self, predict: Predict | None = None) -> None:
-        self._predict = predict
+    def __init__(self, predict: Predict | None = None, error: LabellingError | None = None) -> None:
+        self._predict, self._error = predict, error or LabellingError()
         self._known: dict[tuple[object, ...], Mapping[str, Any]] = {}
         self._lock = threading.Lock()
 
@@ -120,7 +122,7 @@ class Expectations:
             return {}
         key = ("expected", fingerprint(landmarks))  # an edit of the other side asks for the same again
         expected = self._remembered(key, lambda: dict(self._expected(_without(landmarks, "CO"))))
-        found = mirror_ghosts(landmarks, other) | {c: Ghost(c, *expected[c]) for c in expected}
+        found = mirror_ghosts(landmarks, other, self._error) | {c: Ghost(c, *expected[c]) for c in expected}
         return {code: found[code] for code in to_do if code in found}
 
     def _expected(self, landmarks: LandmarkSet) -> Mapping[str, tuple[FloatArray, FloatArray]]:
@@ -132,11 +134,20 @@ class Expectations:
             return {}
 
 
-def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost]:
+def mirror_ghosts(
+    landmarks: LandmarkSet, other: LandmarkSet, error: LabellingError | None = None
+) -> dict[str, Ghost]:
     """Expect the points of the other side, mirrored in the plane between the features placed on both.
 
     Each is known as well as two labels are, as the feature is alike on both sides of an animal, and as the
     plane is known so far from the nearest feature that is placed on both.
+
+    Parameters
+    ----------
+    landmarks, other : LandmarkSet
+        The side, and the one that is mirrored, in one frame.
+    error : LabellingError, optional
+        Of the labels; by default the one that is assumed where nothing was measured.
 
     Returns
     -------
@@ -155,12 +166,17 @@ def mirror_ghosts(landmarks: LandmarkSet, other: LandmarkSet) -> dict[str, Ghost
     normal = across / np.linalg.norm(across)
     middle = (here + there).mean(axis=0) / 2
     of_pairs = float(np.mean([_side_variance(code) for code in paired])) / len(paired)
+    errors = error or LabellingError()
+    # the plane lies between labels; MIRROR_TILT was chosen with those of the assumed error
+    beyond = max(float(np.mean(errors.of(paired) ** 2)) - LABELLING_NOISE_MM**2, 0.0)
+    of_labels, turned = 2 * beyond / len(paired), 8 * beyond / float(across @ across)
     found = {}
     for code, point in other.as_mapping().items():
         position = point - 2 * np.dot(point - middle, normal) * normal
         reach = float(np.linalg.norm(position - here, axis=1).min())
-        tilt = MIRROR_TILT**2 * reach**2 / len(paired)
-        variance = 2 * LABELLING_NOISE_MM**2 + _side_variance(code) + of_pairs + tilt
+        tilt = (MIRROR_TILT**2 + turned) * reach**2 / len(paired)
+        of_two_labels = 2 * float(errors.of([code])[0]) ** 2
+        variance = of_two_labels + _side_variance(code) + of_pairs + of_labels + tilt
         found[code] = Ghost(code, position, variance * np.eye(3), "mirror")
     return found
 

@@ -93,7 +93,8 @@ class LabelsModel:
     ) -> None:
         self.document, self._view, self._scan, self._atlas = document, view, scan, atlas
         self._jobs, self._messages = jobs, messages
-        self._expectations, self._checks = Expectations(atlas.predict), LabelChecks(atlas.check)
+        self._expectations = Expectations(atlas.predict, atlas.labelling_error_in_use)
+        self._checks = LabelChecks(atlas.check)
         self._active = Active(Side.LEFT)
         self._last: Active | None = None
         self._begin()
@@ -167,7 +168,7 @@ class LabelsModel:
 
     def expect(self, predict: Predict | None, check: Check | None = None) -> None:
         """Take another atlas for ghosts and problems, or none."""
-        self._expectations = Expectations(predict)
+        self._expectations = Expectations(predict, self._atlas.labelling_error_in_use)
         self._checks = LabelChecks(check, self._checks.measure)
         self.ghosts_changed.emit()
 
