@@ -37,7 +37,8 @@ def make_list_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler list``."""
     parser = CommandParser(
         prog="gp-labeler list",
-        description="List the specimens in folders and their progress. No scan is opened.",
+        description="List the specimens in folders and their progress, and scans that are not begun. No scan is "
+        "opened.",
         epilog=_LIST_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -68,13 +69,17 @@ def run_list(arguments: Sequence[str]) -> int:
     width = max((len(row.specimen) for row in shown), default=8)
     for row in shown:
         sys.stdout.write(f"{_line(row, width)}\n")
-    sys.stdout.write(f"{n} specimen{'' if n == 1 else 's'}, {n_finished} finished\n")
+    n_new = sum(not row.is_begun for row in rows)
+    not_begun = f", {n_new} not begun" if n_new else ""
+    sys.stdout.write(f"{n} specimen{'' if n == 1 else 's'}, {n_finished} finished{not_begun}\n")
     return 0
 
 
 def _line(row: ListedSpecimen, width: int) -> str:
     if row.problem:
         return f"{row.specimen:<{width}}  cannot be read: {row.problem} ({row.path})"
+    if not row.is_begun:
+        return f"{row.specimen:<{width}}  not begun  {row.path}"
     sides = "  ".join(f"{side.word} {row.done(side):>2}/{_total()}" for side in Side)
     who = ", ".join(row.labellings[:3]) + (", …" if len(row.labellings) > 3 else "")
     scan = row.scan if row.scan_is_there or not row.scan else f"{row.scan} (not found)"

@@ -13,8 +13,10 @@ from gp_core.errors import GpError
 from gp_core.io.file_names import natural_key
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.document.labelling_edits import labelling_text
+from gp_labeler.document.scan_files import is_slice_folder, scan_files
 from gp_labeler.document.specimen_file import SUFFIX, read_document, state_in, thumbnail_in
 from gp_labeler.document.state import SpecimenState
+from gp_labeler.imaging.readers.formats import volume_stem
 
 __all__ = ["SIDE_TOTAL", "ListedSpecimen", "list_specimens", "specimen_files"]
 
@@ -27,12 +29,12 @@ _FEWEST_LEVELS = 4
 
 @dataclass(frozen=True)
 class ListedSpecimen:
-    """One specimen file, as a list shows it.
+    """One specimen file, or a scan that nobody has begun, as a list shows it.
 
     Parameters
     ----------
     path : Path
-        The file.
+        The specimen file; the scan, a file or a folder, where there is none.
     specimen : str
         Name of the specimen.
     placed, unseen, suggested : mapping of Side to int
@@ -59,6 +61,8 @@ class ListedSpecimen:
         What the file holds; None where it cannot be read.
     problem : str
         Why it cannot be read; empty where it can.
+    is_begun : bool
+        Whether there is a specimen file.
     """
 
     path: Path
@@ -77,6 +81,7 @@ class ListedSpecimen:
     thumbnail: bytes = b""
     state: SpecimenState | None = None
     problem: str = ""
+    is_begun: bool = True
 
     def done(self, side: Side) -> int:
         """Return how many features of a side are placed, computed or cannot be seen."""
@@ -107,7 +112,11 @@ class ListedSpecimen:
         }
         names = ("observer", "round", "changed", "notes", "scan", "scan_is_there", "n_notes", "problem")
         about = {name: getattr(self, name) for name in names}
-        finished = {"labellings": list(self.labellings), "finished": self.is_finished}
+        finished = {
+            "labellings": list(self.labellings),
+            "begun": self.is_begun,
+            "finished": self.is_finished,
+        }
         return {"path": str(self.path), "specimen": self.specimen, "sides": sides, **about, **finished}
 
 
@@ -131,7 +140,7 @@ def specimen_files(places: Iterable[str | PathLike[str]]) -> list[Path]:
 def list_specimens(
     places: Iterable[str | PathLike[str]], tell: Callable[[float], object] = lambda fraction: None
 ) -> list[ListedSpecimen]:
-    """Read the specimen files in some folders.
+    """Read the specimen files in some folders, and find the scans that have none.
 
     Parameters
     ----------
@@ -143,27 +152,66 @@ def list_specimens(
     Returns
     -------
     list of ListedSpecimen
-        One for each file; one that cannot be read says why.
+        One for each file, and for each scan that none of them is of; a file that cannot be read says why.
     """
+    places = list(places)
     files, found = specimen_files(places), []
     for n, file in enumerate(files):
         tell(n / len(files))
         found.append(_listed(file))
-    return found
+    found += _not_begun(places, found)
+    return sorted(found, key=lambda row: natural_key(str(row.path)))
+
+
+def _not_begun(
+    places: Iterable[str | PathLike[str]], listed: Iterable[ListedSpecimen]
+) -> list[ListedSpecimen]:
+    """Return the scans in folders that no listed specimen is of, by its path or its name beside it."""
+    begun: set[Path] = set()
+    for row in listed:
+        named = row.path.with_name(row.path.name.removesuffix(SUFFIX))
+        volume = None if row.state is None else row.state.volume
+        of_scan = [] if volume is None or volume.path is None else [Path(volume.path)]
+        for path in (named, *of_scan):
+            begun |= {path.resolve(), *path.resolve().parents[:1]}  # a folder of slices holds its specimen
+    scans = dict.fromkeys(
+        scan for place in places if Path(place).is_dir() for scan in _scans_within(Path(place))
+    )
+    return [
+        ListedSpecimen(scan, _name_of(scan), scan=scan.name, scan_is_there=True, is_begun=False)
+        for scan in scans
+        if not {scan.resolve(), scan.resolve().with_name(_name_of(scan))} & begun
+    ]
+
+
+def _name_of(scan: Path) -> str:
+    return scan.name if scan.is_dir() else volume_stem(scan)
 
 
 def _within(folder: Path, levels: int) -> Iterator[Path]:
-    try:
-        entries = sorted(folder.iterdir())
-    except OSError as error:
-        raise GpError(f"cannot be searched ({error.strerror})", file=folder) from None
-    for entry in entries:
-        if entry.name.startswith("."):
-            continue
+    for entry in _entries(folder):
         if entry.name.endswith(SUFFIX):
             yield entry
         elif levels and entry.is_dir() and not entry.is_symlink():
             yield from _within(entry, levels - 1)
+
+
+def _scans_within(folder: Path, levels: int = _FEWEST_LEVELS) -> Iterator[Path]:
+    entries = _entries(folder)
+    if is_slice_folder(entries):
+        yield folder
+        return
+    yield from scan_files(entries)
+    for entry in entries:
+        if levels and entry.is_dir() and not entry.is_symlink():
+            yield from _scans_within(entry, levels - 1)
+
+
+def _entries(folder: Path) -> list[Path]:
+    try:
+        return sorted(entry for entry in folder.iterdir() if not entry.name.startswith("."))
+    except OSError as error:
+        raise GpError(f"cannot be searched ({error.strerror})", file=folder) from None
 
 
 def _listed(file: Path) -> ListedSpecimen:

@@ -23,7 +23,7 @@ from gp_labeler.models.messages import Messages
 
 __all__ = ["FILTERS", "SpecimenListModel"]
 
-FILTERS = ("all", "unfinished", "finished", "in doubt", "repeated", "with notes")
+FILTERS = ("all", "unfinished", "not begun", "finished", "in doubt", "repeated", "with notes")
 """Which specimens are shown."""
 
 _LISTING = "list specimens"
@@ -88,13 +88,15 @@ class SpecimenListModel:
 
     @property
     def text(self) -> str:
-        """Such as ``12 of 40 specimens, 7 finished``."""
+        """Such as ``12 of 40 specimens, 7 finished, 3 not begun``."""
         n, shown = len(self._every), len(self.rows)
         if not n:
             return "No specimens yet" if self.folders else "Choose a folder of specimens"
         many = "" if n == 1 else "s"
         count = f"{n} specimen{many}" if shown == n else f"{shown} of {n} specimens"
-        return f"{count}, {sum(row.is_finished for row in self._every)} finished"
+        n_new = sum(not row.is_begun for row in self._every)
+        not_begun = f", {n_new} not begun" if n_new else ""
+        return f"{count}, {sum(row.is_finished for row in self._every)} finished{not_begun}"
 
     def n_problems(self, row: ListedSpecimen) -> int | None:
         """Return how many labels of a specimen are doubtful; None while that is not known."""
@@ -176,6 +178,7 @@ class SpecimenListModel:
     def _is_of_kind(self, row: ListedSpecimen) -> bool:
         tests = {
             "unfinished": not row.is_finished,
+            "not begun": not row.is_begun,
             "finished": row.is_finished,
             "in doubt": bool(self.n_problems(row)) or bool(row.problem),
             "repeated": len(row.labellings) > 1,
@@ -185,9 +188,11 @@ class SpecimenListModel:
 
     def _files(self, rows: Iterable[ListedSpecimen] | None) -> tuple[Path, ...]:
         chosen = self.rows if rows is None else tuple(rows)
-        files = tuple(row.path for row in chosen if not row.problem)
+        files = tuple(row.path for row in chosen if row.is_begun and not row.problem)
         if not files:
-            raise GpError("no specimens are listed", remedy="Add a folder of specimens, or show all.")
+            raise GpError(
+                "no labelled specimens are listed", remedy="Add a folder of specimens, or show all."
+            )
         return files
 
     def _take(self, rows: list[ListedSpecimen]) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -16,6 +17,7 @@ from gp_labeler.cli.entry import main
 from gp_labeler.document.edits import AnnotatePoint, ClearPoint
 from gp_labeler.document.specimen_file import read_document, read_specimen, thumbnail_in, write_specimen
 from gp_labeler.document.specimen_list import list_specimens
+from gp_labeler.document.volume_reference import VolumeReference
 from gp_labeler.imaging.thumbnail import thumbnail
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workspace import Workspace
@@ -61,6 +63,43 @@ def test_every_specimen_of_a_folder_is_told_by_its_file(folder):
     assert not rows["damaged"].is_finished
     with pytest.raises(GpError, match="does not exist"):
         list_specimens([folder / "none"])
+
+
+def test_scans_that_nobody_has_begun_are_listed_by_their_names(folder, workspace, tmp_path, capsys):
+    """Whatever they are kept in; but not those of a specimen, nor what only looks like a scan."""
+    new = folder / "new"
+    (new / "stack 12.5um").mkdir(parents=True)
+    (new / "photos").mkdir()
+    for n in range(20):
+        (new / "stack 12.5um" / f"slice{n:04}.png").touch()
+        (new / "photos" / f"{'abcdefghijklmnopqrst'[n]}.png").touch()
+    for name in ("A1.nrrd", "A2.nii.gz", "A3.hdr", "A3.img", "A4.ISQ;1", "A5.seg.nrrd", "A6.vtk", ".A7.mha"):
+        (new / name).touch()
+    (new / "A8.tif").write_bytes(b"picture")
+    (new / "A9.tif").write_bytes(bytes(1 << 22))
+    state = read_specimen(folder / "GP10.gpspecimen.json")
+    (folder / "GP10.mha").touch()  # beside its specimen
+    (folder / "study" / "elsewhere.nrrd").touch()
+    volume = VolumeReference("scan", (2, 2, 2), (1.0, 1.0, 1.0), "", str(folder / "study" / "elsewhere.nrrd"))
+    write_specimen(folder / "GP11.gpspecimen.json", replace(renamed(state, "GP11"), volume=volume))
+    rows = by_name(list_specimens([folder]))
+    begun = {"GP0", "GP1", "GP10", "GP11", "damaged"}
+    assert {name for name, row in rows.items() if row.is_begun} == begun
+    assert rows.keys() - begun == {"A1", "A2", "A3", "A4", "A9", "stack 12.5um"}
+    assert not rows["A1"].is_finished
+    assert rows["A1"].as_dict()["begun"] is False
+    assert main(["list", str(folder)]) == 0
+    said = capsys.readouterr().out
+    assert "11 specimens, 2 finished, 6 not begun" in said
+    assert f"not begun  {new / 'A1.nrrd'}" in said
+    model = workspace.specimens
+    model.add(folder)
+    deliver(workspace)
+    model.show(kind="not begun")
+    assert len(model.rows) == 6
+    with pytest.raises(GpError, match="no labelled specimens are listed"):
+        model.export(tmp_path / "out")
+    assert model.text == "6 of 11 specimens, 2 finished, 6 not begun"
 
 
 def test_hundreds_of_specimens_take_seconds(folder):

@@ -88,6 +88,21 @@ def test_rows_and_the_next_unfinished_open(dialog, folder, qtbot):
     assert [path.name for path in asked] == ["GP1.gpspecimen.json", "GP0.gpspecimen.json"]
 
 
+def test_a_scan_that_is_not_begun_opens_too(dialog, workspace, folder, qtbot):
+    (folder / "GP3.nrrd").touch()
+    workspace.specimens.refresh()
+    deliver(workspace)
+    dialog.kind.setCurrentText("Not begun")
+    assert cells(dialog, 1) == ["GP3"]
+    assert cells(dialog, 7) == ["not begun"]
+    assert not dialog.export.isEnabled()
+    asked = []
+    dialog.open_asked.connect(asked.append)
+    dialog.table.activated.emit(dialog.model.index(0, 1))
+    assert asked == [folder / "GP3.nrrd"]
+    assert list(cut_words(dialog)) == []
+
+
 def test_chosen_rows_are_exported(dialog, workspace, folder, tmp_path, qtbot):
     dialog.table.selectRow(2)
     assert dialog.chosen is None  # one row is where the pointer is: all that are shown are meant

@@ -79,7 +79,7 @@ class SpecimenListDialog(QDialog):
             if self.search.text().split() != model.words.split():
                 self.search.setText(model.words)
         self.table.setVisible(bool(model.every) or bool(model.folders))
-        has_rows = any(not row.problem for row in model.rows)
+        has_rows = any(row.is_begun and not row.problem for row in model.rows)
         for button in (self.export, self.fit_atlas, self.sheets):
             button.setEnabled(has_rows)
         self.next.setEnabled(any(not (row.is_finished or row.problem) for row in model.every))

@@ -102,6 +102,8 @@ class SpecimenTableModel(QAbstractTableModel):
             return row.specimen
         if row.problem:
             return f"cannot be read: {row.problem}" if column == len(COLUMNS) - 1 else NONE
+        if not row.is_begun:
+            return "not begun" if column == len(COLUMNS) - 1 else NONE
         if column in (2, 3):
             side = tuple(Side)[column - 2]
             suggested = row.suggested.get(side, 0)
