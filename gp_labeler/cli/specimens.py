@@ -104,6 +104,8 @@ def make_contact_sheet_parser() -> argparse.ArgumentParser:
     parser.add_argument("specimens", type=Path, nargs="+", metavar="SPECIMEN", help=what)
     where = "a .pdf file for all, or a folder for one file each"
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="PDF|DIR", help=where)
+    every = "pages for each labelling of a specimen that was labelled several times, not only the one in work"
+    parser.add_argument("--all-labellings", action="store_true", help=every)
     return parser
 
 
@@ -125,7 +127,8 @@ def run_contact_sheet(arguments: Sequence[str]) -> int:
     if not files:
         raise GpError("holds no specimens (*.gpspecimen.json)", file=args.specimens[0])
     with protected_inputs(files):
-        made = MakeContactSheets(files, args.output).run(Progress(lambda fraction, text: None))
+        job = MakeContactSheets(files, args.output, args.all_labellings)
+        made = job.run(Progress(lambda fraction, text: None))
     sys.stdout.write(f"{made.lines[0]}\n")
     for line in made.problems:
         sys.stderr.write(f"gp-labeler: {line}\n")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -90,10 +91,14 @@ class MakeContactSheets:
         Specimen files.
     where : Path
         A ``.pdf`` file for all of them, or a folder, for one file each.
+    all_labellings : bool
+        Whether a specimen that was labelled several times has pages for each labelling, not only for the one
+        in work. Where that one is made blind, it is the only one all the same.
     """
 
     files: tuple[Path, ...]
     where: Path
+    all_labellings: bool = False
     title = "Making contact sheets"
 
     def run(self, progress: Progress) -> SheetsMade:
@@ -143,8 +148,8 @@ class MakeContactSheets:
 
     def _add(self, state: SpecimenState, pages: PdfPages, progress: Progress, n: int) -> None:
         """Add the pages of one specimen; its scan is released before the next is opened."""
-        sides = [side for side in Side if state.side(side).placed]
-        if not sides:
+        sheets = [(each, side) for side in Side for each in self._labellings(state) if each.side(side).placed]
+        if not sheets:
             raise GpError("nothing is placed in it", specimen=state.specimen)
         volume = open_scan_of(state, progress)
         threshold = state.threshold
@@ -153,13 +158,17 @@ class MakeContactSheets:
 
             threshold = propose_threshold(volume)
         scan = f"{volume.name}, {' x '.join(f'{mm:.3g}' for mm in dict.fromkeys(volume.spacing))} mm"
-        for i, side in enumerate(sides):
+        for i, (labelled, side) in enumerate(sheets):
 
             def tell(fraction: float, i: int = i) -> None:
-                progress((n + (i + fraction) / len(sides)) / len(self.files))
+                progress((n + (i + fraction) / len(sheets)) / len(self.files))
 
-            features = list(feature_pictures(state, side, volume, threshold, tell))
-            pages.savefig(contact_page(state, side, features, scan))  # type: ignore[no-untyped-call]
+            features = list(feature_pictures(labelled, side, volume, threshold, tell))
+            pages.savefig(contact_page(labelled, side, features, scan))  # type: ignore[no-untyped-call]
+
+    def _labellings(self, state: SpecimenState) -> Sequence[SpecimenState]:
+        """Return the specimen in each labelling; one that is made blind hides the others."""
+        return state.labellings if self.all_labellings and not state.blind else (state,)
 
 
 class _NothingMadeError(Exception):

@@ -163,14 +163,23 @@ class SpecimenListModel:
         self._atlas.fit(self._files(rows))
 
     def make_contact_sheets(
-        self, where: str | PathLike[str], rows: Iterable[ListedSpecimen] | None = None
+        self,
+        where: str | PathLike[str],
+        rows: Iterable[ListedSpecimen] | None = None,
+        *,
+        all_labellings: bool = False,
     ) -> None:
-        """Make contact sheets in the background: one file, or one for each specimen in a folder."""
-        self.make_contact_sheets_of(self._files(rows), where)
+        """Make contact sheets in the background: one file, or one for each specimen in a folder.
 
-    def make_contact_sheets_of(self, files: Iterable[Path], where: str | PathLike[str]) -> None:
+        With `all_labellings`, specimens that were labelled several times have pages for each labelling.
+        """
+        self.make_contact_sheets_of(self._files(rows), where, all_labellings=all_labellings)
+
+    def make_contact_sheets_of(
+        self, files: Iterable[Path], where: str | PathLike[str], *, all_labellings: bool = False
+    ) -> None:
         """Make contact sheets of specimen files in the background."""
-        job = MakeContactSheets(tuple(files), Path(where))
+        job = MakeContactSheets(tuple(files), Path(where), all_labellings)
         self._jobs.submit(job, self._take_sheets, key="contact sheets")
 
     # Inside
@@ -190,9 +199,7 @@ class SpecimenListModel:
         chosen = self.rows if rows is None else tuple(rows)
         files = tuple(row.path for row in chosen if row.is_begun and not row.problem)
         if not files:
-            raise GpError(
-                "no labelled specimens are listed", remedy="Add a folder of specimens, or show all."
-            )
+            raise GpError("no labelled specimens are listed", remedy="Add a folder of them, or show all.")
         return files
 
     def _take(self, rows: list[ListedSpecimen]) -> None:

@@ -26,6 +26,7 @@ from gp_labeler.document.specimen_file import SUFFIX, write_specimen
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.jobs.contact_sheet import MakeContactSheets
 from gp_labeler.jobs.mesh import SaveMesh
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.added_meshes import AddedMesh
@@ -322,8 +323,7 @@ class Recorder(QObject):
             self.tables.append(step("export_measurements"))
             return
         if what == "contact sheet":
-            self.tables.append(step("contact_sheet", path=file.name))
-            return
+            return  # written by its job, which knows of which specimens it is
         if what == "reliability":
             specimens = [str(path.absolute()) for path in self._window.workspace.reliability.paths]
             self.tables.append(step("reliability", specimens=specimens, path=[file.name]))
@@ -384,6 +384,15 @@ class Recorder(QObject):
     def _on_job(self, task: Task[Any]) -> None:
         if isinstance(task.job, SaveMesh):
             self.tables.append(step("mesh", save=Path(task.job.path).name))
+        elif isinstance(task.job, MakeContactSheets):
+            self.tables.append(self._sheets_made(task.job))
+
+    def _sheets_made(self, job: MakeContactSheets) -> Table:
+        """Return the step that makes these contact sheets; of the open one as a script saves it."""
+        is_open = job.files == (self._window.workspace.document.path,)
+        specimens = None if is_open else [str(file.absolute()) for file in job.files]
+        every = job.all_labellings
+        return step("contact_sheet", specimens=specimens, path=job.where.name, all_labellings=every)
 
 
 def step(do: str, **keys: Any) -> Table:

@@ -53,11 +53,14 @@ class ContactSheet(Step):
         Specimen files, or folders of them; by default the open specimen, as it is saved.
     path : str
         A ``.pdf`` file for all, or a folder for one file each.
+    all_labellings : bool
+        Whether each labelling has its pages, not only the one in work.
     """
 
     do: ClassVar[str] = "contact_sheet"
     specimens: tuple[str, ...] = ()
     path: str = "contact.pdf"
+    all_labellings: bool = False
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
         workspace = driver.workspace
@@ -66,7 +69,7 @@ class ContactSheet(Step):
         if not files:
             raise GpError(f"contact_sheet: there are no specimens (*{SUFFIX})")
         where = driver.to_write(self.path)
-        workspace.specimens.make_contact_sheets_of(files, where)
+        workspace.specimens.make_contact_sheets_of(files, where, all_labellings=self.all_labellings)
         driver.wait_until_idle()
         made = [where] if where.suffix.lower() == ".pdf" else sorted(where.glob("*_contact.pdf"))
         driver.wrote(*[file for file in made if file.exists()])

@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from repeated_cases import write_repeated
+from window_cases import write_ball
 
 from gp_core.landmarks.features import CODES, Side
 from gp_labeler.cli.entry import main
 from gp_labeler.document.edits import AnnotatePoint, MarkUnseen
+from gp_labeler.document.labelling_edits import BeginLabelling
 from gp_labeler.document.specimen_file import read_specimen, write_specimen
 from gp_labeler.document.volume_reference import VolumeReference
 from gp_labeler.imaging.close_up import PICTURE_AXES, CloseUp, PictureAxes
@@ -107,6 +109,19 @@ def test_all_in_one_file_or_a_file_each(folder, tmp_path, capsys):
     )
     assert [file.name for file in made.files] == ["GP0_contact.pdf"]
     assert [file.name for file in (tmp_path / "each").iterdir()] == ["GP0_contact.pdf"]
+
+
+def test_every_labelling_has_its_pages_where_asked_but_not_while_one_is_made_blind(tmp_path):
+    (file,) = write_repeated(tmp_path, 1, codes=("CA",), sittings=[("AB", 1), ("CD", 1)])
+    scan = VolumeReference("ball", (9, 9, 9), (1.0, 1.0, 1.0), path=str(write_ball(tmp_path / "ball.nrrd")))
+    state = read_specimen(file).on_volume(scan, {})
+    write_specimen(file, state)
+    words = ["contact-sheet", str(file), "-o"]
+    assert main([*words, str(tmp_path / "every.pdf"), "--all-labellings"]) == 0
+    assert n_pages(tmp_path / "every.pdf") == 4
+    write_specimen(file, BeginLabelling("EF").apply(state))  # which has nothing placed yet
+    assert main([*words, str(tmp_path / "blind.pdf"), "--all-labellings"]) == 2
+    assert not (tmp_path / "blind.pdf").exists()
 
 
 def test_nothing_is_left_where_no_scan_can_be_opened(folder, tmp_path, capsys):

@@ -468,6 +468,29 @@ def test_files_written_are_written_again(recording) -> None:
     assert (recording.folder / "again" / "bone.ply").read_bytes() == (folder / "bone.ply").read_bytes()
 
 
+def test_contact_sheets_of_several_specimens_are_made_again(recording) -> None:
+    recording.begin()
+    place_three(recording)
+    document, folder = recording.document, recording.folder
+    files = [folder / f"GP{n}.gpspecimen.json" for n in range(2)]
+    for file in files:
+        document.save(file)
+    n_before = len(recording.recorder.tables)
+    recording.workspace.specimens.make_contact_sheets_of(files, folder / "all.pdf", all_labellings=True)
+    wait_until_idle(recording.qtbot, recording.window)
+    recording.workspace.specimens.make_contact_sheets_of(files[1:], folder / "one.pdf")
+    wait_until_idle(recording.qtbot, recording.window)
+    assert recording.recorder.tables[n_before:] == [
+        {
+            "do": "contact_sheet",
+            "specimens": [str(file) for file in files],
+            "path": "all.pdf",
+            "all_labellings": True,
+        },
+        {"do": "contact_sheet", "path": "one.pdf"},  # of the open specimen
+    ]
+
+
 def test_work_that_was_begun_before_is_kept_beside_the_script(recording) -> None:
     place_three(recording)
     recording.begin()

@@ -7,6 +7,7 @@ from pathlib import Path
 from qtpy.QtCore import QModelIndex, Qt, Signal
 from qtpy.QtWidgets import (
     QAbstractItemView,
+    QCheckBox,
     QComboBox,
     QDialog,
     QHBoxLayout,
@@ -82,6 +83,7 @@ class SpecimenListDialog(QDialog):
         has_rows = any(row.is_begun and not row.problem for row in model.rows)
         for button in (self.export, self.fit_atlas, self.sheets):
             button.setEnabled(has_rows)
+        self.every.setEnabled(has_rows and any(len(row.labellings) > 1 for row in model.rows))
         self.next.setEnabled(any(not (row.is_finished or row.problem) for row in model.every))
         self.forget.setEnabled(bool(model.folders))
 
@@ -129,6 +131,8 @@ class SpecimenListDialog(QDialog):
         self.sheets = button(
             "Contact sheets…", "PDF with every label on its best slice and on bone", self._sheets
         )
+        self.every = QCheckBox("Of all labellings")
+        self.every.setToolTip("Contact sheets have pages for each labelling, not only for the one in work")
         self.next = button("Next unfinished", "Open the next unfinished specimen", self._next)
         self.next.setProperty("role", "primary")
 
@@ -139,8 +143,8 @@ class SpecimenListDialog(QDialog):
         top.addWidget(self.add_folder)
         top.addWidget(self.forget)
         foot = FlowLayout()
-        for button in (self.next, self.export, self.fit_atlas, self.sheets):
-            foot.addWidget(button)
+        for widget in (self.next, self.export, self.fit_atlas, self.sheets, self.every):
+            foot.addWidget(widget)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 14, 16, 12)
         layout.setSpacing(8)
@@ -187,4 +191,9 @@ class SpecimenListDialog(QDialog):
         suggested = str(Path(self._folder) / "contact.pdf")
         path = self._prompts.save_file("Contact sheets", suggested, _SHEETS)
         if path is not None:
-            attempt(self._workspace, lambda: self._workspace.specimens.make_contact_sheets(path, self.chosen))
+            every = self.every.isEnabled() and self.every.isChecked()
+            model = self._workspace.specimens
+            attempt(
+                self._workspace,
+                lambda: model.make_contact_sheets(path, self.chosen, all_labellings=every),
+            )
