@@ -161,7 +161,8 @@ class LabelModel:
         """
         extra = np.zeros(len(self.mean))
         extra[list(wrong)] = WRONG_MM**2
-        return self.covariance + np.diag(np.repeat(extra, 3))
+        total: FloatArray = self.covariance + np.diag(np.repeat(extra, 3))
+        return total
 
     def prior_cost(self, hypothesis: LabelHypothesis) -> float:
         """Return -2 log of the prior odds of the mistakes that a hypothesis assumes.
