@@ -37,8 +37,8 @@ def make_list_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler list``."""
     parser = CommandParser(
         prog="gp-labeler list",
-        description="List the specimens in folders and their progress, and scans that are not begun. No scan is "
-        "opened.",
+        description="List the specimens in folders with their progress, and scans that are not begun. "
+        "No scan is opened.",
         epilog=_LIST_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
