@@ -6,8 +6,9 @@
     python benchmarks/autolabel.py exchanges --heads mice --out carried/  planted exchanges, false alarms
 
 Heads are ``mice`` (the ten of ../shared that chose nothing), ``dev-mice`` (the three that did), ``phantoms``
-(seeds from 101 as they are), ``varied`` (the same seeds, varied) and ``dev-phantoms`` (seeds 1 to 5). Each is
-predicted from the others of its kind, or from those of ``--library``.
+(as they are), ``varied`` (the same seeds, varied) and ``dev-phantoms`` (seeds 1 to 5). Settings are chosen
+on seeds 101 to 110 and on the dev-mice; figures are of seeds from 201 on. Each is predicted from the others
+of its kind, or from those of ``--library``.
 """
 
 from __future__ import annotations
@@ -62,11 +63,11 @@ def phantoms(seeds: range, varied: bool) -> list[LabelledScan]:
     return scans
 
 
-def heads_of(kind: str, n: int) -> list[LabelledScan]:
-    """Return the heads of one kind."""
+def heads_of(kind: str, first: int, n: int) -> list[LabelledScan]:
+    """Return the heads of one kind; n phantoms from a first seed on."""
     if kind in ("mice", "dev-mice"):
         return mice(list(CHOSE) if kind == "dev-mice" else None)
-    return phantoms(range(1, 6) if kind == "dev-phantoms" else range(101, 101 + n), kind == "varied")
+    return phantoms(range(1, 6) if kind == "dev-phantoms" else range(first, first + n), kind == "varied")
 
 
 def true_pose(scan: LabelledScan, template: Template) -> np.ndarray:
@@ -77,11 +78,37 @@ def true_pose(scan: LabelledScan, template: Template) -> np.ndarray:
     return fit_similarity(template.array(names), here, weights, (0.5, 2.0)).rotation
 
 
-def spoiled(volume: Volume, kind: str, rng: np.random.Generator) -> Volume:
-    """Return a scan turned at random, and noisy, coarse or cut off as its kind says."""
+def without_jaw_and_nose(scan: LabelledScan) -> np.ndarray:
+    """Return the voxels of a phantom, with air from 9 mm below the ears, and 18 mm behind the incisors."""
+    array = np.array(scan.load().array, dtype=np.float32)
+    index = np.linalg.inv(scan.load().T_scan_voxel)
+    ears = np.mean([xyz for name, xyz in scan.points.items() if name not in ("IN", "ZL_L", "ZL_R")], axis=0)
+    below = int((index @ [*(ears - [0, 0, 9.0]), 1.0])[2])
+    before = int((index @ [*(scan.points["IN"] + [0, 18.0, 0]), 1.0])[1])
+    array[: max(below, 0)] = array[:, : max(before, 0)] = array.min()
+    return array
+
+
+def cropped(array: np.ndarray, affine: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+    """Return the part of a scan with a share of its brightest voxels, cut off by a face; moves `affine`."""
+    axis, is_high = int(rng.integers(3)), bool(rng.integers(2))
+    places = np.argwhere(array > np.percentile(array, 90))[:, 2 - axis]
+    at = int(np.quantile(places, 1 - share if is_high else share))
+    if is_high:
+        affine[:3, 3] += affine[:3, axis] * at
+    return np.take(array, range(at, array.shape[2 - axis]) if is_high else range(at), axis=2 - axis)
+
+
+def spoiled(scan: LabelledScan, kind: str, rng: np.random.Generator) -> Volume:
+    """Return a scan turned at random, and noisy, coarse, cropped or cut off as its kind says."""
+    volume = scan.load()
     array = np.asarray(volume.array, dtype=np.float32)
     fill = None
     affine = np.array(volume.T_scan_voxel)
+    if kind == "jawless":
+        array = without_jaw_and_nose(scan)
+    if kind.startswith("crop"):
+        array = cropped(array, affine, float(kind[4:]) / 100, rng)
     if kind == "noisy":
         array = array + rng.normal(0, 0.08 * (np.percentile(array, 99.5) - array.min()), array.shape)
     if kind == "coarse":
@@ -96,8 +123,8 @@ def spoiled(volume: Volume, kind: str, rng: np.random.Generator) -> Volume:
         normal /= np.linalg.norm(normal)
         edge = np.quantile(places @ normal, 1 - float(kind[3:]) / 100)
         fill = float(array.min()) - 1000
-        grid = np.indices(array.shape).transpose(1, 2, 3, 0)
-        array = np.where(grid @ normal > edge, fill, array)
+        z, y, x = (n * np.arange(size) for n, size in zip(normal, array.shape, strict=True))
+        array = np.where(z[:, None, None] + y[:, None] + x > edge, fill, array)
     turn = np.eye(4)
     turn[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn[:3, :3] *= np.sign(np.linalg.det(turn[:3, :3]))
@@ -111,13 +138,13 @@ def run_pose(heads: list[LabelledScan], args: argparse.Namespace) -> None:
     wanted = heads if args.heads != "mice" else [head for head in heads if head.name not in CHOSE]
     lines = args.out / "pose.jsonl"
     done = {(d["head"], d["turn"], d["kind"]) for d in read_lines(lines)}
-    for scan, turn, kind in itertools.product(wanted, range(args.turns), args.kinds):
+    for turn, scan, kind in itertools.product(range(args.turns), wanted, args.kinds):
         if (scan.name, turn, kind) in done:
             continue
         rng = np.random.default_rng([turn, len(scan.name), sum(map(ord, kind + scan.name))])
         template = [t for t in templates if t.name != scan.name][rng.integers(len(templates) - 1)]
         volume = scan.load()
-        spoilt = spoiled(volume, kind, rng)
+        spoilt = spoiled(scan, kind, rng)
         moved = spoilt.T_scan_voxel[:3, :3] / spoilt.spacing
         back = volume.T_scan_voxel[:3, :3] / volume.spacing
         truth = moved @ back.T @ true_pose(scan, template)
@@ -273,9 +300,15 @@ def main() -> None:
     )
     parser.add_argument("part", choices=("pose", "carry", "guesses", "exchanges"))
     parser.add_argument("--heads", default="mice")
+    parser.add_argument("--first", type=int, default=201, help="seed of the first phantom")
     parser.add_argument("--n", type=int, default=10, help="phantoms")
     parser.add_argument("--turns", type=int, default=20)
-    parser.add_argument("--kinds", nargs="+", default=["whole"])
+    parser.add_argument(
+        "--kinds",
+        nargs="+",
+        default=["whole"],
+        help="whole, noisy, coarse, jawless (phantoms), crop55, cut30, cut45: turned at random as well",
+    )
     parser.add_argument("--k", type=int, nargs="+", default=[1, 3, 5])
     parser.add_argument("--subsets", type=int, default=30)
     parser.add_argument("--exchanges", type=int, default=25, help="planted in each head")
@@ -286,7 +319,7 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     heads = [
         replace(scan, volume=scan.load()) if scan.path is None else scan
-        for scan in heads_of(args.heads, args.n)
+        for scan in heads_of(args.heads, args.first, args.n)
     ]
     if args.part == "pose":
         run_pose(heads, args)
