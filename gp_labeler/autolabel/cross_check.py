@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from gp_core.validation import FloatArray
-from gp_labeler.autolabel.confidence import centre_of, spread_of
 from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.prediction import Prediction
 
@@ -135,13 +134,12 @@ def check_predictions(scans: Sequence[LabelledScan], predictions: dict[str, Pred
 
 def _head(scan: LabelledScan, prediction: Prediction) -> _Head:
     names = tuple(name for name in prediction.names if name in scan.points)
-    found = [prediction.of(name) for name in names]
     return _Head(
         scan.name,
         names,
         np.array([scan.points[name] for name in names]).reshape(-1, 3),
-        np.array([centre_of(points) for points in found]).reshape(-1, 3),
-        np.nan_to_num(np.array([spread_of(points) for points in found])),
+        np.array([prediction.centres[name] for name in names]).reshape(-1, 3),
+        np.nan_to_num(np.array([prediction.spreads[name] for name in names])),
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from gp_core.disk import read_json, write_text
 from gp_core.errors import FileFormatError, GpError
-from gp_labeler.autolabel.confidence import GuessConfidence, HeldOut, centre_of, spread_of
+from gp_labeler.autolabel.confidence import GuessConfidence, HeldOut
 from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.prediction import Carried, HeadNotFoundError, Prediction, predict
 from gp_labeler.autolabel.registration import Registration
@@ -211,7 +211,6 @@ def _errors(scan: LabelledScan, prediction: Prediction) -> HeldOut:
     errors, spreads = {}, {}
     for name in prediction.names:
         if name in scan.points:
-            found = prediction.of(name)
-            errors[name] = float(np.linalg.norm(centre_of(found) - scan.points[name]))
-            spreads[name] = spread_of(found)
+            errors[name] = float(np.linalg.norm(prediction.centres[name] - scan.points[name]))
+            spreads[name] = prediction.spreads[name]
     return HeldOut(scan.name, errors, spreads)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
+from gp_labeler.autolabel.confidence import centre_of, spread_of
 from gp_labeler.autolabel.pose_search import FoundPose, find_pose, pose_from_points, refine_pose
 from gp_labeler.autolabel.registration import Registration
 from gp_labeler.autolabel.settings import Settings
@@ -66,6 +68,16 @@ class Prediction:
     def of(self, name: str) -> FloatArray:
         """Return where the templates expect one landmark, (k, 3)."""
         return np.array([carried[name] for carried in self.carried.values() if name in carried])
+
+    @cached_property
+    def centres(self) -> Mapping[str, FloatArray]:
+        """Where they agree, (3,) LPS mm, by landmark; see `gp_labeler.autolabel.confidence.centre_of`."""
+        return {name: centre_of(self.of(name)) for name in self.names}
+
+    @cached_property
+    def spreads(self) -> Mapping[str, float]:
+        """How they differ, mm, by landmark; see `gp_labeler.autolabel.confidence.spread_of`."""
+        return {name: spread_of(self.of(name)) for name in self.names}
 
 
 def predict(

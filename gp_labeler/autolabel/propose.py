@@ -14,7 +14,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.atlas_agreement import compare_with_atlas, disagreement_text
-from gp_labeler.autolabel.confidence import GuessConfidence, centre_of, spread_of
+from gp_labeler.autolabel.confidence import GuessConfidence
 from gp_labeler.autolabel.library import TemplateLibrary
 from gp_labeler.autolabel.pose_search import ACCEPTED
 from gp_labeler.autolabel.prediction import Prediction, predict
@@ -127,8 +127,7 @@ def _guesses(
     """Return the guesses, and the names of what is expected beyond the edge of the scan."""
     guesses, outside = [], []
     for name in prediction.names:
-        points = prediction.of(name)
-        centre, spread = centre_of(points), spread_of(points)
+        centre, spread = prediction.centres[name], prediction.spreads[name]
         if not volume.contains(centre[None])[0]:
             outside.append(name)
             continue
@@ -139,7 +138,7 @@ def _guesses(
                 confidence.radius_95(name, spread),
                 None if np.isnan(spread) else spread,
                 confidence.history_of(name),
-                len(points),
+                len(prediction.of(name)),
             )
         )
     return guesses, outside

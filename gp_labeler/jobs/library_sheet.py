@@ -12,7 +12,6 @@ import numpy as np
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.labels import parse_label
 from gp_core.validation import FloatArray
-from gp_labeler.autolabel.confidence import centre_of
 from gp_labeler.autolabel.cross_check import LibraryCheck, LibraryFinding
 from gp_labeler.autolabel.labelled_scan import LabelledScan, side_and_code
 from gp_labeler.autolabel.prediction import Prediction
@@ -150,7 +149,7 @@ def finding_blocks(
         Where its bone begins.
     """
     places = {
-        name: _Place(name, scan.points[name], centre_of(prediction.of(name)))
+        name: _Place(name, scan.points[name], prediction.centres[name])
         for name in prediction.names
         if name in scan.points
     }
