@@ -36,8 +36,9 @@ COARSER = (
     "(pip install 'gp-labeler[auto]')"
 )
 
-_METRIC = "NCC 2x2x2"
-_SMOOTHING = ("1.5vox", "0.7vox")
+_PASSES = (("NCC 2x2x2", "1.5vox 0.7vox"), ("NCC 1x1x1", "1.0vox 0.3vox"))
+"""What is compared, and how updates and their sum are smoothed: a smooth field, then what it missed."""
+
 _DEMONS_STEPS = (40, 30, 15)
 
 
@@ -47,7 +48,17 @@ class RegisterImages(Protocol):
     def __call__(
         self, fixed: NDArray[np.float32], moving: NDArray[np.float32], step: float, iterations: str
     ) -> Field:
-        """Return the displacements, mm; images (nz, ny, nx), step mm, iterations such as ``60x40x15``."""
+        """Return the displacements, mm.
+
+        Parameters
+        ----------
+        fixed, moving : (nz, ny, nx) array
+        step : float
+            mm.
+        iterations : str
+            From coarse to fine, such as ``60x40x15``; after a space those of a second pass, which starts
+            where the first ended and takes up what that has smoothed away.
+        """
         ...
 
 
@@ -78,15 +89,13 @@ def register_greedy(
 
     The interpreter stands still meanwhile: a program with a window calls it in another process.
     """
-    from picsl_greedy import Greedy3D
-
-    greedy = Greedy3D()
-    command = (
-        f"-i fixed moving -m {_METRIC} -n {iterations} -s {' '.join(_SMOOTHING)} -threads 1 -V 0 -o field"
-    )
-    images = {name: _image(values, step) for name, values in (("fixed", fixed), ("moving", moving))}
-    greedy.execute(command, out=io.StringIO(), err=io.StringIO(), **images, field=None)
-    return np.asarray(_simple_itk().GetArrayFromImage(greedy["field"]), dtype=np.float32)
+    field: Field | None = None
+    for counts, (metric, smoothing) in zip(iterations.split(), _PASSES, strict=False):
+        seen = moving if field is None else _warped(moving, field, step)
+        update = _greedy(fixed, seen, step, f"-m {metric} -n {counts} -s {smoothing}")
+        field = update if field is None else _composed(field, update, step)
+    assert field is not None
+    return field
 
 
 def register_demons(
@@ -137,6 +146,36 @@ def engine_named(name: str = "auto") -> str:
             "picsl_greedy is not installed", remedy="Install it with: pip install 'gp-labeler[auto]'"
         )
     return name
+
+
+def _greedy(fixed: NDArray[np.float32], moving: NDArray[np.float32], step: float, options: str) -> Field:
+    from picsl_greedy import Greedy3D
+
+    greedy = Greedy3D()
+    images = {name: _image(values, step) for name, values in (("fixed", fixed), ("moving", moving))}
+    greedy.execute(
+        f"-i fixed moving {options} -threads 1 -V 0 -wp 0 -o field",
+        out=io.StringIO(),
+        err=io.StringIO(),
+        **images,
+        field=None,
+    )
+    return np.asarray(_simple_itk().GetArrayFromImage(greedy["field"]), dtype=np.float32)
+
+
+def _warped(values: NDArray[np.float32], field: Field, step: float) -> NDArray[np.float32]:
+    """Return an image [z, y, x] as it is seen from the points that a field moves into it."""
+    from scipy.ndimage import map_coordinates
+
+    places = np.indices(values.shape, dtype=np.float32)
+    places += np.moveaxis(field[..., ::-1], -1, 0) / np.float32(step)
+    return np.asarray(map_coordinates(values, places, order=1, mode="nearest", output=np.float32))
+
+
+def _composed(first: Field, then: Field, step: float) -> Field:
+    """Return the field that moves a point by the later one, and from there by the first one."""
+    parts = [_warped(np.ascontiguousarray(first[..., c]), then, step) for c in range(3)]
+    return np.asarray(then + np.stack(parts, axis=-1), dtype=np.float32)
 
 
 def _simple_itk() -> Any:

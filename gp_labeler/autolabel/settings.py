@@ -23,7 +23,8 @@ class Settings:
     fewest : int
         Landmarks that make a region.
     iterations, fine_iterations : str
-        Of greedy, from coarse to fine: for the whole head, and for regions.
+        Of greedy, from coarse to fine: for the whole head, and for regions. After a space, those of a
+        second pass that smooths less.
     """
 
     whole: float = 30.0
@@ -32,7 +33,7 @@ class Settings:
     margin: float = 0.15
     fewest: int = 3
     iterations: str = "60x40x15"
-    fine_iterations: str = "60x40x15"
+    fine_iterations: str = "60x40x15 0x0x15"
 
     @property
     def key(self) -> str:

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.ndimage import gaussian_filter, shift
 from small_heads import FEATURES, OWN, TURN, save_markups, save_volume, small_head
 
 from gp_core.errors import GpError
@@ -15,7 +16,7 @@ from gp_core.landmarks.sets import Status
 from gp_labeler.autolabel import HeadNotFoundError, LabelledScan, TemplateLibrary, propose
 from gp_labeler.autolabel.labelled_scan import side_and_code
 from gp_labeler.autolabel.pose_search import FoundPose, find_pose
-from gp_labeler.autolabel.registration import engine_named, register_demons
+from gp_labeler.autolabel.registration import engine_named, register_demons, register_greedy
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.autolabel.template import Template
@@ -197,12 +198,25 @@ def test_names_of_features_carry_their_side():
         assert side_and_code(other) is None
 
 
+def test_a_second_pass_adds_what_the_first_one_missed():
+    """The first pass stops short; the field of both is the whole shift, not that of the second alone."""
+    pytest.importorskip("picsl_greedy")
+    texture = gaussian_filter(np.random.default_rng(0).normal(size=(24, 24, 24)), 2).astype(np.float32)
+    moved = shift(texture, (0, 0, 1.5), mode="nearest")  # voxels of 0.5 mm
+    once, twice = (
+        register_greedy(texture, moved, 0.5, iterations)[8:16, 8:16, 8:16].mean(axis=(0, 1, 2))
+        for iterations in ("0x4x0", "0x4x0 0x20x15")
+    )
+    assert once[0] < 0.69
+    assert twice == pytest.approx([0.75, 0, 0], abs=0.04)
+
+
 def test_demons_are_said_to_be_coarser(monkeypatch):
     """In a plain image that is shifted, the field is that shift; without greedy, demons are taken."""
     z, y, x = np.meshgrid(*[np.arange(24.0)] * 3, indexing="ij")
     fixed, moving = (
-        np.exp(-((x - 12 - shift) ** 2 + (y - 12) ** 2 + (z - 12) ** 2) / 40).astype(np.float32)
-        for shift in (0, 1.5)
+        np.exp(-((x - 12 - by) ** 2 + (y - 12) ** 2 + (z - 12) ** 2) / 40).astype(np.float32)
+        for by in (0, 1.5)
     )
     field = register_demons(fixed, moving, 0.5, "40x30x15")
     assert field[12, 12, 12] == pytest.approx([0.75, 0, 0], abs=0.15)
