@@ -41,8 +41,8 @@ class SelectionProblem(Protocol):
     def n_sides(self) -> int:
         """How many sides are estimated for one score."""
 
-    def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        """Return the function that scores probe features, given training features.
+    def scorer(self, training: Codes) -> Callable[[Sequence[Codes]], Sequence[float]]:
+        """Return the function that scores sets of probe features, given training features.
 
         Parameters
         ----------
@@ -52,7 +52,7 @@ class SelectionProblem(Protocol):
         Returns
         -------
         callable
-            From probe features to E_T.
+            From several sets of equally many probe features to the E_T of each.
         """
 
 
@@ -366,10 +366,10 @@ def probe_curve(problem: SelectionProblem, training: Codes) -> tuple[ProbeStep, 
     """
     score = problem.scorer(training)
     features = external(training)
-    steps = [ProbeStep(len(features), features, score(features))]
+    steps = [ProbeStep(len(features), features, score([features])[0])]
     while len(features) > FEWEST:
         candidates = _each_left_out(features)
-        scores = [score(candidate) for candidate in candidates]
+        scores = list(score(candidates))
         best = scores.index(min(scores))
         features = candidates[best]
         steps.append(ProbeStep(len(features), features, scores[best]))

@@ -253,10 +253,37 @@ class Folds:
         PoseErrors
             One for each animal, mm and degrees.
         """
-        animals = np.arange(len(self.cochlea))
-        others = np.array([np.delete(animals, held_out) for held_out in animals])
-        touches = self.window[:, [index_of(code) for code in probe]]
-        return jrmpc_errors(self.cochlea[others], touches, self.window, features, settings)
+        return self.errors_of_each(features, [probe], settings)[0]
+
+    def errors_of_each(
+        self, features: Sequence[str], probes: Sequence[Sequence[str]], settings: JrmpcSettings
+    ) -> list[PoseErrors]:
+        """Do the same for several sets of equally many touched features, all in one batch.
+
+        A batch is computed several problems at a time, one in each lane of a vector: of one set alone, some
+        lanes would stay empty.
+
+        Parameters
+        ----------
+        features : sequence of str
+            Training features.
+        probes : sequence of sequence of str
+            Touched features, equally many in each.
+        settings : JrmpcSettings
+            Of the registration.
+
+        Returns
+        -------
+        list of PoseErrors
+            In the order of `probes`; the same, to the last bit, as one after the other.
+        """
+        animals, n = np.arange(len(self.cochlea)), len(probes)
+        others = self.cochlea[np.array([np.delete(animals, held_out) for held_out in animals])]
+        touches = np.concatenate([self.window[:, [index_of(code) for code in probe]] for probe in probes])
+        repeated = np.tile(others, (n, 1, 1, 1)), touches, np.tile(self.window, (n, 1, 1))
+        errors = jrmpc_errors(*repeated, features, settings)
+        parts = np.split(errors.e_co_mm, n), np.split(errors.e_ma_deg, n)
+        return [PoseErrors(*part) for part in zip(*parts, strict=True)]
 
 
 def folds_of(specimens: Sequence[Specimen]) -> list[Folds]:

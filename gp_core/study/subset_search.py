@@ -100,8 +100,8 @@ class JrmpcProblem:
         """How many sides are estimated for one score."""
         return sum(len(fold.cochlea) for fold in self.folds)
 
-    def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        """Return the function that scores probe features, given training features.
+    def scorer(self, training: Codes) -> Callable[[Sequence[Codes]], list[float]]:
+        """Return the function that scores sets of probe features, given training features.
 
         Parameters
         ----------
@@ -111,11 +111,14 @@ class JrmpcProblem:
         Returns
         -------
         callable
-            From probe features to E_T.
+            From several sets of equally many probe features to the E_T of each.
         """
-        return lambda probe: (
-            PoseErrors.joined([fold.errors(training, probe, self.settings) for fold in self.folds]).e_t
-        )
+
+        def score(probes: Sequence[Codes]) -> list[float]:
+            sides = [fold.errors_of_each(training, probes, self.settings) for fold in self.folds]
+            return [PoseErrors.joined(errors).e_t for errors in zip(*sides, strict=True)]
+
+        return score
 
 
 @dataclass(frozen=True)
@@ -135,8 +138,8 @@ class RobustProblem:
         """How many sides are estimated for one score."""
         return sum(len(specimen.sides) for specimen in self.specimens)
 
-    def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        """Fit the atlases, and return the function that scores probe features.
+    def scorer(self, training: Codes) -> Callable[[Sequence[Codes]], list[float]]:
+        """Fit the atlases, and return the function that scores sets of probe features.
 
         Parameters
         ----------
@@ -146,10 +149,13 @@ class RobustProblem:
         Returns
         -------
         callable
-            From probe features to E_T.
+            From several sets of probe features to the E_T of each.
         """
         atlases, truths = held_out_sides(self.specimens, training)
-        return lambda probe: robust_errors(atlases, [touched(truth, probe) for truth in truths], truths).e_t
+        return lambda probes: [
+            robust_errors(atlases, [touched(truth, probe) for truth in truths], truths).e_t
+            for probe in probes
+        ]
 
 
 @checks_arguments

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -17,7 +17,7 @@ from gp_core import CODES, EXTERNAL, PROBE, TRAINING, GpError, Specimen
 from gp_core.registration.jrmpc import DEFAULTS, JrmpcSettings
 from gp_core.study.backward_elimination import Codes, Elimination, SearchProgress, Ticker, probe_curve
 from gp_core.study.checkpoint import Checkpoint
-from gp_core.study.leave_one_out import leave_one_out
+from gp_core.study.leave_one_out import folds_of, leave_one_out
 from gp_core.study.parallel import open_executor
 from gp_core.study.subset_search import SearchReport, problem_of, search_features
 
@@ -32,10 +32,10 @@ class Weighed:
     weights: tuple[tuple[str, float], ...]
     n_sides: int = 2
 
-    def scorer(self, training: Codes) -> Callable[[Codes], float]:
+    def scorer(self, training: Codes) -> Callable[[Sequence[Codes]], list[float]]:
         weights = dict(self.weights)
         base = sum(weights.get(code, 1.0) for code in training) + 50.0 * max(0, 6 - len(training))
-        return lambda probe: base + 0.1 * sum(weights.get(code, 1.0) for code in probe)
+        return lambda probes: [base + 0.1 * sum(weights.get(c, 1.0) for c in probe) for probe in probes]
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Indifferent:
 
     n_sides: int = 2
 
-    def scorer(self, training: Codes) -> Callable[[Codes], float]:
-        return lambda probe: 1.0
+    def scorer(self, training: Codes) -> Callable[[Sequence[Codes]], list[float]]:
+        return lambda probes: [1.0] * len(probes)
 
 
 def test_of_equals_the_fewest_touches_are_taken() -> None:
@@ -104,6 +104,16 @@ def test_score_is_that_of_leave_one_out() -> None:
     for step in report.training:
         again = leave_one_out(animals, training=step.features, probe=step.probe, settings=QUICK)
         assert again.errors.e_t == pytest.approx(step.e_t, abs=1e-9)
+
+
+def test_touched_features_scored_together_have_the_errors_of_each_alone() -> None:
+    for fold in folds_of(cohort(4)):
+        probes = [tuple(code for code in PROBE if code != left_out) for left_out in PROBE[:5]]
+        together = fold.errors_of_each(SMALL, probes, QUICK)
+        for probe, errors in zip(probes, together, strict=True):
+            alone = fold.errors(SMALL, probe, QUICK)
+            assert errors.e_co_mm.tolist() == alone.e_co_mm.tolist()
+            assert errors.e_ma_deg.tolist() == alone.e_ma_deg.tolist()
 
 
 def test_any_number_of_workers_gives_the_same() -> None:
