@@ -38,8 +38,8 @@ from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scripting.events import click, press_keys, turn_wheel  # noqa: E402
 from gp_labeler.scripting.steps.scan import Open  # noqa: E402
 from gp_labeler.scripting.window_driver import WindowDriver  # noqa: E402
-from gp_labeler.views.first_labels_ui import AS_THE_FILE, FOLDER  # noqa: E402
 from gp_labeler.views.panels.label.suggest_row import SuggestRow  # noqa: E402
+from gp_labeler.views.window_commands.landmarks import AS_THE_FILE, FOLDER  # noqa: E402
 
 _VOXEL_PIXELS = 4.0
 _ZOOM_PER_NOTCH = 1.15

@@ -146,7 +146,7 @@ def main() -> None:
         else:
             report(window)
         window.workspace.document.abandon()
-        window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
+        window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
         window.close()
         QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
 

@@ -55,7 +55,7 @@ def main() -> None:
             + f"{1e3 * mean:>8.1f}{mean / straight:>8.2f}{1e3 * alone:>9.1f}"
         )
     window.workspace.document.abandon()
-    window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
+    window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
     window.close()
 
 

@@ -47,7 +47,7 @@ def main() -> None:
         print(f"{name:<18}" + "".join(f"{1e3 * each:>10.1f}" for each, _ in costs), end="")
         print(f"{alone[0]:>18}{alone[1]:>16}", flush=True)
     window.workspace.document.abandon()
-    window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
+    window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
     window.close()
 
 

@@ -55,7 +55,7 @@ def main() -> None:
         told, seen = _touches(window, touched[_AGAIN], rng)
         _print(told, seen, _whole_paints(window))
         window.workspace.document.abandon()
-        window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
+        window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
         window.close()
 
 

@@ -56,7 +56,7 @@ def main() -> None:
         report(title, window, whole, work)
     drawing_alone(window, whole)
     window.workspace.document.abandon()
-    window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
+    window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
     window.close()
 
 

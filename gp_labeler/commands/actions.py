@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from gp_core.errors import GpError
-from gp_labeler.commands.action import MENUS, Action, Ui
+from gp_labeler.commands.action import MENUS, Action
 from gp_labeler.commands.atlas_rows import atlas_rows
 from gp_labeler.commands.frame_rows import frame_rows
 from gp_labeler.commands.labelling_rows import labelling_rows
@@ -17,7 +17,7 @@ from gp_labeler.commands.slab_rows import slab_rows
 from gp_labeler.commands.view_rows import cut_rows
 from gp_labeler.models.workspace import Workspace
 
-__all__ = ["ACTIONS", "MENUS", "Action", "Ui", "action", "gestures", "run"]
+__all__ = ["ACTIONS", "MENUS", "Action", "action", "gestures", "run"]
 
 ACTIONS: Mapping[str, Action] = MappingProxyType(
     {
@@ -54,8 +54,19 @@ def action(id: str) -> Action:
     return ACTIONS[id]
 
 
-def run(id: str, workspace: Workspace, ui: Ui) -> bool:
+def run(
+    id: str, workspace: Workspace, in_window: Mapping[str, Callable[[], object]] = MappingProxyType({})
+) -> bool:
     """Do an action; where it cannot be done, the user is told why.
+
+    Parameters
+    ----------
+    id : str
+        Its name.
+    workspace : Workspace
+        What it acts on.
+    in_window : mapping of str to callable
+        What a window does for the actions that need one, by id; see `gp_labeler.views.window_commands`.
 
     Returns
     -------
@@ -66,7 +77,7 @@ def run(id: str, workspace: Workspace, ui: Ui) -> bool:
     if not row.enabled(workspace):
         return False
     try:
-        row.run(workspace, ui)
+        in_window[id]() if row.run is None else row.run(workspace)
     except GpError as error:
         workspace.say(str(error), "warning")
         return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
 from gp_labeler.models.anatomical_planes import FEATURE_PLANES
 from gp_labeler.models.workspace import Workspace
 
@@ -43,11 +43,11 @@ def _is_turned(workspace: Workspace) -> bool:
 
 
 def _mark(name: str) -> Run:
-    return lambda workspace, ui: workspace.head.mark_point(name)
+    return lambda workspace: workspace.head.mark_point(name)
 
 
 def _show(kind: str) -> Run:
-    return lambda workspace, ui: ui.look_closely(workspace.planes.show(kind))
+    return lambda workspace: workspace.planes.show(kind)
 
 
 def _can_show(kind: str) -> Test:
@@ -60,13 +60,13 @@ def _can_show_for_feature(workspace: Workspace) -> bool:
     return _has_scan(workspace) and code is not None and (kind is None or workspace.planes.can_show(kind))
 
 
-def _show_for_feature(workspace: Workspace, ui: Ui) -> None:
+def _show_for_feature(workspace: Workspace) -> None:
     code = workspace.labels.active.code
     if code is not None:
-        ui.look_closely(workspace.planes.show_for(code))
+        workspace.planes.show_for(code)
 
 
-def _turn_by_hand(workspace: Workspace, ui: Ui) -> None:
+def _turn_by_hand(workspace: Workspace) -> None:
     interaction = workspace.interaction
     if interaction.tool == "turn":
         interaction.leave_turning()
@@ -78,14 +78,14 @@ def _turn_by_hand(workspace: Workspace, ui: Ui) -> None:
 # fmt: off
 def frame_rows() -> Iterator[Action]:
     """Return the commands of the menu View that turn the planes of the slices."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _has_scan, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _has_scan, *,
             checked: Test | None = None, hint: str = "", group: str = "head") -> Action:
         return Action(id, "View", title, keys, run, enabled, checked, hint, group)
 
-    yield row("head.straighten", "Straighten the head", ("Ctrl+H",), lambda w, ui: w.head.straighten(),
+    yield row("head.straighten", "Straighten the head", ("Ctrl+H",), lambda w: w.head.straighten(),
               _can_straighten, hint="Align the views with the head, found by the symmetry of its bone")
     yield row("head.by_landmarks", "Straighten by the placed landmarks", (),
-              lambda w, ui: w.head.straighten_by_landmarks(), _can_straighten,
+              lambda w: w.head.straighten_by_landmarks(), _can_straighten,
               hint="Uses IN and a pair such as OI, or two pairs; refined by the symmetry of the bone")
     yield row("head.midline", "Straighten: the crosshair is on the midline", (), _mark("midline"),
               hint="One of the three points that define the frame of the head")
@@ -93,29 +93,29 @@ def frame_rows() -> Iterator[Action]:
               hint="The same anatomical point on both sides, such as the edge of the ear canal")
     yield row("head.right", "Straighten: the crosshair is on the right of a pair", (), _mark("right"),
               hint="When all three points are set, the head is straightened")
-    yield row("head.forget_points", "Take the marked points away", (), lambda w, ui: w.head.forget_points(),
+    yield row("head.forget_points", "Take the marked points away", (), lambda w: w.head.forget_points(),
               _has_points, hint="Midline, left and right: no head is straightened by them")
     yield row("head.by_hand", "Turn the head by hand", ("Ctrl+Shift+H",), _turn_by_hand,
               checked=lambda w: w.interaction.tool == "turn",
               hint="Drag on a slice to rotate the head: pitch in the sagittal, roll in the coronal, "
                    "yaw in the axial view")
     yield row("head.take_planes", "Use these planes as the head frame", (),
-              lambda w, ui: w.head.take_planes(), _can_take_planes,
+              lambda w: w.head.take_planes(), _can_take_planes,
               hint="After you have dragged the arms of the crosshair")
     yield row("head.take_mid_plane", "Move the mid-plane to the crosshair", (),
-              lambda w, ui: w.head.take_mid_plane(), _has_head)
-    yield row("head.confirm_left", "Confirm that left is correct", (), lambda w, ui: w.head.confirm_left(),
+              lambda w: w.head.take_mid_plane(), _has_head)
+    yield row("head.confirm_left", "Confirm that left is correct", (), lambda w: w.head.confirm_left(),
               lambda w: _has_head(w) and w.head.asks_left,
               hint="A scan cannot prove which side is left: check it against a mark on the animal")
     yield row("head.left_is_right", "Left and right are exchanged in this scan…", (),
-              lambda w, ui: ui.ask_reopen_mirrored(), _has_head,
+              IN_WINDOW, _has_head,
               hint="Reload the scan with the order of its slices reversed")
-    yield row("head.forget", "Remove the head frame", (), lambda w, ui: w.head.forget(), _has_head)
-    yield row("view.frame", "Views in the head frame", ("Shift+F",), lambda w, ui: w.head.show(),
+    yield row("head.forget", "Remove the head frame", (), lambda w: w.head.forget(), _has_head)
+    yield row("view.frame", "Views in the head frame", ("Shift+F",), lambda w: w.head.show(),
               _has_head, checked=lambda w: w.head.is_shown, group="planes",
               hint="When off, views follow the axes of the scan. Positions are always in the scan frame")
     yield row("view.straight_planes", "Reset the planes", ("0",),
-              lambda w, ui: w.planes.straighten(), _is_turned, group="planes")
+              lambda w: w.planes.straighten(), _is_turned, group="planes")
     for kind, title, key in _PLANES:
         yield row(f"view.plane_{kind.replace(' ', '_')}", title, (key,), _show(kind), _can_show(kind),
                   group="planes", hint="For the current side, as labelled, predicted or estimated")

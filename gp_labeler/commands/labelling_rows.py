@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_core.landmarks.provenance import Certainty
-from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["labelling_rows"]
@@ -29,21 +29,13 @@ def _is_marked(certainty: Certainty) -> Test:
 
 
 def _mark(certainty: Certainty) -> Run:
-    def mark(workspace: Workspace, ui: Ui) -> None:
+    def mark(workspace: Workspace) -> None:
         point, is_so = workspace.labels.annotated, _is_marked(certainty)(workspace)
         workspace.labels.annotate("" if is_so else certainty.value)
         if point is not None and point != workspace.labels.active:  # the card shows another one
             workspace.say(f"{point.code} {point.side.word}: {'not said' if is_so else certainty.value}")
 
     return mark
-
-
-def _label_again(workspace: Workspace, ui: Ui) -> None:
-    if workspace.document.author:
-        workspace.label_again()
-        ui.show_step("label")
-    else:
-        ui.show_labellings()
 
 
 def _has_labels(workspace: Workspace) -> bool:
@@ -57,9 +49,9 @@ def labelling_rows() -> Iterator[Action]:
         yield Action(f"point.{certainty.value}", "Landmarks", f"Certainty: {certainty.value}",
                      (f"Alt+{key}",), _mark(certainty), _can_annotate, _is_marked(certainty),
                      group="certainty", hint="For the selected point, or else the point placed last")
-    yield Action("labelling.again", "Landmarks", "Label again, blind", (), _label_again, _has_labels,
+    yield Action("labelling.again", "Landmarks", "Label again, blind", (), IN_WINDOW, _has_labels,
                  group="labelling", hint="Starts the next round; earlier points are kept, but hidden")
     yield Action("labelling.show", "Landmarks", "Observer and labellings…", (),
-                 lambda w, ui: ui.show_labellings(), group="labelling",
+                 IN_WINDOW, group="labelling",
                  hint="Choose who labels; list the observers and rounds of this specimen")
 # fmt: on

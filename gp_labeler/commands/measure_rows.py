@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["measure_rows"]
@@ -19,7 +19,7 @@ def _has_measurements(workspace: Workspace) -> bool:
 
 
 def _toggle(tool: str) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         if workspace.interaction.tool == tool:
             workspace.measure.put_away()
         else:
@@ -35,7 +35,7 @@ def _has_tool(tool: str) -> Test:
 # fmt: off
 def measure_rows() -> Iterator[Action]:
     """Return the commands of the menu Measure."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _has_scan, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _has_scan, *,
             checked: Test | None = None, hint: str = "", group: str = "", icon: str = "") -> Action:
         return Action(id, "Measure", title, keys, run, enabled, checked, hint, group, icon)
 
@@ -46,14 +46,14 @@ def measure_rows() -> Iterator[Action]:
         yield row(f"tool.{tool}", title, (key,), _toggle(tool), checked=_has_tool(tool), hint=hint,
                   group="measure", icon=tool)
     yield row("measure.show", "Measurements and distances…", ("Ctrl+M",),
-              lambda w, ui: ui.show_measurements(), group="list",
+              IN_WINDOW, group="list",
               hint="List of rulers and angles; distances between landmarks compared with the published ones")
-    yield row("measure.remove", "Remove the selected measurement", (), lambda w, ui: w.measure.remove(),
+    yield row("measure.remove", "Remove the selected measurement", (), lambda w: w.measure.remove(),
               lambda w: w.measure.selected is not None, group="list")
     yield row("measure.clear_pair", "Hide the distance of two landmarks", (),
-              lambda w, ui: w.measure.clear_pair(), lambda w: w.measure.pair is not None, group="list")
-    yield row("measure.import", "Import rulers and angles…", (), lambda w, ui: ui.ask_import_measurements(),
+              lambda w: w.measure.clear_pair(), lambda w: w.measure.pair is not None, group="list")
+    yield row("measure.import", "Import rulers and angles…", (), IN_WINDOW,
               hint="Line and angle markups of 3D Slicer (.mrk.json)", group="exchange")
-    yield row("measure.export", "Export rulers and angles…", (), lambda w, ui: ui.ask_export_measurements(),
+    yield row("measure.export", "Export rulers and angles…", (), IN_WINDOW,
               _has_measurements, hint="As line and angle markups of 3D Slicer, a file each", group="exchange")
 # fmt: on

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from gp_core.landmarks.features import FEATURES
-from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
 from gp_labeler.document.edits import CheckPoint, SwapSides
 from gp_labeler.document.state import How, Landmark
 from gp_labeler.models.workspace import Workspace
@@ -103,12 +103,8 @@ def _can_place(workspace: Workspace) -> bool:
 # What is done
 
 
-def _change_text_size(step: int) -> Run:
-    return lambda workspace, ui: ui.change_text_size(step)
-
-
 def _toggle(field: str) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         workspace.view.update(**{field: not getattr(workspace.view.state, field)})
 
     return change
@@ -119,7 +115,7 @@ def _is_on(field: str) -> Test:
 
 
 def _set_layout(layout: str) -> Run:
-    return lambda workspace, ui: workspace.view.update(layout=layout)
+    return lambda workspace: workspace.view.update(layout=layout)
 
 
 def _has_layout(layout: str) -> Test:
@@ -127,7 +123,7 @@ def _has_layout(layout: str) -> Test:
 
 
 def _set_tool(tool: str) -> Run:
-    return lambda workspace, ui: workspace.interaction.set_tool(tool)
+    return lambda workspace: workspace.interaction.set_tool(tool)
 
 
 def _has_tool(tool: str) -> Test:
@@ -135,56 +131,46 @@ def _has_tool(tool: str) -> Test:
 
 
 def _change_opacity(step: float) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         opacity = min(max(workspace.view.state.mesh_opacity + step, 0.0), 1.0)
         workspace.view.update(mesh_opacity=round(opacity, 3))
 
     return change
 
 
-def _toggle_glyphs(workspace: Workspace, ui: Ui) -> None:
+def _toggle_glyphs(workspace: Workspace) -> None:
     is_mm = workspace.view.state.glyph_mm is not None
     workspace.view.update(glyph_mm=None if is_mm else GLYPH_MM)
 
 
-def _auto_window_level(workspace: Workspace, ui: Ui) -> None:
+def _auto_window_level(workspace: Workspace) -> None:
     workspace.view.update(level=None, width=None)
 
 
-def _look_from(letter: str) -> Run:
-    return lambda workspace, ui: ui.look_from(letter)
-
-
-def _place_at_crosshair(workspace: Workspace, ui: Ui) -> None:
+def _place_at_crosshair(workspace: Workspace) -> None:
     workspace.labels.place(workspace.view.crosshair, How.SLICE)
     workspace.interaction.arm_replacing(False)
 
 
-def _confirm(workspace: Workspace, ui: Ui) -> None:
+def _confirm(workspace: Workspace) -> None:
     active = workspace.labels.active
     if active.code is not None:
         workspace.interaction.confirm(active.side, active.code)
 
 
-def _accept_or_confirm(workspace: Workspace, ui: Ui) -> None:
+def _accept_or_confirm(workspace: Workspace) -> None:
     if _is_suggested(workspace):
-        _confirm(workspace, ui)
+        _confirm(workspace)
     else:
         workspace.labels.accept_ghost()
 
 
-def _let_place(workspace: Workspace, ui: Ui) -> None:
-    if not workspace.interaction.is_labelling:
-        ui.show_step("label")
-    workspace.interaction.set_tool("place")
-
-
-def _toggle_lock(workspace: Workspace, ui: Ui) -> None:
+def _toggle_lock(workspace: Workspace) -> None:
     mark = _mark(workspace)
     workspace.labels.lock(mark is None or not mark.locked)
 
 
-def _toggle_check(workspace: Workspace, ui: Ui) -> None:
+def _toggle_check(workspace: Workspace) -> None:
     active, mark = workspace.labels.active, _mark(workspace)
     if active.code is not None and mark is not None:
         workspace.document.do(
@@ -198,7 +184,7 @@ def _all_locked(workspace: Workspace) -> bool:
 
 
 def _step_point(step: int) -> Run:
-    def go(workspace: Workspace, ui: Ui) -> None:
+    def go(workspace: Workspace) -> None:
         codes = [row.code for row in FEATURES if not row.computed]
         active = workspace.labels.active
         at = codes.index(active.code) if active.code in codes else -1 if step > 0 else 0
@@ -207,7 +193,7 @@ def _step_point(step: int) -> Run:
     return go
 
 
-def _other_side(workspace: Workspace, ui: Ui) -> None:
+def _other_side(workspace: Workspace) -> None:
     active = workspace.labels.active
     if active.code is not None:
         workspace.labels.go_to(active.side.other, active.code)
@@ -219,66 +205,66 @@ def _other_side(workspace: Workspace, ui: Ui) -> None:
 # fmt: off
 def file_rows() -> Iterator[Action]:
     """Return the commands of the menu File."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
             hint: str = "", group: str = "", icon: str = "") -> Action:
         return Action(f"file.{id}", "File", title, keys, run, enabled, hint=hint, group=group, icon=icon)
 
-    yield row("new", "New, without a scan", ("Ctrl+N",), lambda w, ui: ui.begin(),
+    yield row("new", "New, without a scan", ("Ctrl+N",), IN_WINDOW,
               hint="A specimen with touches only; you can open its scan later", group="open")
-    yield row("open", "Open…", ("Ctrl+O",), lambda w, ui: ui.ask_open_file(),
+    yield row("open", "Open…", ("Ctrl+O",), IN_WINDOW,
               hint="A scan or a saved specimen", group="open", icon="file")
-    yield row("open_folder", "Open folder…", ("Ctrl+Shift+O",), lambda w, ui: ui.ask_open_folder(),
+    yield row("open_folder", "Open folder…", ("Ctrl+Shift+O",), IN_WINDOW,
               hint="A DICOM series or a stack of slices", group="open", icon="folder")
-    yield row("demo", "Open the demo", (), lambda w, ui: ui.open_demo(),
+    yield row("demo", "Open the demo", (), IN_WINDOW,
               hint="A synthetic guinea-pig head for practice", group="open", icon="play")
-    yield row("specimens", "Specimens…", ("Ctrl+Shift+L",), lambda w, ui: ui.show_specimens(),
+    yield row("specimens", "Specimens…", ("Ctrl+Shift+L",), IN_WINDOW,
               hint="Specimens in your folders: progress, next unfinished, contact sheets", group="open")
-    yield row("next_specimen", "Next unfinished specimen", (), lambda w, ui: ui.open_next_specimen(),
+    yield row("next_specimen", "Next unfinished specimen", (), IN_WINDOW,
               lambda w: bool(w.specimens.every), group="open")
-    yield row("find_scan", "Find scan…", (), lambda w, ui: ui.ask_find_scan(), _lacks_scan, group="open")
-    yield row("save", "Save", ("Ctrl+S",), lambda w, ui: ui.save(), _in_use, group="save", icon="save")
-    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), lambda w, ui: ui.save(ask=True), _in_use,
+    yield row("find_scan", "Find scan…", (), IN_WINDOW, _lacks_scan, group="open")
+    yield row("save", "Save", ("Ctrl+S",), IN_WINDOW, _in_use, group="save", icon="save")
+    yield row("save_as", "Save as…", ("Ctrl+Shift+S",), IN_WINDOW, _in_use,
               group="save")
-    yield row("import", "Import landmarks…", ("Ctrl+I",), lambda w, ui: ui.ask_import(), _has_scan,
+    yield row("import", "Import landmarks…", ("Ctrl+I",), IN_WINDOW, _has_scan,
               group="exchange", icon="import")
-    yield row("export", "Export landmarks…", ("Ctrl+E",), lambda w, ui: ui.ask_export(), _has_labels,
+    yield row("export", "Export landmarks…", ("Ctrl+E",), IN_WINDOW, _has_labels,
               hint="For 3D Slicer and gp-core", group="exchange", icon="export")
-    yield row("save_mesh", "Save bone surface…", (), lambda w, ui: ui.ask_save_mesh(),
+    yield row("save_mesh", "Save bone surface…", (), IN_WINDOW,
               lambda w: bool(w.bone.surfaces), group="exchange")
-    yield row("screenshot", "Save picture…", (), lambda w, ui: ui.ask_screenshot(), group="exchange")
-    yield row("show_references", "Show reference points…", (), lambda w, ui: ui.ask_references(), _has_scan,
+    yield row("screenshot", "Save picture…", (), IN_WINDOW, group="exchange")
+    yield row("show_references", "Show reference points…", (), IN_WINDOW, _has_scan,
               hint="Points of any landmark list, shown in grey for comparison; not part of the specimen",
               group="references")
-    yield row("clear_references", "Clear reference points", (), lambda w, ui: w.references.clear(),
+    yield row("clear_references", "Clear reference points", (), lambda w: w.references.clear(),
               lambda w: bool(w.references.points), group="references")
-    yield row("add_mesh", "Add mesh…", (), lambda w, ui: ui.ask_add_mesh(), _has_scan,
+    yield row("add_mesh", "Add mesh…", (), IN_WINDOW, _has_scan,
               hint="Show a surface from another program with the bone; not part of the specimen",
               group="references")
-    yield row("remove_meshes", "Remove added meshes", (), lambda w, ui: w.meshes.clear(),
+    yield row("remove_meshes", "Remove added meshes", (), lambda w: w.meshes.clear(),
               lambda w: bool(w.meshes.meshes), group="references")
-    yield row("close", "Close", ("Ctrl+Q",), lambda w, ui: ui.close_window(), group="close")
+    yield row("close", "Close", ("Ctrl+Q",), IN_WINDOW, group="close")
 
 
 def edit_rows() -> Iterator[Action]:
     """Return the commands of the menu Edit."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test, icon: str = "",
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test, icon: str = "",
             hint: str = "") -> Action:
         group = "undo" if id in ("undo", "redo") else "swap"
         return Action(f"edit.{id}", "Edit", title, keys, run, enabled, hint=hint, group=group, icon=icon)
 
-    yield row("undo", "Undo", ("Ctrl+Z",), lambda w, ui: w.document.undo(),
+    yield row("undo", "Undo", ("Ctrl+Z",), lambda w: w.document.undo(),
               lambda w: w.document.undo_text is not None, "undo")
-    yield row("redo", "Redo", ("Ctrl+Y", "Ctrl+Shift+Z"), lambda w, ui: w.document.redo(),
+    yield row("redo", "Redo", ("Ctrl+Y", "Ctrl+Shift+Z"), lambda w: w.document.redo(),
               lambda w: w.document.redo_text is not None, "redo")
-    yield row("swap", "Exchange with…", (), lambda w, ui: ui.ask_swap(), _is_free, "swap",
+    yield row("swap", "Exchange with…", (), IN_WINDOW, _is_free, "swap",
               "For two points placed under each other's names")
-    yield row("swap_sides", "Exchange left and right", (), lambda w, ui: w.document.do(SwapSides()),
+    yield row("swap_sides", "Exchange left and right", (), lambda w: w.document.do(SwapSides()),
               _has_labels)
 
 
 def view_rows() -> Iterator[Action]:
     """Return the commands of the menu View."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
             checked: Test | None = None, group: str = "", hint: str = "", icon: str = "") -> Action:
         return Action(id, "View", title, keys, run, enabled, checked, hint, group, icon)
 
@@ -286,18 +272,18 @@ def view_rows() -> Iterator[Action]:
         yield row(f"view.{layout}", title, (key,), _set_layout(layout), checked=_has_layout(layout),
                   group="layout")
     yield row("view.fit_here", "Show everything in the view under the pointer", ("Ctrl+R",),
-              lambda w, ui: ui.reset_view_here(), _has_scan, group="layout",
+              IN_WINDOW, _has_scan, group="layout",
               hint="Does not change the other views")
-    yield row("view.reset", "Show everything", ("R",), lambda w, ui: ui.reset_views(), _has_scan,
+    yield row("view.reset", "Show everything", ("R",), lambda w: w.view.reset_asked.emit(), _has_scan,
               group="show")
-    yield row("view.go_to", "Go to position…", ("Ctrl+G",), lambda w, ui: ui.ask_position(), _has_scan,
+    yield row("view.go_to", "Go to position…", ("Ctrl+G",), IN_WINDOW, _has_scan,
               group="show", hint="For example L 4.6 P 9.1 S 12.4")
     yield row("view.zoom_to_point", "Zoom to the point", ("E", "Shift+R"),
-              lambda w, ui: ui.zoom_to_point(), _has_scan, group="show")
-    for word, letter, keys in _VIEWPOINTS:
-        yield row(f"view.from_{word}", f"Look from {word}", keys, _look_from(letter), group="from")
+              IN_WINDOW, _has_scan, group="show")
+    for word, keys in _VIEWPOINTS:
+        yield row(f"view.from_{word}", f"Look from {word}", keys, IN_WINDOW, group="from")
     for title, tool, key in _TOOLS:
-        run = _let_place if tool == "place" else _set_tool(tool)
+        run = IN_WINDOW if tool == "place" else _set_tool(tool)
         yield row(f"tool.{tool}", title, (key,), run, checked=_has_tool(tool), group="tool",
                   hint="Sets what the left mouse button does on a slice")
     yield row("view.auto_window_level", "Automatic contrast", ("Shift+W",), _auto_window_level, _has_scan,
@@ -310,13 +296,13 @@ def view_rows() -> Iterator[Action]:
     yield row("view.fainter", "Bone more transparent", ("[",), _change_opacity(-0.1), group="bone")
     yield row("view.solider", "Bone more solid", ("]",), _change_opacity(0.1), group="bone")
     yield row("view.projection", "Perspective on or off", ("5", "Num+5"),
-              lambda w, ui: ui.toggle_projection(), group="bone")
-    yield row("view.canvas", "3D canvas…", (), lambda d, ui: ui.ask_canvas(), group="theme",
+              IN_WINDOW, group="bone")
+    yield row("view.canvas", "3D canvas…", (), IN_WINDOW, group="theme",
               hint="Painted or native drawing of the 3D view, from the next start on")
-    yield row("view.theme", "Dark or light", ("Ctrl+T",), lambda w, ui: ui.toggle_theme(), group="theme",
+    yield row("view.theme", "Dark or light", ("Ctrl+T",), IN_WINDOW, group="theme",
               icon="moon")
-    for title, id, step, keys in _TEXT_SIZES:
-        yield row(f"view.text_{id}", title, keys, _change_text_size(step), group="text",
+    for title, id, keys in _TEXT_SIZES:
+        yield row(f"view.text_{id}", title, keys, IN_WINDOW, group="text",
                   hint="In the whole window, including slices and the 3D view")
 
 
@@ -325,12 +311,12 @@ _LAYOUTS = (
     ("Axial only", "axial", "Z"), ("Sagittal only", "sagittal", "S"), ("Coronal only", "coronal", "C"),
 )
 _TEXT_SIZES = (
-    ("Larger text", "larger", 1, ("Ctrl+=", "Ctrl++")), ("Smaller text", "smaller", -1, ("Ctrl+-",)),
-    ("Normal text", "normal", 0, ("Ctrl+0",)),
+    ("Larger text", "larger", ("Ctrl+=", "Ctrl++")), ("Smaller text", "smaller", ("Ctrl+-",)),
+    ("Normal text", "normal", ("Ctrl+0",)),
 )
 _VIEWPOINTS = (
-    ("anterior", "A", ("1", "Num+1")), ("left", "L", ("3", "Num+3")), ("superior", "S", ("7", "Num+7")),
-    ("posterior", "P", ("Ctrl+1",)), ("right", "R", ("Ctrl+3",)), ("inferior", "I", ("Ctrl+7",)),
+    ("anterior", ("1", "Num+1")), ("left", ("3", "Num+3")), ("superior", ("7", "Num+7")),
+    ("posterior", ("Ctrl+1",)), ("right", ("Ctrl+3",)), ("inferior", ("Ctrl+7",)),
 )
 _TOOLS = (
     ("Tool: place points", "place", "P"), ("Tool: move the crosshair", "look", "H"),
@@ -345,7 +331,7 @@ _SHOWN = (
 
 def landmark_rows() -> Iterator[Action]:
     """Return the commands of the menu Landmarks."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _always, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _always, *,
             checked: Test | None = None, group: str = "place", hint: str = "", icon: str = "") -> Action:
         return Action(id, "Landmarks", title, keys, run, enabled, checked, hint, group, icon)
 
@@ -355,31 +341,31 @@ def landmark_rows() -> Iterator[Action]:
     yield row("point.confirm", "Confirm the suggestion or ghost", ("Ctrl+Return", "Ctrl+Enter"), _confirm,
               _can_confirm, hint="Zooms in first if the point cannot be judged in the current view")
     yield row("point.accept_all", "Accept all ghosts of this side", (),
-              lambda w, ui: w.labels.accept_all_ghosts(),
+              lambda w: w.labels.accept_all_ghosts(),
               lambda w: bool(w.labels.ghosts(w.labels.active.side)),
               hint="They become suggestions, which you then confirm")
-    yield row("point.suggest_like", "Suggest from my scans…", (), lambda w, ui: ui.ask_suggest_like(),
+    yield row("point.suggest_like", "Suggest from my scans…", (), IN_WINDOW,
               lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
               hint="First labels from scans that are labelled, to confirm; again, to stop")
     yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
               icon="label")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),
-              lambda w, ui: w.interaction.arm_replacing(not w.interaction.replacing),
+              lambda w: w.interaction.arm_replacing(not w.interaction.replacing),
               lambda w: _has_scan(w) and _is_free(w) and _is_shown(w),
               checked=lambda w: w.interaction.replacing,
               hint="The next click moves the selected point; otherwise, clicks never move a placed point")
-    yield row("point.skip", "Skip for now", ("N",), lambda w, ui: w.labels.skip(), _has_active,
+    yield row("point.skip", "Skip for now", ("N",), lambda w: w.labels.skip(), _has_active,
               icon="skip")
-    yield row("point.unseen", "Cannot be seen", ("X",), lambda w, ui: w.labels.mark_unseen(),
+    yield row("point.unseen", "Cannot be seen", ("X",), lambda w: w.labels.mark_unseen(),
               _is_free, icon="unseen")
-    yield row("point.clear", "Clear", ("Delete", "Backspace"), lambda w, ui: w.labels.clear(),
+    yield row("point.clear", "Clear", ("Delete", "Backspace"), lambda w: w.labels.clear(),
               lambda w: _is_free(w) and (_is_placed_or_unseen(w) or _is_suggested(w)))
     yield row("point.check", "Mark as checked", ("K",), _toggle_check, _is_placed, checked=_is_checked,
               group="state")
     yield row("point.lock", "Lock", ("L",), _toggle_lock, _is_placed_or_unseen, checked=_is_locked,
               group="state", icon="lock")
     yield row("point.lock_all", "Lock all", ("Ctrl+L",),
-              lambda w, ui: w.labels.lock_all(not _all_locked(w)), _has_labels,
+              lambda w: w.labels.lock_all(not _all_locked(w)), _has_labels,
               checked=_all_locked, group="state")
     yield row("point.next", "Next feature", (".",), _step_point(1), group="go")
     yield row("point.previous", "Previous feature", (",",), _step_point(-1), group="go")
@@ -394,8 +380,8 @@ def landmark_rows() -> Iterator[Action]:
 def help_rows() -> Iterator[Action]:
     """Return the commands of the menu Help."""
     yield Action("help.shortcuts", "Help", "Keyboard and mouse", ("?", "F1"),
-                 lambda w, ui: ui.show_shortcuts())
-    yield Action("help.record", "Help", "Record script…", (), lambda w, ui: ui.toggle_recording(),
+                 IN_WINDOW)
+    yield Action("help.record", "Help", "Record script…", (), IN_WINDOW,
                  hint="Records your actions as a script for gp-labeler --offscreen; choose it again to stop")
-    yield Action("help.about", "Help", "About gp-labeler", (), lambda w, ui: ui.show_about())
+    yield Action("help.about", "Help", "About gp-labeler", (), IN_WINDOW)
 # fmt: on

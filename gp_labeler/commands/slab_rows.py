@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.commands.action import Action, Run, Test
 from gp_labeler.imaging.slab import DENOISERS, SLAB_MODES, THICKEST_MM, THINNEST_MM, Slab
 from gp_labeler.models.workspace import Workspace
 
@@ -34,7 +34,7 @@ def _mm(workspace: Workspace) -> float:
 
 
 def _toggle_slab(mode: str) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         is_on = _is_slab(mode)(workspace)
         workspace.view.update(slab=None if is_on else Slab(mode, _mm(workspace)))
 
@@ -42,7 +42,7 @@ def _toggle_slab(mode: str) -> Run:
 
 
 def _thicken(factor: float) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         slab = workspace.view.state.slab
         if slab is not None:
             mm = min(max(slab.mm * factor, THINNEST_MM), THICKEST_MM)
@@ -56,7 +56,7 @@ def _is_denoised(kind: str) -> Test:
 
 
 def _toggle_denoise(kind: str) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         workspace.view.update(denoise=None if _is_denoised(kind)(workspace) else kind)
 
     return change
@@ -65,7 +65,7 @@ def _toggle_denoise(kind: str) -> Run:
 # fmt: off
 def slab_rows() -> Iterator[Action]:
     """Return the commands that change what of the scan a slice view shows."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _has_scan, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _has_scan, *,
             checked: Test | None = None, hint: str = "") -> Action:
         return Action(f"view.{id}", "View", title, keys, run, enabled, checked, hint, "slab")
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from gp_labeler.commands.action import Action, Run, Test, Ui
+from gp_labeler.commands.action import IN_WINDOW, Action, Run, Test
 from gp_labeler.models.workspace import Workspace
 
 __all__ = ["cut_rows"]
@@ -42,32 +42,20 @@ def _is_cut_by(plane: str) -> Test:
     return test
 
 
-def _cut_by(plane: str) -> Run:
-    """Cut by a plane, or leave bone whole w where it is cut by it."""
-
-    def change(workspace: Workspace, ui: Ui) -> None:
-        if _is_cut_by(plane)(workspace):
-            workspace.view.update(cut=None)
-        else:
-            ui.cut(plane)
-
-    return change
-
-
-def _flip(workspace: Workspace, ui: Ui) -> None:
+def _flip(workspace: Workspace) -> None:
     cut = workspace.view.state.cut
     if cut is not None:
         workspace.view.update(cut=cut.flipped())
 
 
-def _cut_here(workspace: Workspace, ui: Ui) -> None:
+def _cut_here(workspace: Workspace) -> None:
     cut = workspace.view.state.cut
     if cut is not None:
         workspace.view.update(cut=cut.through(workspace.view.crosshair))
 
 
 def _move(mm: float) -> Run:
-    def change(workspace: Workspace, ui: Ui) -> None:
+    def change(workspace: Workspace) -> None:
         cut = workspace.view.state.cut
         if cut is not None:
             workspace.view.update(cut=cut.moved(mm))
@@ -75,24 +63,24 @@ def _move(mm: float) -> Run:
     return change
 
 
-def _toggle_slices(workspace: Workspace, ui: Ui) -> None:
+def _toggle_slices(workspace: Workspace) -> None:
     workspace.view.update(slices_visible=not workspace.view.state.slices_visible)
 
 
 # fmt: off
 def cut_rows() -> Iterator[Action]:
     """Return the commands of the menu View that look into bone."""
-    def row(id: str, title: str, keys: tuple[str, ...], run: Run, enabled: Test = _is_cut, *,
+    def row(id: str, title: str, keys: tuple[str, ...], run: Run | None, enabled: Test = _is_cut, *,
             checked: Test | None = None, hint: str = "", group: str = "cut") -> Action:
         return Action(f"view.{id}", "View", title, keys, run, enabled, checked, hint, group)
 
     for plane, key in (("axial", "Shift+Z"), ("sagittal", "Shift+S"), ("coronal", "Shift+C")):
-        yield row(f"cut_{plane}", f"Cut bone: {plane}", (key,), _cut_by(plane), _has_bone,
+        yield row(f"cut_{plane}", f"Cut bone: {plane}", (key,), IN_WINDOW, _has_bone,
                   checked=_is_cut_by(plane),
                   hint=f"Remove the bone in front of the {plane} plane through the crosshair")
-    yield row("cut_view", "Cut bone: across the view", ("Shift+V",), _cut_by("view"), _has_bone,
+    yield row("cut_view", "Cut bone: across the view", ("Shift+V",), IN_WINDOW, _has_bone,
               checked=_is_cut_by("view"), hint="Remove the bone between you and the crosshair")
-    yield row("cut_open", "Cut bone: open at the feature", ("Shift+E",), lambda w, ui: ui.cut_open(),
+    yield row("cut_open", "Cut bone: open at the feature", ("Shift+E",), IN_WINDOW,
               _has_place,
               hint="Cut in the best plane of the feature, viewed from the open side")
     yield row("cut_flip", "Cut: keep the other side", ("Shift+X",), _flip)

@@ -232,14 +232,14 @@ class SpecimenDocument:
         specimen = _loaded(specimen)
         kept = self.dirty and self.state is not self._abandoned  # edited since: a scan takes seconds to load
         name = self.state.specimen
-        self.close(discard=not kept)
+        self.close()
         self._hold(specimen)
         self.reset.emit()
         told = (f"Unsaved edits of {name} are kept, and offered at the next start",)
         self.loaded.emit((*(told if kept and self.directory is not None else ()), *specimen.notices))
 
     def abandon(self) -> None:
-        """Give up the unsaved edits so far, once something else is loaded."""
+        """Give up the unsaved edits so far, once something else is loaded or the program ends."""
         self._abandoned = self.state
 
     def _hold(self, specimen: LoadedSpecimen) -> None:
@@ -472,9 +472,10 @@ class SpecimenDocument:
     def close(self, *, discard: bool = False) -> None:
         """Release journal, locks and scan.
 
-        Unsaved edits stay in the journal, and are offered at the next start, unless the user wants to
-        `discard` them.
+        Unsaved edits stay in the journal, and are offered at the next start, unless they were given up by
+        `abandon`, or all are to `discard`.
         """
+        discard = discard or self.state is self._abandoned
         self.store.close(keep_journal=self.dirty and not discard)
         self._volume = self.measure = None
 

@@ -90,7 +90,7 @@ class AnatomicalPlanesModel:
         return True
 
     def show(self, kind: str) -> FloatArray:
-        """Turn the slice views into one of `ANATOMICAL_PLANES` and the two across it; bring them into view.
+        """Turn the slice views into one of `ANATOMICAL_PLANES` and the two across it, seen from near.
 
         The plane itself is shown in the view that is shown alone, or in the one that turns least.
 
@@ -113,6 +113,7 @@ class AnatomicalPlanesModel:
         }
         self._view.set_planes(planes, dict(zip(views, cut.titles, strict=True)))
         self._view.show_point(cut.centre)
+        self._view.close_up_asked.emit(cut.centre)
         return cut.centre
 
     def show_for(self, code: str) -> FloatArray | None:

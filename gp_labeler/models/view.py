@@ -160,6 +160,10 @@ class ViewModel:
 
     close_look_asked = Signal(object)
     """(3,) scan position that every view shall show so closely that it can be judged, mm."""
+
+    close_up_asked = Signal(object)
+    """(3,) scan position around which every slice view shall show a few mm."""
+
     reset_asked = Signal()
     """Every view shall show everything again."""
 

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from gp_labeler.views.prompts import Prompts
+
 __all__ = ["ScriptPrompts"]
 
 
-class ScriptPrompts:
-    """Answers the window's questions; see `gp_labeler.views.prompts.Prompts` for what they are."""
+class ScriptPrompts(Prompts):
+    """Answers the window's questions by what the step says."""
+
+    in_dialogs = False
 
     def __init__(self) -> None:
+        super().__init__()
         self.files: list[Path] = []
         self.saves: list[Path] = []
         self.answers: tuple[str, ...] = ()
@@ -25,7 +30,7 @@ class ScriptPrompts:
         self.unanswered = []
 
     def choose(
-        self, title: str, text: str, answers: Sequence[str], *, detail: str = "", kind: str = ""
+        self, title: str, text: str, answers: Sequence[str], *, detail: str = "", kind: str = "question"
     ) -> str:
         """Return the first answer offered that the step allows."""
         for answer in answers:
@@ -38,15 +43,17 @@ class ScriptPrompts:
         """Take what must be read as a question that nobody answers."""
         self.unanswered.append(text)
 
-    def open_files(self, title: str, folder: str, filters: str, *, many: bool = False) -> list[Path]:
+    def open_files(
+        self, title: str, filters: str, *, many: bool = False, start: Path | None = None
+    ) -> list[Path]:
         """Return the files of the step."""
         if not self.files:
             self.unanswered.append(title)
         return self.files if many else self.files[:1]
 
-    def folder(self, title: str, folder: str) -> Path | None:
+    def folder(self, title: str, *, start: Path | None = None) -> Path | None:
         """Return the folder of the step."""
-        return next(iter(self.open_files(title, folder, "")), None)
+        return next(iter(self.open_files(title, "")), None)
 
     def save_file(self, title: str, suggestion: str, filters: str) -> Path | None:
         """Return the file of the step, to be written."""

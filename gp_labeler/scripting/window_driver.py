@@ -64,7 +64,7 @@ class WindowDriver:
         self.output, self.folder = output, folder
         self.prompts = ScriptPrompts()
         self.window = make_window(None)
-        self.window.ui.prompts = self.prompts  # type: ignore[assignment]
+        self.window.prompts = self.prompts
         self.workspace = self.window.workspace
         self.messages: list[tuple[str, str]] = []
         self.faults: list[BaseException] = []

@@ -23,11 +23,13 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.system.installation import check_display
 from gp_labeler.system.plain_numbers import use_plain_numbers
 from gp_labeler.views.canvas_choice import choose_canvas, share_contexts
-from gp_labeler.views.canvas_ui import offer_measurement
+from gp_labeler.views.canvas_question import offer_measurement
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.questions import offer_recoveries
 from gp_labeler.views.state_question import directory_to_use
+from gp_labeler.views.window_commands.file import open_demo, open_path
 from gp_labeler.views.window_state import WindowState
 
 __all__ = ["make_application", "make_window", "run_window"]
@@ -130,7 +132,7 @@ def run_window(
         )
     app = make_application()
     wanted = directory or default_directory()
-    directory = directory_to_use(wanted, Prompts(None))
+    directory = directory_to_use(wanted, Prompts())
     window = make_window(directory)
     if observer is not None:
         window.workspace.set_observer(observer)
@@ -141,12 +143,13 @@ def run_window(
         places = list(dict.fromkeys(place for place in (wanted, directory) if place is not None))
         for words in (words for place in places for words in unreadable_journals(place)):
             window.workspace.say(words, "warning")
-        window.ui.take_recoveries(tuple(found for place in places for found in find_recoveries(place)))
+        recoveries = [found for place in places for found in find_recoveries(place)]
+        offer_recoveries(window.workspace, window.prompts, recoveries, window)
         if demo:
-            window.ui.open_demo()
+            open_demo(window.workspace, window.prompts)
         elif path is not None:
-            window.ui.open_path(path)
-        offer_measurement(window, window.ui.prompts)
+            open_path(window.workspace, window.prompts, path)
+        offer_measurement(window, window.prompts)
 
     QTimer.singleShot(0, begin)
     return int(app.exec())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +10,7 @@ from qtpy.QtCore import QObject, Qt, QTimer, Signal
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
-from gp_labeler.commands.actions import ACTIONS, MENUS, Action, Ui, run
+from gp_labeler.commands.actions import ACTIONS, MENUS, Action, run
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.signals import follow
@@ -52,8 +52,8 @@ class Commands(QObject):
     ----------
     workspace : Workspace
         What they act on.
-    ui : Ui
-        What they ask.
+    in_window : mapping of str to callable
+        What the window does, by id, for the actions that need one; see `views.window_commands`.
     window, views : QWidget
         Where keys work: everywhere, or only in the views.
     """
@@ -61,9 +61,18 @@ class Commands(QObject):
     done = Signal(str)
     """Id of the action that was done."""
 
-    def __init__(self, workspace: Workspace, ui: Ui, window: QWidget, views: QWidget) -> None:
+    path_chosen = Signal(object)
+    """`Path` of a file that was opened before, to be opened again."""
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        in_window: Mapping[str, Callable[[], object]],
+        window: QWidget,
+        views: QWidget,
+    ) -> None:
         super().__init__(window)
-        self._workspace, self._ui = workspace, ui
+        self._workspace, self._in_window = workspace, in_window
         self._soon = QTimer(self, singleShot=True, interval=0)
         self._soon.timeout.connect(self.refresh)
         self.actions = {row.id: self._made(row, window, views) for row in ACTIONS.values()}
@@ -158,7 +167,7 @@ class Commands(QObject):
 
     def run(self, id: str, *_: object) -> bool:
         """Do an action; return whether it could be done."""
-        was_done = run(id, self._workspace, self._ui)
+        was_done = run(id, self._workspace, self._in_window)
         self.refresh()
         if was_done:
             self.done.emit(id)
@@ -175,13 +184,12 @@ class Commands(QObject):
             entry = menu.addAction(_short(path))
             entry.setEnabled(path.exists())
             entry.setToolTip(str(path))
-            entry.triggered.connect(partial(self._open, path))
+            entry.triggered.connect(partial(self._on_recent, path))
         if not files:
             menu.addAction("No recent files").setEnabled(False)
 
-    def _open(self, path: Path, *_: object) -> None:
-        opener: Callable[[Path], None] = self._ui.open_path
-        opener(path)
+    def _on_recent(self, path: Path, *_: object) -> None:
+        self.path_chosen.emit(path)
 
 
 def _short(path: Path) -> str:

@@ -19,8 +19,13 @@ from qtpy.QtWidgets import (
     QWidget,
 )
 
+from gp_core.atlas.label_check import Finding
 from gp_core.settings import setting
+from gp_core.study.reliability import Disagreement
 from gp_labeler.document.animals import may_hold_labels
+from gp_labeler.document.specimen_document import VolumeChangedError
+from gp_labeler.imaging.readers import ImportPlan
+from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.view import ViewModel as SessionView
 from gp_labeler.models.view import ViewState
 from gp_labeler.models.workspace import Workspace
@@ -38,14 +43,17 @@ from gp_labeler.views.panels.scan.welcome import Welcome
 from gp_labeler.views.panels.tracker.card import TrackerCard
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
+from gp_labeler.views.questions import ask_how_to_read, offer_other_scan
 from gp_labeler.views.signals import follow
 from gp_labeler.views.status_line import StatusLine
 from gp_labeler.views.theme import THEMES, apply_theme
 from gp_labeler.views.top_bar import TopBar
 from gp_labeler.views.tracker_display import TrackerDisplay
 from gp_labeler.views.view_grid import ViewGrid
+from gp_labeler.views.window_commands.atlas import show_disagreement, show_finding
+from gp_labeler.views.window_commands.file import open_path, resolve_unsaved
+from gp_labeler.views.window_commands.table import window_commands
 from gp_labeler.views.window_state import WindowState
-from gp_labeler.views.window_ui import WindowUi
 
 __all__ = ["MainWindow"]
 
@@ -90,8 +98,9 @@ class MainWindow(QMainWindow):
         self, workspace: Workspace, memory: WindowState | None = None, prompts: Prompts | None = None
     ) -> None:
         super().__init__()
-        self.workspace, self.memory = workspace, memory or WindowState()
-        self.ui = WindowUi(self, workspace, prompts or Prompts(self))
+        self.workspace: Workspace = workspace
+        self.memory: WindowState = memory or WindowState()
+        self.prompts: Prompts = prompts or Prompts(self, self.memory)
         self.setAcceptDrops(True)
         self._recall_view(workspace.view)
         self.theme_name = self.memory.get("theme", str, setting("theme") or "dark")
@@ -104,7 +113,7 @@ class MainWindow(QMainWindow):
             MeasureLayer(workspace, view)
         self.tracker_display = TrackerDisplay(workspace, self.pose_display)
         self.tracker_display.audible = self.memory.get("audible", bool, False)
-        self.commands = Commands(workspace, self.ui, self, self.grid)
+        self.commands = Commands(workspace, window_commands(self), self, self.grid)
         self.commands.fill(self.menuBar())
         self.rail, self.panels = Rail(workspace, self.commands.actions), PanelStack()
         self.pages, self.welcome = QStackedWidget(), Welcome(workspace, self.commands.actions)
@@ -190,11 +199,12 @@ class MainWindow(QMainWindow):
         workspace = self.workspace
         self.grid.hovered.connect(self.status.show_position)
         self.rail.step_chosen.connect(self.set_step)
-        self.welcome.path_chosen.connect(self._on_path_chosen)
+        self.welcome.path_chosen.connect(self.open_path)
+        self.commands.path_chosen.connect(self.open_path)
         for id in ("point.accept_ghost", "point.confirm"):
             self._label.addAction(self.commands.actions[id])  # Enter means it there too
-        self._atlas.animal_asked.connect(self.ui.show_finding)
-        self._atlas.repeatability.disagreement_asked.connect(self.ui.show_disagreement)
+        self._atlas.animal_asked.connect(self._on_finding_asked)
+        self._atlas.repeatability.disagreement_asked.connect(self._on_disagreement_asked)
         follow(self, workspace.scan.opened, self._show_page)
         follow(self, workspace.document.reset, self._show_page)
         follow(self, workspace.scan.import_asked, self._on_import_asked)
@@ -233,14 +243,21 @@ class MainWindow(QMainWindow):
         self.pages.setCurrentIndex(int(is_open or alone))
         self.status.set_without_scan(_ALONE[step] if alone else "")
 
-    def _on_path_chosen(self, path: str) -> None:
-        self.ui.open_path(Path(path))
+    def open_path(self, path: str | Path) -> None:
+        """Open a scan, specimen or atlas; asks first what becomes of unsaved edits."""
+        open_path(self.workspace, self.prompts, Path(path))
 
-    def _on_import_asked(self, plan: object) -> None:
-        self.ui.take_plan(plan)  # type: ignore[arg-type]
+    def _on_finding_asked(self, finding: Finding) -> None:
+        show_finding(self, finding)
 
-    def _on_scan_differs(self, error: object, volume: object) -> None:
-        self.ui.take_other_scan(error, volume)  # type: ignore[arg-type]
+    def _on_disagreement_asked(self, row: Disagreement) -> None:
+        show_disagreement(self, row)
+
+    def _on_import_asked(self, plan: ImportPlan) -> None:
+        ask_how_to_read(self.workspace, self.prompts, plan, self)
+
+    def _on_scan_differs(self, error: VolumeChangedError, volume: Volume) -> None:
+        offer_other_scan(self.workspace, self.prompts, error, volume)
 
     def _show_title(self, *_: object) -> None:
         workspace, document = self.workspace, self.workspace.document
@@ -289,11 +306,11 @@ class MainWindow(QMainWindow):
             layout.activate()  # now, so that views are seen at their size by whoever resized the window
 
     def closeEvent(self, event: QCloseEvent) -> None:  # noqa: D102, N802
-        if not self.ui.resolve_unsaved():
+        if not resolve_unsaved(self.workspace, self.prompts):
             event.ignore()
             return
         self._remember()
-        self.workspace.close(discard=self.ui.discarded)
+        self.workspace.close()
         self.grid.release()
         event.accept()
 
@@ -310,7 +327,7 @@ class MainWindow(QMainWindow):
         elif self.rail.step == "pose" and holds_touches(paths[0]):
             self.take_touches(paths[0])
         else:
-            self.ui.open_path(paths[0])
+            self.open_path(paths[0])
 
 
 def _tight(layout: Layout, *, spacing: int = 0) -> Layout:

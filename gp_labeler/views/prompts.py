@@ -7,6 +7,8 @@ from pathlib import Path
 
 from qtpy.QtWidgets import QFileDialog, QInputDialog, QMessageBox, QWidget
 
+from gp_labeler.views.window_state import WindowState
+
 __all__ = ["Prompts"]
 
 
@@ -17,10 +19,24 @@ class Prompts:
     ----------
     parent : QWidget, optional
         The window.
+    memory : WindowState, optional
+        Remembers the folder of the last file, where the next dialog begins.
     """
 
-    def __init__(self, parent: QWidget | None) -> None:
-        self._parent = parent
+    in_dialogs = True
+    """Whether a person answers, in dialogs that show more than a question; scripts are asked in words."""
+
+    def __init__(self, parent: QWidget | None = None, memory: WindowState | None = None) -> None:
+        self._parent, self._memory = parent, memory or WindowState()
+
+    @property
+    def last_folder(self) -> Path:
+        """Folder of the file that was opened or saved last."""
+        return Path(self._memory.get("folder", str, str(Path.home())))
+
+    def remember(self, path: Path) -> None:
+        """Let the next dialog begin in the folder that holds a path."""
+        self._memory.set(folder=str(path.absolute().parent))
 
     def choose(
         self, title: str, text: str, answers: Sequence[str], *, detail: str = "", kind: str = "question"
@@ -49,24 +65,33 @@ class Prompts:
         """Say something that must be read."""
         QMessageBox.information(self._parent, title, text)
 
-    def open_files(self, title: str, folder: str, filters: str, *, many: bool = False) -> list[Path]:
+    def open_files(
+        self, title: str, filters: str, *, many: bool = False, start: Path | None = None
+    ) -> list[Path]:
         """Ask for a file, or several; empty where the user thinks better of it."""
+        at = str(start or self.last_folder)
         if many:
-            names, _ = QFileDialog.getOpenFileNames(self._parent, title, folder, filters)
+            names, _ = QFileDialog.getOpenFileNames(self._parent, title, at, filters)
         else:
-            name, _ = QFileDialog.getOpenFileName(self._parent, title, folder, filters)
+            name, _ = QFileDialog.getOpenFileName(self._parent, title, at, filters)
             names = [name] if name else []
-        return [Path(name) for name in names]
+        return self._remembered([Path(name) for name in names])
 
-    def folder(self, title: str, folder: str) -> Path | None:
+    def folder(self, title: str, *, start: Path | None = None) -> Path | None:
         """Ask for a folder."""
-        name = QFileDialog.getExistingDirectory(self._parent, title, folder)
-        return Path(name) if name else None
+        name = QFileDialog.getExistingDirectory(self._parent, title, str(start or self.last_folder))
+        return next(iter(self._remembered([Path(name)] if name else [])), None)
 
     def save_file(self, title: str, suggestion: str, filters: str) -> Path | None:
-        """Ask where to save; the dialog itself asks before a file is replaced."""
-        name, _ = QFileDialog.getSaveFileName(self._parent, title, suggestion, filters)
-        return Path(name) if name else None
+        """Ask where to save, by a suggested name; the dialog itself asks before a file is replaced."""
+        at = str(self.last_folder / suggestion)
+        name, _ = QFileDialog.getSaveFileName(self._parent, title, at, filters)
+        return next(iter(self._remembered([Path(name)] if name else [])), None)
+
+    def _remembered(self, chosen: list[Path]) -> list[Path]:
+        if chosen:
+            self.remember(chosen[0])
+        return chosen
 
     def item(self, title: str, text: str, items: Sequence[str]) -> str:
         """Ask for one of many; empty where the user thinks better of it."""

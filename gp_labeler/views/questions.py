@@ -1,4 +1,4 @@
-"""Opening, importing and exporting by plain questions, which a script can answer as well as a person."""
+"""What opening, importing and exporting ask: in dialogs, or by plain questions that a script can answer."""
 
 from __future__ import annotations
 
@@ -6,14 +6,71 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from qtpy.QtWidgets import QWidget
+
 from gp_core.errors import GpError
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.landmark_import import OffBoneError, import_landmarks
+from gp_labeler.document.recovery import Recovery
+from gp_labeler.document.specimen_document import VolumeChangedError
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume
+from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.panels.scan.import_dialog import ImportDialog
+from gp_labeler.views.panels.scan.recover_dialog import RecoverDialog
 from gp_labeler.views.prompts import Prompts
 
-__all__ = ["ask_about", "export_asking", "import_asking"]
+__all__ = [
+    "ask_about",
+    "ask_how_to_read",
+    "export_asking",
+    "import_asking",
+    "offer_other_scan",
+    "offer_recoveries",
+]
+
+
+def offer_recoveries(
+    workspace: Workspace, prompts: Prompts, recoveries: Sequence[Recovery], parent: QWidget
+) -> None:
+    """Offer what programs that were killed left unsaved."""
+    if recoveries and prompts.in_dialogs:
+        dialog = RecoverDialog(tuple(recoveries), parent)
+        dialog.recover_asked.connect(workspace.document.recover)
+        dialog.open()
+        return
+    for recovery in recoveries:
+        answer = prompts.choose(
+            "Unsaved work was found",
+            recovery.text,
+            ["Recover", "Later", "Delete it"],
+            detail="The program ended before this was saved. Nothing is lost.",
+        )
+        if answer == "Recover":
+            workspace.document.recover(recovery)
+            return
+        if answer == "Delete it":
+            recovery.discard()
+
+
+def ask_how_to_read(workspace: Workspace, prompts: Prompts, plan: ImportPlan, parent: QWidget) -> None:
+    """Ask what a scan's files do not say, then read it."""
+    if prompts.in_dialogs:
+        ImportDialog(workspace, plan, parent=parent).open()
+        return
+    answered = ask_about(plan, prompts)
+    if answered is not None:
+        workspace.scan.read(answered)
+
+
+def offer_other_scan(
+    workspace: Workspace, prompts: Prompts, error: VolumeChangedError, volume: Volume
+) -> None:
+    """Ask whether to go on with a scan that is not the one that was labelled."""
+    detail = f"{'; '.join(error.differences).capitalize()}. {error.remedy or ''}"
+    answers = ["Use it anyway"]
+    if prompts.choose("Another scan?", error.problem, answers, detail=detail, kind="warning"):
+        workspace.scan.accept(volume)
 
 
 def ask_about(plan: ImportPlan, prompts: Prompts) -> ImportPlan | None:

@@ -40,7 +40,7 @@ def directory_to_use(wanted: Path, prompts: Prompts) -> Path | None:
             kind="warning",
         )
         if answer == _CHOOSE:
-            directory = prompts.folder("Folder for unsaved edits", str(Path.home())) or directory
+            directory = prompts.folder("Folder for unsaved edits", start=Path.home()) or directory
         elif answer == _WITHOUT or other is None:
             return None
         else:

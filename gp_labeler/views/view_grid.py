@@ -236,6 +236,10 @@ class ViewGrid(QWidget):
         for view in self.views:
             view.reset()
 
+    def _show_closely(self, position: FloatArray) -> None:
+        for view in self.slice_views.values():
+            view.zoom_to(position, CLOSE_MM)
+
     def hides(self, position: FloatArray) -> bool:
         """Whether bone hides a (3,) scan position in the 3D view."""
         return bool(self.scene_view.scene.hidden(position)[0])
@@ -292,6 +296,7 @@ class ViewGrid(QWidget):
         follow(self, self._workspace.view.changed, self._on_view_changed)
         follow(self, self._workspace.view.reset_asked, self.reset)
         follow(self, self._workspace.view.close_look_asked, self.bring_close)
+        follow(self, self._workspace.view.close_up_asked, self._show_closely)
         follow(self, self._workspace.view.planes_changed, self._say_titles)
         follow(self, self._workspace.scan.threshold_changed, self._say_threshold)
         follow(self, self._workspace.document.reset, self._on_reset)

@@ -52,7 +52,7 @@ def make_window(qtbot, tmp_path) -> Iterator[Callable[..., object]]:
 
     def made(directory: Path | None = None, *, atlas: bool = False):
         window = make(directory or tmp_path / "state", atlas=atlas)
-        window.ui.prompts = Answers()
+        window.prompts = Answers()
         window.resize(1100, 760)
         window.show()
         qtbot.waitExposed(window)
@@ -74,7 +74,7 @@ def one_window(qapp) -> Iterator[object]:
     from gp_labeler.views.application import make_window as make
 
     made = make(None, atlas=False)
-    made.ui.prompts = Answers()
+    made.prompts = Answers()
     made.resize(1100, 760)
     made.show()
     yield made

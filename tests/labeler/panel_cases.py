@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from qtpy.QtGui import QFontMetrics
@@ -10,6 +11,7 @@ from qtpy.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWi
 
 from gp_core import Atlas
 from gp_core.landmarks.features import Side
+from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workspace import Workspace
@@ -57,22 +59,14 @@ def place(workspace: Workspace, *codes: str, side: Side = Side.LEFT) -> None:
         workspace.labels.place(in_scan(code, side), side=side, code=code)
 
 
-class RecordingUi:
-    """Stands for the window: keeps which of its dialogs were asked for."""
-
-    def __init__(self) -> None:
-        self.calls: list[str] = []
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return lambda *args, **options: self.calls.append(name)
-
-
-def actions_of(workspace: Workspace, qtbot, ui: RecordingUi | None = None) -> Actions:
-    """Make the window's actions, for panels that are tried alone."""
+def actions_of(workspace: Workspace, qtbot, asked: list[str] | None = None) -> Actions:
+    """Make the window's actions, for panels that are tried alone; what needs the window goes to `asked`."""
+    calls = [] if asked is None else asked
+    in_window = {id: partial(calls.append, id) for id, row in ACTIONS.items() if row.run is None}
     window = QWidget()
     qtbot.addWidget(window)
     vars(qtbot).setdefault("windows", []).append(window)  # which keeps no widget alive by itself
-    return Commands(workspace, ui or RecordingUi(), window, window).actions
+    return Commands(workspace, in_window, window, window).actions
 
 
 def cut_words(root: QWidget) -> Iterator[str]:

@@ -9,6 +9,7 @@ import numpy as np
 from qtpy.QtGui import QImage
 
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.views.prompts import Prompts
 
 BALL_MM, VOXEL_MM = 6.0, 0.25
 PATIENCE_MS = 120_000
@@ -41,10 +42,13 @@ def write_ball(file: Path) -> Path:
     return file
 
 
-class Answers:
+class Answers(Prompts):
     """Answers questions in the user's place, and remembers them."""
 
+    in_dialogs = False
+
     def __init__(self) -> None:
+        super().__init__()
         self.asked: list[str] = []
         self.answers: list[str] = []
         self.files: list[Path] = []
@@ -60,7 +64,7 @@ class Answers:
     def open_files(self, *_: object, **__: object) -> list[Path]:
         return self.files
 
-    def folder(self, *_: object) -> Path | None:
+    def folder(self, *_: object, **__: object) -> Path | None:
         return self.files[0] if self.files else None
 
     def save_file(self, *_: object) -> Path | None:
@@ -106,7 +110,7 @@ def close(window) -> None:
 
     if not isalive(window):
         return
-    window.ui.prompts.answers = ["Do not save"]
+    window.prompts.answers = ["Do not save"]
     window.close()
     window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)

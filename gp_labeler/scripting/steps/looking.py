@@ -217,11 +217,10 @@ class Look(Step):
             workspace.head.show(self.frame == "head")
         if self.plane == "straight":
             workspace.planes.straighten()
+        elif self.plane == "feature":
+            workspace.planes.show_for(workspace.labels.active.code or "")
         elif self.plane is not None:
-            code = workspace.labels.active.code or ""
-            shown = workspace.planes.show_for(code) if self.plane == "feature" else None
-            shown = workspace.planes.show(self.plane) if self.plane != "feature" else shown
-            driver.window.ui.look_closely(shown)
+            workspace.planes.show(self.plane)
         for view, degrees in (self.turn or {}).items():
             workspace.view.rotate_planes(view, np.radians(degrees))
 

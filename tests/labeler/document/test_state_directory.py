@@ -108,7 +108,7 @@ class Answers:
         self.asked.append((text, answers))
         return next((each for each in answers if each.startswith(self.answer)), "")
 
-    def folder(self, title, folder):
+    def folder(self, title, *, start):
         return self.chosen
 
 

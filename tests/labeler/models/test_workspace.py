@@ -300,12 +300,12 @@ def test_actions_say_why_they_cannot(on_ball) -> None:
     on_ball.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     on_ball.labels.lock(side=Side.LEFT, code="CA")
     on_ball.labels.go_to(Side.LEFT, "CA")
-    assert not run("point.clear", on_ball, None)  # not even offered
+    assert not run("point.clear", on_ball)  # not even offered
     assert not ACTIONS["point.clear"].enabled(on_ball)
-    assert not run("edit.swap_sides", on_ball, None)
+    assert not run("edit.swap_sides", on_ball)
     assert on_ball.said[-1][0] == "warning"
     with pytest.raises(GpError, match="unknown action"):
-        run("edit.dance", on_ball, None)
+        run("edit.dance", on_ball)
     with pytest.raises(GpError, match="tool must be one of"):
         on_ball.interaction.set_tool("hammer")
 

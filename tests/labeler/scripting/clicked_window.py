@@ -45,7 +45,7 @@ def point_at(widget: QWidget, pixel: tuple[float, float]) -> None:
 def drive() -> dict[str, object]:
     app = make_application()
     window = make_window(None, atlas=False)
-    window.ui.prompts = Answers()
+    window.prompts = Answers()
     window.resize(1200, 800)
     window.move(QPoint(20, 20))
     window.show()

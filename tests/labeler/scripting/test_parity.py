@@ -80,7 +80,7 @@ def test_events_in_the_window_leave_the_same_files(qtbot, make_window, folder) -
         QTest.mouseClick(table.view.viewport(), Qt.MouseButton.LeftButton, pos=row.center())
         QTest.mouseClick(views[view], Qt.MouseButton.LeftButton, pos=QPoint(*pixel))
         wait_until_idle(qtbot, window)
-    window.ui.prompts.files = [folder / "window"]
+    window.prompts.files = [folder / "window"]
     window.commands.run("file.export")
     assert texts(folder / "window") == texts(folder / "out")
 

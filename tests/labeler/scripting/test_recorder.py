@@ -156,7 +156,7 @@ class Recording:
     def run(self, id: str, *answers: str) -> list[str]:
         """Run a command; return what kinds of steps it left."""
         n = len(self.recorder.tables)
-        self.window.ui.prompts.answers = list(answers)
+        self.window.prompts.answers = list(answers)
         self.window.commands.run(id)
         wait_until_idle(self.qtbot, self.window)
         return [table["do"] for table in self.recorder.tables[n:]]
@@ -165,7 +165,7 @@ class Recording:
         """Save, end the recording, run the script, compare what both leave; return its steps."""
         self.document.save(self.folder / "first" / SAVED, overwrite=True)
         export_landmarks(self.document.measured_state, self.folder / "first", overwrite=True)
-        self.window.ui.prompts.files = [self.script]
+        self.window.prompts.files = [self.script]
         self.window.commands.run("help.record")
         assert self.recorder is None
         script = read_script(self.script)
@@ -279,7 +279,7 @@ def test_rulers_and_angles_are_done_again(recording) -> None:
     recording.workspace.measure.rename("Ruler 1", "to the surface")
     assert recording.run("measure.remove") == ["remove_measurements"]  # the angle, which is selected
     recording.document.undo()
-    recording.window.ui.prompts.files = [recording.folder / "first"]
+    recording.window.prompts.files = [recording.folder / "first"]
     assert recording.run("measure.export") == ["export_measurements"]
     lines = [f"ball_{name}.mrk.json" for name in ("to the surface", "Angle 1")]
     place_three(recording)
@@ -371,9 +371,9 @@ def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
     assert run("tool.place") == ["action"]
     workspace.pose.record_verdict("accept", by="AB")
     assert recording.recorder.tables[-1]["do"] == "verdict"
-    recording.window.ui.prompts.files = [recording.folder / "first" / "pose.json"]
+    recording.window.prompts.files = [recording.folder / "first" / "pose.json"]
     assert run("pose.export")[-1] == "estimate"
-    recording.window.ui.prompts.files = [recording.folder / "first" / "page.html"]
+    recording.window.prompts.files = [recording.folder / "first" / "page.html"]
     assert run("pose.report")[-1] == "report"
     assert run("pose.clear") == ["remove_touches"]
     assert run("edit.undo") == ["undo"]
@@ -383,7 +383,7 @@ def test_a_dry_run_on_the_scan_is_done_again(recording) -> None:
 
 @pytest.mark.parametrize("when", ["before", "after"])
 def test_an_own_atlas_and_an_insertion_path_are_taken_again(recording, when) -> None:
-    workspace, first, prompts = recording.workspace, recording.folder / "first", recording.window.ui.prompts
+    workspace, first, prompts = recording.workspace, recording.folder / "first", recording.window.prompts
     animals = write_animals(recording.folder / "animals", drawn_animals(3))
 
     def take() -> None:
@@ -454,7 +454,7 @@ def test_what_is_seen_is_written_with_its_value(recording) -> None:
 def test_files_written_are_written_again(recording) -> None:
     recording.begin()
     place_three(recording)
-    folder, prompts = recording.folder / "first", recording.window.ui.prompts
+    folder, prompts = recording.folder / "first", recording.window.prompts
     for id, name, do in (
         ("file.save_as", "other.gpspecimen.json", "save"),
         ("file.export", "", "export"),
@@ -507,8 +507,8 @@ def test_another_scan_is_opened_without_what_was_not_saved(recording) -> None:
     recording.begin()
     place_three(recording)
     other = write_ball(recording.folder / "other.nrrd")
-    recording.window.ui.prompts.answers = ["Do not save"]
-    recording.window.ui.open_path(other)
+    recording.window.prompts.answers = ["Do not save"]
+    recording.window.open_path(other)
     wait_until_idle(recording.qtbot, recording.window)
     recording.labels.place(MIDDLE, How.MESH, side="L", code="CA")
     recording.document.do(RenameSpecimen("ball"))
@@ -615,7 +615,7 @@ def test_reference_points_are_written_and_cleared(recording) -> None:
     file = recording.folder / "theirs.csv"
     file.write_text("name,x,y,z\nApex,10,-20,30\n", encoding="utf-8")
     recording.begin()
-    recording.window.ui.prompts.files = [file]
+    recording.window.prompts.files = [file]
     assert recording.run("file.show_references") == ["reference"]
     assert recording.recorder.tables[-1]["files"] == [str(file)]
     assert recording.run("file.clear_references") == ["reference"]

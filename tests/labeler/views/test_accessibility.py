@@ -68,7 +68,7 @@ def ball_window(make_window, qtbot, tmp_path):
     """A window in which the ball was opened by keyboard."""
     window = make_window()
     qtbot.waitUntil(window.isActiveWindow)
-    window.ui.prompts.files = [write_ball(tmp_path / "ball.nrrd")]
+    window.prompts.files = [write_ball(tmp_path / "ball.nrrd")]
     _press(window, "Ctrl+O")
     qtbot.waitUntil(lambda: window.workspace.scan.volume is not None)
     wait_until_idle(qtbot, window)
@@ -105,7 +105,7 @@ def test_every_control_shows_that_it_has_the_focus(ball_window) -> None:
 
 
 def test_the_whole_job_by_keyboard_alone(ball_window, qtbot, tmp_path) -> None:
-    window, prompts = ball_window, ball_window.ui.prompts
+    window, prompts = ball_window, ball_window.prompts
     document, file = window.workspace.document, tmp_path / "ball.gpspecimen.json"
 
     def n_placed() -> int:

@@ -41,7 +41,7 @@ def _pixels(window) -> np.ndarray:
 def test_the_menu_adds_it_and_takes_it_away(qtbot, window, file) -> None:
     before, actions = _pixels(window), window.commands.actions
     assert not actions["file.remove_meshes"].isEnabled()
-    window.ui.prompts.files = [file]
+    window.prompts.files = [file]
     assert window.commands.run("file.add_mesh")
     wait_until_idle(qtbot, window)
     assert [mesh.name for mesh in window.workspace.meshes.meshes] == ["implant"]
@@ -75,7 +75,7 @@ def test_a_damaged_file_is_told_and_nothing_is_shown(qtbot, window, file) -> Non
     file.write_bytes(file.read_bytes()[:-7])
     told = []
     window.workspace.messages.said.connect(lambda text, kind: told.append((text, kind)))
-    window.ui.prompts.files = [file]
+    window.prompts.files = [file]
     window.commands.run("file.add_mesh")
     wait_until_idle(qtbot, window)
     assert [(kind, "implant.stl" in text, "cut off" in text) for text, kind in told] == [

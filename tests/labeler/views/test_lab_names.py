@@ -111,7 +111,7 @@ def test_a_name_stands_for_a_feature_of_one_side(workspace, parent, qtbot, their
 def test_a_table_of_names_is_loaded_and_remembered(workspace, parent, qtbot, theirs, tmp_path) -> None:
     table = tmp_path / "names.csv"
     table.write_text("their name,our code\nAPEX,CA\nbase,CB\nApex R,CA_R\nBregma,\nLambda,\nTip,OS\n")
-    prompts = SimpleNamespace(open_files=lambda *_: [table])
+    prompts = SimpleNamespace(open_files=lambda *_, **__: [table])
     dialog = LandmarkImportDialog(workspace, [theirs], None, prompts, parent)
     dialog.show()
     qtbot.mouseClick(dialog.names.load, _CLICK)
@@ -124,7 +124,7 @@ def test_a_table_of_names_is_loaded_and_remembered(workspace, parent, qtbot, the
 def test_a_table_that_is_none_is_named(workspace, parent, qtbot, theirs, tmp_path) -> None:
     table = tmp_path / "names.csv"
     table.write_text("Apex,no feature\n")
-    prompts = SimpleNamespace(open_files=lambda *_: [table])
+    prompts = SimpleNamespace(open_files=lambda *_, **__: [table])
     dialog = LandmarkImportDialog(workspace, [theirs], None, prompts, parent)
     dialog.show()
     qtbot.mouseClick(dialog.names.load, _CLICK)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from panel_cases import ATLAS, RecordingUi, actions_of, cut_words, deliver, place, workspace_with_scan
+from panel_cases import ATLAS, actions_of, cut_words, deliver, place, workspace_with_scan
 from qtpy.QtCore import Qt
 
 from gp_core.landmarks.features import Side
@@ -72,7 +72,7 @@ def test_a_key_marks_the_point_that_was_placed_last(workspace):
     place(workspace, "CA")
     said = []
     workspace.messages.said.connect(lambda text, level: said.append(text))
-    assert run("point.guess", workspace, RecordingUi())
+    assert run("point.guess", workspace)
     assert workspace.document.state.landmark(L, "CA").certainty is Certainty.GUESS
     assert said == ["CA left: guess"]
 

@@ -53,7 +53,7 @@ def test_two_up_shows_the_slice_in_which_the_chosen_feature_is_best_seen(qtbot, 
 
 def test_a_typed_position_is_brought_into_every_view(window) -> None:
     there = MIDDLE + np.array([2.0, -1.0, 3.0])
-    prompts, view = window.ui.prompts, window.workspace.view
+    prompts, view = window.prompts, window.workspace.view
     prompts.answers = [f"L {there[0]} A {-there[1]} S {there[2]}"]
     window.commands.run("view.go_to")
     assert np.allclose(view.crosshair, there)

@@ -192,12 +192,12 @@ def test_they_are_saved_exported_and_imported(window, tmp_path) -> None:
     workspace.measure.add([ONE, MIDDLE, OTHER])
     saved = workspace.document.save(tmp_path / "ball.gpspecimen.json")
     assert read_specimen(saved).measurements == measured(window)
-    window.ui.prompts.files = [tmp_path / "lines"]
+    window.prompts.files = [tmp_path / "lines"]
     window.commands.run("measure.export")
     files = sorted((tmp_path / "lines").iterdir())
     assert [file.name for file in files] == ["ball_Angle 1.mrk.json", "ball_width.mrk.json"]
     assert read_measurements(files[1]) == (Measurement("width", (tuple(ONE), tuple(OTHER))),)
-    window.ui.prompts.files = files
+    window.prompts.files = files
     window.commands.run("measure.import")
     assert [each.name for each in measured(window)][2:] == ["Angle 1 (2)", "width (2)"]
     assert workspace.document.undo_text == "add 2 measurements"

@@ -14,9 +14,9 @@ from pathlib import Path
 import pytest
 
 from gp_core.errors import GpError
-from gp_labeler.views import canvas_timing, canvas_ui
+from gp_labeler.views import canvas_question, canvas_timing
 from gp_labeler.views.canvas_choice import VARIABLE, CanvasChoice, CanvasTiming, canvas_for, wanted_canvas
-from gp_labeler.views.canvas_ui import ask_canvas
+from gp_labeler.views.canvas_question import ask_canvas
 from gp_labeler.views.opengl import is_software
 from gp_labeler.views.window_state import WindowState
 
@@ -164,19 +164,19 @@ def test_the_menu_sets_what_the_next_start_takes(qtbot, one_window, monkeypatch)
     monkeypatch.delenv(VARIABLE, raising=False)
     told = []
     one_window.workspace.messages.said.connect(lambda text, kind: told.append(text))
-    one_window.ui.prompts.answers = ["Native"]
+    one_window.prompts.answers = ["Native"]
     assert one_window.commands.run("view.canvas")
     assert wanted_canvas(one_window.memory) == "native"
     assert told == ["3D canvas: native from the next start"]
-    one_window.ui.prompts.answers = [""]
-    ask_canvas(one_window, one_window.ui.prompts)
+    one_window.prompts.answers = [""]
+    ask_canvas(one_window, one_window.prompts)
     assert wanted_canvas(one_window.memory) == "native"
 
 
 def test_what_was_measured_is_remembered_and_what_failed_is_told(qtbot, one_window, monkeypatch) -> None:
     told = []
     one_window.workspace.messages.said.connect(lambda text, kind: told.append((kind, text)))
-    monkeypatch.setattr(canvas_ui, "renderer_name", lambda: HARDWARE)
+    monkeypatch.setattr(canvas_question, "renderer_name", lambda: HARDWARE)
     figures = {
         "painted": "noise\n" + json.dumps({"frame_ms": 31.0}),
         "native": json.dumps({"frame_ms": 12.0}),
@@ -186,14 +186,14 @@ def test_what_was_measured_is_remembered_and_what_failed_is_told(qtbot, one_wind
         "run",
         lambda command, env, **_: subprocess.CompletedProcess(command, 0, figures[env[VARIABLE]], ""),
     )
-    canvas_ui.measure(one_window)
+    canvas_question.measure(one_window)
     qtbot.waitUntil(lambda: bool(told))
     assert told[-1][1].startswith("3D canvas: painted 31 ms, native 12 ms a frame; automatic uses native")
     timing = CanvasTiming.of(one_window.memory.fields("canvas_timing"))
     assert timing == CanvasTiming(HARDWARE, 31.0, 12.0)
     assert canvas_for("automatic", lambda: HARDWARE, timing).kind == "native"
     figures["native"] = "Segmentation fault"
-    canvas_ui.measure(one_window)
+    canvas_question.measure(one_window)
     qtbot.waitUntil(lambda: told[-1][0] == "error")
     assert "the native canvas cannot be measured" in told[-1][1]
     assert CanvasTiming.of(one_window.memory.fields("canvas_timing")) == timing
@@ -201,10 +201,10 @@ def test_what_was_measured_is_remembered_and_what_failed_is_told(qtbot, one_wind
 
 def test_a_measurement_is_offered_once(one_window, monkeypatch) -> None:
     choice = CanvasChoice("painted", "not measured yet", to_measure=True)
-    monkeypatch.setattr(canvas_ui, "choose_canvas", lambda _: choice)
-    monkeypatch.setattr(canvas_ui, "renderer_name", lambda: HARDWARE)
-    one_window.ui.prompts.asked.clear()
-    one_window.ui.prompts.answers = ["Not now"]
+    monkeypatch.setattr(canvas_question, "choose_canvas", lambda _: choice)
+    monkeypatch.setattr(canvas_question, "renderer_name", lambda: HARDWARE)
+    one_window.prompts.asked.clear()
+    one_window.prompts.answers = ["Not now"]
     for _ in range(2):
-        canvas_ui.offer_measurement(one_window, one_window.ui.prompts)
-    assert one_window.ui.prompts.asked == ["3D canvas"]
+        canvas_question.offer_measurement(one_window, one_window.prompts)
+    assert one_window.prompts.asked == ["3D canvas"]

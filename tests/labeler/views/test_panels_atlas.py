@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 from animal_cases import drawn_animals, write_animals, write_side
-from panel_cases import RecordingUi, actions_of, cut_words, deliver, in_scan, place, workspace_with_scan
+from panel_cases import actions_of, cut_words, deliver, in_scan, place, workspace_with_scan
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from qtpy.QtGui import QDropEvent, QFontMetrics
 from qtpy.QtWidgets import QApplication, QPushButton
@@ -39,13 +39,13 @@ def workspace() -> Iterator[Workspace]:
 
 
 @pytest.fixture
-def ui() -> RecordingUi:
-    return RecordingUi()
+def asked() -> list[str]:
+    return []
 
 
 @pytest.fixture
-def panel(workspace, qtbot, ui) -> AtlasPanel:
-    panel = AtlasPanel(workspace, actions_of(workspace, qtbot, ui))
+def panel(workspace, qtbot, asked) -> AtlasPanel:
+    panel = AtlasPanel(workspace, actions_of(workspace, qtbot, asked))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(panel.width(), 900)
@@ -111,10 +111,10 @@ def test_points_with_another_problem_are_named_beside_the_table(workspace, panel
     assert panel.labels.verdict.text() == "All 6 labels that can be checked fit the atlas."
 
 
-def test_an_atlas_is_fitted_and_tried_out(workspace, panel, ui, folder, qtbot) -> None:
+def test_an_atlas_is_fitted_and_tried_out(workspace, panel, asked, folder, qtbot) -> None:
     for button in (panel.own.files, panel.own.folder, panel.which.open, panel.which.save):
         qtbot.mouseClick(button, CLICK)
-    assert ui.calls == ["ask_fit_atlas", "ask_fit_atlas", "ask_open_atlas", "ask_save_atlas"]
+    assert asked == ["atlas.fit_files", "atlas.fit_folder", "atlas.open", "atlas.save"]
     animal = drawn_animals(1)[0]
     write_side(folder, "torn", animal.side(L))
     (folder / "torn_L.mrk.json").write_text("{")
@@ -176,7 +176,7 @@ def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qt
     wait_until_idle(qtbot, window)
     workspace = window.workspace
     assert workspace.atlas.current.n_samples == 6
-    window.ui.prompts.files = [tmp_path / "own.json"]
+    window.prompts.files = [tmp_path / "own.json"]
     window.commands.run("atlas.save")
     assert Atlas.load(tmp_path / "own.json").n_samples == 6
     window.commands.run("atlas.published")
@@ -191,7 +191,7 @@ def test_the_window_needs_no_scan_for_an_atlas(make_window, folder, tmp_path, qt
     assert workspace.scan.volume is None
     window.commands.run("atlas.show")
     assert window.rail.step == "atlas"
-    window.ui.prompts.files = [folder]
+    window.prompts.files = [folder]
     window.commands.run("atlas.fit_folder")
     wait_until_idle(qtbot, window)
     assert len(workspace.atlas.specimens) == 3

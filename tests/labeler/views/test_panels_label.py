@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from panel_cases import (
     PANEL_WIDTH,
-    RecordingUi,
     actions_of,
     cut_words,
     deliver,
@@ -54,13 +53,13 @@ def workspace() -> Iterator[Workspace]:
 
 
 @pytest.fixture
-def ui() -> RecordingUi:
-    return RecordingUi()
+def asked() -> list[str]:
+    return []
 
 
 @pytest.fixture
-def panel(workspace: Workspace, qtbot, ui) -> LabelPanel:
-    panel = LabelPanel(workspace, actions_of(workspace, qtbot, ui))
+def panel(workspace: Workspace, qtbot, asked) -> LabelPanel:
+    panel = LabelPanel(workspace, actions_of(workspace, qtbot, asked))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(LOWEST_PANEL)
@@ -280,7 +279,7 @@ def test_an_error_is_told_and_nothing_else_happens(workspace, panel, qtbot):
     assert "CA" in workspace.document.landmarks(LEFT)
 
 
-def test_everything_done_offers_the_export(workspace, panel, ui, qtbot):
+def test_everything_done_offers_the_export(workspace, panel, asked, qtbot):
     for side in Side:
         for row in FEATURES:
             if not row.computed:
@@ -288,17 +287,17 @@ def test_everything_done_offers_the_export(workspace, panel, ui, qtbot):
     assert panel.card.content.name == "Everything is labelled"
     QApplication.processEvents()  # commands are refreshed once a turn
     qtbot.mouseClick(panel.card.primary, CLICK)
-    assert ui.calls == ["ask_export"]
+    assert asked == ["file.export"]
 
 
 def test_without_a_scan_the_card_offers_to_open_one(qtbot):
     workspace = Workspace(None)
-    ui = RecordingUi()
-    card = FeatureCard(workspace, actions_of(workspace, qtbot, ui))
+    asked = []
+    card = FeatureCard(workspace, actions_of(workspace, qtbot, asked))
     qtbot.addWidget(card)
     card.show()
     qtbot.mouseClick(card.primary, CLICK)
-    assert ui.calls == ["ask_open_file"]
+    assert asked == ["file.open"]
     workspace.close(discard=True)
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import RecordingUi, actions_of, cut_words, deliver, grey_volume, place, workspace_with_scan
+from panel_cases import actions_of, cut_words, deliver, grey_volume, place, workspace_with_scan
 from qtpy.QtCore import QMimeData, QPoint, QPointF, Qt, QUrl
 from qtpy.QtGui import QDropEvent
 from qtpy.QtWidgets import QApplication, QPushButton
@@ -39,13 +39,13 @@ def workspace() -> Iterator[Workspace]:
 
 
 @pytest.fixture
-def ui() -> RecordingUi:
-    return RecordingUi()
+def asked() -> list[str]:
+    return []
 
 
 @pytest.fixture
-def panel(workspace: Workspace, qtbot, ui) -> ScanPanel:
-    panel = ScanPanel(workspace, actions_of(workspace, qtbot, ui))
+def panel(workspace: Workspace, qtbot, asked) -> ScanPanel:
+    panel = ScanPanel(workspace, actions_of(workspace, qtbot, asked))
     apply_theme(panel, DARK)
     qtbot.addWidget(panel)
     panel.resize(panel.width(), 760)
@@ -146,10 +146,10 @@ def test_opacity_and_what_is_shown(workspace, panel, qtbot):
     assert panel.mesh.opacity.value() == 40
 
 
-def test_the_mesh_card_counts_triangles_and_offers_to_save(workspace, panel, ui, qtbot):
+def test_the_mesh_card_counts_triangles_and_offers_to_save(workspace, panel, asked, qtbot):
     assert "triangles" in panel.mesh.state.text()
     qtbot.mouseClick(panel.mesh.save, CLICK)
-    assert ui.calls == ["ask_save_mesh"]
+    assert asked == ["file.save_mesh"]
 
 
 # Facts and notes
@@ -218,15 +218,15 @@ def test_the_first_page_offers_scan_specimen_demo_and_recent_files(tmp_path, qtb
     (tmp_path / "GP-014.nrrd").write_text("")
     workspace.recent.add(tmp_path / "GP-014.nrrd")
     workspace.recent.add(tmp_path / "gone.nrrd")
-    ui = RecordingUi()
-    page = Welcome(workspace, actions_of(workspace, qtbot, ui))
+    asked = []
+    page = Welcome(workspace, actions_of(workspace, qtbot, asked))
     apply_theme(page, DARK)
     qtbot.addWidget(page)
     page.resize(900, 640)
     page.show()
     for button in (page.open_scan, page.open_specimen, page.demo):
         qtbot.mouseClick(button, CLICK)
-    assert ui.calls == ["ask_open_file", "ask_open_file", "open_demo"]
+    assert asked == ["file.open", "file.open", "file.demo"]
     QApplication.processEvents()
     recent = [b for b in page.findChildren(QPushButton, "recent") if b.isVisible()]
     assert [b.accessibleName() for b in recent] == ["Open GP-014.nrrd"]

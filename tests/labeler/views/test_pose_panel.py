@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from panel_cases import PANEL_WIDTH, RecordingUi, actions_of, cut_words, deliver, workspace_with_scan
+from panel_cases import PANEL_WIDTH, actions_of, cut_words, deliver, workspace_with_scan
 from qtpy.QtCore import QEvent, QPoint, QSize, Qt
 from qtpy.QtGui import QGuiApplication
 from qtpy.QtWidgets import QApplication, QLabel, QLineEdit
@@ -63,8 +63,8 @@ def panel(workspace: Workspace, qtbot) -> PosePanel:
     return shown(workspace, qtbot)
 
 
-def shown(workspace: Workspace, qtbot, size: QSize = NARROW, theme=DARK, ui=None) -> PosePanel:
-    panel = PosePanel(workspace, actions_of(workspace, qtbot, ui))
+def shown(workspace: Workspace, qtbot, size: QSize = NARROW, theme=DARK, asked=None) -> PosePanel:
+    panel = PosePanel(workspace, actions_of(workspace, qtbot, asked))
     apply_theme(panel, theme)
     qtbot.addWidget(panel)
     panel.set_wide(size.width() > PANEL_WIDTH)
@@ -585,21 +585,21 @@ def test_what_is_drawn_is_chosen(workspace, panel, qtbot):
 
 
 def test_other_parts_of_the_program_are_asked_for(workspace, qtbot):
-    ui = RecordingUi()
-    panel = shown(workspace, qtbot, ui=ui)
+    asked = []
+    panel = shown(workspace, qtbot, asked=asked)
     touch(workspace, *PROBE)
     for button in (panel.touches.ways["file"], panel.touches.ways["tracker"], panel.touches.guide):
         qtbot.mouseClick(button, CLICK)
     for button in (panel.head.to_atlas, panel.report, panel.export, panel.in_scan.file):
         button.click()
-    assert ui.calls == [
-        "ask_open_touches",
-        "show_tracker",
-        "show_guide",
-        "show_step",
-        "ask_report",
-        "ask_export_pose",
-        "ask_open_skull",
+    assert asked == [
+        "pose.open_touches",
+        "pose.tracker",
+        "pose.guide",
+        "atlas.show",
+        "pose.report",
+        "pose.export",
+        "pose.open_skull",
     ]
 
 

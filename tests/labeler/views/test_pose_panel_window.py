@@ -93,7 +93,7 @@ def test_the_key_that_records_works_from_the_moment_a_tracker_is_connected(qtbot
 def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_window, tmp_path):
     to_step(qtbot, bare, "pose")
     drop_file(bare, touch_file(tmp_path))
-    bare.ui.prompts.files = [tmp_path / "touched"]
+    bare.prompts.files = [tmp_path / "touched"]
     bare.commands.flush()
     assert bare.commands.actions["file.save"].isEnabled()
     bare.commands.run("file.save")
@@ -102,7 +102,7 @@ def test_touches_without_a_scan_are_saved_and_opened_again(qtbot, bare, make_win
     assert "touched" in bare.windowTitle() or bare.workspace.document.state.specimen in bare.windowTitle()
     close(bare)
     again = make_window()
-    again.ui.open_path(saved)
+    again.open_path(saved)
     wait_until_idle(qtbot, again)
     assert again.rail.step == "pose"
     assert again.steps["pose"].isVisible()
@@ -140,9 +140,9 @@ def test_another_specimen_is_begun_without_a_scan(qtbot, bare, tmp_path):
     qtbot.keyClick(head.specimen, Qt.Key.Key_Return)
     drop_file(bare, touch_file(tmp_path))
     assert bare.windowTitle().startswith("GP-7")
-    bare.ui.prompts.answers = ["Do not save"]
+    bare.prompts.answers = ["Do not save"]
     qtbot.mouseClick(head.new, CLICK)
-    assert bare.ui.prompts.asked == ["Not saved"]
+    assert bare.prompts.asked == ["Not saved"]
     assert touched(bare) == {}
     assert bare.steps["pose"].isVisible()
     assert head.specimen.text() == bare.workspace.document.state.specimen != "GP-7"
@@ -232,13 +232,13 @@ def test_keys_and_menu_do_what_the_panel_does(qtbot, window):
 
 def test_files_are_asked_for(qtbot, window, tmp_path):
     window.workspace.atlas.use(ATLAS)
-    window.ui.prompts.files = [touch_file(tmp_path)]
+    window.prompts.files = [touch_file(tmp_path)]
     assert window.commands.run("pose.open_touches")
     assert window.rail.step == "pose"
     assert set(touched(window)) == set(PROBE)
     skull = tmp_path / "skull.csv"
     skull.write_text("label,x,y,z\nS1,1,2,3\n")
-    window.ui.prompts.files = [skull]
+    window.prompts.files = [skull]
     qtbot.mouseClick(window.steps["pose"].in_scan.file, CLICK)
     assert window.workspace.document.state.skull == {"S1": (1, 2, 3)}
 

@@ -41,7 +41,7 @@ def window(qtbot, one_window, ball):
 
 @pytest.fixture
 def shown(qtbot, window, tmp_path):
-    window.ui.prompts.files = [write_list(tmp_path, Apex=ON_BONE, Umbo=INSIDE)]
+    window.prompts.files = [write_list(tmp_path, Apex=ON_BONE, Umbo=INSIDE)]
     assert window.commands.run("file.show_references")
     wait_until_idle(qtbot, window)
     return window

@@ -41,7 +41,7 @@ def workspace():
 @pytest.fixture
 def dialog(workspace, folder, qtbot):
     prompts = ScriptPrompts()
-    dialog = SpecimenListDialog(workspace, prompts, str(folder))
+    dialog = SpecimenListDialog(workspace, prompts)
     qtbot.addWidget(dialog)
     dialog.resize(820, 500)
     dialog.show()

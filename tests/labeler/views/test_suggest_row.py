@@ -29,7 +29,7 @@ def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path,
     window.set_step("label")
     button = window.findChild(SuggestRow).button
     assert button.isVisible()
-    answers = window.ui.prompts = Answers()
+    answers = window.prompts = Answers()
     answers.files = [labelled_head(tmp_path)]
     answers.answers = ["From a folder…", "Left is as the file says"]
     button.click()

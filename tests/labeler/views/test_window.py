@@ -26,6 +26,7 @@ from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.application import make_window as make_plain
+from gp_labeler.views.questions import offer_recoveries
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
 from gp_labeler.views.top_bar import TopBar
 
@@ -40,7 +41,7 @@ def test_a_long_message_can_be_read_whole_and_then_makes_room_again(window, qtbo
     text = status.next_click
     assert text.width() > 0.7 * status.width()
     assert height < status.height() >= text.heightForWidth(text.width())
-    window.ui.open_demo()
+    window.commands.run("file.demo")
     qtbot.waitUntil(status.work.bar.isVisible)
     status.work.stop.click()
     wait_until_idle(qtbot, window)
@@ -83,11 +84,11 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
     image.SetOrigin(volume.origin.tolist())
     sitk.WriteImage(image, str(tmp_path / "ball.nrrd"))
     window = make_window()
-    window.ui.open_path(tmp_path / "ball.nrrd")
+    window.open_path(tmp_path / "ball.nrrd")
     wait_until_idle(qtbot, window)
     window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     assert window.isWindowModified()
-    window.ui.prompts.files = [tmp_path / "one"]
+    window.prompts.files = [tmp_path / "one"]
     window.commands.run("file.save")
     saved = tmp_path / "one.gpspecimen.json"
     assert saved.exists()
@@ -95,7 +96,7 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
     close(window)
     again = make_window()
     assert saved.resolve() in again.workspace.recent.all()
-    again.ui.open_path(saved)
+    again.open_path(saved)
     wait_until_idle(qtbot, again)
     np.testing.assert_array_equal(again.workspace.document.landmarks("L")["CA"], MIDDLE)
     assert again.workspace.scan.volume.size == volume.size
@@ -105,7 +106,7 @@ def test_saved_specimens_open_again(qtbot, make_window, tmp_path) -> None:
 def test_a_file_that_is_no_scan_is_said_in_words(qtbot, make_window, tmp_path) -> None:
     (tmp_path / "notes.nrrd").write_text("milk, bread")
     window = make_window()
-    window.ui.open_path(tmp_path / "notes.nrrd")
+    window.open_path(tmp_path / "notes.nrrd")
     wait_until_idle(qtbot, window)
     assert "notes.nrrd" in window.status.next_click.text()
     assert window.pages.currentIndex() == 0
@@ -116,10 +117,10 @@ def test_a_scan_without_a_voxel_size_is_asked_about(qtbot, make_window, tmp_path
 
     tifffile.imwrite(tmp_path / "ball.tif", ball_volume().array.astype(np.uint16))
     window = make_window()
-    window.ui.prompts.answers = ["Keep the order of the slices", "Go on"]
-    window.ui.open_path(tmp_path / "ball.tif")
+    window.prompts.answers = ["Keep the order of the slices", "Go on"]
+    window.open_path(tmp_path / "ball.tif")
     wait_until_idle(qtbot, window)
-    assert window.ui.prompts.asked
+    assert window.prompts.asked
     if window.workspace.scan.volume is not None:
         assert window.workspace.document.state.import_choices
 
@@ -127,10 +128,10 @@ def test_a_scan_without_a_voxel_size_is_asked_about(qtbot, make_window, tmp_path
 @pytest.mark.parametrize("answer", ["", "Save", "Do not save"])
 def test_closing_with_unsaved_edits_asks(window, tmp_path, answer) -> None:
     window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
-    window.ui.prompts.answers = [answer]
-    window.ui.prompts.files = [tmp_path / "saved"]
+    window.prompts.answers = [answer]
+    window.prompts.files = [tmp_path / "saved"]
     assert window.close() is (answer != "")
-    assert window.ui.prompts.asked == ["Not saved"]
+    assert window.prompts.asked == ["Not saved"]
     assert (tmp_path / "saved.gpspecimen.json").exists() is (answer == "Save")
     if answer == "Do not save":
         assert find_recoveries(tmp_path / "state") == ()
@@ -139,8 +140,8 @@ def test_closing_with_unsaved_edits_asks(window, tmp_path, answer) -> None:
 def test_edits_that_are_not_wanted_are_not_offered_again(qtbot, window, tmp_path) -> None:
     window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     (tmp_path / "x.gpspecimen.json").write_text("{}")
-    window.ui.prompts.answers = ["Do not save"]
-    window.ui.open_path(tmp_path / "x.gpspecimen.json")  # no specimen: the edits are still there
+    window.prompts.answers = ["Do not save"]
+    window.open_path(tmp_path / "x.gpspecimen.json")  # no specimen: the edits are still there
     assert "CA" in window.workspace.document.landmarks("L")
     window.workspace.scan.begin(ball_volume())
     wait_until_idle(qtbot, window)
@@ -151,8 +152,8 @@ def test_what_a_killed_program_left_is_offered(qtbot, window, make_window, tmp_p
     window.workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
     window.workspace.close()  # as if killed: nothing asked, nothing saved
     again = make_window()
-    again.ui.prompts.answers = ["Recover"]
-    again.ui.take_recoveries(find_recoveries(tmp_path / "state"))
+    again.prompts.answers = ["Recover"]
+    offer_recoveries(again.workspace, again.prompts, find_recoveries(tmp_path / "state"), again)
     assert "CA" in again.workspace.document.landmarks("L")
     assert again.workspace.document.undo_text == "place CA left"
 
@@ -195,8 +196,8 @@ def test_a_window_killed_in_the_middle_loses_nothing(make_window, tmp_path) -> N
     process.communicate()
     assert sorted(placed) == ["CA", "OS", "RWP"]
     window = make_window()
-    window.ui.prompts.answers = ["Recover"]
-    window.ui.take_recoveries(find_recoveries(tmp_path / "state"))
+    window.prompts.answers = ["Recover"]
+    offer_recoveries(window.workspace, window.prompts, find_recoveries(tmp_path / "state"), window)
     document = window.workspace.document
     for code, where in placed.items():
         np.testing.assert_array_equal(document.landmarks("L")[code], where)
@@ -210,18 +211,18 @@ def _kept(window) -> str:
 def test_a_second_window_on_a_specimen_is_noticed(qtbot, window, make_window, tmp_path) -> None:
     saved = window.workspace.document.save(tmp_path / "one")
     other = make_window()
-    other.ui.prompts.answers = [""]
-    other.ui.open_path(saved)
-    assert other.ui.prompts.asked == ["Open elsewhere"]
-    other.ui.prompts.answers = ["Open a copy"]
-    other.ui.open_path(saved)
+    other.prompts.answers = [""]
+    other.open_path(saved)
+    assert other.prompts.asked == ["Open elsewhere"]
+    other.prompts.answers = ["Open a copy"]
+    other.open_path(saved)
     assert other.workspace.document.path is None
     assert other.workspace.document.state.specimen == "ball"
     titles = [each.windowTitle().replace("[*]", "") for each in (window, other)]
     original = tmp_path / "one"
     assert titles == [f"ball – {original} – gp-labeler", f"ball – copy of {original} – gp-labeler"]  # noqa: RUF001
     assert _kept(other) == "• a copy"
-    other.ui.prompts.files = [tmp_path / "ball"]
+    other.prompts.files = [tmp_path / "ball"]
     other.commands.run("file.save_as")
     assert other.windowTitle().replace("[*]", "") == f"ball – {tmp_path} – gp-labeler"  # noqa: RUF001
     assert _kept(other) == "• saved"
@@ -232,13 +233,13 @@ def test_landmarks_are_exported_and_imported(window, make_window, tmp_path) -> N
     labels.place(MIDDLE, side=Side.LEFT, code="CA")
     folder = tmp_path / "out"
     folder.mkdir()
-    window.ui.prompts.files = [folder]
+    window.prompts.files = [folder]
     window.commands.run("file.export")
     assert [f.name for f in folder.iterdir()] == ["ball_L.mrk.json"]
     assert "right side is not labelled" in window.status.next_click.text()
     labels.clear(side=Side.LEFT, code="CA")
-    window.ui.prompts.files = [folder / "ball_L.mrk.json"]
-    window.ui.prompts.answers = ["Import anyway"]
+    window.prompts.files = [folder / "ball_L.mrk.json"]
+    window.prompts.answers = ["Import anyway"]
     window.commands.run("file.import")
     np.testing.assert_allclose(document.landmarks("L")["CA"], MIDDLE)
 
@@ -282,7 +283,7 @@ def test_no_key_means_two_things() -> None:
 def test_every_action_can_be_run_at_any_time(window, make_window) -> None:
     risky = {"file.close", "file.demo", "help.shortcuts", "help.about"}
     for target in (window, make_window()):
-        target.ui.prompts.answers = ["CB"] * 40
+        target.prompts.answers = ["CB"] * 40
         for id in ACTIONS:
             if id not in risky and not id.startswith("file."):
                 target.commands.run(id)
@@ -336,7 +337,7 @@ def test_twenty_windows_leave_nothing_behind(qtbot) -> None:
     remains = []
     for _ in range(20):
         window = make_plain(None, atlas=False)
-        window.ui.prompts = Answers()
+        window.prompts = Answers()
         window.show()
         window.workspace.scan.begin(ball_volume())
         wait_until_idle(qtbot, window)
@@ -363,7 +364,7 @@ def write_ball(file: Path) -> None:
 
 def test_a_first_window_fits_the_screen_and_offers_to_open_a_scan(qapp) -> None:
     window = make_plain(None, atlas=False)
-    window.ui.prompts = Answers()
+    window.prompts = Answers()
     room = window.screen().availableSize()
     least = window.minimumSize()
     assert window.width() <= max(room.width(), least.width())
@@ -384,7 +385,7 @@ def test_a_specimen_is_opened_where_its_labelling_goes_on(qtbot, make_window, tm
     close(first)
     window = make_window()
     assert window.rail.step == "scan"
-    window.ui.open_path(saved)
+    window.open_path(saved)
     assert window.rail.step == "label"
     assert window.steps["label"].card.content.name == "The scan is not open"
     wait_until_idle(qtbot, window)
@@ -430,14 +431,14 @@ def test_a_scan_that_moved_is_asked_for_where_the_next_action_stands(qtbot, make
     saved = window.workspace.document.save(tmp_path / "one")
     window.workspace.scan.begin(ball_volume())
     moved = file.rename(tmp_path / "elsewhere.mha")
-    window.ui.open_path(saved)
+    window.open_path(saved)
     wait_until_idle(qtbot, window)
     card = window.steps["label"].card
     window.set_step("label")
     assert (card.content.name, card.primary.accessibleName()) == ("The scan was not found", "Find scan…")
     window.status.set_without_scan("")  # as once the message has gone
     assert "Find scan" in window.status.next_click.text()
-    window.ui.prompts.files = [moved]
+    window.prompts.files = [moved]
     QTest.mouseClick(card.primary, Qt.MouseButton.LeftButton)
     wait_until_idle(qtbot, window)
     assert window.workspace.scan.volume is not None

@@ -169,7 +169,7 @@ class LandmarkImportDialog(QDialog):
 
     def _ask_table(self) -> None:
         """Ask for a file that says what the names stand for, and choose what it says."""
-        for file in self._prompts.open_files("Open a table of names", str(self._files[0].parent), _TABLES):
+        for file in self._prompts.open_files("Open a table of names", _TABLES, start=self._files[0].parent):
             try:
                 names = read_lab_names(file)
             except GpError as error:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from qtpy.QtCore import QModelIndex, Qt, Signal
 from qtpy.QtWidgets import (
     QAbstractItemView,
@@ -43,18 +41,14 @@ class SpecimenListDialog(QDialog):
         Whose list it is.
     prompts : Prompts
         Who asks for folders.
-    folder : str
-        Where to look for folders first.
     """
 
     open_asked = Signal(object)
     """The `Path` of a specimen to open."""
 
-    def __init__(
-        self, workspace: Workspace, prompts: Prompts, folder: str, parent: QWidget | None = None
-    ) -> None:
+    def __init__(self, workspace: Workspace, prompts: Prompts, parent: QWidget | None = None) -> None:
         super().__init__(parent)
-        self._workspace, self._prompts, self._folder = workspace, prompts, folder
+        self._workspace, self._prompts = workspace, prompts
         self.setWindowTitle("Specimens")
         self.setAttribute(Qt.WidgetAttribute.WA_DeleteOnClose)
         self.model = SpecimenTableModel(workspace, self)
@@ -166,7 +160,7 @@ class SpecimenListDialog(QDialog):
             self.open_asked.emit(row.path)
 
     def _add(self) -> None:
-        folder = self._prompts.folder("A folder of specimens", self._folder)
+        folder = self._prompts.folder("A folder of specimens")
         if folder is not None:
             attempt(self._workspace, lambda: self._workspace.specimens.add(folder))
 
@@ -180,7 +174,7 @@ class SpecimenListDialog(QDialog):
         )
 
     def _export(self) -> None:
-        folder = self._prompts.folder("Export landmarks into this folder", self._folder)
+        folder = self._prompts.folder("Export landmarks into this folder")
         if folder is not None:
             attempt(self._workspace, lambda: self._workspace.specimens.export(folder, self.chosen))
 
@@ -188,8 +182,7 @@ class SpecimenListDialog(QDialog):
         attempt(self._workspace, lambda: self._workspace.specimens.fit(self.chosen))
 
     def _sheets(self) -> None:
-        suggested = str(Path(self._folder) / "contact.pdf")
-        path = self._prompts.save_file("Contact sheets", suggested, _SHEETS)
+        path = self._prompts.save_file("Contact sheets", "contact.pdf", _SHEETS)
         if path is not None:
             every = self.every.isEnabled() and self.every.isChecked()
             model = self._workspace.specimens

@@ -11,6 +11,7 @@ from gp_core import PROBE, Atlas, Side
 from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_labeler.document.touches import TouchHow
+from gp_labeler.views.window_commands.estimate import ask_path, ask_report
 
 ATLAS = Atlas.published()
 ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(3)).side("L")
@@ -25,19 +26,19 @@ def touch(window, animal=ANIMAL, how=TouchHow.TYPED) -> None:
 def test_the_authors_path_is_carried_once_its_axes_are_told(make_window, shared_data):
     window = make_window()
     touch(window)
-    window.ui.prompts.files = [shared_data / "usevitch2021" / "Curve_Points.csv"]
-    window.ui.prompts.answers = ["m", "left", "z,-y,x", "The first 20"]
-    window.ui.ask_path()
+    window.prompts.files = [shared_data / "usevitch2021" / "Curve_Points.csv"]
+    window.prompts.answers = ["m", "left", "z,-y,x", "The first 20"]
+    ask_path(window.workspace, window.prompts)
     carried = window.workspace.pose.path
     assert len(carried.points) == 20
     assert carried.points[0, 1] > 1.5, "it begins at the round window"
     assert next(iter(carried.readings(carried.source, "L", units="m"))) == "z,-y,x", "likeliest first"
-    window.ui.prompts.answers = ["m", "right"]
+    window.prompts.answers = ["m", "right"]
     with pytest.raises(GpError, match="winds as in a left ear"):
-        window.ui.ask_path()
-    window.ui.prompts.answers = ["mm", "left"]
+        ask_path(window.workspace, window.prompts)
+    window.prompts.answers = ["mm", "left"]
     with pytest.raises(GpError, match="look like m"):
-        window.ui.ask_path()
+        ask_path(window.workspace, window.prompts)
 
 
 def test_a_path_in_the_cochlea_frame_asks_for_no_axes(make_window, tmp_path):
@@ -45,8 +46,8 @@ def test_a_path_in_the_cochlea_frame_asks_for_no_axes(make_window, tmp_path):
     touch(window)
     table = tmp_path / "path.csv"
     table.write_text("-0.5,2,0\n0,1.5,0.2\n0.4,1,0.5\n")
-    window.ui.prompts.files, window.ui.prompts.answers = [table], ["mm", "left"]
-    window.ui.ask_path()
+    window.prompts.files, window.prompts.answers = [table], ["mm", "left"]
+    ask_path(window.workspace, window.prompts)
     assert len(window.workspace.pose.path.points) == 3
 
 
@@ -59,8 +60,8 @@ def test_a_report_leaves_the_camera_where_it_was(window, tmp_path):
     window.workspace.view.set_crosshair(MIDDLE + 5.0)
     camera.focus_on(MIDDLE - 3.0, across_mm=3.0)
     before = camera.state()
-    window.ui.prompts.files = [tmp_path / "report.pdf"]
-    window.ui.ask_report()
+    window.prompts.files = [tmp_path / "report.pdf"]
+    ask_report(window)
     assert (tmp_path / "report.pdf").stat().st_size > 10_000
     assert camera.state() == before
     assert QApplication.overrideCursor() is None
