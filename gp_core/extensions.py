@@ -50,6 +50,8 @@ class Extensions(Generic[Thing]):
 
     def __init__(self, group: str, builtin: Mapping[str, Thing]) -> None:
         self._group = group
+        self.left_out: list[str] = []
+        """What was left out of `added`, and why, once that was looked at."""
         self.builtin: Mapping[str, Thing] = builtin
 
     def names(self) -> tuple[str, ...]:
@@ -108,7 +110,9 @@ class Extensions(Generic[Thing]):
                 self._leave_out(entry, f"{type(error).__name__}: {error}")
 
     def _leave_out(self, entry: EntryPoint, reason: str) -> None:
-        _log.warning("%s is left out: %s", self.described(entry.name, entry), reason)
+        text = f"{self.described(entry.name, entry)} is left out: {reason}"
+        self.left_out.append(text)
+        _log.warning("%s", text)
 
     def described(self, name: str, entry: EntryPoint | None = None) -> str:
         """Return an extension in words, with the package that it is of.

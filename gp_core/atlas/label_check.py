@@ -336,20 +336,33 @@ def check_side(landmarks: LandmarkSet, atlas: Atlas, *, scan: ScanEvidence | Non
     SideCheck
         Computed in 1 ms for a side in order, and in 10 ms for one that is not.
     """
-    scan = scan or landmarks.scan_evidence
-    found = [*_found_by_checks(landmarks, atlas), *(() if scan is None else _against_scan(landmarks, scan))]
-    deviations: dict[str, Deviation] = {}
-    codes = tuple(code for code in landmarks.placed if code in atlas.codes)
-    try:
-        _require_enough(landmarks, atlas, codes)
-        explained, deviations = _explain(landmarks, atlas, codes)
-        found += explained
-    except GpError as error:
-        text = f"positions not checked: {error.problem}"
-        found.append(_finding(landmarks, "unchecked", (), text, error.remedy or ""))
-    found = [_as_checked(finding, landmarks) for finding in found]
+    labels = landmarks
+    if scan is not None:
+        labels = replace(landmarks, scan_evidence=scan.measured_at(landmarks.as_mapping()))
+    found: list[Finding] = []
+    deviations: Mapping[str, Deviation] = MappingProxyType({})
+    for name in CHECKS.names():
+        result = _run_check(name, labels, atlas)
+        found += (_as_checked(finding, landmarks) for finding in result)
+        if isinstance(result, _Comparison):
+            deviations = result.deviations
     found.sort(key=lambda finding: -finding.severity)
-    return SideCheck((*found, *_not_placed(landmarks)), MappingProxyType(deviations))
+    return SideCheck(tuple(found), deviations)
+
+
+def _run_check(name: str, landmarks: LandmarkSet, atlas: Atlas) -> Iterable[Finding]:
+    """Run one of `CHECKS`; one of a package that fails says so in a finding, and stops no other."""
+    if not CHECKS.is_added(name):
+        return CHECKS.get(name)(landmarks, atlas)
+    try:
+        found = list(CHECKS.get(name)(landmarks, atlas))
+        if not all(isinstance(finding, Finding) for finding in found):
+            raise TypeError("it did not return findings")
+    except Exception as error:
+        failure = CHECKS.failure(name, error)
+        return [_finding(landmarks, "unchecked", (), failure.problem, failure.remedy or "")]
+    # under a kind of its own, so that no label is left out of an atlas because of it
+    return [replace(finding, kind=f"{name} (added)") for finding in found]
 
 
 def _as_checked(finding: Finding, *sets: LandmarkSet) -> Finding:
@@ -420,7 +433,7 @@ def _finding(
     return Finding("", landmarks.side, kind, codes, text, remedy, **more)
 
 
-def _not_placed(landmarks: LandmarkSet) -> Iterator[Finding]:
+def _not_placed(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
     for row in FEATURES:
         if row.computed or row.code in landmarks:
             continue
@@ -432,7 +445,7 @@ def _not_placed(landmarks: LandmarkSet) -> Iterator[Finding]:
             yield _finding(landmarks, "missing", (row.code,), f"not placed: {row.definition}")
 
 
-def _duplicates(landmarks: LandmarkSet) -> Iterator[Finding]:
+def _duplicates(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
     placed = [code for code in landmarks.placed if not feature(code).computed]
     for a, b in combinations(placed, 2):
         if np.linalg.norm(landmarks[a] - landmarks[b]) < SAME_PLACE_MM:
@@ -440,31 +453,10 @@ def _duplicates(landmarks: LandmarkSet) -> Iterator[Finding]:
             yield _finding(landmarks, "duplicate", (a, b), text, remedy)
 
 
-CHECKS: Extensions[Callable[[LandmarkSet, Atlas], Iterable[Finding]]] = Extensions(
-    "gp_labeler.checks", {"duplicates": lambda landmarks, _: _duplicates(landmarks)}
-)
-"""Checks of the labels of one side, those of installed packages among them."""
-
-
-def _found_by_checks(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
-    """Yield what the checks find; one of a package that fails says so in a finding, and stops no other."""
-    for name in CHECKS.names():
-        if not CHECKS.is_added(name):
-            yield from CHECKS.get(name)(landmarks, atlas)
-            continue
-        try:
-            found = list(CHECKS.get(name)(landmarks, atlas))
-            if not all(isinstance(finding, Finding) for finding in found):
-                raise TypeError("it did not return findings")
-        except Exception as error:
-            failure = CHECKS.failure(name, error)
-            yield _finding(landmarks, "unchecked", (), failure.problem, failure.remedy or "")
-        else:
-            # under a kind of its own, so that no label is left out of an atlas because of it
-            yield from (replace(finding, kind=f"{name} (added)") for finding in found)
-
-
-def _against_scan(landmarks: LandmarkSet, scan: ScanEvidence) -> Iterator[Finding]:
+def _against_scan(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
+    scan = landmarks.scan_evidence
+    if scan is None:
+        return
     for code, distance_mm in scan.bone_distances.items():
         if code not in landmarks or feature(code).computed:
             continue
@@ -499,9 +491,28 @@ def _require_enough(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]
         )
 
 
-def _explain(
-    landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]
-) -> tuple[list[Finding], dict[str, Deviation]]:
+@dataclass(frozen=True)
+class _Comparison:
+    """What the labels of a side tell about each other: findings, and the deviation of every label."""
+
+    findings: tuple[Finding, ...]
+    deviations: Mapping[str, Deviation] = field(default_factory=_nothing)
+
+    def __iter__(self) -> Iterator[Finding]:
+        return iter(self.findings)
+
+
+def _compared_with_atlas(landmarks: LandmarkSet, atlas: Atlas) -> _Comparison:
+    codes = tuple(code for code in landmarks.placed if code in atlas.codes)
+    try:
+        _require_enough(landmarks, atlas, codes)
+        return _explain(landmarks, atlas, codes)
+    except GpError as error:
+        text = f"positions not checked: {error.problem}"
+        return _Comparison((_finding(landmarks, "unchecked", (), text, error.remedy or ""),))
+
+
+def _explain(landmarks: LandmarkSet, atlas: Atlas, codes: tuple[str, ...]) -> _Comparison:
     """Find the most probable hypothesis on the labels; return its findings, and all deviations."""
     model, labels, side = LabelModel(atlas, codes), landmarks.array(codes), landmarks.side
     own, other = (mirror_right(labels, named) for named in (side, side.other))
@@ -521,7 +532,7 @@ def _explain(
         for away in deviations.values()
         if away.is_outlier and away.code not in explained
     ]
-    return found, deviations
+    return _Comparison(tuple(found), MappingProxyType(deviations))
 
 
 def _other_side(landmarks: LandmarkSet, codes: tuple[str, ...], certainty: float) -> Finding:
@@ -550,6 +561,21 @@ def _deviations(
     covariances, errors = flip @ rest.covariance @ flip, model.labelling_sd.tolist()
     places = zip(codes, labels, rest.expected @ flip, covariances, errors, strict=True)
     return {code: deviation(code, *place) for code, *place in places}
+
+
+CHECKS: Extensions[Callable[[LandmarkSet, Atlas], Iterable[Finding]]] = Extensions(
+    "gp_labeler.checks",
+    {
+        "duplicates": _duplicates,
+        "bone": _against_scan,
+        "atlas": _compared_with_atlas,
+        "not placed": _not_placed,
+    },
+)
+"""All checks of the labels of one side, those of installed packages among them.
+
+What the scan tells of the labels is in `LandmarkSet.scan_evidence`.
+"""
 
 
 def _shared_points(specimen: Specimen) -> Iterator[Finding]:

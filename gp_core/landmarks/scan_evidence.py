@@ -71,6 +71,23 @@ class ScanEvidence:
         return replace(self, bone_distances=distances, positions=positions, outside=self.outside & kept)
 
     @checks_arguments
+    def measured_at(self, points: Mapping[str, FloatArray]) -> ScanEvidence:
+        """Return the evidence as one that was measured at some positions.
+
+        Parameters
+        ----------
+        points : mapping of str to (3,) array
+            Where the features were then, mm, in the frame of the labels.
+
+        Returns
+        -------
+        ScanEvidence
+            The same distances, with these positions.
+        """
+        measured = {code: place for code, place in points.items() if code in self.bone_distances}
+        return replace(self, positions={code: _position(at.tolist()) for code, at in measured.items()})
+
+    @checks_arguments
     def moved(self, T_dst_src: RigidTransform) -> ScanEvidence:
         """Return the evidence for labels that were moved as a whole into another frame.
 

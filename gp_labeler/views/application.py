@@ -9,7 +9,6 @@ import os
 import sys
 import traceback
 from pathlib import Path
-from types import TracebackType
 
 from qtpy.QtCore import QLocale, QMessageLogContext, Qt, QTimer, QtMsgType, qInstallMessageHandler
 from qtpy.QtGui import QIcon
@@ -26,13 +25,14 @@ from gp_labeler.views.canvas_choice import choose_canvas, share_contexts
 from gp_labeler.views.canvas_question import offer_measurement
 from gp_labeler.views.dispatch import QtDispatcher
 from gp_labeler.views.main_window import MainWindow
+from gp_labeler.views.panels.table import panel_at_fault
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import offer_recoveries
 from gp_labeler.views.state_question import directory_to_use
 from gp_labeler.views.window_commands.file import open_demo, open_path
 from gp_labeler.views.window_state import WindowState
 
-__all__ = ["make_application", "make_window", "run_window"]
+__all__ = ["make_application", "make_window", "report_fault", "run_window"]
 
 _log = logging.getLogger(__name__)
 _applications: list[QApplication] = []
@@ -136,7 +136,7 @@ def run_window(
     window = make_window(directory)
     if observer is not None:
         window.workspace.set_observer(observer)
-    sys.excepthook = lambda kind, error, trace: _report(window, kind, error, trace)
+    sys.excepthook = lambda kind, error, trace: report_fault(window, error)
     window.show()
 
     def begin() -> None:
@@ -167,11 +167,16 @@ def _tell(_: QtMsgType, __: QMessageLogContext, text: str) -> None:
         sys.stderr.write(f"{text}\n")
 
 
-def _report(
-    window: MainWindow, kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
-    """Tell of a fault of the program; the work goes on, every edit is in the journal."""
-    _log.error("%s", "".join(traceback.format_exception(kind, error, trace)))
+def report_fault(window: MainWindow, error: BaseException) -> None:
+    """Tell of a fault of the program; the work goes on, every edit is in the journal.
+
+    A panel of an installed package that is at fault is named, and taken away.
+    """
+    _log.error("%s", "".join(traceback.format_exception(error)))
+    panel = panel_at_fault(error)
+    if panel is not None:
+        window.leave_out_panel(panel, error)
+        return
     window.workspace.say(
-        f"Something went wrong in the program ({kind.__name__}: {error}). Save your work.", "error"
+        f"Something went wrong in the program ({type(error).__name__}: {error}). Save your work.", "error"
     )

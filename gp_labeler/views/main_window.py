@@ -20,6 +20,7 @@ from qtpy.QtWidgets import (
 )
 
 from gp_core.atlas.label_check import Finding
+from gp_core.errors import GpError
 from gp_core.settings import setting
 from gp_core.study.reliability import Disagreement
 from gp_labeler.document.animals import may_hold_labels
@@ -36,10 +37,11 @@ from gp_labeler.views.painting.reference_layer import ReferenceLayer
 from gp_labeler.views.panels.atlas.panel import AtlasPanel
 from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.panel_stack import PanelStack
+from gp_labeler.views.panels.parts import scrolled
 from gp_labeler.views.panels.pose.panel import PosePanel, holds_touches
-from gp_labeler.views.panels.rail import Rail
-from gp_labeler.views.panels.scan.panel import ScanPanel
+from gp_labeler.views.panels.rail import Rail, WorkStep
 from gp_labeler.views.panels.scan.welcome import Welcome
+from gp_labeler.views.panels.table import PANELS, added_panels
 from gp_labeler.views.panels.tracker.card import TrackerCard
 from gp_labeler.views.pose_display import PoseDisplay
 from gp_labeler.views.prompts import Prompts
@@ -58,6 +60,7 @@ from gp_labeler.views.window_state import WindowState
 __all__ = ["MainWindow"]
 
 Layout = TypeVar("Layout", bound=QBoxLayout)
+Panel = TypeVar("Panel", bound=QWidget)
 
 _ALONE = MappingProxyType(
     {
@@ -122,6 +125,7 @@ class MainWindow(QMainWindow):
         self._listen()
         self._recall_place()
         self._show_title()
+        self._add_panels()
         app = QApplication.instance()
         if isinstance(app, QApplication):
             app.fontChanged.connect(self._restyle)  # the desktop's text became larger or smaller
@@ -166,16 +170,11 @@ class MainWindow(QMainWindow):
 
     def _dock(self) -> None:
         workspace, actions = self.workspace, self.commands.actions
-        self._scan, self._label = ScanPanel(workspace, actions), LabelPanel(workspace, actions)
+        self.steps = {name: make(workspace, actions) for name, make in PANELS.builtin.items()}
+        self._label, self._atlas = self._panel(LabelPanel), self._panel(AtlasPanel)
+        self._pose = self._panel(PosePanel)
         self.grid.scene_view.frame_drawn.connect(self._label.card.refresh_hidden)
-        self._atlas, self._pose = AtlasPanel(workspace, actions), PosePanel(workspace, actions)
         self._pose.add_card(TrackerCard(workspace, actions))
-        self.steps: dict[str, QWidget] = {
-            "scan": self._scan,
-            "label": self._label,
-            "atlas": self._atlas,
-            "pose": self._pose,
-        }
         for panel in self.steps.values():
             self.panels.addWidget(panel)
         work = QWidget()
@@ -194,6 +193,33 @@ class MainWindow(QMainWindow):
         whole.addWidget(self.status)
         self.setCentralWidget(centre)
         self._show_page()
+
+    def _panel(self, kind: type[Panel]) -> Panel:
+        return next(panel for panel in self.steps.values() if isinstance(panel, kind))
+
+    def _add_panels(self) -> None:
+        """Add the panels of installed packages; name those that fail, and go on without them."""
+        for name, panel in added_panels(self.workspace, self.commands.actions):
+            if isinstance(panel, GpError):
+                self.workspace.say(str(panel), "warning")
+                continue
+            self.steps[name] = scrolled(panel)
+            self.panels.addWidget(self.steps[name])
+            self.rail.add_step(WorkStep(name, name.capitalize(), "layout", PANELS.described(name)))
+        for text in PANELS.left_out:
+            self.workspace.say(text, "warning")
+
+    def leave_out_panel(self, name: str, error: BaseException) -> None:
+        """Take away the panel of an installed package that failed, and name it."""
+        panel = self.steps.pop(name, None)
+        if panel is not None:
+            if self.rail.step == name:
+                self.set_step("label" if self.workspace.scan.volume is not None else "scan")
+            self.rail.remove_step(name)
+            self.panels.removeWidget(panel)
+            panel.deleteLater()
+        reason = f"{PANELS.described(name)} is left out ({type(error).__name__}: {error})"
+        self.workspace.say(f"{reason[0].upper()}{reason[1:]}. Your labels are kept.", "error")
 
     def _listen(self) -> None:
         workspace = self.workspace

@@ -29,6 +29,11 @@ odd = broken:estimate
 
 [gp_labeler.landmark_formats]
 bad = broken:read
+
+[gp_labeler.readers]
+tif = broken:read
+bad = broken:read
+worse = broken:reader
 """
 _BROKEN_MODULE = """
 def check(landmarks, atlas):
@@ -39,6 +44,13 @@ def estimate(given):
 
 def read(path):
     raise KeyError("x")
+
+def __getattr__(name):  # only a test of scans imports the readers
+    from gp_labeler.imaging.readers.plan import ScanReader
+
+    if name != "reader":
+        raise AttributeError(name)
+    return ScanReader(("worse",), lambda path: path.suffix == ".worse", lambda *_: 1 / 0)
 """
 
 
@@ -84,29 +96,50 @@ def test_the_example_adds_a_format_a_method_and_a_check(example: Path) -> None:
     done = _run(example, _CORE, "check", "A_L.mrk.json")
     assert done.returncode == 1, done.stderr
     assert "OS lies at whole millimetres" in done.stdout
+    assert "nobody is named who placed these labels" in done.stdout
 
 
 @pytest.mark.slow
-def test_the_example_adds_a_reader_and_a_step(example: Path) -> None:
-    with (example / "head.npyscan").open("wb") as file:
+def test_the_example_adds_a_reader_a_panel_and_a_step(example: Path) -> None:
+    (example / "scans").mkdir()
+    with (example / "scans" / "head.npyscan").open("wb") as file:
         np.savez(file, values=np.arange(24.0, dtype=np.float32).reshape(2, 3, 4), spacing=[10.0, 11.0, 12.0])
     code = (
         "from gp_labeler.imaging.readers import read_volume\n"
         "from gp_labeler.scripting.script import make_script\n"
-        "volume = read_volume('head.npyscan')\n"
+        "volume = read_volume('scans')\n"
         "print(*volume.size, *volume.spacing)\n"
-        "print(make_script([{'do': 'count', 'least': 3}]).steps[0].title)"
+        "print(make_script([{'do': 'count', 'least': 3}]).steps[0].title)\n"
+        "from gp_labeler.models.workspace import Workspace\n"
+        "from gp_labeler.views.application import make_application\n"
+        "from gp_labeler.views.panels.table import added_panels\n"
+        "app = make_application()\n"
+        "workspace = Workspace(None)\n"
+        "workspace.document.attach_volume(volume)\n"
+        "workspace.labels.place([0, 0, 0], side='L', code='CA')\n"
+        "workspace.labels.place([0, 3, 4], side='L', code='CB')\n"
+        "((name, panel),) = added_panels(workspace, {})\n"
+        "workspace.labels.choose('L', 'CA')\n"
+        "print(name, *(panel.table.item(0, column).text() for column in (0, 1)))\n"
+        "panel.table.cellClicked.emit(0, 0)\n"
+        "print(workspace.labels.active.code)\n"
     )
     done = _run(example, code)
-    assert done.stdout.splitlines() == ["4 3 2 10.0 11.0 12.0", "count"], done.stderr
+    expected = ["4 3 2 10.0 11.0 12.0", "count", "distances CB 5.00", "CB"]
+    assert done.stdout.splitlines() == expected, done.stderr
 
 
-def test_what_fails_is_named_and_left_out(tmp_path: Path) -> None:
-    info = tmp_path / "broken-1.0.dist-info"
+def _break(folder: Path) -> None:
+    """Install a package whose extensions fail."""
+    info = folder / "broken-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text(_BROKEN)
-    (tmp_path / "broken.py").write_text(_BROKEN_MODULE)
+    (folder / "broken.py").write_text(_BROKEN_MODULE)
+
+
+def test_what_fails_is_named_and_left_out(tmp_path: Path) -> None:
+    _break(tmp_path)
     (tmp_path / "touches.bad").write_text("x")
     code = (
         "import gp_core\n"
@@ -125,6 +158,24 @@ def test_what_fails_is_named_and_left_out(tmp_path: Path) -> None:
     assert "unchecked the check 'fails' of the package broken failed (ZeroDivisionError" in done.stdout
     assert "the estimator 'odd' of the package broken gave no CochleaPose" in done.stdout
     assert "touches.bad: the landmark format 'bad' of the package broken failed (KeyError" in done.stdout
+
+
+def test_a_reader_that_fails_is_named_and_one_of_a_built_in_format_left_out(tmp_path: Path) -> None:
+    _break(tmp_path)
+    for name in ("head.bad", "head.worse"):
+        (tmp_path / name).write_text("x")
+    code = (
+        "from gp_core import GpError\n"
+        "from gp_labeler.imaging.readers import read_volume\n"
+        "for name in ('head.bad', 'head.worse'):\n"
+        "    try: read_volume(name)\n"
+        "    except GpError as error: print(error)\n"
+    )
+    done = _run(tmp_path, code)
+    assert "the reader 'tif' of the package broken is left out: tif is built in" in done.stderr
+    first, second = done.stdout.splitlines()
+    assert "head.bad: the reader 'bad' of the package broken failed (KeyError: 'x')" in first
+    assert "head.worse: the reader 'worse' of the package broken failed (ZeroDivisionError" in second
 
 
 def test_the_table_of_what_is_built_in_needs_no_look_at_packages(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from gp_core.errors import GpError
-from gp_core.extensions import Extensions
 from gp_core.validation import FloatArray
+from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
-from gp_labeler.imaging.readers.plan import Geometry, ImportPlan
+from gp_labeler.imaging.readers.plan import Geometry, ImportPlan, ScanReader
 from gp_labeler.imaging.readers.problems import VolumeError
 
-__all__ = ["READERS", "ScanData", "inspect_added"]
+__all__ = ["Read", "ScanData", "added_reader"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,46 +46,71 @@ class ScanData:
     sides_known: bool = False
 
 
-READERS: Extensions[Callable[[Path], ScanData]] = Extensions("gp_labeler.readers", {})
-"""Readers by the ending of a file's name."""
+Read = Callable[[Path], ScanData]
+"""A function that reads a whole scan."""
 
 
-def inspect_added(path: Path, options: ImportOptions) -> ImportPlan | None:
-    """Return the plan for a scan that an installed package reads, or None where none does.
+def added_reader(
+    ending: str, read: ScanReader | Read, described: str, failure: Callable[[Exception], GpError]
+) -> ScanReader:
+    """Return the reader that an installed package adds; whatever it raises becomes an error that names it.
 
-    Raises
-    ------
-    VolumeError
-        The package fails on it; the error names the package.
+    Parameters
+    ----------
+    ending : str
+        Of the names of its files.
+    read : ScanReader or callable
+        What the package names.
+    described : str
+        The reader and its package in words.
+    failure : callable
+        Makes an error of the program of one that the package raised.
     """
-    name = path.name.lower()
-    ending = next((e for e in READERS.added if name.endswith(f".{e.lower()}")), None)
-    if ending is None:
-        return None
-    try:
-        data = READERS.get(ending)(path)
+    reader = read if isinstance(read, ScanReader) else _reading_all(ending, read, described)
+
+    @contextmanager
+    def named(path: Path) -> Iterator[None]:
+        try:
+            yield
+        except (Cancelled, VolumeError):
+            raise
+        except Exception as error:
+            failed = failure(error)
+            raise VolumeError(failed.problem, file=path, remedy=failed.remedy) from error
+
+    def knows(path: Path) -> bool:
+        with named(path):
+            return reader.knows(path)
+
+    def inspect(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+        with named(path):
+            return reader.inspect(path, options, report)
+
+    return ScanReader(reader.endings, knows, inspect)
+
+
+def _reading_all(ending: str, read: Read, described: str) -> ScanReader:
+    """Return the reader of a function that reads a whole scan."""
+    package = described.rpartition(" ")[2]
+
+    def inspect(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+        data = read(path)
         values = np.asarray(data.values)
         if values.ndim != 3 or values.dtype.kind not in "iuf":
             raise TypeError(f"it gave values of shape {values.shape} and type {values.dtype}")
-    except Exception as error:
-        failure = READERS.failure(ending, error)
-        raise VolumeError(failure.problem, file=path, remedy=failure.remedy) from error
-    nz, ny, nx = values.shape
-    try:
-        geometry = Geometry(data.spacing, data.origin, np.asarray(data.direction, float), data.sides_known)
-    except GpError as error:
-        raise VolumeError(error.problem, file=path, remedy=error.remedy) from error
-    return ImportPlan(
-        path=path,
-        format=f".{ending} ({READERS.described(ending).rpartition(' ')[2]})",
-        files=(path,),
-        size=(nx, ny, nz),
-        stored_dtype=values.dtype,
-        source=_Planes(values),
-        geometry=geometry,
-        options=options,
-        name=path.name.partition(".")[0],
-    )
+        return ImportPlan(
+            path=path,
+            format=f".{ending} ({package})",
+            files=(path,),
+            size=values.shape[::-1],
+            stored_dtype=values.dtype,
+            source=_Planes(values),
+            geometry=Geometry(data.spacing, data.origin, np.asarray(data.direction, float), data.sides_known),
+            options=options,
+            name=path.name.partition(".")[0],
+        )
+
+    return ScanReader((ending,), lambda path: path.name.lower().endswith(f".{ending.lower()}"), inspect)
 
 
 @dataclass(frozen=True, eq=False)

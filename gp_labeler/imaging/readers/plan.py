@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,7 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.disk_cache import cache_folder, needs_cache, space_problem
+from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers.choosing import Choice
 from gp_labeler.imaging.readers.grey import loaded_dtype, narrowing
 from gp_labeler.imaging.readers.options import ImportOptions, Spacing
@@ -19,7 +21,7 @@ from gp_labeler.imaging.readers.problems import Problem, warning
 from gp_labeler.imaging.readers.source import RawSource, SliceSource, window
 from gp_labeler.imaging.readers.spacing import shown, spacing_problems
 
-__all__ = ["MORE_ROOM", "Geometry", "ImportPlan"]
+__all__ = ["MORE_ROOM", "Geometry", "ImportPlan", "ScanReader"]
 
 MORE_ROOM = "Free space, set another folder or limit (the settings cache and cache_gb), or use --stride 2."
 
@@ -278,3 +280,22 @@ class ImportPlan:
 
 def _accepted(problem: Problem, options: ImportOptions) -> bool:
     return problem.code in options.accept and "accept" in problem.resolved_by
+
+
+@dataclass(frozen=True)
+class ScanReader:
+    """One kind of scan.
+
+    Parameters
+    ----------
+    endings : tuple of str
+        Endings of the names of its files, without the dot, in lower case.
+    knows : callable
+        Whether a file, which is not empty, is of this kind, by its name or its content.
+    inspect : callable
+        Looks into the scan that a file belongs to.
+    """
+
+    endings: tuple[str, ...]
+    knows: Callable[[Path], bool]
+    inspect: Callable[[Path, ImportOptions, Report], ImportPlan]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
+from gp_core.extensions import Extensions
 from gp_labeler.imaging.progress import Report
-from gp_labeler.imaging.readers.added import inspect_added
+from gp_labeler.imaging.readers.added import Read, added_reader
 from gp_labeler.imaging.readers.choosing import FEW
 from gp_labeler.imaging.readers.dicom import inspect_dicom
 from gp_labeler.imaging.readers.dicom_disc import lost_files
@@ -19,6 +21,7 @@ from gp_labeler.imaging.readers.formats import (
     SCANCO_SUFFIXES,
     SLICE_SUFFIXES,
     TIFF_SUFFIXES,
+    VOLUME_SUFFIXES,
     is_readable_name,
     scanco_suffix,
     volume_kind,
@@ -26,13 +29,13 @@ from gp_labeler.imaging.readers.formats import (
 from gp_labeler.imaging.readers.itk_image import inspect_itk_image
 from gp_labeler.imaging.readers.naming import group_slices
 from gp_labeler.imaging.readers.options import ImportOptions
-from gp_labeler.imaging.readers.plan import ImportPlan
+from gp_labeler.imaging.readers.plan import ImportPlan, ScanReader
 from gp_labeler.imaging.readers.problems import VolumeError, failing_as_volume_error, names, quiet, warning
 from gp_labeler.imaging.readers.scanco import inspect_scanco
 from gp_labeler.imaging.readers.stack import inspect_stack
 from gp_labeler.imaging.readers.tiff import inspect_tiff, is_multi_page
 
-__all__ = ["inspect_path"]
+__all__ = ["READERS", "inspect_path"]
 
 _FEW_IMAGES = 20  # more than that are slices, and need not be opened to see it
 _HINTS = {
@@ -71,26 +74,23 @@ def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Repo
 
 
 def _inspect_file(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
-    kind, suffix = volume_kind(path) or _kind_by_content(path), path.suffix.lower()
-    if kind is not None:
-        return inspect_itk_image(path, options, kind)
-    if is_dicomdir(path):
-        return _inspect_folder(path.parent, options, report)
-    if is_dicom(path) or suffix in DICOM_SUFFIXES:
-        return inspect_dicom(path.parent, _siblings(path), options, report, chosen=path)
-    if suffix in TIFF_SUFFIXES and is_multi_page(path):
-        return inspect_tiff(path, options)
-    if suffix in SLICE_SUFFIXES:
-        return inspect_stack(path.parent, _images(_siblings(path)), options, report, chosen=path)
-    if suffix == ".log" and (images := _images(_siblings(path))):
-        return inspect_stack(path.parent, images, options, report)
-    if scanco_suffix(path) in SCANCO_SUFFIXES or _begins(path, b"CTDATA-HEADER_V1"):
-        return inspect_scanco(path, options)
-    if (added := inspect_added(path, options)) is not None:
-        return added
-    raise VolumeError(
-        "its format is not known", file=path, remedy=_HINTS.get(suffix, f"Readable are {READABLE}.")
-    )
+    """Look into a file by the first reader that knows it."""
+    reader = next((reader for reader in _readers() if reader.knows(path)), None)
+    if reader is None:
+        hint = _HINTS.get(path.suffix.lower(), f"Readable are {READABLE}.")
+        raise VolumeError("its format is not known", file=path, remedy=hint)
+    return reader.inspect(path, options, report)
+
+
+def _readers() -> Iterator[ScanReader]:
+    """Yield all readers; no package is imported for a file that one of those built in knows."""
+    yield from _BUILT_IN
+    yield from _added_readers()
+
+
+def _added_readers() -> Iterator[ScanReader]:
+    for ending, read in READERS.added.items():
+        yield added_reader(ending, read, READERS.described(ending), partial(READERS.failure, ending))
 
 
 def _inspect_folder(folder: Path, options: ImportOptions, report: Report) -> ImportPlan:
@@ -170,21 +170,9 @@ def _is_volume(path: Path) -> bool:
             return path.stat().st_size > 0 and is_multi_page(path)
         except Exception:  # a broken slice: the stack reader names it
             return False
-    known = volume_kind(path) is not None and path.suffix.lower() not in (".img",)
-    return known or scanco_suffix(path) in SCANCO_SUFFIXES
-
-
-def _kind_by_content(path: Path) -> str | None:
-    """Recognise what goes under another name, or none."""
-    if path.suffix.lower() in (*SLICE_SUFFIXES, *TIFF_SUFFIXES, *DICOM_SUFFIXES):
-        return None
-    with path.open("rb") as file:
-        head = file.read(352)
-    if head.startswith(b"NRRD000"):
-        return "NRRD"
-    if head[344:348] == b"n+1\0" or head[4:8] == b"n+2\0":
-        return "NIfTI"
-    return "MetaImage" if head.startswith((b"ObjectType", b"NDims")) else None
+    if volume_kind(path) is not None or scanco_suffix(path) in SCANCO_SUFFIXES:
+        return path.suffix.lower() != ".img"
+    return any(path.name.lower().endswith(f".{ending.lower()}") for ending in READERS.added)
 
 
 def _begins(path: Path, magic: bytes) -> bool:
@@ -206,3 +194,78 @@ def _subfolders(folder: Path) -> list[Path]:
 
 def _images(files: Sequence[Path]) -> list[Path]:
     return [file for file in files if file.suffix.lower() in SLICE_SUFFIXES]
+
+
+# What is built in
+
+
+def _itk_kind(path: Path) -> str | None:
+    """Return the format of `VOLUME_SUFFIXES` that a file is of, by its name or its content."""
+    if (kind := volume_kind(path)) is not None:
+        return kind
+    if path.suffix.lower() in (*SLICE_SUFFIXES, *TIFF_SUFFIXES, *DICOM_SUFFIXES):
+        return None
+    with path.open("rb") as file:
+        head = file.read(352)
+    if head.startswith(b"NRRD000"):
+        return "NRRD"
+    if head[344:348] == b"n+1\0" or head[4:8] == b"n+2\0":
+        return "NIfTI"
+    return "MetaImage" if head.startswith((b"ObjectType", b"NDims")) else None
+
+
+def _inspect_itk(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    return inspect_itk_image(path, options, _itk_kind(path) or "")
+
+
+def _is_dicom_file(path: Path) -> bool:
+    return is_dicom(path) or path.suffix.lower() in DICOM_SUFFIXES
+
+
+def _is_tiff(path: Path) -> bool:
+    return path.suffix.lower() in TIFF_SUFFIXES and is_multi_page(path)
+
+
+def _is_slice(path: Path) -> bool:
+    return path.suffix.lower() in SLICE_SUFFIXES
+
+
+def _is_skyscan_log(path: Path) -> bool:
+    return path.suffix.lower() == ".log" and bool(_images(_siblings(path)))
+
+
+def _is_scanco(path: Path) -> bool:
+    return scanco_suffix(path) in SCANCO_SUFFIXES or _begins(path, b"CTDATA-HEADER_V1")
+
+
+def _inspect_disc(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    return _inspect_folder(path.parent, options, report)
+
+
+def _inspect_series(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    return inspect_dicom(path.parent, _siblings(path), options, report, chosen=path)
+
+
+def _inspect_slices(path: Path, options: ImportOptions, report: Report) -> ImportPlan:
+    chosen = path if _is_slice(path) else None
+    return inspect_stack(path.parent, _images(_siblings(path)), options, report, chosen=chosen)
+
+
+_BUILT_IN = tuple(
+    ScanReader(tuple(suffix.lstrip(".") for suffix in suffixes), knows, inspect)
+    for suffixes, knows, inspect in (
+        (tuple(VOLUME_SUFFIXES), lambda path: _itk_kind(path) is not None, _inspect_itk),
+        (("dicomdir",), is_dicomdir, _inspect_disc),
+        (DICOM_SUFFIXES, _is_dicom_file, _inspect_series),
+        (TIFF_SUFFIXES, _is_tiff, lambda path, options, _: inspect_tiff(path, options)),
+        (SLICE_SUFFIXES, _is_slice, _inspect_slices),
+        ((".log",), _is_skyscan_log, _inspect_slices),
+        (SCANCO_SUFFIXES, _is_scanco, lambda path, options, _: inspect_scanco(path, options)),
+    )
+)
+"""In the order in which they are asked; what a file holds counts more than how it is named."""
+
+READERS: Extensions[ScanReader | Read] = Extensions(
+    "gp_labeler.readers", {ending: reader for reader in _BUILT_IN for ending in reader.endings}
+)
+"""Readers by the endings of their files' names, those of installed packages among them."""

@@ -1,4 +1,4 @@
-"""The rail: the four steps of the work, at the left edge of the window."""
+"""The rail: the steps of the work, at the left edge of the window."""
 
 from __future__ import annotations
 
@@ -41,7 +41,6 @@ STEPS = (
     ),
     WorkStep("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )
-_NEEDS_SCAN = ("label",)
 _PAD = 8
 
 
@@ -69,6 +68,7 @@ class Rail(QWidget):
         self.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
         self.setProperty("role", "rail")
         self._group = QButtonGroup(self)
+        self._needs_scan = {"label"}
         self.buttons = {step.id: self._button(n, step) for n, step in enumerate(STEPS, 1)}
         self.keys_button = _RailButton("keys", "Keys", "?", "info", self)
         self.keys_button.setToolTip("All keyboard shortcuts (?)")
@@ -76,8 +76,11 @@ class Rail(QWidget):
         layout = QVBoxLayout(self)
         layout.setContentsMargins(0, 8, 0, 8)
         layout.setSpacing(4)
+        self._steps = QVBoxLayout()
+        self._steps.setSpacing(4)
         for button in self.buttons.values():
-            layout.addWidget(button)
+            self._steps.addWidget(button)
+        layout.addLayout(self._steps)
         layout.addStretch(1)
         layout.addWidget(self.keys_button)
         self.buttons["scan"].setChecked(True)
@@ -98,6 +101,20 @@ class Rail(QWidget):
             button.setChecked(True)
             self.step_chosen.emit(step)
 
+    def add_step(self, step: WorkStep) -> None:
+        """Add the step of an installed package, below the others; it is enabled once there is a scan."""
+        self.buttons[step.id] = self._button(len(self.buttons) + 1, step)
+        self._needs_scan.add(step.id)
+        self._steps.addWidget(self.buttons[step.id])
+        self._refresh()
+
+    def remove_step(self, step: str) -> None:
+        """Take a step away; another one must be the current one."""
+        self._needs_scan.discard(step)
+        button = self.buttons.pop(step)
+        button.hide()
+        button.deleteLater()
+
     def _button(self, number: int, step: WorkStep) -> _RailButton:
         button = _RailButton(step.id, step.title, str(number), step.icon, self)
         button.setCheckable(True)
@@ -110,7 +127,7 @@ class Rail(QWidget):
     def _refresh(self, *_: object) -> None:
         document, labels = self._workspace.document, self._workspace.labels
         done = [labels.progress(side) for side in Side]
-        for id in _NEEDS_SCAN:
+        for id in self._needs_scan:
             self.buttons[id].setEnabled(document.state.volume is not None)
         self.buttons["scan"].set_done(self._workspace.scan.volume is not None)
         self.buttons["label"].set_done(all(p.n_placed + p.n_unseen >= p.n_total for p in done))
@@ -187,7 +204,9 @@ class _RailButton(QAbstractButton):
             draw_chip(painter, "checked", QRectF(left, 5 if has_icon else 1, side, side), theme)
         painter.setFont(font_of(self, bold=self.isChecked()))
         painter.setPen(QColor(colour))
-        words = f"{self._number} {self.text()}"
+        words = painter.fontMetrics().elidedText(
+            f"{self._number} {self.text()}", Qt.TextElideMode.ElideRight, round(box.width())
+        )
         top = self._icon_height - 2 if has_icon else 0
         painter.drawText(box.adjusted(0, top, 0, -2 if has_icon else 0), Qt.AlignmentFlag.AlignCenter, words)
         painter.end()

@@ -47,6 +47,13 @@ def find_round_numbers(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding
             yield Finding("", landmarks.side, "round", (code,), text, remedy)
 
 
+def find_unsigned(landmarks: LandmarkSet, atlas: Atlas) -> Iterator[Finding]:
+    """Find labels of which nobody knows who placed them."""
+    if landmarks.placed and not landmarks.observer:
+        text, remedy = "nobody is named who placed these labels", "Enter who labels, and save again."
+        yield Finding("", landmarks.side, "unsigned", (), text, remedy)
+
+
 def read_npyscan(path: Path) -> ScanData:
     """Read a scan from NumPy's ``.npz`` format under another name: ``values`` and ``spacing``."""
     from gp_labeler.imaging.readers.added import ScanData
