@@ -75,6 +75,11 @@ class Surface:
         First and last voxel index of the part of the volume that was meshed.
     stride : int
         Voxels taken along each axis: 1 for full resolution.
+
+    Attributes
+    ----------
+    locator : vtkStaticCellLocator
+        Finds triangles along rays and near points, once it is built: at the first use, or by `prepare`.
     """
 
     mesh: pv.PolyData
@@ -82,7 +87,7 @@ class Surface:
     T_voxel_scan: FloatArray
     region: FloatArray
     stride: int = 1
-    _locator: vtkStaticCellLocator = field(default_factory=vtkStaticCellLocator, init=False, repr=False)
+    locator: vtkStaticCellLocator = field(default_factory=vtkStaticCellLocator, init=False, repr=False)
     _lock: Lock = field(default_factory=Lock, init=False, repr=False)
 
     @property
@@ -114,7 +119,7 @@ class Surface:
     @property
     def ready(self) -> bool:
         """Whether picking answers at once."""
-        return self._locator.GetDataSet() is not None
+        return self.locator.GetDataSet() is not None
 
     def prepare(self) -> Surface:
         """Build the search structure for picking, in a job, before the first click needs it.
@@ -124,7 +129,7 @@ class Surface:
         """
         with self._lock:
             if not self.ready and self.n_triangles:
-                _build_without_blocking(self._locator, self.mesh)
+                _build_without_blocking(self.locator, self.mesh)
         return self
 
     def pick(self, ray_origin: ArrayLike, ray_direction: ArrayLike) -> SurfaceHit | None:
@@ -168,7 +173,7 @@ class Surface:
             raise GeometryError("the surface is empty: there is nothing to project on")
         self.prepare()
         nearest, triangle, part, squared = [0.0, 0.0, 0.0], _out(0), _out(0), _out(0.0)
-        self._locator.FindClosestPoint(triple(point), nearest, triangle, part, squared)
+        self.locator.FindClosestPoint(triple(point), nearest, triangle, part, squared)
         return self._hit(nearest, int(triangle))
 
     def outside(self, region: FloatArray) -> Surface:
@@ -244,7 +249,7 @@ class Surface:
         point, inside = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
         along, part, triangle = _out(0.0), _out(0), _out(0)
         tolerance = _PICK_TOLERANCE * self.voxel_mm  # a ray may pass exactly between two triangles
-        found = self._locator.IntersectWithLine(
+        found = self.locator.IntersectWithLine(
             triple(start), triple(end), tolerance, along, point, inside, part, triangle
         )
         return self._hit(point, int(triangle)) if found else None

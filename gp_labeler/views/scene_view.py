@@ -358,7 +358,8 @@ class SceneView(QWidget):
         self.overlay.measurements = kept_measurements(self._workspace.measure)
         self.scene.lines.show(drawn_segments(self._workspace, theme_of(self).scene))
 
-    def _mark_at(self, x: float, y: float) -> str | None:
+    def mark_at(self, x: float, y: float) -> str | None:
+        """Return the key of the nearest mark, or handle, that is drawn near a pixel."""
         self._take_points()
         mark, within = self.scene.mark_at(x, y, _NEAR_PIXELS), _NEAR_PIXELS * self.scene.scale
         return mark_or_handle(self._workspace, mark, self.scene.display_of, (x, y), within)
@@ -481,7 +482,7 @@ class SceneView(QWidget):
             return
         x, y = pixel_of(self, event.position())
         if button is Button.LEFT and held is Modifier.NONE:
-            self._placement.press(self._mark_at(x, y), x, y)
+            self._placement.press(self.mark_at(x, y), x, y)
         if not self._placement.holds:
             self.scene.control.press(button, x, y, held)
 
@@ -504,7 +505,7 @@ class SceneView(QWidget):
         if event.button() == Qt.MouseButton.LeftButton and clicked:
             self._click(x, y, mark, replace=modifiers_of(event) == Modifier.CTRL)
         elif event.button() == Qt.MouseButton.RightButton and clicked:
-            self._placement.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
+            self._placement.open_menu(self, self.mark_at(x, y), event.globalPosition().toPoint())
         self._look_at(x, y, Modifier.NONE)
 
     def mouseDoubleClickEvent(self, event: QMouseEvent) -> None:  # noqa: D102, N802
@@ -594,7 +595,7 @@ class SceneView(QWidget):
     def _show_cursor(self, *_: object) -> None:
         """Show the pointer that says what a click here does."""
         if self._pointer is not None:
-            self.setCursor(self._placement.cursor(self._on_target, self._mark_at(*self._pointer)))
+            self.setCursor(self._placement.cursor(self._on_target, self.mark_at(*self._pointer)))
 
     def _point_at(self, x: float, y: float) -> FloatArray | None:
         """Take where the pointer is; return the (3,) scan position where a click would land."""

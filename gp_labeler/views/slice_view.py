@@ -266,7 +266,7 @@ class SliceView(QWidget):
         x, y = pixel_of(self, event.position())
         if self._control.press(button, x, y, held) or button is not Button.LEFT:
             return
-        mark = self._mark_at(x, y)
+        mark = self.mark_at(x, y)
         self._placement.press(mark, x, y)
         if mark is not None and self._placement.holds:
             self._edge = self._edge_for(mark)
@@ -315,7 +315,7 @@ class SliceView(QWidget):
         dragged = self._placement.holds and not self._placement.is_click
         mark = self._placement.release()
         if clicked and event.button() == Qt.MouseButton.RightButton:
-            self._placement.open_menu(self, self._mark_at(x, y), event.globalPosition().toPoint())
+            self._placement.open_menu(self, self.mark_at(x, y), event.globalPosition().toPoint())
         held = modifiers_of(event)
         plain = event.button() == Qt.MouseButton.LeftButton and held in (Modifier.NONE, Modifier.CTRL)
         here = self.shown.pixel_to_scan([[x, y]])[0]
@@ -383,7 +383,7 @@ class SliceView(QWidget):
     def _show_cursor(self, *_: object) -> None:
         """Show the pointer that says what a click here does."""
         if self.shown is not None and self._pointer is not None:
-            here, mark = self.shown.pixel_to_scan([self._pointer])[0], self._mark_at(*self._pointer)
+            here, mark = self.shown.pixel_to_scan([self._pointer])[0], self.mark_at(*self._pointer)
             ratio = self.devicePixelRatioF()
             if mark is None and self.turning.is_on_handle(self.shown, *self._pointer, ratio):
                 self.setCursor(Qt.CursorShape.PointingHandCursor)
@@ -446,7 +446,7 @@ class SliceView(QWidget):
         marks = {mark.key: mark.position for mark in drawn_marks(self._workspace)}
         return marks[key or ""]
 
-    def _mark_at(self, x: float, y: float) -> str | None:
+    def mark_at(self, x: float, y: float) -> str | None:
         """Return the key of the nearest mark, or handle, that is drawn within 8 logical pixels."""
         within = _NEAR_PIXELS * self.devicePixelRatioF()
         return mark_or_handle(self._workspace, self._landmark_at(x, y), self._drawn_pixels, (x, y), within)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 
 import numpy as np
 import pytest
 
-from gp_core.registration import jrmpc as registration
-from gp_core.registration import jrmpc_kernels, jrmpc_lanes
+from gp_core.registration import jrmpc_lanes
 from gp_core.registration.jrmpc import DEFAULTS, ESTIMATION, JrmpcBatch, JrmpcSettings, jrmpc_batch
 from gp_core.registration.lanes import LANES
 from gp_core.validation import FloatArray
@@ -35,10 +35,18 @@ def _turn(rng: np.random.Generator) -> FloatArray:
 def both(
     batch: FloatArray, settings: JrmpcSettings, monkeypatch: pytest.MonkeyPatch
 ) -> tuple[JrmpcBatch, JrmpcBatch]:
-    assert registration._batch_kernels() is jrmpc_lanes
-    lanes = jrmpc_batch(batch, SIZES, settings)
-    monkeypatch.setattr(registration, "_batch_kernels", lambda: jrmpc_kernels)
-    return lanes, jrmpc_batch(batch, SIZES, settings)
+    run, n_runs = jrmpc_lanes.run_batch, []
+
+    def counted(*inputs: object, **options: object) -> object:
+        n_runs.append(1)
+        return run(*inputs, **options)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(jrmpc_lanes, "run_batch", counted)
+        lanes = jrmpc_batch(batch, SIZES, settings)
+        assert n_runs
+        patched.setitem(sys.modules, jrmpc_lanes.__name__, None)  # as where they cannot be compiled
+        return lanes, jrmpc_batch(batch, SIZES, settings)
 
 
 def assert_same(one: JrmpcBatch, other: JrmpcBatch, which: Sequence[int] | slice = slice(None)) -> None:

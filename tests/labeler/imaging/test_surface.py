@@ -278,7 +278,7 @@ def test_what_a_user_can_do_wrong_is_said(tmp_path: Path) -> None:
 
 def test_a_surface_is_let_go_with_its_locator() -> None:
     surface = extract_isosurface(ball(np.eye(3)), 0.0)
-    mesh, locator = weakref.ref(surface.mesh), weakref.ref(surface._locator)
+    mesh, locator = weakref.ref(surface.mesh), weakref.ref(surface.locator)
     del surface
     gc.collect()
     assert mesh() is None

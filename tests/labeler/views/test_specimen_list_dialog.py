@@ -39,8 +39,12 @@ def workspace():
 
 
 @pytest.fixture
-def dialog(workspace, folder, qtbot):
-    prompts = ScriptPrompts()
+def prompts():
+    return ScriptPrompts()
+
+
+@pytest.fixture
+def dialog(workspace, prompts, folder, qtbot):
     dialog = SpecimenListDialog(workspace, prompts)
     qtbot.addWidget(dialog)
     dialog.resize(820, 500)
@@ -103,14 +107,14 @@ def test_a_scan_that_is_not_begun_opens_too(dialog, workspace, folder, qtbot):
     assert list(cut_words(dialog)) == []
 
 
-def test_chosen_rows_are_exported(dialog, workspace, folder, tmp_path, qtbot):
+def test_chosen_rows_are_exported(dialog, prompts, workspace, folder, tmp_path, qtbot):
     dialog.table.selectRow(2)
     assert dialog.chosen is None  # one row is where the pointer is: all that are shown are meant
     dialog.table.selectionModel().select(
         dialog.model.index(3, 0),
         dialog.table.selectionModel().SelectionFlag.Select | dialog.table.selectionModel().SelectionFlag.Rows,
     )
-    dialog._prompts.prepare(files=[tmp_path / "out"])
+    prompts.prepare(files=[tmp_path / "out"])
     qtbot.mouseClick(dialog.export, Qt.MouseButton.LeftButton)
     deliver(workspace)
     assert {path.name.split("_")[0] for path in (tmp_path / "out").iterdir()} == {"GP1", "GP2"}

@@ -40,7 +40,7 @@ def oblique(window):
 
 def around(view, degrees: float, reach: float) -> tuple[float, float]:
     """Return the logical pixel so far from the crosshair, in a direction from right to down."""
-    x, y = view.pixel_at(view._workspace.view.crosshair)
+    x, y = view.pixel_at(view.window().workspace.view.crosshair)
     angle = np.radians(degrees)
     return x + reach * np.cos(angle), y + reach * np.sin(angle)
 
@@ -129,10 +129,10 @@ def test_the_wheel_goes_by_voxels_across_and_points_show_near_their_slice(obliqu
     near, far = (model.crosshair + part * reach * shown.normal for part in (0.9, 1.1))
     oblique.workspace.labels.place(near, side=Side.LEFT, code="CA")
     model.set_crosshair(near - 0.9 * reach * shown.normal)
-    assert view._mark_at(*view.shown.scan_to_pixel(near[None])[0]) == "L:CA"
+    assert view.mark_at(*view.shown.scan_to_pixel(near[None])[0]) == "L:CA"
     oblique.workspace.labels.place(far, side=Side.LEFT, code="CA")
     model.set_crosshair(far - 1.1 * reach * shown.normal)
-    assert view._mark_at(*view.shown.scan_to_pixel(far[None])[0]) is None
+    assert view.mark_at(*view.shown.scan_to_pixel(far[None])[0]) is None
 
 
 def test_the_3d_view_shows_and_picks_oblique_slices(qtbot, oblique) -> None:
