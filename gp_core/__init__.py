@@ -37,7 +37,15 @@ from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen, Status
 from gp_core.landmarks.suggestion import Suggestion
 from gp_core.moved_modules import keep_importable
-from gp_core.pose.both_ears import EarCheck, MirrorPlane, check_ears, fuse_ears, mirror_plane
+from gp_core.pose.both_ears import (
+    EarCheck,
+    EarComparison,
+    MirrorPlane,
+    check_ears,
+    compare_ears,
+    fuse_ears,
+    mirror_plane,
+)
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.estimate import estimate_again, estimate_pose
 from gp_core.pose.estimate_inputs import EstimateInputs
@@ -47,6 +55,7 @@ from gp_core.pose.insertion_path import carry_path, read_path
 from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_core.pose.quality import PoseQuality, pose_quality
+from gp_core.pose.skull_link import SkullLink
 from gp_core.registration.fiducials import register_fiducials
 from gp_core.registration.jrmpc import JrmpcResult, JrmpcSettings, jrmpc
 from gp_core.registration.pivot import PivotCalibration, calibrate_pivot
@@ -117,6 +126,7 @@ __all__ = [
     "DistanceCheck",
     "DistanceTable",
     "EarCheck",
+    "EarComparison",
     "EstimateInputs",
     "Feature",
     "FiducialRegistration",
@@ -146,6 +156,7 @@ __all__ = [
     "Side",
     "SideCheck",
     "SimulationReport",
+    "SkullLink",
     "Specimen",
     "Status",
     "Suggestion",
@@ -158,6 +169,7 @@ __all__ = [
     "check_side",
     "check_specimen",
     "compare",
+    "compare_ears",
     "conditions",
     "distances",
     "estimate_again",

@@ -30,10 +30,9 @@ from gp_core.io import read_touches
 from gp_core.io.file_names import named_side
 from gp_core.io.pose_export import pose_text
 from gp_core.io.pose_json import is_pose_file, read_pose
-from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.answer import WITHHELD, pose_answer
-from gp_core.pose.both_ears import EarCheck, check_ears, fuse_ears, mirror_plane
+from gp_core.pose.both_ears import EarComparison, compare_ears
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
 from gp_core.pose.estimate import estimate_pose
 from gp_core.pose.gate import GateReason, PoseGate, named_for_other_side
@@ -154,6 +153,13 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
         help="combine the axes of both ears if they agree (needs --other-ear)",
     )
     group.add_argument(
+        "--midline",
+        type=_names,
+        metavar="S1,S2",
+        help="skull features that lie in the mid-plane of the head, touched with either ear: they determine "
+        "that plane better (needs --other-ear)",
+    )
+    group.add_argument(
         "--accept-warnings",
         action="store_true",
         help="write all files even where names or side look wrong or are undecided; without it, only --json "
@@ -219,7 +225,9 @@ def run(args: argparse.Namespace) -> int:
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
     if check is not None:
-        say(f"  {'' if ears.agrees else '! '}{ears.text}")
+        say(f"  {'' if ears.check.agrees else '! '}{ears.check.text}")
+        if ears.link is not None:
+            say(f"  {'! ' if ears.link.has_moved else ''}{ears.link.text}")
     if taken is not None:
         odds = f"{100 * taken.probability:.1f} %"
         say(f"  ! used as {taken.label}, which is more likely than the given names and side ({odds})")
@@ -298,7 +306,7 @@ def _given_pose(args: argparse.Namespace) -> _Given:
         raise GpError(
             "does not contain the touches and the atlas from which it was estimated",
             file=args.touches,
-            remedy="It is of an earlier version: estimate it from the file of touches.",
+            remedy="It is of both ears, or of an earlier version: estimate it from the files of touches.",
         )
     if args.side not in (None, made.touches.side.value):
         raise GpError(f"is of the {made.touches.side.word} side", file=args.touches)
@@ -330,25 +338,21 @@ def _atlas_for(words: list[str], method: str) -> AtlasSource:
 
 def _checked(
     args: argparse.Namespace, given: _Given, touches: LandmarkSet, pose: CochleaPose
-) -> tuple[CochleaPose, EarCheck] | None:
+) -> tuple[CochleaPose, EarComparison] | None:
     """Compare the estimate with that of the other ear, and with ``--both-ears`` make one axis of both."""
     if args.other_ear is None:
-        if args.both_ears:
-            raise GpError("--both-ears needs the touches of the other ear", remedy="Give --other-ear FILE.")
+        option = "--both-ears" if args.both_ears else "--midline" if args.midline else ""
+        if option:
+            raise GpError(f"{option} needs the touches of the other ear", remedy="Give --other-ear FILE.")
         return None
     with blaming(args.other_ear):
         other = read_touches(args.other_ear, touches.side.other, names=lab_names(args))
-        poses = {touches.side: pose, other.side: given.estimate(other)}
-        touched = {touches.side: touches, other.side: other}
-        plane = mirror_plane(touched[Side.LEFT], touched[Side.RIGHT])
-        check = check_ears(poses[Side.LEFT], poses[Side.RIGHT], plane)
-        if not (args.both_ears and check.agrees):
-            return pose, check
-        return fuse_ears(poses[Side.LEFT], poses[Side.RIGHT], plane)[pose.side], check
+        found = compare_ears(touches, pose, other, given.estimate(other), midline=args.midline or ())
+        return found.fused(pose.side) if args.both_ears and found.check.agrees else pose, found
 
 
-def _of_ears(check: EarCheck) -> list[GateReason]:
-    return [] if check.agrees else [GateReason("ears disagree", check.text)]
+def _of_ears(found: EarComparison) -> list[GateReason]:
+    return [] if found.check.agrees else [GateReason("ears disagree", found.check.text)]
 
 
 def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:
@@ -359,6 +363,10 @@ def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:
     mm = float(np.linalg.norm(pose.origin - stored.origin))
     degrees = float(angle_between_deg(pose.axis, stored.axis))
     return f"CO lies {mm:.2g} mm from that of {name}, the axis {degrees:.2g} deg"
+
+
+def _names(text: str) -> tuple[str, ...]:
+    return tuple(name.strip().upper() for name in text.split(",") if name.strip())
 
 
 def _two_names(text: str) -> tuple[str, str]:

@@ -140,6 +140,7 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         probability=_probability(content.get("probability", 1.0)),
         hypotheses=tuple(_hypothesis(entry, frame) for entry in content.get("hypotheses", ())),
         repeats={_text(name): _repeated(one) for name, one in content.get("repeated_touches", {}).items()},
+        of_both_ears=content.get("axis_of_both_ears", False) is True,
         stamp=_stamp(content.get("stamp", "")),
         inputs=None if content.get("inputs") is None else inputs_from(content["inputs"]),
     )

@@ -1,29 +1,41 @@
 """Both ears of one head: two estimates that check each other without any CT, or that are made one.
 
 Where both ears of a skull were touched in one frame, its mid-sagittal plane follows from the touches: of the
-features that were touched on both sides, and IN. The estimate of one ear, mirrored in that plane, should then
-be that of the other.
+features that were touched on both sides, of IN, and of skull features that are named as lying in it. The
+estimate of one ear, mirrored in that plane, should then be that of the other. Skull features that were
+touched with both ears tell whether the head moved between them (`gp_core.pose.skull_link`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from gp_core.argument_types import checks_arguments
+from gp_core.atlas.atlas import Atlas
 from gp_core.constants import CHI2_3_95
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform, angle_between_deg, cross_matrix
-from gp_core.landmarks.features import EXTERNAL, Side, feature
+from gp_core.landmarks.features import CODES, EXTERNAL, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.skull_link import SkullLink, link_by_skull
 from gp_core.validation import FloatArray, as_points, as_vectors, freeze_arrays
 
-__all__ = ["EarCheck", "MirrorPlane", "check_ears", "fuse_ears", "mirror_plane"]
+__all__ = [
+    "EarCheck",
+    "EarComparison",
+    "MirrorPlane",
+    "check_ears",
+    "compare_ears",
+    "fuse_ears",
+    "mirror_plane",
+]
 
 _FEWEST_PAIRS = 3
 _PAIR_SD_MM = 0.5
@@ -34,6 +46,13 @@ _ASYMMETRY_MM, _RESIDUAL_FACTOR = 0.3, 1.5
 
 _CORRELATION = 0.6
 """Of the errors of the two axes: both ears of an animal differ from the atlas in much the same way."""
+
+_PAIR_ASYMMETRY, _PLANE_ERROR_MM = 0.9, 0.1
+"""2 (1 - r), where r is how alike the two ears of an animal are: variance of a pair over that of its feature
+between animals. Error of the plane of the other pairs at a pair, mm a coordinate."""
+
+_PAIR_SQUARED = 16.3
+"""Squared Mahalanobis distance of a pair from being mirror images; 1 ordinary pair of 1000 exceeds it."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +71,11 @@ class MirrorPlane:
         Features that it is made from.
     normal_sd_deg, offset_sd_mm : float
         Standard deviation of its direction, and of its place at the middle of the pairs.
+    pairs_mm : mapping of str to float
+        By feature, how far its two touches are from being mirror images in the plane of all *other* features;
+        empty where too few are left for that.
+    rest_mm : mapping of str to float
+        By feature, the RMS distance of those others.
     """
 
     normal: FloatArray
@@ -60,9 +84,13 @@ class MirrorPlane:
     codes: tuple[str, ...]
     normal_sd_deg: float
     offset_sd_mm: float
+    pairs_mm: Mapping[str, float] = field(default_factory=dict)
+    rest_mm: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         freeze_arrays(self)
+        for name in ("pairs_mm", "rest_mm"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
     def mirror(self, points: ArrayLike) -> FloatArray:
         """Return points mirrored in the plane.
@@ -113,6 +141,8 @@ class EarCheck:
         What 95 % of heads stay within, by the regions of both estimates and of the plane.
     expected_residual_mm : float
         What the residual of the plane stays within, by the noise of the touches and the asymmetry of heads.
+    expected_pairs_mm : mapping of str to float
+        What a pair stays within, see `MirrorPlane.pairs_mm`, by the same.
     """
 
     plane: MirrorPlane
@@ -121,12 +151,23 @@ class EarCheck:
     expected_mm: float
     expected_deg: float
     expected_residual_mm: float
+    expected_pairs_mm: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "expected_pairs_mm", MappingProxyType(dict(self.expected_pairs_mm)))
 
     @property
     def agrees(self) -> bool:
         """Whether both differences, and those of the touched pairs, are within what is expected."""
         within = self.origin_mm <= self.expected_mm and self.axis_deg <= self.expected_deg
-        return within and self.plane.residual_mm <= self.expected_residual_mm
+        return within and self.plane.residual_mm <= self.expected_residual_mm and not self.suspects
+
+    @property
+    def suspects(self) -> tuple[str, ...]:
+        """Features whose two touches are no mirror images, the worst first: one of them is a mistouch."""
+        limits, apart = self.expected_pairs_mm, self.plane.pairs_mm
+        beyond = [code for code in limits if apart[code] > limits[code]]
+        return tuple(sorted(beyond, key=lambda code: limits[code] / apart[code]))
 
     @property
     def text(self) -> str:
@@ -136,7 +177,17 @@ class EarCheck:
             f"the two ears {word}: CO {self.origin_mm:.2f} mm and axis {self.axis_deg:.1f} deg from the "
             f"mirror image of the other (within {self.expected_mm:.2f} mm, {self.expected_deg:.1f} deg), "
             f"pairs {self.plane.residual_mm:.2f} mm (within {self.expected_residual_mm:.2f} mm); "
-            f"mid-plane from {', '.join(self.plane.codes)}"
+            f"mid-plane from {', '.join(self.plane.codes)}{self._of_suspects()}"
+        )
+
+    def _of_suspects(self) -> str:
+        """Say which feature to touch again: the worst, as it draws the plane from which others are judged."""
+        if not self.suspects:
+            return ""
+        code = self.suspects[0]
+        return (
+            f"; {code} is {self.plane.pairs_mm[code]:.2f} mm from being mirrored "
+            f"(within {self.expected_pairs_mm[code]:.2f} mm): touch it again on both ears"
         )
 
     def as_dict(self) -> dict[str, Any]:
@@ -158,17 +209,22 @@ class EarCheck:
             "plane_from": list(self.plane.codes),
             "plane_residual_mm": self.plane.residual_mm,
             "expected_residual_mm": self.expected_residual_mm,
+            "pairs_mm": dict(self.plane.pairs_mm),
+            "expected_pairs_mm": dict(self.expected_pairs_mm),
+            "suspect": list(self.suspects),
         }
 
 
 @checks_arguments
-def mirror_plane(left: LandmarkSet, right: LandmarkSet) -> MirrorPlane:
+def mirror_plane(left: LandmarkSet, right: LandmarkSet, *, midline: Iterable[str] = ()) -> MirrorPlane:
     """Return the mid-sagittal plane of a head from touches of both ears, in one frame.
 
     Parameters
     ----------
     left, right : LandmarkSet
         Touches of the two sides, mm.
+    midline : iterable of str
+        Skull features (``S1``, ...) that lie in the plane, touched with either ear.
 
     Returns
     -------
@@ -178,8 +234,8 @@ def mirror_plane(left: LandmarkSet, right: LandmarkSet) -> MirrorPlane:
     Raises
     ------
     GpError
-        The frames differ, fewer than three features were touched on both sides, or the pairs do not lie about
-        one plane.
+        The frames differ, fewer than three features were touched on both sides, a feature of the midline was
+        not touched, or the pairs do not lie about one plane.
 
     Examples
     --------
@@ -199,13 +255,29 @@ def mirror_plane(left: LandmarkSet, right: LandmarkSet) -> MirrorPlane:
             f"the mid-plane needs {_FEWEST_PAIRS} features that are touched on both sides, got {len(codes)}",
             remedy="Touch the same features on both ears.",
         )
-    one, other = left.array(codes), right.array(codes)
-    middle, half = (one + other) / 2, (one - other) / 2
     shared = [c for c in EXTERNAL if feature(c).shared and (c in left or c in right)]
-    on_plane = np.vstack([middle, *(_shared_point(left, right, c)[None] for c in shared)])
+    middle = {name: _shared_point(left, right, name) for name in (*shared, *midline)}
+    plane = _plane_of(left, right, codes, middle)
+    pairs_mm, rest_mm = {}, {}
+    if len(codes) > _FEWEST_PAIRS:
+        for code in codes:
+            others = _plane_of(left, right, tuple(c for c in codes if c != code), middle)
+            image = others.mirror(right[code][None])[0]
+            pairs_mm[code] = float(np.linalg.norm(image - left[code]))
+            rest_mm[code] = others.residual_mm
+    return replace(plane, pairs_mm=pairs_mm, rest_mm=rest_mm)
+
+
+def _plane_of(
+    left: LandmarkSet, right: LandmarkSet, codes: tuple[str, ...], middle: Mapping[str, FloatArray]
+) -> MirrorPlane:
+    """Return the plane of some pairs, and of points that lie in it."""
+    one, other = left.array(codes), right.array(codes)
+    half = (one - other) / 2
+    on_plane = np.vstack([(one + other) / 2, *middle.values()])
     normal = _normal(half, on_plane)
     offset = float((on_plane @ normal).mean())
-    plane = MirrorPlane(normal, offset, 0.0, (*codes, *shared), 0.0, 0.0)
+    plane = MirrorPlane(normal, offset, 0.0, (*codes, *middle), 0.0, 0.0)
     residual = float(np.sqrt(((plane.mirror(other) - one) ** 2).sum(axis=1).mean()))
     # each pair turns the normal by its error over its width, as a lever
     levers = float(np.sqrt((half**2).sum() + ((on_plane - on_plane.mean(axis=0)) ** 2).sum()))
@@ -232,8 +304,16 @@ def _normal(half: FloatArray, on_plane: FloatArray) -> FloatArray:
     return normal if along[0] > 0 else -normal
 
 
-def _shared_point(left: LandmarkSet, right: LandmarkSet, code: str) -> FloatArray:
-    points: FloatArray = np.mean([one[code] for one in (left, right) if code in one], axis=0)
+def _shared_point(left: LandmarkSet, right: LandmarkSet, name: str) -> FloatArray:
+    """Return a point of the plane: the mean of its touches with both ears."""
+    found = [point for one in (left, right) if (point := one.extra.get(name)) is not None]
+    found += [one[name] for one in (left, right) if name in CODES and name in one]
+    if not found:
+        raise GpError(
+            f"{name} is to lie in the mid-plane, and was touched with neither ear",
+            remedy="Name skull features that were touched, such as S1.",
+        )
+    points: FloatArray = np.mean(found, axis=0)
     return points
 
 
@@ -271,7 +351,156 @@ def check_ears(left: CochleaPose, right: CochleaPose, plane: MirrorPlane) -> Ear
     expected_deg = float(np.sqrt((cones**2).sum() + CHI2_3_95 * sway**2))
     noise = max(left.probe_noise or 0.0, right.probe_noise or 0.0)
     residual_mm = _RESIDUAL_FACTOR * float(np.sqrt(3 * (2 * noise**2 + _ASYMMETRY_MM**2)))
-    return EarCheck(plane, apart, turned, expected_mm, expected_deg, residual_mm)
+    pairs_mm = _expected_pairs(plane, left, right)
+    return EarCheck(plane, apart, turned, expected_mm, expected_deg, residual_mm, pairs_mm)
+
+
+def _expected_pairs(plane: MirrorPlane, left: CochleaPose, right: CochleaPose) -> dict[str, float]:
+    """Return how far a pair may be from being mirror images, by feature: noise, asymmetry and the plane.
+
+    The noise is what the estimates say, or what all other pairs show, whichever is more: six touches hardly
+    tell their own.
+    """
+    codes = list(plane.pairs_mm)
+    if not codes:
+        return {}
+    noise = sum((pose.probe_noise or 0.0) ** 2 for pose in (left, right))
+    shown = np.array([plane.rest_mm[code] ** 2 / 3 for code in codes])
+    asymmetry = _PAIR_ASYMMETRY * Atlas.published().variances(codes)
+    limits = np.sqrt(_PAIR_SQUARED * (asymmetry + np.maximum(noise, shown) + _PLANE_ERROR_MM**2))
+    return dict(zip(codes, limits.tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class EarComparison:
+    """Two ears of a head, compared in the frame of the first.
+
+    Attributes
+    ----------
+    check : EarCheck
+        Whether they agree.
+    poses : mapping of Side to CochleaPose
+        Both, in the frame of the first ear, as they were estimated.
+    link : SkullLink or None
+        What the skull features say that were touched with both ears; None with fewer than three.
+    """
+
+    check: EarCheck
+    poses: Mapping[Side, CochleaPose]
+    link: SkullLink | None = None
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The findings, a sentence each."""
+        return (self.check.text, *([] if self.link is None else [self.link.text]))
+
+    @checks_arguments
+    def fused(self, side: Side) -> CochleaPose:
+        """Return the estimate of a side with one axis of both ears, as `fuse_ears` makes it.
+
+        Parameters
+        ----------
+        side : Side
+            Which ear.
+
+        Returns
+        -------
+        CochleaPose
+            In the frame of the first ear.
+
+        Raises
+        ------
+        GpError
+            The two ears disagree.
+        """
+        return fuse_ears(self.poses[Side.LEFT], self.poses[Side.RIGHT], self.check.plane)[side]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the comparison for a JSON file, mm and degrees.
+
+        Returns
+        -------
+        dict
+            Plain values.
+        """
+        return {**self.check.as_dict(), "skull": None if self.link is None else self.link.as_dict()}
+
+
+@checks_arguments
+def compare_ears(
+    touches: LandmarkSet,
+    pose: CochleaPose,
+    other_touches: LandmarkSet,
+    other_pose: CochleaPose,
+    *,
+    midline: Iterable[str] = (),
+) -> EarComparison:
+    """Compare the estimates of two ears of a head that were touched in one frame.
+
+    Skull features that were touched with both ears say whether the head moved against its reference between
+    them; if it did, the other ear is moved back by them first.
+
+    Parameters
+    ----------
+    touches, other_touches : LandmarkSet
+        Touches of the two ears, with the skull features that were touched with each, mm.
+    pose, other_pose : CochleaPose
+        Their estimates.
+    midline : iterable of str
+        Skull features that lie in the mid-sagittal plane; see `mirror_plane`.
+
+    Returns
+    -------
+    EarComparison
+        In the frame of `touches`.
+
+    Raises
+    ------
+    GpError
+        Both are of one side, or as for `mirror_plane`.
+
+    Examples
+    --------
+    >>> from gp_core import estimate_pose
+    >>> atlas = Atlas.published()
+    >>> points = {code: atlas[code] + [0, 6, 0] for code in ("CL", "LLI", "MN", "OS", "RWA", "RWP")}
+    >>> left = LandmarkSet.from_touches(points, "L")
+    >>> right = LandmarkSet.from_touches({code: p * [1, -1, 1] for code, p in points.items()}, "R")
+    >>> compare_ears(left, estimate_pose(left, "L"), right, estimate_pose(right, "R")).check.agrees
+    True
+    """
+    link = link_by_skull(touches, other_touches)
+    if link is not None and link.T_ear_other is not None:
+        other_touches = other_touches.moved(link.T_ear_other)
+        other_pose = _moved(other_pose, link.T_ear_other)
+    sets = {one.side: one for one in (touches, other_touches)}
+    poses = {one.side: one for one in (pose, other_pose)}
+    if set(sets) != set(Side) or set(poses) != set(Side):
+        raise GpError("two ears of a head are needed, a left and a right one")
+    plane = mirror_plane(sets[Side.LEFT], sets[Side.RIGHT], midline=midline)
+    check = check_ears(poses[Side.LEFT], poses[Side.RIGHT], plane)
+    return EarComparison(check, MappingProxyType(poses), link)
+
+
+def _moved(pose: CochleaPose, T: RigidTransform) -> CochleaPose:
+    """Return a pose as it lies after a motion within its frame."""
+    turn = np.kron(np.eye(2), T.rotation)
+    hypotheses = tuple(
+        replace(
+            one,
+            transform_to_touches=T @ one.transform_to_touches,
+            covariance=turn @ one.covariance @ turn.T,
+        )
+        for one in pose.hypotheses
+    )
+    return replace(
+        pose,
+        transform_to_touches=T @ pose.transform_to_touches,
+        covariance=turn @ pose.covariance @ turn.T,
+        T_touches_atlas=None if pose.T_touches_atlas is None else T @ pose.T_touches_atlas,
+        hypotheses=hypotheses,
+        inputs=None,
+    )
 
 
 @checks_arguments
@@ -330,7 +559,13 @@ def _fused(pose: CochleaPose, other: CochleaPose, plane: MirrorPlane) -> Cochlea
     covariance[3:, 3:] = left_over @ own @ left_over.T + gain @ theirs @ gain.T + shared + shared.T
     covariance[:3, 3:] = covariance[:3, 3:] @ left_over.T
     covariance[3:, :3] = covariance[:3, 3:].T
-    return replace(pose, transform_to_touches=turned, covariance=(covariance + covariance.T) / 2, inputs=None)
+    return replace(
+        pose,
+        transform_to_touches=turned,
+        covariance=(covariance + covariance.T) / 2,
+        of_both_ears=True,
+        inputs=None,
+    )
 
 
 def _of_plane(plane: MirrorPlane) -> FloatArray:

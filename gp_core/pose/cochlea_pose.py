@@ -77,6 +77,8 @@ class CochleaPose:
         Other hypotheses that are not ruled out, the likeliest first.
     repeats : mapping of str to RepeatedTouches
         The touches of each feature that was touched more than once.
+    of_both_ears : bool
+        Whether its axis was made of both ears' (`gp_core.fuse_ears`).
     stamp : str
         When it was estimated, ISO 8601 in UTC; empty where that is not known.
     inputs : EstimateInputs or None
@@ -101,6 +103,7 @@ class CochleaPose:
     probability: float = 1.0
     hypotheses: tuple[Hypothesis, ...] = ()
     repeats: Mapping[str, RepeatedTouches] = field(default_factory=dict)
+    of_both_ears: bool = False
     stamp: str = field(default="", compare=False)
     inputs: EstimateInputs | None = field(default=None, repr=False, compare=False)
 
@@ -236,6 +239,8 @@ class CochleaPose:
             if self.T_touches_atlas is None
             else self.T_touches_atlas.matrix.tolist(),
         }
+        if self.of_both_ears:
+            content["axis_of_both_ears"] = True
         if self.repeats:
             content["repeated_touches"] = {code: one.as_dict() for code, one in self.repeats.items()}
         return content

@@ -68,6 +68,10 @@ class EstimateSettings:
         RMS length of one offset that all touches of the session share, mm; the regions allow for it.
     touches_each : int
         How often each feature is asked for; the estimate takes all touches there are.
+    both_ears : bool
+        Whether the axis is made of both ears', where both were touched and agree.
+    midline : tuple of str
+        Skull features that lie in the mid-plane of the head, by which the ears are compared.
     """
 
     side: Side = Side.LEFT
@@ -77,6 +81,8 @@ class EstimateSettings:
     round_window: str = "touched"
     shared_error: float = DEFAULT_SHARED_ERROR_MM
     touches_each: int = 1
+    both_ears: bool = False
+    midline: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

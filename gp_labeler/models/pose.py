@@ -30,6 +30,7 @@ from gp_labeler.document.touches import TouchHow, touch_name
 from gp_labeler.jobs.pose import WarmFit, WarmJoint
 from gp_labeler.jobs.runner import Jobs
 from gp_labeler.models.atlas import AtlasModel
+from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import EstimateSettings, SideEstimate, verdict_on
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.pose_estimator import PoseEstimator
@@ -163,6 +164,11 @@ class PoseModel:
     def of_side(self, side: Side) -> SideEstimate | None:
         """Return the estimate of a side, as `estimate` does for the one that is touched."""
         return self._estimator.of_side(self._document.state, side)
+
+    @property
+    def ears(self) -> BothEars | None:
+        """How the estimates of both ears agree; None where too little was touched of both in one frame."""
+        return self._estimator.ears(self._document.state, self.side)
 
     @property
     def waiting_text(self) -> str:

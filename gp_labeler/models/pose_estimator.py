@@ -17,6 +17,7 @@ from gp_core.pose.systematic_error import SystematicError
 from gp_core.validation import check_option
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.document.touch_edits import LeaveOutTouch
+from gp_labeler.models.both_ears import BothEars, compare_sides
 from gp_labeler.models.estimate import REGISTRATIONS, EstimateSettings, SideEstimate, apart, make_estimate
 
 __all__ = ["PoseEstimator"]
@@ -53,7 +54,9 @@ class PoseEstimator:
         self._atlas: Atlas | None = None
         self._specimens: tuple[Specimen, ...] = ()
         self._known: dict[Side, RigidTransform] = {}
-        self._made: _Made | None = None
+        self._made: dict[tuple[Side, bool], _Made] = {}
+        self._ears: dict[Side, BothEars] = {}
+        self._joined: dict[Side, tuple[BothEars, SideEstimate]] = {}
 
     def choose(self, **fields: Any) -> bool:
         """Change settings, fields of `EstimateSettings`; return whether they differ.
@@ -83,23 +86,23 @@ class PoseEstimator:
 
     def use_atlas(self, atlas: Atlas, specimens: Sequence[Specimen] = ()) -> None:
         """Take another atlas, with the labelled animals it was fitted to where they are known."""
-        self._atlas, self._specimens, self._made = atlas, tuple(specimens), None
+        self._atlas, self._specimens, self._made = atlas, tuple(specimens), {}
 
     def set_joint_ready(self) -> None:
         """Say that JRMPC is compiled."""
-        self.joint_ready, self._made = True, None
+        self.joint_ready, self._made = True, {}
 
     def set_registration(self, side: Side, T_scan_tracker: RigidTransform | None) -> None:
         """Say how the tracker lies to the scan, where that is known otherwise than from points."""
         self._known.pop(side, None)
         if T_scan_tracker is not None:
             self._known[side] = T_scan_tracker
-        self._made = None
+        self._made = {}
 
     def forget_registrations(self) -> None:
         """Forget how the tracker lies to the scan: it is another scan."""
         self._known.clear()
-        self._made = None
+        self._made = {}
 
     def waiting_text(self, state: SpecimenState) -> str:
         """Return what is still wanting for an estimate, in words; empty where there is one."""
@@ -110,21 +113,50 @@ class PoseEstimator:
         return "Loading the atlas" if self._atlas is None else ""
 
     def of_side(self, state: SpecimenState, side: Side) -> SideEstimate | None:
-        """Return the estimate of a side; None without an atlas or with fewer than three touches."""
-        chosen, made = self.settings, self._made
+        """Return the estimate of a side; None without an atlas or with fewer than three touches.
+
+        Where that is chosen, and both ears were touched and agree, its axis is that of both.
+        """
+        own = self._own(state, side)
+        if own is None or not self.settings.both_ears:
+            return own
+        compared = self._compared(state, side, own)
+        made = self._joined.get(side)
+        if made is None or made[0] is not compared:
+            made = self._joined[side] = compared, compared.joined(own)
+        return made[1]
+
+    def ears(self, state: SpecimenState, side: Side) -> BothEars | None:
+        """Return how the estimates of a side and of the other ear agree; None where that cannot be said."""
+        own = self._own(state, side)
+        found = None if own is None else self._compared(state, side, own)
+        return None if found is None or found.is_empty else found
+
+    def _compared(self, state: SpecimenState, side: Side, own: SideEstimate) -> BothEars:
+        other = self._own(state, side.other, plain=True)
+        found = self._ears.get(side)
+        if found is None or not found.is_of(own, other):
+            found = self._ears[side] = compare_sides(own, other)
+        return found
+
+    def _own(self, state: SpecimenState, side: Side, *, plain: bool = False) -> SideEstimate | None:
+        """Return what a side's own touches say; `plain`, by the robust method alone."""
+        chosen, made = self.settings, self._made.get((side, plain))
         if made is not None and made.is_of(state, chosen, side):
             return made.estimate
         settings = replace(chosen, side=side)
-        if not self.joint_ready:
+        if plain:
+            settings = replace(settings, methods=("robust",))
+        elif not self.joint_ready:
             settings = replace(settings, methods=_without_joint(settings.methods))
         key = (state.touches, state.skull, state.landmarks, settings)
         estimate = made.estimate if made is not None and made.key == key else self._make(state, settings)
-        self._made = _Made(state, chosen, side, key, estimate)
+        self._made[side, plain] = _Made(state, chosen, side, key, estimate)
         return estimate
 
     def without(self, state: SpecimenState, name: str) -> tuple[float, float] | None:
         """Return by how much the pose moves, mm and degrees, if a touch is left out, or taken in again."""
-        current = self.of_side(state, self.settings.side)
+        current = self._own(state, self.settings.side)
         touch = state.touches.get((self.settings.side, name))
         if current is None or current.pose is None or touch is None or name not in current.atlas.codes:
             return None

@@ -21,6 +21,7 @@ from gp_labeler.document.labelling_edits import labelling_text
 from gp_labeler.document.specimen_file import application
 from gp_labeler.document.state import PoseCheck, SpecimenState
 from gp_labeler.document.touches import Touch
+from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import SideEstimate
 
 __all__ = ["PoseReport"]
@@ -49,12 +50,15 @@ class PoseReport:
         PNG files by caption, in the order they are shown, six at most for one page.
     time : str
         ISO 8601.
+    ears : BothEars, optional
+        How the estimate agrees with that of the other ear, where both were touched.
     """
 
     state: SpecimenState
     estimate: SideEstimate
     pictures: Mapping[str, bytes] = field(default_factory=dict)
     time: str = ""
+    ears: BothEars | None = None
 
     @property
     def check(self) -> PoseCheck | None:
@@ -115,7 +119,18 @@ class PoseReport:
         )
         registration = self._registration()
         warnings = "".join(f'<p style="color:{_BAD}">! {escape(text)}</p>' for text in self._warnings())
-        return f"<h2>Estimate</h2>{_TABLE}<tr><th></th>{heads}</tr>{rows}</table>{registration}{warnings}"
+        table = f"{_TABLE}<tr><th></th>{heads}</tr>{rows}</table>"
+        return f"<h2>Estimate</h2>{table}{registration}{self._both_ears()}{warnings}"
+
+    def _both_ears(self) -> str:
+        """Say how the two ears agree, and whether the axis is that of both."""
+        if self.ears is None or self.ears.comparison is None:
+            return ""
+        pose = self.estimate.poses.get("robust")
+        joined = pose is not None and pose.of_both_ears
+        text = "; ".join(self.ears.comparison.texts) + ("; the axis is that of both ears" if joined else "")
+        colour = "" if self.ears.comparison.check.agrees else f' style="color:{_BAD}"'
+        return f"<p{colour}>{escape(text[:1].upper() + text[1:])}</p>"
 
     def _rows(self) -> Iterator[tuple[str, list[str]]]:
         estimate = self.estimate

@@ -225,6 +225,8 @@ class Recorder(QObject):
             probe_noise=settings.probe_noise,
             shared_error=None if settings.shared_error == DEFAULT_SHARED_ERROR_MM else settings.shared_error,
             round_window=window,
+            both_ears=settings.both_ears,
+            midline=list(settings.midline) or None,
         )
         is_fitted = pose.estimate is not None and pose.estimate.registered is not None
         register = [step("register", side=side, by=settings.registration)] if is_fitted else []

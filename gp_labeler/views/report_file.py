@@ -41,7 +41,9 @@ _MARGINS_MM = (14.0, 12.0, 14.0, 12.0)
 def report_of(window: MainWindow) -> PoseReport:
     """Make the report of the estimate a window shows; raises `GpError` where there is none."""
     estimate, document = reported_estimate(window.workspace), window.workspace.document
-    return PoseReport(document.state, estimate, report_pictures(window), document.now())
+    return PoseReport(
+        document.state, estimate, report_pictures(window), document.now(), window.workspace.pose.ears
+    )
 
 
 def reported_estimate(workspace: Workspace) -> SideEstimate:

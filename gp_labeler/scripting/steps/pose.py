@@ -107,6 +107,10 @@ class EstimateStep(Step):
         is then of the side that was taken.
     round_window : str
         What y of the cochlea frame points to: the ``touched`` round window, or the ``expected`` one.
+    both_ears : bool
+        Where both ears were touched in one frame and agree, make the axis of both.
+    midline : text or texts
+        Skull features that lie in the mid-plane of the head, by which the ears are compared.
     path : text or texts
         Where the pose is written: .json, .tfm, .csv (4 x 4) or .mrk.json.
     """
@@ -126,6 +130,8 @@ class EstimateStep(Step):
     take_best: bool = False
     accept_warnings: bool = False
     round_window: str = "touched"
+    both_ears: bool = False
+    midline: tuple[str, ...] = ()
     path: tuple[str, ...] = ("pose.json",)
 
     def run(self, driver: WindowDriver) -> str:  # noqa: D102
@@ -140,6 +146,8 @@ class EstimateStep(Step):
             probe_noise=self.probe_noise,
             shared_error=self.shared_error,
             round_window=self.round_window,
+            both_ears=self.both_ears,
+            midline=self.midline,
         )
         estimate = current_estimate(driver, self.side)
         if self.take_best and (taken := driver.workspace.pose.take_likelier()) is not None:
@@ -153,6 +161,7 @@ class EstimateStep(Step):
         for method in self.method:
             for warning in estimate.poses[method].warnings:
                 driver.workspace.say(f"{method}: {warning}", "warning")
+        self._tell_of_ears(driver)
         side = estimate.side
         driver.poses[side] = Estimated(estimate, pose, _truth(driver, side))
         files = [
@@ -160,6 +169,16 @@ class EstimateStep(Step):
             for path in self.path
         ]
         return _told(driver.poses[side], driver.wrote(*files))
+
+    def _tell_of_ears(self, driver: WindowDriver) -> None:
+        ears = driver.workspace.pose.ears
+        if ears is None:
+            return
+        if ears.comparison is None:
+            driver.workspace.say(ears.problem, "warning")
+            return
+        for text in ears.comparison.texts:
+            driver.workspace.say(text, "info" if ears.comparison.check.agrees else "warning")
 
     def _take_atlas(self, driver: WindowDriver) -> None:
         if self.specimens:

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from atlas_cases import random_pose
+from scipy.spatial.transform import Rotation
 
-from gp_core import PROBE, Atlas, GpError, LandmarkSet, Side, estimate_pose
+from gp_core import (
+    EXTERNAL,
+    PROBE,
+    Atlas,
+    EarComparison,
+    GpError,
+    LandmarkSet,
+    Side,
+    estimate_pose,
+    read_pose,
+)
 from gp_core.atlas.sampling import draw_animal
 from gp_core.cli.entry import main
-from gp_core.frames import angle_between_deg
+from gp_core.frames import RigidTransform, angle_between_deg
 from gp_core.landmarks.anatomy import with_cochlea_origin
-from gp_core.pose.both_ears import check_ears, fuse_ears, mirror_plane
+from gp_core.pose.both_ears import check_ears, compare_ears, fuse_ears, mirror_plane
+from gp_core.pose.skull_link import link_by_skull
 
 ATLAS = Atlas.published()
 
@@ -92,6 +105,93 @@ def test_one_axis_of_both_ears_is_nearer_to_the_truth() -> None:
     assert np.mean(within) > 0.9
 
 
+@pytest.mark.parametrize("side", Side)
+def test_a_mistouch_on_one_ear_is_named_by_its_pair_and_ordinary_ears_have_none(side: Side) -> None:
+    named, wrong, alarms = 0, 0, 0
+    for seed in range(25):
+        _, touches = _head(seed)
+        alarms += bool(_compared(touches).check.suspects)
+        way = np.random.default_rng(seed).standard_normal(3)
+        off = 2.5 * way / np.linalg.norm(way)
+        code = ("CL", "LLI", "OS", "RWA", "RWP")[seed % 5]
+        check = _compared({**touches, side: touches[side].with_point(code, touches[side][code] + off)}).check
+        assert not check.agrees or not check.suspects
+        named += code in check.suspects[:1]
+        wrong += bool(check.suspects) and check.suspects[0] != code
+    assert named >= 21
+    assert wrong <= 2
+    assert alarms <= 1
+
+
+def _compared(touches: dict[Side, LandmarkSet], **options: object) -> EarComparison:
+    left, right = touches[Side.LEFT], touches[Side.RIGHT]
+    return compare_ears(left, estimate_pose(left, "L"), right, estimate_pose(right, "R"), **options)
+
+
+def _with_skull(touches: dict[Side, LandmarkSet], noise: float, seed: int) -> dict[Side, LandmarkSet]:
+    """Touch four skull features with each ear, the first two of them in the mid-plane."""
+    rng = np.random.default_rng(seed)
+    plane = mirror_plane(touches[Side.LEFT], touches[Side.RIGHT])
+    middle = touches[Side.LEFT]["OS"] - 8 * plane.normal
+    places = middle + rng.normal(0, 8, (4, 3))
+    places[:2] -= np.outer(places[:2] @ plane.normal - plane.offset, plane.normal)
+    return {
+        side: replace(
+            one, extra={f"S{n + 1}": place + noise * rng.standard_normal(3) for n, place in enumerate(places)}
+        )
+        for side, one in touches.items()
+    }
+
+
+def test_skull_features_tell_that_the_head_moved_between_the_ears_and_bring_it_back() -> None:
+    motion = RigidTransform.from_parts(
+        Rotation.from_rotvec([0.05, -0.1, 0.08]).as_matrix(), [2, -3, 1], dst="tracker", src="tracker"
+    )
+    still, moved = 0, 0
+    for seed in range(8):
+        touches = _with_skull(_head(seed)[1], 0.1, seed)
+        before = _compared(touches)
+        assert before.link is not None
+        still += not before.link.has_moved
+        knocked = {**touches, Side.RIGHT: touches[Side.RIGHT].moved(motion)}
+        after = _compared(knocked)
+        assert after.link is not None
+        moved += after.link.has_moved
+        assert after.check.plane.residual_mm < before.check.plane.residual_mm + 0.5
+        assert after.poses[Side.RIGHT].radius_95 == pytest.approx(
+            before.poses[Side.RIGHT].radius_95, rel=1e-6
+        )
+    assert still >= 7
+    assert moved == 8
+    assert "moved against its reference" in after.link.text
+    assert after.as_dict()["skull"]["moved"] is True
+    two = replace(touches[Side.LEFT], extra={"S1": [0, 0, 0], "S2": [1, 0, 0]})
+    assert link_by_skull(two, two) is None
+
+
+def test_skull_features_of_the_midline_determine_the_plane_better() -> None:
+    without, with_midline = [], []
+    for seed in range(20):
+        truth, touches = _head(seed, noise=0.4)
+        exact = mirror_plane(*(LandmarkSet.from_mapping(truth[s].as_mapping(EXTERNAL), s) for s in Side))
+        normal = exact.normal
+        rng = np.random.default_rng(seed)
+        places = (
+            np.array([[0, 0, 0], [12.0, 0, 0], [0, 12.0, 5]])
+            @ np.linalg.qr(np.column_stack([normal, rng.standard_normal((3, 2))]))[0][:, [1, 2, 0]].T
+        )
+        places += truth[Side.LEFT]["OS"]
+        places -= np.outer(places @ normal - exact.offset, normal)
+        extra = {f"S{n}": place + 0.1 * rng.standard_normal(3) for n, place in enumerate(places)}
+        left = replace(touches[Side.LEFT], extra=extra)
+        for found, midline in ((without, ()), (with_midline, tuple(extra))):
+            plane = mirror_plane(left, touches[Side.RIGHT], midline=midline)
+            found.append(float(angle_between_deg(plane.normal, normal)))
+    assert np.mean(with_midline) < 0.9 * np.mean(without)
+    with pytest.raises(GpError, match="S9 is to lie in the mid-plane, and was touched with neither ear"):
+        mirror_plane(left, touches[Side.RIGHT], midline=["S9"])
+
+
 def test_what_is_no_pair_of_ears_is_refused() -> None:
     _, touches = _head(0)
     left, right = touches[Side.LEFT], touches[Side.RIGHT]
@@ -125,5 +225,11 @@ def test_the_command_checks_and_joins_both_ears(tmp_path: Path, capsys: pytest.C
     assert joined["plain_cone_95_deg"] < 1.02 * content["plain_cone_95_deg"]
     assert joined["modiolar_axis"] != content["modiolar_axis"]
     assert joined["cochlea_origin_mm"] == content["cochlea_origin_mm"]
+    assert joined["axis_of_both_ears"] is True
+    assert read_pose(out).of_both_ears
+    assert main(["estimate", str(out)]) == 2
+    assert "It is of both ears" in capsys.readouterr().err
+    assert main([*words, "--midline", "S1"]) == 2
+    assert "S1 is to lie in the mid-plane" in capsys.readouterr().err
     assert main(["estimate", str(file), "--side", "L", "--both-ears"]) == 2
     assert "--other-ear" in capsys.readouterr().err

@@ -19,6 +19,7 @@ from gp_labeler.views.panels.flow import FlowLayout
 from gp_labeler.views.panels.parts import Card, text_label
 from gp_labeler.views.panels.pose.wording import (
     allowance_text,
+    ear_notices,
     fine_mm,
     gain_text,
     likely_text,
@@ -227,3 +228,4 @@ def _notices(workspace: Workspace, estimate: SideEstimate) -> Iterator[tuple[str
                 said.add(warning)
                 words, _, remedy = warning.partition(": ")
                 yield ("warning", sentence(words), sentence(remedy) if remedy else "")
+    yield from ear_notices(workspace.pose.ears, wanted=workspace.pose.settings.both_ears)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from qtpy.QtWidgets import QHBoxLayout, QLabel, QLineEdit, QWidget
+from qtpy.QtWidgets import QCheckBox, QHBoxLayout, QLabel, QLineEdit, QWidget
 
 from gp_core.constants import METHOD_NAMES
 from gp_core.landmarks.features import Side
@@ -66,6 +66,11 @@ class EstimateSettingsCard(Card):
             "How often each feature is asked for. All touches are used, by their mean; three times take some "
             "30 % off the error of CO where touches are rough"
         )
+        self.ears = QCheckBox("Combine the axes of both ears")
+        self.ears.setToolTip(
+            "If both ears were touched in one frame and agree, the axis is estimated from both. CO is not "
+            "changed"
+        )
         self.atlas = ElidedLabel()
         self.problem = text_label("", "warning", wrap=True)
         self.problem.setAccessibleName("Why the atlas chosen last time is not in use")
@@ -77,6 +82,7 @@ class EstimateSettingsCard(Card):
         self.noise.textEdited.connect(self._on_edited)
         self.shared.value_chosen.connect(lambda mm: self._choose(shared_error=mm))
         self.each.value_chosen.connect(lambda n: self._choose(touches_each=round(n)))
+        self.ears.clicked.connect(lambda on: self._choose(both_ears=on))
         do_action(self.to_atlas, actions["atlas.show"])
         self.specimen.editingFinished.connect(self._rename)
         do_action(self.new, actions["file.new"])
@@ -101,6 +107,8 @@ class EstimateSettingsCard(Card):
             self.specimen.setText(state.specimen)
         atlas = self._workspace.atlas.current
         self.each.set_value(settings.touches_each)
+        self.ears.setChecked(settings.both_ears)
+        self.ears.setEnabled(settings.both_ears or self._workspace.pose.ears is not None)
         self.atlas.set_words("loading…" if atlas is None else atlas.name)
         problem = self._workspace.atlas.problem
         self.problem.setText(breakable(f"{problem} The published atlas is used.") if problem else "")
@@ -138,7 +146,7 @@ class EstimateSettingsCard(Card):
         each.addStretch(1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
-        for what in (self._named, choices, noise, shared, each, atlas, self.problem):
+        for what in (self._named, choices, noise, shared, each, self.ears, atlas, self.problem):
             self.add(what)
 
     def _rename(self) -> None:

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from gp_core.constants import METHOD_NAMES
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, feature
 from gp_core.landmarks.repeats import combine_repeats
+from gp_core.pose.both_ears import EarCheck
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.next_touch import TouchGain
 from gp_labeler.document.touches import Touch, TouchHow
+from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.views.formatting import NONE, degrees_text
 
 __all__ = [
     "allowance_text",
     "change_text",
+    "ear_notices",
     "fine_mm",
     "gain_text",
     "likely_text",
@@ -102,6 +105,37 @@ def allowance_text(pose: CochleaPose) -> str:
         return text
     plain = f"{fine_mm(pose.plain_radius_95)}  ·  cone {degrees_text(pose.plain_cone_95)}"
     return f"As named: {plain}\nThe region above covers several hypotheses. {text}"
+
+
+def ear_notices(ears: BothEars | None, *, wanted: bool) -> Iterator[tuple[str, ...]]:
+    """Yield level, words and remedy of what the two ears say of each other; `wanted`: one axis of both."""
+    if ears is None:
+        return
+    if ears.comparison is None:
+        yield ("warning", f"The two ears cannot be compared: {sentence(ears.problem)}")
+        return
+    check, link = ears.comparison.check, ears.comparison.link
+    apart = (
+        f"mirrored, CO is {fine_mm(check.origin_mm)} and the axis {check.axis_deg:.1f}° from the other ear's "
+        f"(95 %: {fine_mm(check.expected_mm)}, {check.expected_deg:.1f}°)"
+    )
+    if check.agrees:
+        use = ". The axis is that of both" if wanted else ""
+        yield ("info", f"The two ears agree: {apart}{use}.")
+    else:
+        yield ("warning", f"The two ears disagree: {apart}.", _ear_remedy(check))
+    if link is not None and link.has_moved:
+        yield ("warning", sentence(link.text), "Fix the head or its marker before the next touches.")
+
+
+def _ear_remedy(check: EarCheck) -> str:
+    if check.suspects:
+        code = check.suspects[0]
+        return (
+            f"{code} is {fine_mm(check.plane.pairs_mm[code])} from being mirrored "
+            f"({fine_mm(check.expected_pairs_mm[code])} is possible): touch it again on both ears."
+        )
+    return "Check sides and names, and that head and reference did not move between the ears."
 
 
 def likely_text(probability: float) -> str:
