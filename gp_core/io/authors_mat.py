@@ -96,7 +96,7 @@ def import_mat(
     }
     if not overwrite and (there := next((file for file in files if file.exists()), None)):
         remedy = "Name an empty folder, or replace what is there (--replace)."
-        raise GpError("is there already", file=there, remedy=remedy)
+        raise GpError("already exists", file=there, remedy=remedy)
     for file, (name, landmarks) in files.items():
         source = Path(path_left if landmarks.side is Side.LEFT else path_right).name
         provenance = {code: {"method": "imported", "source": source} for code in landmarks.placed}

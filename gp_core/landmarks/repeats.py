@@ -90,7 +90,7 @@ class RepeatedTouches:
 
     @property
     def outliers(self) -> tuple[int, ...]:
-        """Which touches lie apart from the others; the first is 1."""
+        """Which touches are outliers; the first is 1."""
         return tuple(int(i) + 1 for i in np.flatnonzero(~self.used))
 
 

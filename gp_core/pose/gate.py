@@ -173,7 +173,7 @@ def named_for_other_side(file: str, side: Side) -> GateReason:
     GateReason
         The side is ambiguous.
     """
-    return GateReason("side undecided", f"by its name {file} is of the {side.other.word} side")
+    return GateReason("side undecided", f"the name {file} indicates the {side.other.word} side")
 
 
 def reasons_against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:

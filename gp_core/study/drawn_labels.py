@@ -154,7 +154,7 @@ def _write(folder: Path, files: dict[Path, tuple[str, LandmarkSet]], overwrite: 
         raise GpError(f"cannot be made a folder ({error})", file=folder, remedy="Name another.") from None
     if not overwrite and (there := next((file for file in files if file.exists()), None)):
         remedy = "Name an empty folder, or replace what is there (--replace)."
-        raise GpError("is there already", file=there, remedy=remedy)
+        raise GpError("already exists", file=there, remedy=remedy)
     for file, (name, landmarks) in files.items():
         provenance = {code: {"method": "drawn"} for code in landmarks.placed}
         write_markups(file, landmarks, specimen=name, provenance=provenance)

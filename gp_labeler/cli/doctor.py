@@ -129,7 +129,7 @@ def _packages(found: Examination) -> None:
         found.note("Packages", f"{asked.name:24} {version}")
         if not asked.specifier.contains(version, prereleases=True):
             wanted = f"{asked.name}{asked.specifier}"
-            found.wrong.append(f'{asked.name} {version} does not do. Run pip install "{wanted}"')
+            found.wrong.append(f'{asked.name} {version} is too old. Run pip install "{wanted}"')
 
 
 def _libraries(found: Examination) -> None:
@@ -240,7 +240,7 @@ def _state_folder(found: Examination) -> None:
     except OSError as error:
         found.note("State folder", f"{folder}: cannot be written")
         found.wrong.append(
-            f"{there}: {error.strerror}; edits are not kept if the program ends. Make it writable"
+            f"{there}: {error.strerror}; edits would be lost if the program ended. Make it writable"
         )
         return
     found.note("State folder", f"{folder}: {_journals(folder)}, {free / 1e9:.1f} GB free")

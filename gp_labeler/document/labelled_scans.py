@@ -113,7 +113,7 @@ class _Finding:
             points: dict[str, FloatArray] = {}
             for specimen in load_specimens(own):
                 if any(landmarks.frame != "scan" for landmarks in specimen.sides.values()):
-                    self.skipped.append(Skipped(name, "its landmarks are not in the frame of a scan"))
+                    self.skipped.append(Skipped(name, "its landmarks are not in the scan frame"))
                     continue
                 points |= flat_points(specimen.sides)
             if points:
@@ -128,7 +128,7 @@ class _Finding:
         options: Mapping[str, object],
     ) -> None:
         if name in self.scans:
-            self.skipped.append(Skipped(file.name, f"{name} is there already"))
+            self.skipped.append(Skipped(file.name, f"{name} already exists"))
         elif len(points) < FEWEST_LANDMARKS:
             self.skipped.append(Skipped(file.name, f"{len(points)} points are placed"))
         elif path is None or not path.exists():

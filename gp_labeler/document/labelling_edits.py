@@ -56,7 +56,7 @@ class BeginLabelling:
         new = StoredLabelling(" ".join(self.observer.split()), number, {}, self.blind)
         if any(each.round == number and _is_by(each, self.observer) for each in _others(state)):
             raise GpError(
-                f"{labelling_text(self.observer, number)} is there already",
+                f"{labelling_text(self.observer, number)} already exists",
                 specimen=state.specimen,
                 remedy="Open that labelling, or begin the next round.",
             )
@@ -106,7 +106,7 @@ class NameObserver:
         """Return the state with this observer; raises `GpError` where that labelling is there already."""
         if any(each.round == state.round and _is_by(each, self.observer) for each in state.others):
             raise GpError(
-                f"{labelling_text(self.observer, state.round)} is there already",
+                f"{labelling_text(self.observer, state.round)} already exists",
                 specimen=state.specimen,
                 remedy="Name another observer.",
             )

@@ -193,7 +193,7 @@ def _nothing_placed(state: SpecimenState) -> GpError:
     return GpError(
         f"nothing is placed yet, {n} point{' is' if n == 1 else 's are'} only suggested",
         specimen=state.specimen,
-        remedy="Confirm them where you can judge them, or export the suggestions too.",
+        remedy="Confirm them, or also export the suggestions.",
     )
 
 

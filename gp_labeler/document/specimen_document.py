@@ -50,7 +50,7 @@ class VolumeChangedError(GpError):
         super().__init__(
             f"{reference.name} is not the scan that was labelled: {'; '.join(differences)}",
             file=reference.path,
-            remedy="Choose the right one, or accept it after looking where the points lie.",
+            remedy="Choose the correct scan, or accept this one after you have checked where the points are.",
         )
 
 
@@ -235,7 +235,7 @@ class SpecimenDocument:
         self.close()
         self._hold(specimen)
         self.reset.emit()
-        told = (f"Unsaved edits of {name} are kept, and offered at the next start",)
+        told = (f"Unsaved edits of {name} are kept; the next start offers them",)
         self.loaded.emit((*(told if kept and self.directory is not None else ()), *specimen.notices))
 
     def abandon(self) -> None:

@@ -301,7 +301,7 @@ class SpecimenState:
         if not name or set(name) & set('/\\:*?"<>|\n\t') or name.startswith("."):
             raise GpError(
                 f"a specimen's name must be a valid file name, got {self.specimen!r}",
-                remedy="Such as GP-014.",
+                remedy="For example GP-014.",
             )
         kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
         sets = {

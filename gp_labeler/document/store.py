@@ -171,7 +171,7 @@ class SpecimenStore:
                 volume_lock_path(self.directory, path), f"The scan {Path(path).name}"
             )
         except InUseError as error:
-            return f"{error.problem}. Labels made there are not seen here."
+            return f"{error.problem}. Labels made there are not shown here."
         except GpError as error:
             _log.warning("%s", error)
         return None
@@ -197,7 +197,7 @@ class SpecimenStore:
             raise GpError("exists already", file=target, remedy="Choose another name, or overwrite it.")
         if digest(target) != self._saved:
             raise GpError(
-                "was changed by another program since it was opened here",
+                "was changed by another program after it was opened",
                 file=target,
                 remedy="Save under another name, or overwrite it.",
             )

@@ -94,7 +94,7 @@ def touch_name(name: str) -> str:
             remedy=f"Touch any of {' '.join(EXTERNAL)}.",
         )
     if not text:
-        raise FeatureError("a touch needs the name of a feature", remedy=f"Such as {EXTERNAL[0]}.")
+        raise FeatureError("a touch needs the name of a feature", remedy=f"For example {EXTERNAL[0]}.")
     return text
 
 

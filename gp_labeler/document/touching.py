@@ -109,13 +109,15 @@ def load_touches(document: SpecimenDocument, path: str | PathLike[str], side: Si
             for name, p in points.items()
         }
     if not taken:
-        raise GpError("holds no touch that the tracker saw", file=path, remedy="Touch the features again.")
+        raise GpError(
+            "contains no touch that the tracker has seen", file=path, remedy="Touch the features again."
+        )
     with blaming(path):
         document.do(TakeTouches(Side.parse(side), taken))
     named, unseen = named_side(source), " ".join(sorted(touched.unseen))
     warnings = [f"Not seen by the tracker: {unseen}"] if unseen else []
     if named not in (None, Side.parse(side)):
-        warnings.append(f"By its name it is of the {named.word} side: check the side")
+        warnings.append(f"Its name indicates the {named.word} side: check the side")
     return tuple(warnings)
 
 
@@ -165,7 +167,9 @@ def load_skull(document: SpecimenDocument, path: str | PathLike[str]) -> tuple[s
     skull = {name: p.position for name, p in named if p.position is not None and name not in CODES}
     if not skull:
         raise GpError(
-            "names no skull feature", file=path, remedy="Name them as the touches do, such as S1 to S8."
+            "names no skull feature",
+            file=path,
+            remedy="Use the same names as in the touches, such as S1 to S8.",
         )
     with blaming(path):
         document.do(SetSkull({name: as_position(point, name) for name, point in skull.items()}))

@@ -43,7 +43,7 @@ def space_problem(n_bytes: int) -> str | None:
     """Return why so many bytes cannot be put there; None where they can."""
     limit, folder = setting("cache_gb") or _DEFAULT_GB, cache_folder()
     if n_bytes > limit * 1e9:
-        return f"unpacked it takes {n_bytes / 1e9:.1f} GB, and the limit of the cache is {limit} GB"
+        return f"unpacked it takes {n_bytes / 1e9:.1f} GB, but the limit of the cache is {limit} GB"
     there = next((place for place in (folder, *folder.parents) if place.is_dir()), None)
     free = shutil.disk_usage(there).free if there is not None else 0
     if n_bytes + _SPARE_BYTES > free:

@@ -159,7 +159,7 @@ def replace_fill(array: _Array, fills: tuple[Fill, ...], replacement: Replacemen
 def _note(fill: Fill, n: int, size: int) -> str:
     what = "without a finite value" if np.isnan(fill.value) else f"of the value {fill.value:g}"
     part = f"{100 * n / size:.2g} %"
-    return f"{n} voxels {what} ({part}) were not measured, and count as neither bone nor air"
+    return f"{n} voxels {what} ({part}) are fill values, and count as neither bone nor air"
 
 
 def _below(low: float, high: float, dtype: np.dtype[Any]) -> tuple[float, bool]:

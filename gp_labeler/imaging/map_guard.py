@@ -135,7 +135,7 @@ def _install() -> None:
     engine = _compiled(str(_handler(ctypes.addressof(before), _address(libc.sigaction), _address(libc.mmap))))
     action = _action(engine.get_function_address(_NAME))
     if libc.sigaction(_SIGBUS[sys.platform], action, before) != 0:
-        raise OSError("the system takes no handler")
+        raise OSError("the system does not allow a handler")
     _installed.extend((engine, before, action))
 
 

@@ -101,7 +101,7 @@ class MappedFile:
         except OSError as error:
             return f"cannot be read any more ({error.strerror or error})"
         if now.st_size < self._n_bytes:
-            return f"was cut while it was open: {now.st_size:,} of its {self._n_bytes:,} bytes are left"
+            return f"was truncated while it was open: {now.st_size:,} of its {self._n_bytes:,} bytes are left"
         if self._map.broken:
             return "cannot be read any more: its disk failed, or is not connected"
         return "was changed while it was open" if now.st_mtime_ns != self._written else None

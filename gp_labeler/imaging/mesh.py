@@ -170,7 +170,7 @@ class Surface:
             The surface is empty.
         """
         if not self.n_triangles:
-            raise GeometryError("the surface is empty: there is nothing to project on")
+            raise GeometryError("the surface is empty: nothing can be projected onto it")
         self.prepare()
         nearest, triangle, part, squared = [0.0, 0.0, 0.0], _out(0), _out(0), _out(0.0)
         self.locator.FindClosestPoint(triple(point), nearest, triangle, part, squared)

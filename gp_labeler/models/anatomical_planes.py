@@ -222,8 +222,8 @@ class AnatomicalPlanesModel:
     def _lacks(self, codes: str, what: str) -> GpError:
         side = self._labels.active.side.word
         return GpError(
-            f"where the {what} of the {side} side is, is not known yet",
-            remedy=f"Place {codes}, or three features, from which they are expected.",
+            f"where the {what} of the {side} side is not known yet",
+            remedy=f"Place {codes}, or three features, from which their positions are predicted.",
         )
 
 
@@ -254,6 +254,6 @@ def _facing(straight: SlicePlane, normal: FloatArray, down: FloatArray, origin: 
 def _unit(vector: FloatArray, what: str) -> FloatArray:
     length = float(np.linalg.norm(vector))
     if length < 1e-9:
-        raise GpError(f"{what} are at the same place, so no plane goes through them")
+        raise GpError(f"{what} are at the same place, so they do not define a plane")
     unit: FloatArray = vector / length
     return unit

@@ -335,7 +335,7 @@ class AtlasModel:
             return
         if recalled.problem:
             self.use(recalled.fitted.atlas)
-            self.problem = f"The atlas of {source.text} cannot be had any more: {recalled.problem}"
+            self.problem = f"The atlas of {source.text} is no longer available: {recalled.problem}"
             self.details_changed.emit()
             self._messages.say(f"{self.problem} The published atlas is used.", "warning")
         elif source.file is not None:

@@ -379,10 +379,10 @@ def _times(state: SpecimenState, side: Side, codes: Iterable[str]) -> dict[str, 
 def _check_joint(touches: LandmarkSet, specimens: Sequence[Specimen]) -> None:
     """Refuse what JRMPC cannot do, with what is to be done about it here rather than in the shell."""
     if not specimens:
-        raise GpError("it needs the labelled animals", remedy="Fit the atlas from them in step 3 Atlas.")
+        raise GpError("it needs labelled animals", remedy="Fit an atlas to them in the step 3 Atlas.")
     lacking = [code for code in ("RWA", "RWP", "LLI") if code not in touches.placed]
     if lacking:
-        raise GpError(f"it begins at the round window and needs {' '.join(lacking)}", remedy="Touch it too.")
+        raise GpError(f"it starts at the round window and needs {' '.join(lacking)}", remedy="Touch it too.")
 
 
 def _registered(

@@ -208,11 +208,13 @@ class HeadModel:
             The views show planes along an ear, or not three planes at right angles.
         """
         if self._view.shows_anatomy:
-            raise GpError("the views show planes of an ear, not of the head", remedy="Straighten them first.")
+            raise GpError(
+                "the views show planes of an ear, not the head frame", remedy="Straighten them first."
+            )
         sagittal, coronal, axial = (self._view.planes[n] for n in ("sagittal", "coronal", "axial"))
         axes = np.stack([sagittal.normal, coronal.normal, axial.normal])
         if np.linalg.det(axes) < 1 - 1e-6:
-            raise GpError("the three views are not at right angles", remedy="Straighten them first.")
+            raise GpError("the three views are not perpendicular", remedy="Straighten them first.")
         origin = sagittal.origin if self.is_shown else self._view.crosshair
         self._take_by_hand(axes, origin, merge=merge)
 
@@ -269,7 +271,9 @@ class HeadModel:
             SetHeadFrame(HeadFrame(frame.matrix, pose.found_by, pose.pitch, pose.left, left_is_known))
         )
         self._points.clear()
-        words = [f"The head lies {pose.tilt_deg:.0f}° off the axes of its scan; the views are straight now"]
+        words = [
+            f"The head lies {pose.tilt_deg:.0f}° from the axes of its scan; the views are now aligned with it"
+        ]
         if self.asks_left:
             words.append("say which side is left: 1 Scan > Head")
         self._messages.say("; ".join((*words, *pose.warnings)), "warning" if pose.warnings else "info")

@@ -331,7 +331,7 @@ class PoseModel:
     def require_target(self) -> str:
         """Return the feature to touch next; raises `GpError` where all are touched."""
         if self._target is None:
-            raise GpError("all features are touched", remedy="Choose one to touch again.")
+            raise GpError("all features are touched", remedy="Select one to touch again.")
         return self._target
 
     def change_side(self) -> None:
@@ -371,7 +371,7 @@ class PoseModel:
     def swap_names(self) -> None:
         """Give each of these two the other's name; raises `GpError` where none look so."""
         if self.swapped is None:
-            raise GpError("no two touches look as if each had the other's name")
+            raise GpError("no two touches look exchanged")
         touching.swap_touches(self._document, self.side, *self.swapped)
 
     def take_likelier(self) -> Hypothesis | None:
@@ -457,7 +457,7 @@ class PoseModel:
             There is none, the pose is in doubt as for `export`, or the file cannot be written.
         """
         if self._path is None:
-            raise GpError("there is no insertion path", remedy="Carry one to the estimate first.")
+            raise GpError("there is no insertion path", remedy="Load one with Insertion path first.")
         self._check_writable(self._pose(), path)
         assert self.estimate is not None
         file = self._path.save_carried(self.estimate, path)

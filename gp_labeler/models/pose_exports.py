@@ -188,7 +188,7 @@ class InsertionPath:
         """
         carried = self.in_touches(estimate)
         if carried is None:
-            raise GpError("there is no estimate to carry the path to")
+            raise GpError("there is no estimate for the path")
         write_path(path, carried)
         return Path(path)
 

@@ -30,7 +30,7 @@ _WAYS = {
     "features": "features both touched and labelled",
     "skull": "skull features",
     "placed": "touches placed on it",
-    "known": "a registration known from elsewhere",
+    "known": "a registration given with the touches",
 }
 _GOOD, _BAD, _QUIET, _RULE = "#1b7f4b", "#b3361f", "#5d6670", "#d5dae0"
 _TABLE = '<table cellspacing="0" cellpadding="0" style="margin-left: 0px; margin-right: 0px">'
@@ -288,7 +288,7 @@ def _shared_error(pose: CochleaPose) -> str:
 
 
 def _moved(mm: float, degrees: float) -> str:
-    return f"Not of this estimate: it moved by {mm:.2f} mm and turned by {degrees:.1f}&deg; since."
+    return f"Refers to an earlier estimate: this one differs by {mm:.2f} mm and {degrees:.1f}&deg;."
 
 
 def _numbers(values: object, digits: int) -> str:

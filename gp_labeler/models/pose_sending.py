@@ -74,7 +74,7 @@ class PoseSending:
         state : SpecimenState
             Holds what persons said of estimates.
         doubtful : tuple of str
-            Touches that may lie in another frame than what the tracker reads now.
+            Touches that may be in a different frame from the current readings of the tracker.
         reference_age_s : float or None
             How long ago the reference was read, seconds; None where no touch hangs on one.
         file_warnings : tuple of GateReason
@@ -116,9 +116,9 @@ class PoseSending:
 
 def _reasons_of_touches(pose: CochleaPose, doubtful: tuple[str, ...]) -> tuple[GateReason, ...]:
     if pose.transform_to_touches.dst != "tracker":
-        return (GateReason("not tracked", "it was touched on the scan, not with the tracker"),)
+        return (GateReason("not tracked", "it was touched on the scan, not with a tracker"),)
     if doubtful:
-        text = f"{', '.join(doubtful)} may lie in another frame than what the tracker reads now"
+        text = f"{', '.join(doubtful)} may be in a different frame from the current readings of the tracker"
         return (GateReason("frame", text),)
     return ()
 

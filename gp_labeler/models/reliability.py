@@ -99,7 +99,7 @@ class ReliabilityModel:
     def use_error(self, use: bool) -> None:
         """Let checks and regions allow for the measured error, or for the assumed one."""
         if use and self.error is None:
-            raise GpError("no error of labels was measured yet", remedy="Compare repeated labels first.")
+            raise GpError("no labelling error has been measured yet", remedy="Compare repeated labels first.")
         self._atlas.set_labelling_error(self.error if use else None)
         self.changed.emit()
 
@@ -136,7 +136,7 @@ class ReliabilityModel:
         )
         if state.blind and unfinished and state.specimen == row.specimen:
             raise GpError(
-                f"{row.specimen} is being labelled blind, so its other labels stay hidden",
+                f"{row.specimen} is being labelled blind, so its other labels are hidden",
                 remedy="Finish this labelling first.",
             )
         file = None if self.measured is None else self.measured.read.files.get(row.specimen)
@@ -162,7 +162,9 @@ class ReliabilityModel:
 
     def _require(self) -> ReliabilityReport:
         if self.report is None:
-            raise GpError("no labels were compared yet", remedy="Choose animals labelled more than once.")
+            raise GpError(
+                "no labels have been compared yet", remedy="Choose animals labelled more than once."
+            )
         return self.report
 
 

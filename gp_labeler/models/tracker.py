@@ -283,7 +283,7 @@ class TrackerModel:
             if self._frame.is_unknown(self._tracked()[doubtful[0]].position):
                 was, it = ("was", "it") if len(doubtful) == 1 else ("were", "them")
                 return (
-                    f"{', '.join(doubtful)} {was} touched in an earlier sitting, and the reference may have "
+                    f"{', '.join(doubtful)} {was} touched in an earlier session, and the reference may have "
                     f"moved since. Touch {it} again."
                 )
             return (
@@ -296,10 +296,10 @@ class TrackerModel:
             return (
                 f"Reference not verified since {_clock_time(begun)}: touch a feature again." if begun else ""
             )
-        apart = f"{last.name} touched again {last.distance_mm:.1f} mm from before"
+        apart = f"{last.name} touched again {last.distance_mm:.1f} mm from its earlier position"
         if last.agrees:
             return f"Reference verified at {_clock_time(last.time)}: {apart}."
-        return f"The reference moved, or a touch was wrong, at {_clock_time(last.time)}: {apart}."
+        return f"The reference has moved, or a touch is wrong, at {_clock_time(last.time)}: {apart}."
 
     def _tracked(self) -> dict[str, Touch]:
         side, touches = self._pose.side, self._document.state.touches
@@ -365,7 +365,7 @@ class TrackerModel:
         was_recording = self._recorder.recording
         self._recorder.cancel()
         if was_recording:
-            self.refused.emit(f"{name or 'Nothing'} is no longer asked for. Touch again.")
+            self.refused.emit(f"{name or 'Nothing'} is no longer requested. Touch again.")
 
     def _take(self, outcome: RecordedTouch | RefusedTouch) -> None:
         if isinstance(outcome, RefusedTouch):
@@ -405,8 +405,8 @@ class TrackerModel:
         )
         if repeated is not None and not repeated.agrees:
             self._messages.say(
-                f"{name} is {repeated.distance_mm:.1f} mm from where it was touched before: "
-                "the reference moved, or one of the two touches was wrong",
+                f"{name} is {repeated.distance_mm:.1f} mm from its earlier position: "
+                "the reference has moved, or one of the two touches is wrong",
                 "warning",
             )
         elif self.doubtful:

@@ -13,7 +13,7 @@ __all__ = ["typed_position"]
 
 _AXES = {"R": (0, -1.0), "L": (0, 1.0), "A": (1, -1.0), "P": (1, 1.0), "I": (2, -1.0), "S": (2, 1.0)}
 _LETTERED = re.compile(r"([A-Z])\s*([-+]?\d+(?:[.,]\d+)?)\s*(?:MM)?[\s,;]*")
-_EXAMPLES = "Such as L 4.6 P 9.1 S 12.4, or three numbers towards left, posterior and superior."
+_EXAMPLES = "For example L 4.6 P 9.1 S 12.4, or three numbers towards left, posterior and superior."
 
 
 def typed_position(text: str) -> FloatArray:

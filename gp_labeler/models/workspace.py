@@ -120,7 +120,7 @@ class Workspace:
         A labelling that has no observer yet is theirs.
         """
         if not name.strip():
-            raise GpError("the observer needs a name or initials", remedy="Such as AB.")
+            raise GpError("the observer needs a name or initials", remedy="For example AB.")
         self.document.author = name
         if self._observers is not None:
             self._observers.remember(self.document.author)

@@ -72,7 +72,7 @@ def press_keys(widget: QWidget, keys: str) -> None:
     sequence = QKeySequence(keys)
     first = sequence[0] if sequence.count() == 1 else None  # type: ignore[index]
     if first is None or first.key() == Qt.Key.Key_unknown:
-        raise GpError(f"unknown keys {keys!r}", remedy="Such as Ctrl+Z, Return, Space or Left.")
+        raise GpError(f"unknown keys {keys!r}", remedy="For example Ctrl+Z, Return, Space or Left.")
     QTest.keyClick(widget, first.key(), first.keyboardModifiers())
 
 

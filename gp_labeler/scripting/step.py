@@ -92,7 +92,7 @@ def make_step(kinds: Mapping[str, type[Step]], table: Any) -> Step:
         raise GpError(f"must be a table such as do = 'save', got {table!r:.60}")
     does = table.get("do")
     if does is None:
-        raise GpError("does not say what to do", remedy=f"Give do = one of {', '.join(kinds)}.")
+        raise GpError("has no key do", remedy=f"Give do = one of {', '.join(kinds)}.")
     if not isinstance(does, str) or does not in kinds:
         raise GpError(
             f"unknown step {does!r:.40}{_nearest(does, kinds)}", remedy=f"There are {', '.join(kinds)}."

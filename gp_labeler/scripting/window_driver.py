@@ -144,13 +144,13 @@ class WindowDriver:
             No scan is open.
         """
         if self.workspace.scan.volume is None:
-            raise GpError("no scan is open", remedy="Let a step open one first.")
+            raise GpError("no scan is open", remedy="Add an open step before it.")
         return min(self.workspace.scan.volume.spacing)
 
     def truth(self, side: Side, code: str) -> FloatArray:
         """Return where a feature of the phantom really is, (3,) mm, scan frame."""
         if self.workspace.scan.truth is None:
-            raise GpError("the truth is known of a phantom only", landmark=code)
+            raise GpError("the truth is known only for a phantom", landmark=code)
         return self.workspace.scan.truth.side(side)[code]
 
     def placed(self, side: Side, code: str) -> FloatArray | None:

@@ -110,7 +110,7 @@ def desktop_file() -> str:
 def _quoted(word: str) -> str:
     """Quote a word of a command line, first as a shell does, then as a value of a desktop entry."""
     if "\n" in word:
-        raise GpError("a desktop entry cannot hold a line break", file=word)
+        raise GpError("a desktop entry cannot contain a line break", file=word)
     if _RESERVED.search(word):
         word = '"' + re.sub(r"([\"`$\\])", r"\\\1", word) + '"'
     return word.replace("\\", "\\\\").replace("%", "%%")
@@ -141,6 +141,6 @@ def _refresh() -> None:
 def _check_system() -> None:
     if sys.platform in ("win32", "darwin"):
         raise GpError(
-            "only desktops of Linux can be set up from here",
+            "desktop entries can be installed only on Linux",
             remedy="Make a shortcut to gp-labeler-window instead.",
         )

@@ -103,7 +103,7 @@ def _other_display(asked: str) -> str:
     lacking = missing(["app"])
     if lacking:
         return _sentence(advice(lacking))
-    mend = "Unset QT_QPA_PLATFORM" if asked else "Log in where there is a display"
+    mend = "Unset QT_QPA_PLATFORM" if asked else "Log in to a session with a display"
     return f"{mend}, or use gp-labeler --offscreen SCRIPT|demo --output DIR"
 
 

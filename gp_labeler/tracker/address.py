@@ -82,7 +82,7 @@ def check_host(host: str) -> None:
     if not isinstance(host, str) or not host.strip():
         raise GpError("the tracker's host is empty", remedy=remedy)
     if host.count(":") == 1:
-        raise GpError(f"the host must be without the port, got {host!r}", remedy="Give the port by itself.")
+        raise GpError(f"the host must be without the port, got {host!r}", remedy="Give the port separately.")
     if host != host.strip() or re.search(r"[\s/]", host):
         raise GpError(f"the host must be one name without spaces or slashes, got {host!r}", remedy=remedy)
 
@@ -92,7 +92,7 @@ def check_port(port: int) -> None:
     if isinstance(port, bool) or not isinstance(port, int) or not 1 <= port <= 65535:
         raise GpError(
             f"the port must be a whole number from 1 to 65535, got {port!r}",
-            remedy=f"OpenIGTLink servers listen on {DEFAULT_PORT} by custom.",
+            remedy=f"OpenIGTLink servers use {DEFAULT_PORT} by default.",
         )
 
 

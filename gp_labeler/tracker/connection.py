@@ -199,7 +199,7 @@ class Connection:
                     if ready & selectors.EVENT_READ:
                         data = sock.recv(_BLOCK)
                         if not data:
-                            return "the other end closed the connection"
+                            return "the server closed the connection"
                         self._tell(decoder.feed(data, time.monotonic()))
                     if ready & selectors.EVENT_WRITE and waiting:
                         del waiting[: sock.send(waiting)]

@@ -68,7 +68,7 @@ class DeviceClock:
             The sender's time stamp and this computer's monotonic clock, seconds.
         """
         if time == self._time:
-            return Fault.REPEATED, "a message of the same time came before"
+            return Fault.REPEATED, "a message with the same time stamp arrived before"
         if np.isfinite(self._received):
             self._quickest += _DRIFT * max(received - self._received, 0.0)
         self._received = received
@@ -82,7 +82,7 @@ class DeviceClock:
     def _in_time(self, time: float, received: float) -> tuple[Fault, str]:
         self._run = None
         if time < self._time:
-            return Fault.BACKWARDS, f"it is {self._time - time:.3f} s older than one before"
+            return Fault.BACKWARDS, f"it is {self._time - time:.3f} s older than an earlier one"
         self._time = time
         self._quickest = min(self._quickest, received - time)
         return Fault.NONE, ""
@@ -102,9 +102,9 @@ class DeviceClock:
 
     def _words(self, time: float, excess: float) -> tuple[Fault, str]:
         if excess < 0:
-            return Fault.CLOCK, f"the tracker's clock is {-excess:.1f} s ahead of what it was"
+            return Fault.CLOCK, f"the tracker's clock is {-excess:.1f} s ahead of its earlier time"
         if time < self._time and self._run is not None and self._run.last_time > self._run.first_time:
-            return Fault.CLOCK, f"the tracker's clock is {excess:.1f} s behind what it was"
+            return Fault.CLOCK, f"the tracker's clock is {excess:.1f} s behind its earlier time"
         if time < self._time:
-            return Fault.BACKWARDS, f"it is {self._time - time:.3f} s older than one before"
+            return Fault.BACKWARDS, f"it is {self._time - time:.3f} s older than an earlier one"
         return Fault.LATE, f"it arrived {excess:.2f} s late"

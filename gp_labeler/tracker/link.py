@@ -228,10 +228,10 @@ class TrackerLink:
         probe = self.address.probe
         kind = self.devices.get(probe)
         if kind in POSE_KINDS:
-            return "its marker is out of sight, or the tracker is paused."
+            return "its marker is hidden, or the tracker is paused."
         if kind is not None:
-            return f"it comes as {kind}; have the server send it as TRANSFORM."
+            return f"it arrives as {kind}; let the server send it as TRANSFORM."
         others = [name for name, kind in self.devices.items() if kind in POSE_KINDS and name]
         if others:
-            return f"the server sends {', '.join(sorted(others)[:6])}; is the name right?"
-        return "its marker is out of sight, or it has another name there."
+            return f"the server sends {', '.join(sorted(others)[:6])}; check the name."
+        return "its marker is hidden, or the server uses another name."

@@ -158,8 +158,8 @@ def _read_header(data: bytes) -> dict[str, Any]:
         known = False
     if not known:
         raise GpError(
-            "what answers there does not speak OpenIGTLink",
-            remedy="Check the port; PLUS and 3D Slicer listen on 18944 by custom.",
+            "the server does not use OpenIGTLink",
+            remedy="Check the port; PLUS and 3D Slicer use 18944 by default.",
         )
     return header
 

@@ -110,13 +110,13 @@ class PivotCollector:
     def words(self) -> str:
         """What to do next."""
         if self.ready:
-            return f"Enough: {self.count} poses, turned by {self.turned_deg:.0f} degrees."
+            return f"Complete: {self.count} poses, rotated by {self.turned_deg:.0f} degrees."
         if self.turned_deg < self.turn_wanted_deg:
             return (
-                "Keep the tip in the hollow and tilt the probe to all sides: "
+                "Keep the tip in the hollow and tilt the probe in all directions: "
                 f"{self.turned_deg:.0f} of {self.turn_wanted_deg:.0f} degrees."
             )
-        return f"Go on turning: {self.count} of {self.poses_wanted} poses."
+        return f"Continue to tilt the probe: {self.count} of {self.poses_wanted} poses."
 
     def update(self, samples: Iterable[Sample]) -> int:
         """Take samples; return how many of them became poses."""

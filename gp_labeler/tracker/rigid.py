@@ -30,7 +30,7 @@ def why_not_rigid(matrix: FloatArray, tolerance: float) -> str:
     rotation = matrix[:3, :3]
     determinant = float(np.linalg.det(rotation))
     if determinant <= 0:
-        return "its matrix mirrors" if determinant < 0 else "its matrix is flat"
+        return "its matrix contains a reflection" if determinant < 0 else "its matrix is singular"
     if float(np.abs(rotation.T @ rotation - np.eye(3)).max()) > tolerance:
         scale = determinant ** (1 / 3)
         return f"its matrix scales by {scale:.3f}" if abs(scale - 1) > tolerance else "its matrix shears"

@@ -152,7 +152,7 @@ class _Device:
         assert message.matrix is not None
         matrix = nearest_rigid(message.matrix)
         if self._frozen(message):
-            detail = "the tracker repeats its last position"
+            detail = "the readings do not change"
             return Sample(time, message.received, matrix, Fault.FROZEN, detail, oriented=message.oriented)
         return Sample(time, message.received, matrix, oriented=message.oriented)
 
@@ -160,13 +160,13 @@ class _Device:
         status = message.metadata.get("TransformStatus", "OK").upper().removeprefix("TOOL_")
         valid = message.metadata.get("TransformValid", "1").strip().upper()
         if status != "OK":
-            return Fault.HIDDEN, f"the marker is not seen ({status.replace('_', ' ').lower()})"
+            return Fault.HIDDEN, f"the marker is not visible ({status.replace('_', ' ').lower()})"
         if valid in ("0", "FALSE"):
-            return Fault.HIDDEN, "the marker is not seen"
+            return Fault.HIDDEN, "the marker is not visible"
         if message.matrix is None:
-            return Fault.DAMAGED, message.problem or "it holds no matrix"
+            return Fault.DAMAGED, message.problem or "it contains no matrix"
         if np.array_equal(message.matrix, np.eye(4)):
-            return Fault.HIDDEN, "the marker is not seen (identity)"
+            return Fault.HIDDEN, "the marker is not visible (identity)"
         problem = why_not_rigid(message.matrix, self.limits.rigid)
         return (Fault.NOT_RIGID, problem) if problem else (Fault.NONE, "")
 

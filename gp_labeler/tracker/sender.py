@@ -20,7 +20,7 @@ _BACKLOG = 8
 _MOST_WAITING = 1_000_000
 
 
-_SILENT = GateReason("stale", "gp-labeler does not answer")
+_SILENT = GateReason("stale", "gp-labeler does not respond")
 _STOPPED = GateReason("stopped", "sending was stopped")
 
 
@@ -91,7 +91,7 @@ class PoseSender:
         """How it stands, for a person."""
         if self._connection is not None:
             return self._status
-        to = "nobody listens" if not self._peers else f"{self._peers} listening"
+        to = "no client connected" if not self._peers else f"{self._peers} listening"
         what = f"sending {self.device}" if self._message.usable else "sending no pose"
         return f"Port {self.port}: {what}, {to}."
 

@@ -19,8 +19,8 @@ from gp_labeler.tracker.samples import Fault, Sample
 __all__ = ["RecordedTouch", "RefusedTouch", "TouchRecorder", "TouchSettings"]
 
 NO_ORIENTATION = (
-    "The tracker tells the position of the marker without its orientation: set the tip to 0, 0, 0 if that is "
-    "the tip, or have the server send TRANSFORM"
+    "The tracker reports the position of the marker without its orientation: set the tip to 0, 0, 0 if this "
+    "is the tip, or let the server send TRANSFORM"
 )
 """What is told of a probe with a tip offset whose messages have no orientation."""
 
@@ -278,7 +278,7 @@ class TouchRecorder:
         tips = np.array([self.probe.tip(s) for s in usable])
         position, kept = _robust_mean(tips)
         if kept.mean() < self.settings.good_share:
-            strays = f"{len(kept) - kept.sum()} of {len(kept)} readings lie apart from the others"
+            strays = f"{len(kept) - kept.sum()} of {len(kept)} readings are outliers"
             return RefusedTouch(f"{strays}. Touch again.")
         distances = np.linalg.norm(tips[kept] - position, axis=1)
         third = len(tips) // 3 + 1
@@ -308,10 +308,12 @@ class TouchRecorder:
             fault = faults.most_common(1)[0][0]
             return RefusedTouch(f"{_detail(window, fault)} Touch again.", fault)
         if not usable:
-            return RefusedTouch("No message of the marker came. Is it in sight, and the tracker connected?")
+            return RefusedTouch(
+                "No message of the marker arrived. Check that it is visible and the tracker connected."
+            )
         if gap > settings.max_gap_s:
-            return RefusedTouch(f"No reading came for {gap:.2f} s. Touch again.")
-        few = f"Only {len(usable)} readings came in {settings.window_s:g} s"
+            return RefusedTouch(f"No reading arrived for {gap:.2f} s. Touch again.")
+        few = f"Only {len(usable)} readings arrived in {settings.window_s:g} s"
         return RefusedTouch(f"{few}, {settings.min_samples} are needed. Touch again.")
 
 

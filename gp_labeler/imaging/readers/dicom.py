@@ -72,7 +72,7 @@ def _left_out(damaged: Sequence[Path], junk: Sequence[Path], scouts: Sequence[Se
         remedy = "Copy them again, or accept that they are left out (--accept damaged)."
         found.append(Problem("damaged", text, remedy=remedy, resolved_by=("accept",)))
     if junk:
-        found.append(warning("junk", f"files that are no DICOM images are left out: {names(junk)}"))
+        found.append(warning("junk", f"files that are not DICOM images are left out: {names(junk)}"))
     if scouts:
         files = [one.file.path for series in scouts for one in series.slices]
         found.append(warning("scout", f"scout images are left out: {names(files)}"))

@@ -154,7 +154,7 @@ def _unpacked(frame: bytes, file: DicomFile) -> Plane:
         plane = np.asarray(_DECODERS[file.syntax](frame))
     else:
         raise VolumeError(
-            f"its pixels are packed as {file.syntax or 'nobody knows what'}, which is not read",
+            f"its pixels are packed as {file.syntax or 'an unknown codec'}, which is not read",
             remedy="Export it uncompressed.",
         )
     n, signed = 2**file.bits, file.stored_range[0] < 0

@@ -433,7 +433,7 @@ def _padding(tags: Any, *, signed: bool) -> tuple[float, float] | None:
 
 
 def _rescaling(rescale: Any, tags: Any) -> tuple[float, float, str]:
-    """Return slope and intercept, as 1 and 0 where they are no numbers, and what is wrong with them."""
+    """Return slope and intercept, as 1 and 0 where they are not numbers, and what is wrong with them."""
     trouble = []
     values = []
     for name, missing in (("RescaleSlope", 1.0), ("RescaleIntercept", 0.0)):

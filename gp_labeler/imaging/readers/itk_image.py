@@ -72,10 +72,10 @@ def _findings(
         problems.append(warning("colour", f"its voxels have {header.channels} channels; {taken} is taken"))
         _check_channel(options.channel, header.channels)
     if np.linalg.det(header.geometry.direction) < 0:
-        notes.append("the voxel axes are left-handed; positions are kept as the file gives them")
+        notes.append("the voxel axes are left-handed; positions are used as stored")
     twin = path.with_suffix("") if path.name.lower().endswith(".nii.gz") else None
     if twin is not None and twin.exists():
-        notes.append(f"{twin.name} lies beside it and was not touched")
+        notes.append(f"{twin.name} is beside it and was not changed")
     return tuple(problems), tuple(notes)
 
 

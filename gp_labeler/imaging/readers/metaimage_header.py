@@ -63,8 +63,8 @@ def read_meta_header(path: Path, channel: int | None = None) -> Header:
         raise not_a("MetaImage", path)
     if "list" in fields.get("kinds", "").lower().split() or b"Seq_Frame0" in head[: end.start()]:
         raise VolumeError(
-            "it is a sequence of 2-D images, as tracking software records them, and no volume",
-            remedy="Give a CT. The poses in it are for gp-core pivot and gp-core touches.",
+            "it is a sequence of 2-D images, as recorded by tracking software, not a volume",
+            remedy="Give a CT. Use gp-core pivot or gp-core touches for the poses in it.",
         )
     layout = _layout(fields)
     said = fields["elementdatafile"]
@@ -199,7 +199,7 @@ def _contradictions(letters: str, direction: FloatArray) -> tuple[Problem, ...]:
     if letters in (to, come_from):
         return ()
     text = (
-        f"its AnatomicalOrientation, {letters}, contradicts its TransformMatrix, by which it is {come_from}; "
-        "the matrix is taken"
+        f"its AnatomicalOrientation, {letters}, contradicts its TransformMatrix, which means {come_from}; "
+        "the matrix is used"
     )
     return (warning("orientation", text),)

@@ -58,7 +58,7 @@ def read_nifti_header(path: Path, channel: int | None = None) -> Header:
     Raises
     ------
     VolumeError
-        It is neither, or its header makes no sense.
+        It is neither, or its header is invalid.
     """
     header_file, voxel_file = _pair(path)
     head = _unpacked(header_file, 544)
@@ -151,7 +151,7 @@ def _checked(kind: Any, head: bytes) -> tuple[Any, tuple[Problem, ...]]:
         try:
             header = kind(head[: kind.sizeof_hdr], check=True)
         except HeaderDataError as problem:
-            raise VolumeError(f"its header makes no sense: {problem}", remedy="Save it again.") from None
+            raise VolumeError(f"its header is invalid: {problem}", remedy="Save it again.") from None
     mended = [line for line in said if "SPM" not in line]
     return header, (warning("header", f"its header was mended: {'; '.join(mended)}"),) if mended else ()
 
@@ -189,7 +189,7 @@ def _scaling(header: Any) -> tuple[_Values, tuple[Problem, ...]]:
         remedy = "Save it again, or accept the values as they are stored (--accept scaling)."
         return _Values(), (Problem("scaling", text, remedy=remedy, resolved_by=("accept",)),)
     kept = _Values(slope, 0.0) if np.isfinite(slope) else _Values()
-    return kept, (warning("scaling", f"{text}; what is no number was left out, as nibabel does"),)
+    return kept, (warning("scaling", f"{text}; values that are not numbers were ignored, as in nibabel"),)
 
 
 def _geometry(header: Any, spm: SpmMatrix | None) -> tuple[Geometry, tuple[Problem, ...], tuple[str, ...]]:
@@ -230,7 +230,7 @@ def _against_spm(
     if apart <= _APART * np.linalg.norm(matrix[:3, :3], axis=0).min():
         return (), False
     how = "mirrors the voxels" if mirrored else f"places the voxels up to {apart * mm:.3g} mm elsewhere"
-    text = f"{spm.path.name} beside it, which only SPM obeys, {how}; the {name} is taken, as nibabel does"
+    text = f"{spm.path.name} beside it, which only SPM obeys, {how}; the {name} is used, as in nibabel"
     return (warning("placement", text),), mirrored
 
 
@@ -250,7 +250,9 @@ def _forms(header: Any) -> tuple[list[tuple[str, FloatArray]], tuple[Problem, ..
         if np.isfinite(matrix).all() and abs(np.linalg.det(matrix[:3, :3])) > 0:
             forms.append((f"{name} (code {code})", matrix))
         else:
-            found.append(warning("placement", f"its {name} (code {code}) is no placement, and was left out"))
+            found.append(
+                warning("placement", f"its {name} (code {code}) is not a valid transform, and was ignored")
+            )
     return forms, tuple(found)
 
 
@@ -260,7 +262,7 @@ def _disagreement(
     """Say how far sform and qform, or sform and pixdim, are apart, and whether they are mirror images."""
     name, matrix = forms[0]
     voxel = np.linalg.norm(matrix[:3, :3], axis=0)
-    taken = "the sform is taken, as nibabel does"
+    taken = "the sform is used, as in nibabel"
     if len(forms) == 1:
         if name.startswith("qform") or len(zooms) < 3 or np.allclose(voxel, np.abs(zooms), rtol=1e-3):
             return (), False

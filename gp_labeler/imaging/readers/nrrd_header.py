@@ -197,7 +197,7 @@ def _geometry(
     lengths = np.linalg.norm(matrix, axis=0)
     if not (np.isfinite(lengths).all() and lengths.min() > 0):
         raise VolumeError(
-            f"its space directions, {fields['spacedirections']}, are no three axes",
+            f"its space directions, {fields['spacedirections']}, are not three axes",
             remedy="Correct its header.",
         )
     spacing = _three(lengths)

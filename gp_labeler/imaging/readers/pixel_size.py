@@ -107,7 +107,7 @@ def _ome(image: OmeImage) -> PixelSize:
     x, y, z = image.pixel_mm
     if image.units:
         reason = (
-            f"its OME description gives the voxel size in {' and '.join(image.units)}, which is no length"
+            f"its OME description gives the voxel size in {' and '.join(image.units)}, which is not a length"
         )
         return PixelSize(x, y, z, "its OME description", reason)
     return UNKNOWN if x is None or y is None else PixelSize(x, y, z, "its OME description")
@@ -130,7 +130,7 @@ def stack_geometry(size: PixelSize, z_factor: float = 1.0) -> Geometry:
     if size.z is not None:
         reason = (
             f"{size.said_by} gives slices {shown((size.z,))} apart, but their numbers run in steps of "
-            f"{z_factor:g}: if slices were taken out, they are farther apart"
+            f"{z_factor:g}: if slices were removed, the distance is larger"
         )
         suggested: Spacing = (size.x, size.y, size.z * z_factor)
         return Geometry(sides_known=False, suggested=suggested, reason=reason)
@@ -140,6 +140,6 @@ def stack_geometry(size: PixelSize, z_factor: float = 1.0) -> Geometry:
         return Geometry(sides_known=False, reason=reason)
     suggested = (size.x, size.y, size.x * z_factor)
     reason = size.reason or (
-        f"{size.said_by} gives pixels of {shown((size.x, size.y))}, but nothing gives the distance of slices"
+        f"{size.said_by} gives pixels of {shown((size.x, size.y))}, but not the distance between slices"
     )
     return Geometry(sides_known=False, suggested=suggested, reason=reason)

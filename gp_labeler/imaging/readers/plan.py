@@ -69,7 +69,7 @@ class Geometry:
         if self.spacing is not None and not (np.isfinite(self.spacing).all() and min(self.spacing) > 0):
             object.__setattr__(self, "spacing", None)
         if not np.isfinite(self.origin).all():
-            raise GpError(f"its origin is not a place: {self.origin}")
+            raise GpError(f"its origin is not a valid position: {self.origin}")
         off = self.direction.T @ self.direction - np.eye(3)
         if not np.isfinite(off).all() or np.abs(off).max() > _ORTHOGONAL:
             raise GpError(
@@ -226,7 +226,7 @@ class ImportPlan:
     def _size_problems(self) -> tuple[Problem, ...]:
         found = []
         if min(self.size) < 2:
-            text = f"it holds {' x '.join(map(str, self.size))} voxels, which is no volume"
+            text = f"it holds {' x '.join(map(str, self.size))} voxels, which is not a volume"
             found.append(Problem("flat", text, remedy="Give the whole scan, not one slice of it."))
         if self.is_unpacked_to_disk:
             found.append(self._unpacking())
@@ -250,7 +250,7 @@ class ImportPlan:
         if self.sides_known:
             return ()
         text = (
-            f"{self.format} does not say which side is left: check a side that you know, "
+            f"{self.format} does not say which side is left: check a structure whose side you know, "
             "and reverse the slices if left and right are exchanged"
         )
         return (warning("sides-unknown", text),)

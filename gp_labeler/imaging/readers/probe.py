@@ -52,7 +52,7 @@ _HINTS = {
     ".xz": "Unpack it first.",
     ".zst": "Unpack it first.",
     ".zip": "Unpack it first.",
-    ".npy": "It says neither voxel size nor directions: save it as NRRD or MHA first.",
+    ".npy": "This format has neither voxel size nor directions: save it as NRRD or MHA first.",
     ".stl": "This is a mesh; give the scan it was made from.",
     ".ply": "This is a mesh; give the scan it was made from.",
 }
@@ -67,7 +67,7 @@ def inspect_path(path: str | PathLike[str], options: ImportOptions, report: Repo
         if where.is_dir():
             return _inspect_folder(where, options, report)
         if not where.is_file():
-            raise VolumeError("it is no plain file", file=where, remedy="Give a scan or its folder.")
+            raise VolumeError("it is not a regular file", file=where, remedy="Give a scan or its folder.")
         if where.stat().st_size == 0:
             raise VolumeError("it is empty", file=where, remedy="Copy it again.")
         return _inspect_file(where, options, report)

@@ -177,7 +177,7 @@ def _typed_out(file: Path, stored: StoredVoxels, layout: Layout) -> Plane:
         else:
             values = np.array(text.split(maxsplit=n)[:n], dtype=np.float64)
     except ValueError:
-        raise VolumeError("its voxels, written as text, are no numbers", file=file) from None
+        raise VolumeError("its voxels, written as text, are not numbers", file=file) from None
     if len(values) < n:
         raise VolumeError(
             f"it holds {len(values):,} values, but {n:,} are needed: it is incomplete",

@@ -53,9 +53,7 @@ def _inspect_isq(path: Path, head: bytes, options: ImportOptions) -> ImportPlan:
     nx, ny, nz, x_um, y_um, z_um = struct.unpack("<6i", head[44:68])
     (blocks,) = struct.unpack("<i", head[508:512])
     if min(nx, ny, nz) < 1 or blocks < 0:
-        raise VolumeError(
-            f"its header speaks of {nx} x {ny} x {nz} voxels", file=path, remedy="Copy it again."
-        )
+        raise VolumeError(f"its header states {nx} x {ny} x {nz} voxels", file=path, remedy="Copy it again.")
     source = RawSource(path, (blocks + 1) * _BLOCK, np.dtype("<i2"), (ny, nx), nz)
     known = min(x_um, y_um, z_um) > 0
     spacing: Spacing | None = (x_um / nx / 1000, y_um / ny / 1000, z_um / nz / 1000) if known else None
@@ -131,5 +129,5 @@ def _itk_read(path: Path) -> Any:
         except (RuntimeError, TypeError) as problem:
             last = str(problem).strip().splitlines()[-1]
             raise VolumeError(
-                f"it is no Scanco file: {last}", file=path, remedy="Check what it is."
+                f"it is not a Scanco file: {last}", file=path, remedy="Check what it is."
             ) from None

@@ -77,12 +77,12 @@ def _check_image(path: Path) -> None:
     if kind and kind[1].upper() != b"STRUCTURED_POINTS":
         name = kind[1].decode("ascii", "replace")
         raise VolumeError(
-            f"it holds {name}, which is no image", file=path, remedy="Give the scan it was made from."
+            f"it holds {name}, which is not an image", file=path, remedy="Give the scan it was made from."
         )
     text = head[: _vtk_data(head)]
     if re.search(rb"^CELL_DATA", text, re.MULTILINE | re.IGNORECASE):
         raise VolumeError(
-            "its values belong to cells (CELL_DATA), not to points",
+            "its values belong to cells (CELL_DATA) rather than points",
             file=path,
             remedy="Save it as NRRD or MHA.",
         )

@@ -162,7 +162,7 @@ def log_geometry(
     size = f"{shape[1]} x {shape[0]}"
     if log.width and log.height and (log.height, log.width) != shape:
         reason = (
-            f"{log.path.name} speaks of {log.width} x {log.height} pixels, the slices have {size}: "
+            f"{log.path.name} states {log.width} x {log.height} pixels, the slices have {size}: "
             f"if they were made smaller, its voxel size of {shown((mm,))} is wrong for them"
         )
         suggested = _shrunk(log, mm, shape, step)
@@ -177,11 +177,11 @@ def log_geometry(
 def _warnings(log: SkyScanLog, pattern: str, numbers: Sequence[int]) -> list[Problem]:
     found = []
     if log.prefix and not pattern.lower().startswith(log.prefix.lower()):
-        text = f"{log.path.name} speaks of slices {log.prefix}..., these are {pattern}; it is believed"
+        text = f"{log.path.name} states slices {log.prefix}..., these are {pattern}; the log is used"
         found.append(warning("log-prefix", text))
     ends = (min(numbers), max(numbers))
     if log.n_sections is not None and ends != (log.first, log.last):
-        text = f"{log.path.name} speaks of slices {log.first} to {log.last}, there are {ends[0]} to {ends[1]}"
+        text = f"{log.path.name} states slices {log.first} to {log.last}, there are {ends[0]} to {ends[1]}"
         found.append(warning("log-sections", text))
     return found
 
@@ -201,14 +201,14 @@ def _sections_apart(log: SkyScanLog, numbers: Sequence[int], step: int, n_slices
     NRecon names slices by their sections. Other programs number them again, from 0 or 1.
     """
     there = f"there are {n_slices}, numbered {min(numbers)} to {max(numbers)}"
-    said = f"{log.path.name} speaks of every {log.step}. section from {log.first} to {log.last}; {there}"
+    said = f"{log.path.name} states every {log.step}. section from {log.first} to {log.last}; {there}"
     if log.n_sections is None:
         return max(step, log.step), said if log.step not in (1, step) else ""
     if step == 1 and n_slices == log.n_sections:
         return log.step, ""
     fewer = round(log.n_sections / n_slices)
     if step == 1 and fewer > 1 and abs(log.n_sections - fewer * n_slices) < fewer:
-        return fewer * log.step, f"{said}: perhaps only some of them were kept"
+        return fewer * log.step, f"{said}: some of them may have been removed"
     return max(step, log.step), said if step % log.step else ""
 
 

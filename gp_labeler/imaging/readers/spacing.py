@@ -104,11 +104,11 @@ def spacing_problems(
 
 def _implausible(spacing: Spacing) -> tuple[str, str] | None:
     if all(abs(length - 1) < 1e-9 for length in spacing):
-        return "spacing-unit", "the voxel size in the file is 1 mm, which programs write when they know none"
+        return "spacing-unit", "the voxel size in the file is 1 mm, which programs write if it is unknown"
     if abs(spacing[2] - 1) < 1e-9 or abs(spacing[0] - 1) < 1e-9:
         return (
             "spacing-unit",
-            f"the voxel size in the file is {shown(spacing)}; a 1 stands where none was known",
+            f"the voxel size in the file is {shown(spacing)}; a value of 1 usually means unknown",
         )
     if is_screen_resolution(spacing[0]):
         dpi = round(25.4 / spacing[0])

@@ -103,7 +103,7 @@ def _left_out(files: Sequence[Path], slices: Sequence[Path], groups: Sequence[Sl
     few = [group for group in groups if len(group.files) < max(2, FEW * len(groups[0].files))]
     if few:
         stray = [file for group in few for file in group.files]
-        found.append(warning("stray", f"images that are no part of a stack are left out: {names(stray)}"))
+        found.append(warning("stray", f"images that are not part of a stack are left out: {names(stray)}"))
     return found
 
 
@@ -117,7 +117,9 @@ def _read_headers(files: Sequence[Path], report: Report) -> dict[Path, _Slice]:
             headers[file] = _tiff_slice(file) if file.suffix.lower() in TIFF_SUFFIXES else _image_slice(file)
         except (OSError, ValueError, SyntaxError, tifffile.TiffFileError) as problem:
             raise VolumeError(
-                f"it is no image: {problem}", file=file, remedy="Copy it again, or remove it from the stack."
+                f"it is not an image: {problem}",
+                file=file,
+                remedy="Copy it again, or remove it from the stack.",
             ) from None
     return headers
 

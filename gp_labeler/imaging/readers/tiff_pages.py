@@ -79,9 +79,9 @@ def check_orientations(pages: Sequence[tifffile.TiffPage], path: Path) -> None:
     if said - {orientation_of(pages[0])}:
         values = names([str(value) for value in sorted({*said, orientation_of(pages[0])})])
         raise VolumeError(
-            f"its pages have the tag Orientation {values}: they do not lie on each other",
+            f"its pages have the tag Orientation {values}: they are not aligned",
             file=path,
-            remedy="Save the slices again, all turned alike.",
+            remedy="Save the slices again with one orientation.",
         )
 
 
@@ -196,4 +196,4 @@ def orientation_problems(orientations: set[int]) -> list[Problem]:
     if not turned:
         return []
     values = " and ".join(map(str, turned))
-    return [warning("orientation", f"rows and columns are turned as the tag Orientation ({values}) says")]
+    return [warning("orientation", f"rows and columns are oriented by the tag Orientation ({values}) says")]

@@ -103,7 +103,7 @@ class Expect(Step):
         pose = driver.poses.get(self.side or Side.LEFT)
         errors = None if pose is None else pose.errors
         if errors is None:
-            raise GpError("no pose was estimated whose truth is known, or that is labelled")
+            raise GpError("no pose with a known truth, or of a labelled ear, was estimated")
         if errors[0] > allowed:
             raise GpError(f"the cochlea is {errors[0]:.3f} mm off, allowed are {allowed:g}")
         return f"cochlea {errors[0]:.3f} mm off"

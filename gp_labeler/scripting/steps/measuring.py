@@ -68,7 +68,7 @@ class Measure(Step):
         made = driver.workspace.document.state.measurements[before:]
         if not made:
             measure.put_away()
-            raise GpError("nothing was measured: a click hit nothing, or a place that it had hit already")
+            raise GpError("nothing was measured: a click hit nothing, or the same position twice")
         if self.name is not None:
             measure.rename(made[0].name, self.name)
         return f"{self.name or made[0].name}, {made[0].value_text}"
@@ -77,7 +77,9 @@ class Measure(Step):
         view = driver.view(self.view)
         if self.view == "3d":
             if not aim_at_bone(driver, aim, turn=False):
-                raise GpError("bone hides that position from where the camera is", remedy="Look elsewhere.")
+                raise GpError(
+                    "bone hides that position from where the camera is", remedy="Choose another position."
+                )
         else:
             scroll_to(driver, Plane(self.view), aim)
         click(view, *view.pixel_at(aim))

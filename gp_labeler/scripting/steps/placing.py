@@ -124,7 +124,8 @@ def _seen_in(driver: WindowDriver, name: str, code: str, aim: FloatArray) -> str
             name = "axial"  # hidden behind bone from everywhere
     elif name == "3d" and not aim_at_bone(driver, aim, turn=False):
         raise GpError(
-            "bone hides that position from where the camera is", remedy="Look from elsewhere, or use best."
+            "bone hides that position from where the camera is",
+            remedy='Change the camera, or use view = "best".',
         )
     if name not in VIEWS:
         raise GpError(f"view must be best or one of {', '.join(VIEWS)}, got {name!r}")
@@ -345,6 +346,6 @@ class Drag(Step):
         driver.wait_until_idle(in_passing=False)
         end = driver.placed(self.side, code)
         if end is None or np.allclose(start, end, atol=1e-9):
-            why = " ".join(text for text, _ in driver.messages[since:]) or "it is where it was"
+            why = " ".join(text for text, _ in driver.messages[since:]) or "it did not move"
             raise GpError(f"{code} {self.side.word} was not moved: {why}", landmark=code)
         return f"by {math.dist(start, end):.3f} mm"

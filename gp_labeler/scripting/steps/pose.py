@@ -151,7 +151,9 @@ class EstimateStep(Step):
         )
         estimate = current_estimate(driver, self.side)
         if self.take_best and (taken := driver.workspace.pose.take_likelier()) is not None:
-            driver.workspace.say(f"Taken as {taken.label}, which is likelier than what was given", "warning")
+            driver.workspace.say(
+                f"Used as {taken.label}, which is more likely than what was given", "warning"
+            )
             estimate = current_estimate(driver, taken.side)
         for method in self.method:
             if method not in estimate.poses:
@@ -295,8 +297,8 @@ class Overlay(Step):
         placed = current_estimate(driver, self.side or driver.workspace.pose.side).in_scan()
         if placed is None:
             raise GpError(
-                "nothing says where the touches lie in the scan",
-                remedy="Label three of the touched features of that side first, or register by the skull.",
+                "the touches are not registered to the scan",
+                remedy="Label three of the touched features of that side, or register by the skull.",
             )
         driver.bring(placed.origin)
 

@@ -68,8 +68,8 @@ class Open(Step):
             raise GpError("open needs a path, phantom = a seed, or empty = true: one of them")
         if driver.workspace.document.dirty and not self.discard:
             raise GpError(
-                "what is open has edits that are not saved",
-                remedy="Let a save step come first, or give discard = true.",
+                "the open specimen has unsaved edits",
+                remedy="Add a save step before it, or give discard = true.",
             )
         driver.workspace.document.abandon()
         if self.empty:

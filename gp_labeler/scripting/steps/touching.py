@@ -160,7 +160,7 @@ def _there(driver: WindowDriver, side: Side, name: str) -> FloatArray:
     """Return where a simulated probe touches, (3,) mm, scan frame."""
     if name not in CODES:
         if name not in driver.workspace.document.state.skull:
-            raise GpError(f"nothing says where {name} is on the scan", landmark=name)
+            raise GpError(f"the position of {name} on the scan is not known", landmark=name)
         return np.array(driver.workspace.document.state.skull[name])
     there = driver.truth(side, name) if driver.workspace.scan.truth else driver.placed(side, name)
     if there is None:
@@ -242,12 +242,12 @@ def current_estimate(driver: WindowDriver, side: Side) -> SideEstimate:
     estimate = driver.workspace.pose.estimate
     if estimate is None:
         waiting = driver.workspace.pose.waiting_text or "there is no estimate"
-        raise GpError(f"{side.word}: {waiting}", remedy="Let a touches step come first.")
+        raise GpError(f"{side.word}: {waiting}", remedy="Add a touches step before it.")
     return estimate
 
 
 def _why_not(estimate: SideEstimate) -> str:
-    nothing = "nothing says where the touches lie in the scan: label three of the touched features"
+    nothing = "the touches are not registered to the scan: label three of the touched features"
     return estimate.problems.get("registration", nothing)
 
 

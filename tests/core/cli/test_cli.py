@@ -66,7 +66,7 @@ def test_estimate_says_what_names_and_paths_tell(tmp_path: Path, capsys: pytest.
     touches = _touches(tmp_path)
     assert main(["estimate", str(touches), "--side", "L"]) == 0
     text = capsys.readouterr().out
-    assert "by its name" not in text
+    assert "indicates the" not in text
     assert "round window" not in text, "nothing was written"
     touches = touches.rename(tmp_path / "Skull_Right_new.csv")
     angles = -np.linspace(0, 8, 20)
@@ -76,7 +76,7 @@ def test_estimate_says_what_names_and_paths_tell(tmp_path: Path, capsys: pytest.
     about = ["--path", str(path), "--path-units", "mm", "--path-side", "L", "--path-out"]
     words = ["estimate", str(touches), "--side", "L", *about, str(tmp_path / "out.csv")]
     assert main(words) == 3
-    assert "as by its name Skull_Right_new.csv is of the right side" in capsys.readouterr().out
+    assert "as the name Skull_Right_new.csv indicates the right side" in capsys.readouterr().out
     words.append("--accept-warnings")
     assert main(words) == 0
     text = capsys.readouterr().out

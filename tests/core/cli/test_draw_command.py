@@ -56,7 +56,7 @@ def test_touches_are_of_the_animal_that_is_printed(
         (["-o", "labelled", "-n", "0"], "at least one animal"),
         (["-o", "labelled", "--label-error", "-1"], "no negative number"),
         (["--csv", "touches.json"], "--csv writes a .csv file"),
-        (["-o", "here", "-n", "1"], "is there already"),
+        (["-o", "here", "-n", "1"], "already exists"),
     ],
 )
 def test_what_cannot_be_is_one_line(

@@ -145,7 +145,7 @@ def test_labels_that_are_there_already_are_not_replaced_unasked(made_up, tmp_pat
     first, *_ = written = import_mat(left, right, tmp_path)
     first.write_text("corrected by hand")
     written[-1].unlink()
-    with pytest.raises(GpError, match=r"_L\.mrk\.json: is there already.*--replace"):
+    with pytest.raises(GpError, match=r"_L\.mrk\.json: already exists.*--replace"):
         import_mat(left, right, tmp_path)
     assert first.read_text() == "corrected by hand"
     assert not written[-1].exists()  # nothing was written before it was refused

@@ -294,7 +294,7 @@ def test_opening_asks_about_what_was_left(tmp_path):
     left.close()
     taken = SpecimenDocument(recover_specimen(recovery, tmp_path / "state"))
     assert (taken.state.notes, taken.path) == ("not saved", file)
-    with pytest.raises(GpError, match="was changed by another program since"):
+    with pytest.raises(GpError, match="was changed by another program after"):
         taken.save()
     taken.save(overwrite=True)
     taken.close()

@@ -148,7 +148,7 @@ def test_rounds_follow_each_other_and_empty_ones_are_dropped(editing):
     editing.document.do(BeginLabelling("AB"))
     assert editing.document.state.round == 2
     assert [(each.observer, each.round) for each in editing.document.state.others] == [("AB", 1), ("CD", 1)]
-    with pytest.raises(GpError, match="AB, round 1 is there already"):
+    with pytest.raises(GpError, match="AB, round 1 already exists"):
         editing.document.do(BeginLabelling("AB", 1))
     with pytest.raises(GpError, match="There are: AB, round 1; CD, round 1"):
         editing.document.do(OpenLabelling("EF", 1))
@@ -238,7 +238,7 @@ def test_an_unnamed_labelling_gets_the_observer_who_answers_later(tmp_path):
     workspace.label_again("CD")
     workspace.labels.place([1, 2, 4], side=L, code="CA")
     assert workspace.document.author == "CD"
-    with pytest.raises(GpError, match="AB, round 1 is there already"):
+    with pytest.raises(GpError, match="AB, round 1 already exists"):
         workspace.document.do(NameObserver("AB"))
     workspace.open_labelling("AB", 1)
     assert tuple(workspace.document.landmarks(L)["CA"]) == (1, 2, 3)

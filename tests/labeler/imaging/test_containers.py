@@ -499,8 +499,11 @@ def test_nifti(name: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> 
     ("write", "words"),
     [
         (NIFTIS["sform right, qform mirrored"], "sform (code 2) and its qform (code 1) are mirror images"),
-        (NIFTIS["sform right, qform moved"], "place the voxels up to 8.66 mm apart; the sform is taken"),
-        (NIFTIS["sform no placement, qform right"], "its sform (code 1) is no placement, and was left out"),
+        (NIFTIS["sform right, qform moved"], "place the voxels up to 8.66 mm apart; the sform is used"),
+        (
+            NIFTIS["sform no placement, qform right"],
+            "its sform (code 1) is not a valid transform, and was ignored",
+        ),
         (nifti(qform_code=0, pixdim=(0.5, 0.5, 0.5)), "pixdim says voxels of 0.5 x 0.5 x 0.5, its sform"),
         (NIFTIS["slope NaN"], "scl_slope is nan"),
         (NIFTIS["intercept NaN"], "scl_inter nan"),

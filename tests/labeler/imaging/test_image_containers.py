@@ -293,7 +293,7 @@ def test_orientation_is_obeyed_whatever_the_packing(
     assert said == (
         []
         if orientation == 1
-        else [f"rows and columns are turned as the tag Orientation ({orientation}) says"]
+        else [f"rows and columns are oriented by the tag Orientation ({orientation}) says"]
     )
 
 
@@ -371,12 +371,12 @@ ASKED: dict[str, tuple[str, Writer, str]] = {
     "imagej frames": (
         "a.tif",
         imagej(shape="frames"),
-        "nothing gives the distance of slices.*--spacing 0.25",
+        "not the distance between slices.*--spacing 0.25",
     ),
     "imagej zunit pixel": ("a.tif", imagej("mm", 1, "zunit=pixel\nspacing=1"), "slice distance in 'pixel'"),
-    "imagej no spacing": ("a.tif", imagej("mm", 1, "x=0"), "nothing gives the distance of slices"),
-    "ome pixel": ("a.ome.tif", ome_file("pixel", 4), "voxel size in pixel, which is no length"),
-    "ome frame": ("a.ome.tif", ome_file("reference frame", 4), "in reference frame, which is no length"),
+    "imagej no spacing": ("a.tif", imagej("mm", 1, "x=0"), "not the distance between slices"),
+    "ome pixel": ("a.ome.tif", ome_file("pixel", 4), "voxel size in pixel, which is not a length"),
+    "ome frame": ("a.ome.tif", ome_file("reference frame", 4), "in reference frame, which is not a length"),
     "ome z in pixels": (
         "a.ome.tif",
         tif(ome=True, metadata=ome(X, Y, 1, ("mm", "mm", "pixel"))),

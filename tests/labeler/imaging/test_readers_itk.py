@@ -252,7 +252,7 @@ def respaced(spacing: float, dtype: str = "uint8") -> Scan:
 @pytest.mark.parametrize(
     ("spacing", "code", "words"),
     [
-        (1.0, "spacing-unit", "1 mm, which programs write when they know none"),
+        (1.0, "spacing-unit", "1 mm, which programs write if it is unknown"),
         (25.4 / 72, "spacing-screen", "72 dpi"),
         (25.4 / 96, "spacing-screen", "96 dpi"),
         (25.4 / 300, "spacing-screen", "300 dpi"),
@@ -486,7 +486,7 @@ def test_one_slice_is_no_volume(tmp_path: Path) -> None:
     image = SimpleITK.GetImageFromArray(cropped().array[:1])
     image.SetSpacing((0.2, 0.2, 0.2))
     SimpleITK.WriteImage(image, str(tmp_path / "flat.nrrd"))
-    with pytest.raises(VolumeError, match="72 x 66 x 1 voxels, which is no volume"):
+    with pytest.raises(VolumeError, match="72 x 66 x 1 voxels, which is not a volume"):
         read_volume(tmp_path / "flat.nrrd")
 
 
@@ -523,5 +523,5 @@ def test_a_scale_of_metaimage_that_nobody_applies_is_said(tmp_path: Path) -> Non
 def test_a_vtk_mesh_is_no_scan(tmp_path: Path) -> None:
     path = tmp_path / "a.vtk"
     path.write_text("# vtk DataFile Version 3.0\nbone\nASCII\nDATASET POLYDATA\nPOINTS 1 float\n0 0 0\n")
-    with pytest.raises(VolumeError, match="it holds POLYDATA, which is no image"):
+    with pytest.raises(VolumeError, match="it holds POLYDATA, which is not an image"):
         read_volume(path)

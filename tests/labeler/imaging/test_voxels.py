@@ -203,7 +203,7 @@ def test_a_file_that_is_cut_while_mapped_ends_no_program(
     assert len(told) == 3
     for line in told:
         assert line.startswith("GpError")
-        assert f"was cut while it was open: {left:,} of its" in line
+        assert f"was truncated while it was open: {left:,} of its" in line
         assert "labels are kept" in line
 
 

@@ -241,7 +241,7 @@ def test_an_atlas_that_is_gone_gives_way_to_the_published_one(start, folder, tmp
     (level, said) = workspace.said[-1]
     assert level == "warning"
     name = "own.json" if what == "file" else "animals"
-    assert said.startswith(f"The atlas of {name} cannot be had any more: ")
+    assert said.startswith(f"The atlas of {name} is no longer available: ")
     assert said.endswith("The published atlas is used.")
     assert workspace.atlas.problem in said
     workspace = start()

@@ -80,7 +80,7 @@ def test_a_scan_that_is_cut_while_open_is_told_once_and_labels_can_be_saved(open
         workspace.view.set_crosshair(MIDDLE + n)
     workspace.scan.set_threshold(700.0)
     wait()
-    told = [text for text in said if "was cut while it was open: 20,000 of its" in text]
+    told = [text for text in said if "was truncated while it was open: 20,000 of its" in text]
     assert len([text for text in told if text.startswith("The scan ball")]) == 1
     assert len(told) == 2  # the mesh that was asked for says it too
     workspace.labels.place(MIDDLE, How.SLICE, side=Side.RIGHT, code="CA")

@@ -101,11 +101,11 @@ def test_a_verdict_on_another_estimate_is_said_to_be_that():
         touching.record_touch(editing.document, "L", code, Atlas.published()[code])
     check = estimating.record_verdict("accept")
     made = (editing, estimating)
-    assert "Not of this estimate" not in Page(report(made).html()).text
+    assert "Refers to an earlier estimate" not in Page(report(made).html()).text
     touching.record_touch(editing.document, "L", "RWP", Atlas.published()["RWP"] + (0.8, 0, 0))
     mm, degrees = estimating.estimate.moved_since(check.pose)
     page = Page(report(made).html()).text
-    assert f"Not of this estimate: it moved by {mm:.2f} mm and turned by {degrees:.1f}° since." in page
+    assert f"Refers to an earlier estimate: this one differs by {mm:.2f} mm and {degrees:.1f}°." in page
     assert mm > 0.05
     editing.document.undo()
     assert estimating.estimate.moved_since(check.pose) is None

@@ -25,7 +25,7 @@ def test_they_are_doubtful_with_or_without_a_tracker(tmp_path: Path) -> None:
         again.document.load(read_specimen(file))
         assert not again.tracker.on
         assert set(again.tracker.doubtful) == set(PROBE)  # the typed one is in no tracker's frame
-        assert "earlier sitting" in again.tracker.frame_words
+        assert "earlier session" in again.tracker.frame_words
         again.pose.choose(side=Side.RIGHT)
         assert again.tracker.doubtful == ()
     finally:

@@ -133,7 +133,7 @@ IMPOSSIBLE = (
     ({"do": "open"}, "a path, phantom"),
     ({"do": "place", "feature": "CO", "side": "L", "at": [0, 0, 0]}, "CO left cannot be chosen"),
     ({"do": "place", "feature": "XX", "side": "L", "at": [0, 0, 0]}, "unknown feature"),
-    ({"do": "place", "feature": "CA", "side": "L", "at": "truth"}, "known of a phantom only"),
+    ({"do": "place", "feature": "CA", "side": "L", "at": "truth"}, "known only for a phantom"),
     ({"do": "place", "feature": "CA", "side": "L", "at": "there"}, "at must be truth, ghost"),
     ({"do": "place", "feature": "CA", "side": "L", "pixel": [9e3, 0]}, "outside the view"),
     ({"do": "place", "feature": "CA", "side": "L", "pixel": [0, 0], "view": "3d"}, "nothing was hit"),

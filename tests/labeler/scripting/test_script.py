@@ -60,7 +60,7 @@ def test_the_name_of_a_specimen_goes_into_its_places() -> None:
     ("table", "text"),
     [
         ({"do": "plaice", "feature": "CA"}, r"step 2: unknown step 'plaice' \(did you mean place\b"),
-        ({"feature": "CA"}, "step 2: does not say what to do"),
+        ({"feature": "CA"}, "step 2: has no key do"),
         ("save", "step 2: must be a table"),
         ({"do": "place", "side": "L"}, "step 2: place: feature is missing"),
         ({"do": "place", "feature": "CA", "side": "L", "aat": [1, 2, 3]}, "unknown key 'aat'"),

@@ -77,5 +77,5 @@ def test_the_checker_of_desktop_entries_finds_nothing(data: Path) -> None:
 
 def test_other_systems_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "platform", "win32")
-    with pytest.raises(GpError, match="only desktops of Linux"):
+    with pytest.raises(GpError, match="only on Linux"):
         install_desktop()

@@ -20,7 +20,7 @@ def test_an_address_reads_as_host_and_port() -> None:
     [
         ({"host": ""}, "host is empty"),
         ({"host": "a b"}, "without spaces"),
-        ({"host": "127.0.0.1:18944"}, "Give the port by itself"),
+        ({"host": "127.0.0.1:18944"}, "Give the port separately"),
         ({"port": 0}, "from 1 to 65535, got 0"),
         ({"port": 70000}, "got 70000"),
         ({"port": True}, "got True"),

@@ -201,7 +201,7 @@ def test_a_marker_that_sends_nothing_is_silence(resting, plain) -> None:
     assert _off(plain.touch(), "OS") < _CLOSE
     resting.do("hide probe")
     plain.until(lambda: plain.link.state.phase is LinkPhase.SILENT, "silence")
-    assert "out of sight" in plain.link.state.words
+    assert "is hidden" in plain.link.state.words
     refused = plain.press()
     assert isinstance(refused, RefusedTouch)
     assert "No message" in refused.reason
@@ -237,7 +237,7 @@ def test_turning_the_probe_calibrates_its_tip(resting, plain) -> None:
 def test_a_wrong_name_is_told_with_what_there_is(resting) -> None:
     link = TrackerLink(TrackerAddress(port=resting.port, probe="StylusToTracker"), silent_s=0.2)
     link.open()
-    until(lambda: "ProbeToTracker; is the name right?" in link.state.words, link.poll, "the right name")
+    until(lambda: "ProbeToTracker; check the name." in link.state.words, link.poll, "the right name")
     assert link.state.phase is LinkPhase.SILENT
     link.close()
 
@@ -285,7 +285,7 @@ def test_a_server_of_another_kind_is_told() -> None:
         link = TrackerLink(TrackerAddress(port=server.getsockname()[1]))
         link.open()
         until(lambda: link.state.phase is LinkPhase.LOST, link.poll, "the refusal")
-        assert "does not speak OpenIGTLink" in link.state.words
+        assert "does not use OpenIGTLink" in link.state.words
         link.close()
         thread.join(DEADLINE)
 

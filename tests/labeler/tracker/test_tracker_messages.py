@@ -48,7 +48,7 @@ def test_a_string_is_read() -> None:
 
 def test_what_is_not_openigtlink_is_said() -> None:
     web = b"HTTP/1.1 400 Bad Request\r\nContent-Type: text/html\r\nConnection: close\r\n\r\n"
-    with pytest.raises(GpError, match="does not speak OpenIGTLink"):
+    with pytest.raises(GpError, match="does not use OpenIGTLink"):
         MessageDecoder().feed(web, 1.0)
 
 

@@ -106,7 +106,7 @@ def test_holding_still_where_nothing_is_asked_for_is_no_touch(workspace, simulat
     assert refusals == []
     workspace.tracker.press()
     until(lambda: bool(refusals), workspace.tracker.poll, "who presses is told")
-    assert refusals[0] == "All features are touched. Choose one to touch again."
+    assert refusals[0] == "All features are touched. Select one to touch again."
 
 
 def test_without_a_tracker_a_press_says_so(workspace):

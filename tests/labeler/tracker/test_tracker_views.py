@@ -97,7 +97,7 @@ def test_a_device_without_noise_is_believed_where_a_person_says_so(qtbot, worksp
     qtbot.mouseClick(dialog.connect_button, Qt.MouseButton.LeftButton)
     simulator.do("go MN 0.2")
     simulator.tell("stale 60")
-    going(qtbot, workspace, lambda: "repeats its last position" in dialog.words.text())
+    going(qtbot, workspace, lambda: "readings do not change" in dialog.words.text())
     qtbot.mouseClick(dialog.still, Qt.MouseButton.LeftButton, pos=QPoint(8, dialog.still.height() // 2))
     going(qtbot, workspace, lambda: workspace.tracker.visible)
     workspace.tracker.refused.connect(lambda _: workspace.tracker.press())

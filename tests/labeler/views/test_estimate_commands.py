@@ -31,7 +31,7 @@ def test_the_authors_path_is_carried_once_its_axes_are_told(make_window, shared_
     ask_path(window.workspace, window.prompts)
     carried = window.workspace.pose.path
     assert len(carried.points) == 20
-    assert carried.points[0, 1] > 1.5, "it begins at the round window"
+    assert carried.points[0, 1] > 1.5, "it starts at the round window"
     assert next(iter(carried.readings(carried.source, "L", units="m"))) == "z,-y,x", "likeliest first"
     window.prompts.answers = ["m", "right"]
     with pytest.raises(GpError, match="winds as in a left ear"):
@@ -78,11 +78,11 @@ def test_a_file_named_for_the_other_side_is_told_and_moved_by_a_click(qtbot, mak
     window.set_step("pose")
     panel = window.steps["pose"]
     assert panel.take_file(shared_data / "probe" / "SkullD_Right.dat")
-    assert "By its name SkullD_Right.dat is of the right side." in told(panel)
+    assert "The name SkullD_Right.dat indicates the right side." in told(panel)
     assert [reason.code for reason in window.workspace.pose.file_warnings] == ["side undecided"]
     qtbot.mouseClick(panel.result.other_side, Qt.MouseButton.LeftButton)
     assert window.workspace.pose.side is Side.RIGHT
-    assert not any("By its name" in text for text in told(panel))
+    assert not any("indicates the right side" in text for text in told(panel))
 
 
 def test_a_file_named_for_the_other_side_is_believed_once_the_user_says_which_side_it_is(
@@ -95,12 +95,12 @@ def test_a_file_named_for_the_other_side_is_believed_once_the_user_says_which_si
     rows = (f"{code},{','.join(map(str, ANIMAL[code]))}" for code in PROBE)
     file.write_text("\n".join(rows) + "\n")
     assert panel.take_file(file)
-    assert "By its name GP7_Right.csv is of the right side." in told(panel)
+    assert "The name GP7_Right.csv indicates the right side." in told(panel)
     assert panel.result.this_side.text() == "Keep the left side"
-    with pytest.raises(GpError, match=r"by its name GP7_Right.csv is of the right side"):
+    with pytest.raises(GpError, match=r"the name GP7_Right.csv indicates the right side"):
         window.workspace.pose.export(tmp_path / "pose.tfm")
     qtbot.mouseClick(panel.result.this_side, Qt.MouseButton.LeftButton)
-    assert not any("By its name" in text for text in told(panel))
+    assert not any("indicates the right side" in text for text in told(panel))
     assert not panel.result.this_side.isVisible()
     window.workspace.pose.export(tmp_path / "pose.tfm")
 

@@ -140,7 +140,7 @@ def test_every_state_has_its_word(workspace, panel):
     assert word(table, "RWM", LEFT) == "unseen"
     assert word(table, "FPA", LEFT) == "ghost"
     assert word(table, "FPA", RIGHT) == "to do"
-    assert word(table, "CO", RIGHT) == "by itself", "nobody places it"
+    assert word(table, "CO", RIGHT) == "automatic", "nobody places it"
     distance = workspace.labels.problems(LEFT)["OI"].deviation_of("OI").distance
     assert word(table, "OI", LEFT) == f"{distance:.1f} mm"
 

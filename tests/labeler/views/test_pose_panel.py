@@ -447,7 +447,7 @@ def test_the_likelier_reading_is_taken_in_one_step(workspace, panel):
 
 def test_an_atlas_that_is_not_the_one_chosen_is_told_beside_the_estimate(workspace, panel):
     assert not panel.head.problem.isVisible()
-    workspace.atlas.problem = "The atlas of own.json cannot be had any more: own.json: does not exist."
+    workspace.atlas.problem = "The atlas of own.json is no longer available: own.json: does not exist."
     workspace.atlas.details_changed.emit()
     assert panel.head.problem.isVisible()
     assert "The published atlas is used." in panel.head.problem.text()

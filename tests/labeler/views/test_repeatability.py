@@ -111,7 +111,7 @@ def test_two_labels_are_looked_at_together_but_not_while_labelling_blind(folder)
     assert (away @ away) ** 0.5 == pytest.approx(row.distance_mm)
     workspace.label_again("EF")
     assert not workspace.references.points
-    with pytest.raises(GpError, match="labelled blind, so its other labels stay hidden"):
+    with pytest.raises(GpError, match="labelled blind, so its other labels are hidden"):
         workspace.reliability.file_of(row)
     workspace.close(discard=True)
 

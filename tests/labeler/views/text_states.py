@@ -214,7 +214,7 @@ def _pose(window: MainWindow, look: Look) -> None:
     workspace.pose.choose(registration="auto", methods=("robust", "jrmpc"))
     _wait(window)
     look("pose, both methods, no animals", window)
-    workspace.atlas.problem = f"The atlas of {LONG_NAME}.json cannot be had any more: it does not exist."
+    workspace.atlas.problem = f"The atlas of {LONG_NAME}.json is no longer available: it does not exist."
     workspace.atlas.details_changed.emit()
     look("pose, atlas gone", window)
     workspace.interaction.set_tool("touch")

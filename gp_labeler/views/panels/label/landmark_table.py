@@ -41,7 +41,7 @@ _ROOMY_ROW = 24
 _FEWEST_ROWS = 6
 """SliceViewport in a low window, which scrolls the table."""
 
-_WIDEST_STATES = (*(state.value for state in PointState), "by itself", "99.9 mm")
+_WIDEST_STATES = (*(state.value for state in PointState), "automatic", "99.9 mm")
 _CHIP, _PAD = 12, 8
 
 

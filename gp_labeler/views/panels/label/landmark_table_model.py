@@ -143,7 +143,7 @@ class LandmarkTableModel(QAbstractTableModel):
         ):
             return problem.word
         if feature(code).computed and state is PointState.TO_DO:
-            return "by itself"
+            return "automatic"
         return str(state.value)
 
     def _sentence(self, code: str, side: Side, state: PointState) -> str:

@@ -35,7 +35,7 @@ _FOUND = {
     "features": "by labelled features",
     "skull": "by skull features",
     "placed": "placed on the scan itself",
-    "known": "known from elsewhere",
+    "known": "given with the touches",
 }
 
 
