@@ -7,10 +7,13 @@ The labelled scans are synthetic heads with the seeds 1 to 5, the new heads thos
 simulated user sees each feature where it truly is, and knows where to look:
 
 - *without*, the user takes the features in the order that the window proposes. From the third on, ghosts say
-  where to look. The user goes to the feature's slice in the view where that takes the fewest notches of the
-  wheel, zooms in until a voxel is four pixels wide, and clicks.
-- *with*, the user asks for suggestions. Each that is off by more than a voxel is corrected, by Ctrl+click on
-  its slice; the others are confirmed by Enter.
+  where to look. In the view in which the feature is best seen (axial for what is best seen in 3D), the user
+  turns the wheel to the feature's slice, zooms in until a voxel is four pixels wide, and clicks.
+- *with*, the user asks for suggestions. Each that is off by more than a voxel is corrected in the same way, with
+  Ctrl held for the click; the others are confirmed by Enter.
+
+Each key, click and notch of the wheel is an action. A stroke is a turn of the wheel without a pause. Memory
+is the resident memory of the window and of its process for registration.
 """
 
 from __future__ import annotations
@@ -18,10 +21,13 @@ from __future__ import annotations
 import argparse
 import os
 import resource
+import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -32,8 +38,8 @@ sys.path[:0] = [str(ROOT)]
 import numpy as np  # noqa: E402
 
 from gp_core.errors import GpError  # noqa: E402
-from gp_core.landmarks.features import FEATURES, Side  # noqa: E402
-from gp_labeler.phantom import make_phantom, save_phantom  # noqa: E402
+from gp_core.io import load_specimens  # noqa: E402
+from gp_core.landmarks.features import FEATURES, Side, feature  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scripting.events import click, press_keys, turn_wheel  # noqa: E402
 from gp_labeler.scripting.steps.scan import Open  # noqa: E402
@@ -41,6 +47,7 @@ from gp_labeler.scripting.window_driver import WindowDriver  # noqa: E402
 from gp_labeler.views.panels.label.suggest_row import SuggestRow  # noqa: E402
 from gp_labeler.views.window_commands.landmarks import AS_THE_FILE, FOLDER  # noqa: E402
 
+_SLICES = tuple(plane.value for plane in Plane)
 _VOXEL_PIXELS = 4.0
 _ZOOM_PER_NOTCH = 1.15
 _MOST = 200
@@ -77,9 +84,9 @@ class Hand:
         self.done[kind] += n
         self.driver.wait_until_idle(in_passing=False)
 
-    def place(self, position: np.ndarray, *, replace: bool) -> None:
-        """Go to a (3,) scan position where that is nearest, zoom in, and click."""
-        name = min((plane.value for plane in Plane), key=lambda n: abs(self._slices_to(n, position)))
+    def place(self, code: str, position: np.ndarray, *, replace: bool) -> None:
+        """Go to a (3,) scan position in the view of the feature, zoom in, and click."""
+        name = feature(code).view if feature(code).view in _SLICES else "axial"
         view = self.driver.view(name)
         middle = view.width() / 2, view.height() / 2
         self.wheel(view, *middle, self._slices_to(name, position))
@@ -108,12 +115,13 @@ class Labelled:
     n_confirmed: int = 0
     suggested: np.ndarray | None = None
     cpu: float = 0.0
-    peak_mb: float = 0.0
+    memory: str = ""
 
 
-def open_head(driver: WindowDriver, seed: int, spacing: float) -> Hand:
+def open_head(driver: WindowDriver, head: Path) -> Hand:
     """Open a fresh head in the step Label."""
-    Open(phantom=seed, spacing=spacing, discard=True).run(driver)
+    Open(path=str(head), discard=True).run(driver)
+    (driver.workspace.scan.truth,) = load_specimens(head.parent.glob(f"{head.stem}_[LR].mrk.json"))
     driver.window.set_step("label")
     driver.wait_until_idle()
     return Hand(driver)
@@ -133,21 +141,22 @@ def errors_of(driver: WindowDriver) -> np.ndarray:
     return np.array(off)
 
 
-def without(driver: WindowDriver, seed: int, spacing: float) -> Labelled:
+def without(driver: WindowDriver, head: Path) -> Labelled:
     """Label a head as it was before there were first labels."""
-    hand = open_head(driver, seed, spacing)
+    hand = open_head(driver, head)
     for _ in range(_MOST):
         active = driver.workspace.labels.active
         if active.code is None:
             break
-        hand.place(driver.truth(active.side, active.code), replace=False)
+        hand.place(active.code, driver.truth(active.side, active.code), replace=False)
     return Labelled(hand.done, errors_of(driver))
 
 
-def suggest(hand: Hand, library: Path) -> tuple[float, float]:
-    """Ask for first labels; return CPU seconds and the peak of memory, MB, that it took."""
+def suggest(hand: Hand, library: Path) -> tuple[float, str]:
+    """Ask for first labels; return CPU seconds, and memory in words."""
     driver = hand.driver
-    begun = cpu_seconds()
+    begun, before = cpu_seconds(), resident_mb()
+    memory = PeakMemory()
     driver.prompts.prepare(files=[library], answers=(FOLDER, AS_THE_FILE))
     button = driver.window.findChild(SuggestRow).button
     hand.click(button, button.width() / 2, button.height() / 2)
@@ -155,8 +164,39 @@ def suggest(hand: Hand, library: Path) -> tuple[float, float]:
     driver.wait_until_idle()
     if driver.workspace.first_labels.proposal is None:
         raise GpError(driver.trouble(0) or "nothing was suggested")
-    usage = [resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-    return cpu_seconds() - begun, sum(usage) / 1024
+    return cpu_seconds() - begun, f"{before:.0f} MB before, {memory.stop():.0f} at most"
+
+
+class PeakMemory:
+    """Watches the resident memory of this process and its children."""
+
+    def __init__(self) -> None:
+        self._peak, self._over = 0.0, threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+
+    def _watch(self) -> None:
+        while not self._over.wait(0.1):
+            self._peak = max(self._peak, resident_mb())
+
+    def stop(self) -> float:
+        """Return the most there was, MB."""
+        self._over.set()
+        self._thread.join()
+        return self._peak
+
+
+def resident_mb() -> float:
+    """Return the resident memory of this process and its children, MB; shared pages count twice (Linux)."""
+    pids, total = [os.getpid()], 0
+    for pid in pids:
+        try:
+            total += int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+            for task in Path(f"/proc/{pid}/task").iterdir():
+                pids += map(int, (task / "children").read_text().split())
+        except OSError:  # it has just ended
+            continue
+    return total * resource.getpagesize() / 2**20
 
 
 def cpu_seconds() -> float:
@@ -165,10 +205,10 @@ def cpu_seconds() -> float:
     return sum(each.ru_utime + each.ru_stime for each in used)
 
 
-def with_first_labels(driver: WindowDriver, seed: int, spacing: float, library: Path) -> Labelled:
+def with_first_labels(driver: WindowDriver, head: Path, library: Path) -> Labelled:
     """Label a head that has first labels."""
-    hand = open_head(driver, seed, spacing)
-    cpu, peak = suggest(hand, library)
+    hand = open_head(driver, head)
+    cpu, memory = suggest(hand, library)
     suggested = np.array(
         [
             np.linalg.norm(np.array(found.position) - driver.truth(side, code))
@@ -185,11 +225,11 @@ def with_first_labels(driver: WindowDriver, seed: int, spacing: float, library: 
         truth = driver.truth(active.side, active.code)
         found = driver.workspace.document.landmarks(active.side).suggested.get(active.code)
         if found is None or np.linalg.norm(np.array(found.position) - truth) > driver.voxel:
-            hand.place(truth, replace=True)
+            hand.place(active.code, truth, replace=True)
         else:
             hand.key("Return")
             n_confirmed += driver.placed(active.side, active.code) is not None
-    return Labelled(hand.done, errors_of(driver), n_confirmed, suggested, cpu, peak)
+    return Labelled(hand.done, errors_of(driver), n_confirmed, suggested, cpu, memory)
 
 
 def tell(name: str, found: Labelled) -> None:
@@ -210,13 +250,15 @@ def presses(found: Labelled) -> int:
     return sum(found.done[kind] for kind in ("keys", "clicks", "strokes"))
 
 
-def make_library(folder: Path, n: int, spacing: float) -> Path:
-    """Make labelled heads, as ``gp-labeler phantom --labelled`` does, where they are not there yet."""
-    for seed in range(1, n + 1):
-        path = folder / f"phantom-{seed}.nrrd"
-        if not path.exists():
-            save_phantom(make_phantom(seed, spacing=spacing), path, labelled=True)
-    return folder
+def labelled_heads(folder: Path, seeds: Iterable[int], spacing: float) -> list[Path]:
+    """Return labelled heads, made by ``gp-labeler phantom --labelled`` where they are not there yet."""
+    paths = []
+    for seed in seeds:
+        paths.append(folder / f"phantom-{seed}.nrrd")
+        if not paths[-1].exists():
+            words = ["phantom", "--seed", seed, "--labelled", "--spacing", spacing, "-o", paths[-1]]
+            subprocess.run([sys.executable, "-m", "gp_labeler", *map(str, words)], check=True)
+    return paths
 
 
 def main() -> None:
@@ -232,24 +274,26 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as thrown_away:
         folder = options.folder or Path(thrown_away)
         os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
-        scans = folder / f"labelled-{options.labelled}-{options.spacing:g}"
-        library = make_library(scans, options.labelled, options.spacing)
+        library = folder / f"labelled-{options.labelled}-{options.spacing:g}"
+        labelled_heads(library, range(1, options.labelled + 1), options.spacing)
+        heads = labelled_heads(folder / f"new-{options.spacing:g}", options.heads, options.spacing)
         driver = WindowDriver(folder, folder)
         print(
             f"{'':<16}{'keys':>9}{'clicks':>9}{'notches':>9}{'strokes':>9}{'all':>9}{'presses':>9}"
             f"{'median':>9}{'90 %':>7}{'most':>7}"
         )
-        for seed in options.heads:
-            report(driver, seed, options.spacing, library)
+        for head in heads:
+            report(driver, head, library)
         driver.close()
 
 
-def report(driver: WindowDriver, seed: int, spacing: float, library: Path) -> None:
+def report(driver: WindowDriver, head: Path, library: Path) -> None:
     """Print the rows of one head."""
-    started = time.monotonic()
-    bare, helped = without(driver, seed, spacing), with_first_labels(driver, seed, spacing, library)
-    tell(f"{seed} without", bare)
-    tell(f"{seed} with", helped)
+    started, name = time.monotonic(), head.stem.removeprefix("phantom-")
+    bare = without(driver, head)
+    tell(f"{name} without", bare)
+    helped = with_first_labels(driver, head, library)
+    tell(f"{name} with", helped)
     assert helped.suggested is not None
     within = int((helped.suggested <= driver.voxel).sum())
     print(
@@ -257,7 +301,7 @@ def report(driver: WindowDriver, seed: int, spacing: float, library: Path) -> No
         f"{np.median(helped.suggested):.3f} mm, most {helped.suggested.max():.2f}), "
         f"{helped.n_confirmed} confirmed; all actions {every(helped) / every(bare):.2f} of those without, "
         f"presses {presses(helped) / presses(bare):.2f}; suggesting took {helped.cpu:.0f} CPU s, "
-        f"peak {helped.peak_mb:.0f} MB; {time.monotonic() - started:.0f} s",
+        f"{helped.memory}; {time.monotonic() - started:.0f} s",
         flush=True,
     )
 
