@@ -9,8 +9,8 @@ simulated user sees each feature where it truly is, and knows where to look:
 - *without*, the user takes the features in the order that the window proposes. From the third on, ghosts say
   where to look. In the view in which the feature is best seen (axial for what is best seen in 3D), the user
   turns the wheel to the feature's slice, zooms in until a voxel is four pixels wide, and clicks.
-- *with*, the user asks for suggestions. Each that is off by more than a voxel is corrected in the same way, with
-  Ctrl held for the click; the others are confirmed by Enter.
+- *with*, the user asks for suggestions. Each that is off by more than a voxel is corrected in the same way,
+  with Ctrl held for the click; the others are confirmed by Enter.
 
 Each key, click and notch of the wheel is an action. A stroke is a turn of the wheel without a pause. Memory
 is the resident memory of the window and of its process for registration.
