@@ -17,7 +17,7 @@ from gp_labeler.commands.slab_rows import slab_rows
 from gp_labeler.commands.view_rows import cut_rows
 from gp_labeler.models.workspace import Workspace
 
-__all__ = ["ACTIONS", "MENUS", "Action", "action", "gestures", "run"]
+__all__ = ["ACTIONS", "MENUS", "Action", "InWindow", "action", "gestures", "run"]
 
 ACTIONS: Mapping[str, Action] = MappingProxyType(
     {
@@ -54,9 +54,15 @@ def action(id: str) -> Action:
     return ACTIONS[id]
 
 
-def run(
-    id: str, workspace: Workspace, in_window: Mapping[str, Callable[[], object]] = MappingProxyType({})
-) -> bool:
+InWindow = Callable[[str], Callable[[], object]]
+"""Returns what a window does for an action, by its id; see `gp_labeler.views.window_commands`."""
+
+
+def _without_window(id: str) -> Callable[[], object]:
+    raise GpError(f"{id} needs a window")
+
+
+def run(id: str, workspace: Workspace, in_window: InWindow = _without_window) -> bool:
     """Do an action; where it cannot be done, the user is told why.
 
     Parameters
@@ -65,8 +71,8 @@ def run(
         Its name.
     workspace : Workspace
         What it acts on.
-    in_window : mapping of str to callable
-        What a window does for the actions that need one, by id; see `gp_labeler.views.window_commands`.
+    in_window : callable
+        What a window does for the actions that need one.
 
     Returns
     -------
@@ -77,7 +83,7 @@ def run(
     if not row.enabled(workspace):
         return False
     try:
-        in_window[id]() if row.run is None else row.run(workspace)
+        in_window(id)() if row.run is None else row.run(workspace)
     except GpError as error:
         workspace.say(str(error), "warning")
         return False

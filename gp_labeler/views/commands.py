@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from qtpy.QtCore import QObject, Qt, QTimer, Signal
 from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
-from gp_labeler.commands.actions import ACTIONS, MENUS, Action, run
+from gp_labeler.commands.actions import ACTIONS, MENUS, Action, InWindow, run
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.signals import follow
@@ -52,8 +51,8 @@ class Commands(QObject):
     ----------
     workspace : Workspace
         What they act on.
-    in_window : mapping of str to callable
-        What the window does, by id, for the actions that need one; see `views.window_commands`.
+    in_window : callable
+        Returns what the window does for an action that needs one, by its id; see `views.window_commands`.
     window, views : QWidget
         Where keys work: everywhere, or only in the views.
     """
@@ -67,7 +66,7 @@ class Commands(QObject):
     def __init__(
         self,
         workspace: Workspace,
-        in_window: Mapping[str, Callable[[], object]],
+        in_window: InWindow,
         window: QWidget,
         views: QWidget,
     ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TypeVar
@@ -54,7 +55,7 @@ from gp_labeler.views.tracker_display import TrackerDisplay
 from gp_labeler.views.view_grid import ViewGrid
 from gp_labeler.views.window_commands.atlas import show_disagreement, show_finding
 from gp_labeler.views.window_commands.file import open_path, resolve_unsaved
-from gp_labeler.views.window_commands.table import window_commands
+from gp_labeler.views.window_commands.table import command_of
 from gp_labeler.views.window_state import WindowState
 
 __all__ = ["MainWindow"]
@@ -116,7 +117,7 @@ class MainWindow(QMainWindow):
             MeasureLayer(workspace, view)
         self.tracker_display = TrackerDisplay(workspace, self.pose_display)
         self.tracker_display.audible = self.memory.get("audible", bool, False)
-        self.commands = Commands(workspace, window_commands(self), self, self.grid)
+        self.commands = Commands(workspace, partial(command_of, self), self, self.grid)
         self.commands.fill(self.menuBar())
         self.rail, self.panels = Rail(workspace, self.commands.actions), PanelStack()
         self.pages, self.welcome = QStackedWidget(), Welcome(workspace, self.commands.actions)

@@ -11,7 +11,6 @@ from qtpy.QtWidgets import QAbstractButton, QApplication, QCheckBox, QLabel, QWi
 
 from gp_core import Atlas
 from gp_core.landmarks.features import Side
-from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workspace import Workspace
@@ -62,11 +61,10 @@ def place(workspace: Workspace, *codes: str, side: Side = Side.LEFT) -> None:
 def actions_of(workspace: Workspace, qtbot, asked: list[str] | None = None) -> Actions:
     """Make the window's actions, for panels that are tried alone; what needs the window goes to `asked`."""
     calls = [] if asked is None else asked
-    in_window = {id: partial(calls.append, id) for id, row in ACTIONS.items() if row.run is None}
     window = QWidget()
     qtbot.addWidget(window)
     vars(qtbot).setdefault("windows", []).append(window)  # which keeps no widget alive by itself
-    return Commands(workspace, in_window, window, window).actions
+    return Commands(workspace, lambda id: partial(calls.append, id), window, window).actions
 
 
 def cut_words(root: QWidget) -> Iterator[str]:

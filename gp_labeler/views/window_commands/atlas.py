@@ -14,7 +14,7 @@ from gp_core.study.reliability import Disagreement
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.signals import attempt
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 from gp_labeler.views.window_commands.file import open_path
 
 if TYPE_CHECKING:
@@ -114,12 +114,12 @@ def _ask_folder(window: MainWindow, title: str) -> list[Path]:
 ATLAS_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "atlas.show": lambda window: window.set_step("atlas"),
-        "atlas.open": asking(ask_open_atlas),
+        "atlas.open": Asking(ask_open_atlas),
         "atlas.fit_files": lambda window: fit_atlas(window, _ask_files(window, _FIT)),
         "atlas.fit_folder": lambda window: fit_atlas(window, _ask_folder(window, _FIT)),
-        "atlas.save": asking(ask_save_atlas),
+        "atlas.save": Asking(ask_save_atlas),
         "atlas.reliability_files": lambda window: compare_labels(window, _ask_files(window, _COMPARE)),
         "atlas.reliability_folder": lambda window: compare_labels(window, _ask_folder(window, _COMPARE)),
-        "atlas.save_reliability": asking(ask_save_reliability),
+        "atlas.save_reliability": Asking(ask_save_reliability),
     }
 )

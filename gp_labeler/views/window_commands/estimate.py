@@ -24,7 +24,7 @@ from gp_labeler.views.panels.pose.physical_dialog import PhysicalDialog
 from gp_labeler.views.panels.tracker.dialog import TrackerDialog
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.report_file import report_of, reported_estimate, save_report
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 from gp_labeler.views.window_commands.file import POINTS
 
 if TYPE_CHECKING:
@@ -174,15 +174,15 @@ def look_at_pose(window: MainWindow, placement: Callable[[DrawnPose], CameraPlac
 ESTIMATE_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "pose.open_touches": ask_open_touches,
-        "pose.open_skull": asking(ask_open_skull),
+        "pose.open_skull": Asking(ask_open_skull),
         "pose.tracker": show_tracker,
         "pose.guide": show_guide,
         "pose.along_axis": partial(look_at_pose, placement=along_axis),
         "pose.through_window": partial(look_at_pose, placement=through_round_window),
-        "pose.export": asking(ask_export_pose),
+        "pose.export": Asking(ask_export_pose),
         "pose.report": ask_report,
-        "pose.path": asking(ask_path),
-        "pose.save_path": asking(ask_save_path),
+        "pose.path": Asking(ask_path),
+        "pose.save_path": Asking(ask_save_path),
         "pose.physical": show_physical,
         "pose.accept": lambda window: window.judge_pose("accept"),
         "pose.reject": lambda window: window.judge_pose("reject"),

@@ -20,7 +20,7 @@ from gp_labeler.views.panels.scan.specimen_list_dialog import SpecimenListDialog
 from gp_labeler.views.pictures import grab, write_picture
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.questions import export_asking, import_asking
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -209,20 +209,20 @@ def ask_add_mesh(workspace: Workspace, prompts: Prompts) -> None:
 FILE_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "file.new": begin,
-        "file.open": asking(ask_open_file),
-        "file.open_folder": asking(ask_open_folder),
-        "file.demo": asking(open_demo),
+        "file.open": Asking(ask_open_file),
+        "file.open_folder": Asking(ask_open_folder),
+        "file.demo": Asking(open_demo),
         "file.specimens": show_specimens,
-        "file.next_specimen": asking(open_next_specimen),
-        "file.find_scan": asking(ask_find_scan),
-        "file.save": asking(save),
+        "file.next_specimen": Asking(open_next_specimen),
+        "file.find_scan": Asking(ask_find_scan),
+        "file.save": Asking(save),
         "file.save_as": lambda window: save(window.workspace, window.prompts, ask=True),
         "file.import": ask_import,
         "file.export": ask_export,
-        "file.save_mesh": asking(ask_save_mesh),
+        "file.save_mesh": Asking(ask_save_mesh),
         "file.screenshot": ask_screenshot,
-        "file.show_references": asking(ask_references),
-        "file.add_mesh": asking(ask_add_mesh),
+        "file.show_references": Asking(ask_references),
+        "file.add_mesh": Asking(ask_add_mesh),
         "file.close": lambda window: window.close(),
     }
 )

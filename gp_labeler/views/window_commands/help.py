@@ -11,7 +11,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.recorder import Recorder
 from gp_labeler.views.shortcuts_sheet import ShortcutsSheet
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -53,6 +53,6 @@ HELP_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "help.shortcuts": show_shortcuts,
         "help.record": toggle_recording,
-        "help.about": asking(show_about),
+        "help.about": Asking(show_about),
     }
 )

@@ -12,7 +12,7 @@ from gp_core.landmarks.features import FEATURES, feature
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.label.labellings_dialog import LabellingsDialog
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 from gp_labeler.views.window_commands.view import ask_reopen_mirrored
 
 if TYPE_CHECKING:
@@ -114,9 +114,9 @@ def _knows_left(workspace: Workspace, prompts: Prompts) -> bool:
 
 LANDMARK_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
-        "edit.swap": asking(ask_swap),
+        "edit.swap": Asking(ask_swap),
         "tool.place": place_by_click,
-        "point.suggest_like": asking(ask_suggest_like),
+        "point.suggest_like": Asking(ask_suggest_like),
         "labelling.again": label_again,
         "labelling.show": show_labellings,
     }

@@ -10,7 +10,7 @@ from gp_core.errors import GpError
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.measure.dialog import MeasureDialog
 from gp_labeler.views.prompts import Prompts
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 
 if TYPE_CHECKING:
     from gp_labeler.views.main_window import MainWindow
@@ -53,7 +53,7 @@ def ask_export_measurements(workspace: Workspace, prompts: Prompts) -> None:
 MEASURE_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "measure.show": show_measurements,
-        "measure.import": asking(ask_import_measurements),
-        "measure.export": asking(ask_export_measurements),
+        "measure.import": Asking(ask_import_measurements),
+        "measure.export": Asking(ask_export_measurements),
     }
 )

@@ -17,7 +17,7 @@ from gp_labeler.views.fonts import nearest_text_size
 from gp_labeler.views.prompts import Prompts
 from gp_labeler.views.status_line import where_text
 from gp_labeler.views.view_grid import CLOSE_MM
-from gp_labeler.views.window_commands.command import WindowCommand, asking
+from gp_labeler.views.window_commands.command import Asking, WindowCommand
 from gp_labeler.views.window_commands.file import resolve_unsaved
 
 if TYPE_CHECKING:
@@ -124,7 +124,7 @@ VIEW_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
     {
         "view.fit_here": reset_view_here,
         "view.zoom_to_point": zoom_to_point,
-        "view.go_to": asking(ask_position),
+        "view.go_to": Asking(ask_position),
         "view.from_anterior": partial(look_from, letter="A"),
         "view.from_posterior": partial(look_from, letter="P"),
         "view.from_left": partial(look_from, letter="L"),
@@ -142,6 +142,6 @@ VIEW_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(
         "view.text_smaller": partial(change_text_size, step=-1),
         "view.text_normal": partial(change_text_size, step=0),
         "view.canvas": lambda window: ask_canvas(window, window.prompts),
-        "head.left_is_right": asking(ask_reopen_mirrored),
+        "head.left_is_right": Asking(ask_reopen_mirrored),
     }
 )
