@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["compact", "kept_points", "part_of_points", "subset"]
+__all__ = ["compact", "kept_points", "subset"]
 
 _Numbers = NDArray[np.integer[Any]]
 
@@ -119,13 +119,6 @@ def _take(triangles: Any, chosen: Any, used: Any, number: Any) -> tuple[Any, int
                 taken[n_triangles, corner] = number[triangles[t, corner]]
             n_triangles += 1
     return taken, n_points
-
-
-def part_of_points(triangles: _Numbers, n_points: int) -> _Numbers:
-    """Return, for each point, the number of the connected part it belongs to, from 0."""
-    part = np.empty(n_points, np.int32)
-    _parts(triangles, part)
-    return part
 
 
 def kept_points(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -104,10 +104,6 @@ class SlicePlane:
         right, down, normal = (R @ self._orthonormal()).T
         point = np.asarray(about, dtype=np.float64)
         return SlicePlane(right, down, normal, point + R @ (self.origin - point))
-
-    def with_origin(self, origin: ArrayLike) -> SlicePlane:
-        """Return the same orientation, counted from another (3,) origin."""
-        return replace(self, origin=np.asarray(origin, dtype=np.float64))
 
     def same_as(self, other: SlicePlane) -> bool:
         """Whether it is the same plane on the same screen."""

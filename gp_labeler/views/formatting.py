@@ -17,7 +17,6 @@ __all__ = [
     "spacing_text",
     "suggestion_text",
     "value_text",
-    "voxel_text",
 ]
 
 NONE = "\N{EN DASH}"
@@ -56,11 +55,6 @@ def position_text(position: Iterable[float]) -> str:
         shown = round(float(value), 1)
         parts.append(f"{plus if shown >= 0 else minus} {abs(shown):.1f}")
     return "  ".join(parts) + " mm"
-
-
-def voxel_text(index: Iterable[float]) -> str:
-    """Return the voxel that a fractional index lies in, such as ``(74, 65, 88)``."""
-    return f"({', '.join(str(math.floor(i + 0.5)) for i in index)})"
 
 
 def value_text(value: float | None) -> str:

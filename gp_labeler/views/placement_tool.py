@@ -75,7 +75,27 @@ class PlacementTool:
             self._workspace.measure.end_drag()
         return mark
 
-    def cancel(self) -> None:
+    def escape(self) -> bool:
+        """Take back what was begun last, as the key Escape does; return whether there was anything.
+
+        A dragged point goes back; the next click replaces no point; a measurement is taken back by one step;
+        the head is no longer turned by hand.
+        """
+        interaction = self._workspace.interaction
+        if interaction.drag is not None:
+            self._cancel_drag()
+            return True
+        if interaction.replacing:
+            interaction.arm_replacing(False)
+            return True
+        if self._take_back_measurement():
+            return True
+        if interaction.tool == "turn":
+            interaction.leave_turning()
+            return True
+        return False
+
+    def _cancel_drag(self) -> None:
         """Let a dragged point go back to where it was, and the crosshair with it."""
         self._mark, drag = None, self._workspace.interaction.drag
         self._workspace.interaction.end_drag(keep=False)
@@ -84,7 +104,7 @@ class PlacementTool:
             if where is not None:
                 self._workspace.view.set_crosshair(where)
 
-    def put_away(self) -> bool:
+    def _take_back_measurement(self) -> bool:
         """Take back what is being measured, a step at a time; return whether there was anything."""
         if self._workspace.measure.dragged is None:
             return self._workspace.measure.take_back()

@@ -524,11 +524,7 @@ class SceneView(QWidget):
 
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         arrow = _ARROWS.get(Qt.Key(event.key()))
-        if event.key() == Qt.Key.Key_Escape and self._workspace.interaction.drag is not None:
-            self._placement.cancel()
-        elif event.key() == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
-            self._workspace.interaction.arm_replacing(False)
-        elif event.key() == Qt.Key.Key_Escape and self._placement.put_away():
+        if event.key() == Qt.Key.Key_Escape and self._placement.escape():
             event.accept()
         elif arrow is not None and event.modifiers() == Qt.KeyboardModifier.NoModifier:
             self.scene.camera.rotate(*arrow)

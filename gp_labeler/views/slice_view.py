@@ -348,14 +348,8 @@ class SliceView(QWidget):
     def keyPressEvent(self, event: QKeyEvent) -> None:  # noqa: D102, N802
         key = Qt.Key(event.key())
         plain = event.modifiers() in (Qt.KeyboardModifier.NoModifier, Qt.KeyboardModifier.KeypadModifier)
-        if key == Qt.Key.Key_Escape and self._workspace.interaction.drag is not None:
-            self._placement.cancel()
-        elif key == Qt.Key.Key_Escape and self._workspace.interaction.replacing:
-            self._workspace.interaction.arm_replacing(False)
-        elif key == Qt.Key.Key_Escape and self._placement.put_away():
+        if key == Qt.Key.Key_Escape and self._placement.escape():
             event.accept()
-        elif key == Qt.Key.Key_Escape and self._workspace.interaction.tool == "turn":
-            self._workspace.interaction.leave_turning()
         elif key in _ARROWS and plain and self.source is not None:
             self._nudge(*_ARROWS[key])
         elif key in _STEPS and plain:

@@ -9,10 +9,12 @@ from qtpy.QtGui import QResizeEvent
 from qtpy.QtWidgets import (
     QFrame,
     QHBoxLayout,
+    QHeaderView,
     QLabel,
     QLayout,
     QScrollArea,
     QSizePolicy,
+    QTableView,
     QVBoxLayout,
     QWidget,
 )
@@ -31,6 +33,7 @@ __all__ = [
     "breakable",
     "column_of_captions",
     "emptied",
+    "fix_headers",
     "open_at",
     "scrolled",
     "text_label",
@@ -235,6 +238,18 @@ class Facts(QWidget):
         layout.addWidget(caption, 0, Qt.AlignmentFlag.AlignTop)
         layout.addWidget(words, 1)
         return row
+
+
+def fix_headers(table: QTableView, *, stretched: int = 0) -> None:
+    """Let nobody resize the rows and columns of a table; one column takes the width that is left."""
+    table.verticalHeader().hide()
+    table.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+    header = table.horizontalHeader()
+    header.setHighlightSections(False)
+    header.setSectionsClickable(False)
+    header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+    header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
+    header.setSectionResizeMode(stretched, QHeaderView.ResizeMode.Stretch)
 
 
 def column_of_captions(caption: QLabel) -> None:

@@ -16,7 +16,7 @@ from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_edits import SetThreshold
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.models.workspace import Workspace
-from gp_labeler.views.formatting import mm_text, position_text, spacing_text, value_text, voxel_text
+from gp_labeler.views.formatting import mm_text, position_text, spacing_text, value_text
 from gp_labeler.views.panels.number_field import NumberField
 from gp_labeler.views.panels.rail import Rail
 from gp_labeler.views.panels.scan.notes_card import NotesCard
@@ -246,7 +246,6 @@ def test_the_first_page_offers_scan_specimen_demo_and_recent_files(tmp_path, qtb
 def test_numbers_are_written_for_people():
     assert [mm_text(x) for x in (12.34, 0.456, 0.0123)] == ["12.3 mm", "0.46 mm", "0.012 mm"]
     assert position_text([4.6, -9.1, 0.0]) == "L 4.6  A 9.1  S 0.0 mm"
-    assert voxel_text([73.6, 64.4, -0.2]) == "(74, 64, 0)"
     assert spacing_text((0.035, 0.035, 0.035)) == "0.035 mm"
     assert [value_text(x) for x in (None, 1234.5, -3)][1:] == ["1234.5", "\N{MINUS SIGN}3"]
 

@@ -168,6 +168,9 @@ def test_the_tool_turns_the_head_in_one_edit_a_drag(window) -> None:
     assert workspace.head.frame.T_head_scan.rotation == pytest.approx(before)
     QTest.keyClick(view, Qt.Key.Key_Escape)
     assert workspace.interaction.tool != "turn"
+    window.commands.run("head.by_hand")
+    QTest.keyClick(window.grid.scene_view, Qt.Key.Key_Escape)  # in the 3D view as in a slice
+    assert workspace.interaction.tool != "turn"
 
 
 def test_keys_letters_cube_and_headers_follow_the_frame_and_the_line_says_it(window) -> None:

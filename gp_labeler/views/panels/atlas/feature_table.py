@@ -10,7 +10,6 @@ from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentMo
 from qtpy.QtGui import QColor, QPainter
 from qtpy.QtWidgets import (
     QAbstractItemView,
-    QHeaderView,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -26,6 +25,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import fit, font_of, heading_width, line_height, pixels, text_width
 from gp_labeler.views.formatting import NONE
+from gp_labeler.views.panels.parts import fix_headers
 from gp_labeler.views.signals import attempt, follow
 from gp_labeler.views.theme import theme_of
 
@@ -199,14 +199,7 @@ class FeatureTable(QTableView):
         return QSize(first + sum(self._widths()) + 4, height)
 
     def _arrange(self) -> None:
-        self.verticalHeader().hide()
-        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        header = self.horizontalHeader()
-        header.setHighlightSections(False)
-        header.setSectionsClickable(False)
-        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        fix_headers(self)
         fit(self, self._fit)
 
     def _fit(self) -> None:

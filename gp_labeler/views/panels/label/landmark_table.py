@@ -6,7 +6,6 @@ from qtpy.QtCore import QEvent, QModelIndex, QPersistentModelIndex, QPoint, QRec
 from qtpy.QtGui import QColor, QKeyEvent, QPainter, QPen, QResizeEvent
 from qtpy.QtWidgets import (
     QAbstractItemView,
-    QHeaderView,
     QStyle,
     QStyledItemDelegate,
     QStyleOptionViewItem,
@@ -30,6 +29,7 @@ from gp_labeler.views.panels.label.landmark_table_model import (
     STATE_ROLE,
     LandmarkTableModel,
 )
+from gp_labeler.views.panels.parts import fix_headers
 from gp_labeler.views.signals import attempt, blocked, follow
 from gp_labeler.views.theme import Theme, theme_of
 
@@ -134,14 +134,7 @@ class _TableView(QTableView):
         self.setContextMenuPolicy(Qt.ContextMenuPolicy.CustomContextMenu)
         self.setHorizontalScrollBarPolicy(Qt.ScrollBarPolicy.ScrollBarAlwaysOff)
         self.setVerticalScrollMode(QAbstractItemView.ScrollMode.ScrollPerPixel)
-        self.verticalHeader().hide()
-        self.verticalHeader().setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        header = self.horizontalHeader()
-        header.setHighlightSections(False)
-        header.setSectionsClickable(False)
-        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
-        header.setSectionResizeMode(QHeaderView.ResizeMode.Fixed)
-        header.setSectionResizeMode(0, QHeaderView.ResizeMode.Stretch)
+        fix_headers(self)
         model.headings_changed.connect(self._on_headings)
         fit(self, self._fit)
 
