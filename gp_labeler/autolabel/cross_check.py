@@ -51,7 +51,7 @@ class LibraryFinding:
     @property
     def text(self) -> str:
         """One sentence."""
-        off = f"{self.distance:.2f} mm from where the other scans expect it, usually {self.expected:.2f}"
+        off = f"{self.distance:.2f} mm from its prediction by the other scans, usually {self.expected:.2f}"
         if self.kind == "exchanged":
             return f"{self.names[0]} and {self.names[1]} seem to be exchanged ({off})"
         if self.kind == "sides exchanged":

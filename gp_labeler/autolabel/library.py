@@ -56,10 +56,10 @@ class TemplateLibrary:
     def __post_init__(self) -> None:
         names = [scan.name for scan in self.scans]
         if not names:
-            raise GpError("there is no labelled scan to suggest from")
+            raise GpError("no labelled scan was given")
         twice = next((name for name in names if names.count(name) > 1), None)
         if twice is not None:
-            raise GpError("is there twice", specimen=twice, remedy="Leave one of them out.")
+            raise GpError("was given twice", specimen=twice, remedy="Leave one of them out.")
         if self.most < 1:
             raise GpError(f"the number of templates must be 1 or more, got {self.most}")
 

@@ -93,11 +93,11 @@ class FoundPose:
     def refusal(self) -> str:
         """Why it cannot be trusted, in words; empty where it can."""
         if self.score > UNCERTAIN:
-            return f"the bones do not meet: score {self.score:.2f}, at most {UNCERTAIN:.2f}"
+            return f"the bones do not match: score {self.score:.2f}, at most {UNCERTAIN:.2f}"
         if self.seen < LEAST_SEEN:
             return f"only {100 * self.seen:.0f} % of a head would lie in it"
         if self.rival - self.score < LEAST_LEAD:
-            return "it fits nearly as well turned otherwise"
+            return "a different orientation fits nearly as well"
         return ""
 
 
@@ -208,7 +208,7 @@ def pose_from_points(
     n = len(here)
     if n < 3 or min(_width(here), _width(there)) < 0.05 * known.radius:
         raise GpError(
-            "the points do not say how the head is turned",
+            "the points do not determine the orientation of the head",
             remedy="Place three that are far apart, not on a line.",
         )
     start = fit_similarity(there, here, np.full(n, 1 / n), (1.0, 1.0) if n < 4 else SCALES_OF_A_SPECIES)

@@ -38,7 +38,7 @@ class HeadNotFoundError(GpError):
         super().__init__(
             f"the head was not found in the scan ({found.refusal})",
             file=file,
-            remedy="Place three landmarks that are far apart, and suggest again: they say how the head lies.",
+            remedy="Place three landmarks that are far apart, and run it again.",
         )
 
 
@@ -123,7 +123,7 @@ def predict(
         The report said so.
     """
     if not templates:
-        raise GpError("there is no labelled scan to suggest from")
+        raise GpError("no labelled scan was given")
     report = report or Report()
     if len(templates) <= most:
         earlier = {template.name: known(template) for template in templates}

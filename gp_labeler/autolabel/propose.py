@@ -84,7 +84,7 @@ def propose(
     report = Report(progress, cancel)
     own = [scan.name for scan in library.scans if _is_same(volume, scan.path)]
     if len(own) == len(library.scans):
-        raise GpError("its own labels are the only ones to suggest from", file=volume.path)
+        raise GpError("it is the only labelled scan", file=volume.path)
     first = _HISTORY_SHARE if with_history else 0.1
     confidence = GuessConfidence(())
     if with_history:
@@ -153,7 +153,7 @@ def _warnings(
 ) -> Iterator[str]:
     """Yield what a person should look at."""
     if uncertain_score is not None:
-        yield f"the head's pose is uncertain (score {uncertain_score:.2f}): check where the guesses lie"
+        yield f"the head's pose is uncertain (score {uncertain_score:.2f}): check the suggestions"
     if registration.name == "demons":
         yield COARSER
     if not confidence.history:
@@ -166,9 +166,9 @@ def _warnings(
 
 
 _LEFT = {
-    None: "left and right are the file's, which nothing in the scan proves: say if it is stored mirrored",
-    "as it is": "left and right are the file's, as was confirmed",
-    "mirrored": "the scan is stored as its mirror image, as was said",
+    None: "left and right are taken from the file; state whether the scan is stored mirrored (--stored)",
+    "as it is": "left and right are taken from the file, as confirmed",
+    "mirrored": "the scan is stored as its mirror image, as stated",
 }
 
 

@@ -32,8 +32,7 @@ Field = NDArray[np.float32]
 """Displacements (nz, ny, nx, 3), mm: from a point of the fixed image to the same place in the moving one."""
 
 COARSER = (
-    "registered by SimpleITK's demons, whose suggestions are coarser than those of greedy "
-    "(pip install 'gp-labeler[auto]')"
+    "registered with SimpleITK's demons, which is less accurate than greedy (pip install 'gp-labeler[auto]')"
 )
 
 _PASSES = (("NCC 2x2x2", "1.5vox 0.7vox"), ("NCC 1x1x1", "1.0vox 0.3vox"))

@@ -95,7 +95,9 @@ class ProcessRegistration:
             found = connection.recv()
         except (EOFError, OSError):
             self.close()
-            raise GpError("the registration died", remedy="Free some memory, and try again.") from None
+            raise GpError(
+                "the registration process ended unexpectedly", remedy="Free some memory, and try again."
+            ) from None
         if isinstance(found, str):
             raise GpError(f"the registration failed ({found})")
         return np.asarray(found, dtype=np.float32)

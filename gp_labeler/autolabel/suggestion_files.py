@@ -44,7 +44,7 @@ def write_proposal(
         Nothing was guessed, or a file cannot be written.
     """
     if not proposal.guesses:
-        raise GpError("all landmarks are expected beyond the edge of the scan", specimen=specimen)
+        raise GpError("all landmarks are predicted outside the scan", specimen=specimen)
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

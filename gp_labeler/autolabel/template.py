@@ -165,7 +165,7 @@ class Template:
                 image = _unpacked(kept, "whole")
                 return cls(str(kept["name"]), str(kept["key"]), points, surface, image, regions)
         except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
-            raise FileFormatError(f"is no template ({error})", file=path, remedy="Delete it.") from None
+            raise FileFormatError(f"is not a template ({error})", file=path, remedy="Delete it.") from None
 
 
 def part_of(volume: Volume, step: float, box: FloatArray | None = None) -> CoarseScan:

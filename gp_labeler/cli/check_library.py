@@ -18,8 +18,8 @@ _EXAMPLE = """examples:
   gp-labeler check-library labelled/
   gp-labeler check-library GP-0*.gpspecimen.json --json library.json --pictures library.pdf
 
-Every labelled scan is predicted from the others; labels that lie far from there, or fit under each other's
-names, are named. The status is 1 where something was found.
+Every labelled scan is predicted from the others. Labels that are far from their prediction, or fit better
+under each other's names, are reported. The exit status is 1 if anything was found.
 """
 
 
@@ -34,7 +34,7 @@ def make_check_library_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "labelled", type=Path, nargs="+", metavar="LABELLED", help="labelled scans, or folders of them"
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write what was found")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the findings to this file")
     parser.add_argument(
         "--pictures",
         type=Path,
@@ -89,7 +89,7 @@ def run_check_library(arguments: Sequence[str]) -> int:
         drawn = draw_library_check(check, library.scans, predictions, args.pictures) if args.pictures else ()
     for name in check.checked:
         found = check.of(name)
-        sys.stdout.write(f"{name}: {f'{len(found)} to look at' if found else 'agrees with the others'}\n")
+        sys.stdout.write(f"{name}: {f'{len(found)} to review' if found else 'agrees with the others'}\n")
         sys.stdout.write("".join(f"  {finding.text}\n" for finding in found))
     for name in check.unchecked:
         sys.stdout.write(f"{name}: the head was not found, so its labels were not checked\n")

@@ -27,10 +27,10 @@ _EXAMPLE = """examples:
 
 Labelled scans are specimen files, or landmark files beside their scans: GP-014.nrrd, GP-014_L.mrk.json,
 GP-014_R.mrk.json. Landmarks may have any names. The first run prepares each labelled scan and predicts it
-from the others, which says how far suggestions are off; later runs use that again. What an earlier run has
-written is kept.
+from the others, to measure how accurate suggestions are; later runs reuse these results. Results of an
+earlier run are kept.
 
-Suggestions are no labels: open them with the scan, and confirm or correct each.
+Suggestions are not labels: open them with the scan, and confirm or correct each.
 """
 
 
@@ -38,7 +38,7 @@ def make_propose_parser() -> argparse.ArgumentParser:
     """Return the parser of ``gp-labeler propose``."""
     parser = CommandParser(
         prog="gp-labeler propose",
-        description="Suggest the landmarks of scans, from scans that are labelled.",
+        description="Suggest the landmarks of scans, based on labelled scans.",
         epilog=_EXAMPLE,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -50,17 +50,17 @@ def make_propose_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--stored",
         choices=("as-it-is", "mirrored"),
-        help="whether the scans are stored as mirror images, which nothing in them tells; by default the "
-        "files are believed, with a warning",
+        help="whether the scans are stored as mirror images; by default, the orientation of the file is "
+        "used, with a warning",
     )
     parser.add_argument(
         "--points",
         type=Path,
         nargs="+",
         metavar="FILE",
-        help="three or more landmarks of the one scan, where the head is not found by itself",
+        help="three or more landmarks of the scan, if the head is not found automatically",
     )
-    parser.add_argument("--replace", action="store_true", help="do again what an earlier run has written")
+    parser.add_argument("--replace", action="store_true", help="recompute the results of an earlier run")
     add_library_options(parser)
     add_import_options(parser.add_argument_group("reading the scans"))
     return parser
@@ -68,24 +68,26 @@ def make_propose_parser() -> argparse.ArgumentParser:
 
 def add_library_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of how labelled scans are prepared and registered."""
-    group = parser.add_argument_group("how labelled scans are used")
+    group = parser.add_argument_group("use of labelled scans")
     group.add_argument(
-        "--most", type=int, default=5, metavar="N", help="labelled scans to suggest from, by default 5"
+        "--most", type=int, default=5, metavar="N", help="labelled scans to use for a head; default: 5"
     )
     group.add_argument(
         "--engine",
         choices=("auto", "greedy", "demons"),
         default="auto",
-        help="the registration: greedy, or demons, which are coarser, where greedy is not installed",
+        help="registration: greedy, or the less accurate demons if greedy is not installed",
     )
     group.add_argument(
         "--templates",
         type=Path,
         metavar="DIR",
-        help="where what is prepared is kept; by default a folder of the user",
+        help="folder for prepared scans; default: a folder of the user",
     )
-    group.add_argument("--workers", type=int, default=1, metavar="N", help="processes, by default 1")
-    group.add_argument("--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://host:8786")
+    group.add_argument("--workers", type=int, default=1, metavar="N", help="processes to use; default: 1")
+    group.add_argument(
+        "--scheduler", metavar="ADDRESS", help="address of a Dask cluster, such as tcp://host:8786"
+    )
 
 
 def run_propose(arguments: Sequence[str]) -> int:
@@ -187,7 +189,7 @@ def _tell(result: HeadResult) -> None:
         return
     about = result.proposal
     doubtful = [guess["name"] for guess in about["guesses"] if guess["doubtful"]]
-    written = "as an earlier run wrote" if result.is_earlier else ", ".join(f.name for f in result.files)
+    written = "kept from an earlier run" if result.is_earlier else ", ".join(f.name for f in result.files)
     sys.stdout.write(
         f"{result.path.name}: {len(about['guesses'])} suggestions from {len(about['templates'])} labelled "
         f"scans{_radii(about['guesses'])}; {written}\n"

@@ -346,7 +346,7 @@ def landmark_rows() -> Iterator[Action]:
               hint="They become suggestions, which you then confirm")
     yield row("point.suggest_like", "Suggest from my scans…", (), IN_WINDOW,
               lambda w: w.scan.volume is not None, checked=lambda w: w.first_labels.is_running,
-              hint="First labels from scans that are labelled, to confirm; again, to stop")
+              hint="Suggests first labels from labelled scans; choose it again to stop")
     yield row("point.place", "Place at the crosshair", ("Space",), _place_at_crosshair, _can_place,
               icon="label")
     yield row("point.replace", "Re-place with the next click", ("Shift+P",),

@@ -140,7 +140,9 @@ def _index_range(volume: Volume, box: ArrayLike | None) -> tuple[NDArray[np.intp
     first = np.clip(np.ceil(index.min(axis=0)), 0, size).astype(np.intp)
     last = np.clip(np.floor(index.max(axis=0)) + 1, 0, size).astype(np.intp)
     if np.any(last - first < 2):
-        raise GpError("the box holds none of the scan", file=volume.path, remedy="Draw it around the head.")
+        raise GpError(
+            "the box contains no part of the scan", file=volume.path, remedy="Draw it around the head."
+        )
     return first, last
 
 
@@ -220,7 +222,7 @@ class Bone:
         sizes[0] = 0
         large = np.argsort(-sizes)[: np.count_nonzero(sizes >= _SMALLEST_ISLAND * max(int(sizes.max()), 1))]
         if sizes[large].sum() < _FEWEST_VOXELS:
-            raise GpError(f"there is hardly any bone above {threshold:g}", remedy="Move the threshold.")
+            raise GpError(f"there is almost no bone above {threshold:g}", remedy="Move the threshold.")
         together = cls(scan, threshold, np.isin(numbers, large))
         rivals = [i for i in large[:3] if sizes[i] >= 0.2 * sizes[large[0]]]
         return [together, *(cls(scan, threshold, numbers == i) for i in rivals if len(large) > 1)]

@@ -70,7 +70,7 @@ def straighten_by_landmarks(
     left_right = [n for n in names if n != "IN"]
     if not left_right or len(placed) < 3:
         raise HeadPoseError(
-            "landmarks of one side alone do not tell how the head lies",
+            "landmarks of one side do not determine the pose of the head",
             file=volume.path,
             remedy="Place IN, and one feature such as OI or MN on both sides.",
         )
@@ -78,7 +78,7 @@ def straighten_by_landmarks(
         scale = _spread(placed) / _spread(mean)
         fit = fit_rigid(scale * mean, placed, dst="scan", src="head").transform
     except GpError as error:
-        reason = f"the landmarks do not tell how the head lies: {error}"
+        reason = f"the landmarks do not determine the pose of the head: {error}"
         raise HeadPoseError(reason, file=volume.path) from None
     start = MidPlane.through(fit.translation, fit.rotation[:, 0])
     unrefined: _Refined = (start, None, None, [])
@@ -123,21 +123,25 @@ def straighten_by_points(
     Raises
     ------
     HeadPoseError
-        The points are too near to each other, or there is no bone to refine by.
+        The points are too near to each other, or there is no bone for the refinement.
     """
     m, a, b = (np.asarray(p, dtype=np.float64) for p in (midline, left, right))
     if not np.isfinite([m, a, b]).all() or np.linalg.norm(a - b) < _LEAST_SPREAD_MM:
         raise HeadPoseError(
-            "the pair of points is too near to each other", file=volume.path, remedy="Choose a wider pair."
+            "the two points of the pair are too close to each other",
+            file=volume.path,
+            remedy="Choose a wider pair.",
         )
     start = _halfway_plane(m, a, b)
     plane, confidence, bone, warnings = _refined(volume, start, threshold)
     if bone is None:
-        raise HeadPoseError("there is no bone to refine by", file=volume.path, remedy="Move the threshold.")
+        raise HeadPoseError(
+            "there is no bone for the refinement", file=volume.path, remedy="Move the threshold."
+        )
     known = template or phantom_template()
     pose = pose_in_plane(volume, bone, plane, confidence, known, _SILENT, found_by="points")
     if float(pose.T_head_scan.rotation[0] @ (a - b)) < 0:
-        warnings.append("the point given as left lies on what the file's orientation calls right")
+        warnings.append("the point given as left is on the right according to the file's orientation")
     return HeadPose(
         pose.T_head_scan, "points", confidence, pose.pitch, pose.left, (*pose.warnings, *warnings)
     )

@@ -158,7 +158,7 @@ def _best_plane(bone: Bone, fine: Bone, report: Report) -> _Found:
 def _why(found: _Found) -> str:
     c = found.confidence
     if c.overlap < _WHOLE[1]:
-        reason = f"only {100 * c.overlap:.0f} % of the bone has its mirror image in the scan"
+        reason = f"only {100 * c.overlap:.0f} % of the bone has a mirror image within the scan"
     elif c.agreement < _WHOLE[0]:
         reason = f"only {100 * c.agreement:.0f} % of the bone meets its mirror image"
     else:

@@ -275,7 +275,7 @@ class HeadModel:
             f"The head lies {pose.tilt_deg:.0f}° from the axes of its scan; the views are now aligned with it"
         ]
         if self.asks_left:
-            words.append("say which side is left: 1 Scan > Head")
+            words.append("confirm which side is left: 1 Scan > Head")
         self._messages.say("; ".join((*words, *pose.warnings)), "warning" if pose.warnings else "info")
         self._say_wrong_sides(None)
         self.changed.emit()

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["AS_THE_FILE", "FOLDER", "LANDMARK_COMMANDS"]
 
 LISTED, FOLDER, FILES = "From the list of specimens", "From a folder…", "From files…"
-AS_THE_FILE, MIRRORED = "Left is as the file says", "The scan is mirrored…"
+AS_THE_FILE, MIRRORED = "Left is correct", "The scan is mirrored…"
 _LABELLED = "Labelled scans (*.gpspecimen.json *.mrk.json *.fcsv);;All files (*)"
 
 
@@ -80,10 +80,10 @@ def _ask_labelled(workspace: Workspace, prompts: Prompts) -> list[Path]:
     answers = [LISTED, FOLDER, FILES] if listed else [FOLDER, FILES]
     answer = prompts.choose(
         "Suggest from my scans",
-        "Which labelled scans shall the landmarks be suggested from?",
+        "Which labelled scans should the suggestions be based on?",
         answers,
-        detail="Three to five heads of the same species are enough. The first time, each is prepared, "
-        "which takes some minutes. Suggestions count once you have confirmed them.",
+        detail="Three to five heads of the same species are enough. The first run prepares "
+        "each scan, which takes some minutes. A suggestion counts when you have confirmed it.",
     )
     if answer == FOLDER:
         folder = prompts.folder("A folder of labelled scans")
@@ -99,10 +99,10 @@ def _knows_left(workspace: Workspace, prompts: Prompts) -> bool:
         return True
     answer = prompts.choose(
         "Left and right",
-        "Is the animal's left side on the left of the scan, as the file says?",
+        "Is the animal's left side where the file says it is?",
         [AS_THE_FILE, MIRRORED],
-        detail="Nothing in a scan can prove it: a head and its mirror image look alike. Check it against "
-        "a mark on the animal. A mirrored scan is read again, the right way round.",
+        detail="A scan cannot prove it: a head and its mirror image look alike. Check it against "
+        "a mark on the animal. A mirrored scan is reloaded with its slices reversed.",
     )
     if answer == MIRRORED:
         ask_reopen_mirrored(workspace, prompts)

@@ -115,8 +115,8 @@ def test_a_ball_is_no_head():
     [
         (0.40, 0.60, 0.9, True, ""),
         (0.56, 0.60, 0.9, True, ""),
-        (0.58, 0.90, 0.9, False, "the bones do not meet"),
-        (0.40, 0.42, 0.9, False, "turned otherwise"),
+        (0.58, 0.90, 0.9, False, "the bones do not match"),
+        (0.40, 0.42, 0.9, False, "a different orientation"),
         (0.40, 0.60, 0.2, False, "only 20 % of a head"),
     ],
 )
@@ -178,7 +178,7 @@ def test_the_command_suggests_any_scheme_for_a_folder_and_goes_on_where_it_was(l
     assert proposing(lab) == 2  # and the other head is not lost
     assert (lab / "out" / "small-3_suggested.mrk.json").stat().st_mtime_ns == before
     said = capsys.readouterr()
-    assert "as an earlier run wrote" in said.out
+    assert "kept from an earlier run" in said.out
     assert said.err.count("broken.nrrd") >= 1
 
 

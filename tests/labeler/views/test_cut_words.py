@@ -120,7 +120,7 @@ def seen(parent: QWidget, widget: QWidget, width: int, height: int = 30) -> list
 )
 def test_the_walk_names_what_is_cut(parent, make, enough) -> None:
     assert seen(parent, make(), enough) == []
-    assert any("Round" in line or "Place" in line or "Leave" in line for line in seen(parent, make(), 60))
+    assert any("Round" in line or "Place" in line or "Remove" in line for line in seen(parent, make(), 60))
 
 
 def test_only_names_of_the_user_may_be_shortened(parent) -> None:

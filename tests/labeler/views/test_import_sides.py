@@ -95,7 +95,7 @@ def test_the_preview_is_straightened_where_bone_tells_how(workspace, stack, pare
 
 def test_the_preview_stays_as_stored_where_the_head_is_refused(workspace, stack, parent, monkeypatch) -> None:
     def refuse(volume: Volume, **_: object) -> HeadPose:
-        raise GpError("there is hardly any bone")
+        raise GpError("there is almost no bone")
 
     monkeypatch.setattr(head_pose, "straighten", refuse)
     dialog = ImportDialog(workspace, inspect_volume(stack), parent=parent)

@@ -31,7 +31,7 @@ def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path,
     assert button.isVisible()
     answers = window.prompts = Answers()
     answers.files = [labelled_head(tmp_path)]
-    answers.answers = ["From a folder…", "Left is as the file says"]
+    answers.answers = ["From a folder…", "Left is correct"]
     button.click()
     assert answers.asked == ["Suggest from my scans", "Left and right"]
     wait_until_idle(qtbot, window)

@@ -30,7 +30,7 @@ class SuggestRow(QWidget):
         self.button = action_button(
             actions["point.suggest_like"],
             words,
-            "First labels from labelled scans; again, to stop",
+            "Suggests first labels from labelled scans; click again to stop",
         )
         row = QHBoxLayout(self)
         row.setContentsMargins(0, 0, 12, 0)

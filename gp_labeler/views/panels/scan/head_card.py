@@ -36,7 +36,7 @@ class HeadCard(Card):
         self._notices = QVBoxLayout()
         self._notices.setSpacing(6)
         self.add(self._notices)
-        self.confirm = action_button(actions["head.confirm_left"], "Left is left")
+        self.confirm = action_button(actions["head.confirm_left"], "Left is correct")
         self.exchanged = action_button(actions["head.left_is_right"], "They are exchanged…")
         self._answers = _row(self.confirm, self.exchanged)
         self.add(self._answers)
@@ -53,7 +53,7 @@ class HeadCard(Card):
         self.stop.clicked.connect(workspace.head.cancel)
         self.add(_row(self.straighten, self.stop, self.by_landmarks, self.by_hand))
         self._lay_out_points(actions)
-        self.take_planes = action_button(actions["head.take_planes"], "Take these planes")
+        self.take_planes = action_button(actions["head.take_planes"], "Use these planes")
         self.mid_plane = action_button(actions["head.take_mid_plane"], "Mid-plane to crosshair")
         self._hand = _row(self.take_planes, self.mid_plane)
         self.add(self._hand)
@@ -96,9 +96,9 @@ class HeadCard(Card):
 
     def _lay_out_points(self, actions: Actions) -> None:
         self.points = {n: action_button(actions[f"head.{n}"], n.capitalize()) for n in FREE_POINTS}
-        words = "By three points: move the crosshair to each, then say which it is."
+        words = "By three points: move the crosshair to each point, then click its name."
         self.add(text_label(words, "hint", wrap=True))
-        self.forget_points = action_button(actions["head.forget_points"], "Take away")
+        self.forget_points = action_button(actions["head.forget_points"], "Remove points")
         self.add(_row(*self.points.values(), self.forget_points))
 
 
@@ -106,7 +106,7 @@ def head_text(workspace: Workspace) -> str:
     """Say how the head was straightened, and what of it is only a proposal."""
     head = workspace.head
     if head.is_running:
-        return "The symmetry of the bone is searched…"
+        return "Searching the plane of symmetry…"
     if workspace.interaction.tool == "turn":
         return (
             "Drag over a slice to turn the head about the crosshair: in the sagittal slice its pitch, in the "
@@ -116,7 +116,7 @@ def head_text(workspace: Workspace) -> str:
     if frame is None:
         return "The views lie along the axes of the scan. Straighten them if the head is tilted."
     pitch = f" Pitch: {frame.pitch}." if frame.pitch and frame.found_by != "hand" else ""
-    check = " Turn it by hand where it is off." if frame.pitch.startswith("proposed") else ""
+    check = " Correct it by hand if necessary." if frame.pitch.startswith("proposed") else ""
     return f"Straightened by {frame.found_by}.{pitch}{check}"
 
 
