@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
 from gp_core.io.markups import write_markups
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
@@ -20,8 +21,9 @@ from gp_labeler.head_pose import (
     straighten_by_landmarks,
     straighten_by_points,
 )
-from gp_labeler.head_pose.bone import coarse_scan
-from gp_labeler.imaging.progress import Cancelled
+from gp_labeler.head_pose.bone import bone_of, coarse_scan
+from gp_labeler.head_pose.template import front_and_up
+from gp_labeler.imaging.progress import Cancelled, Report
 from gp_labeler.imaging.readers import read_volume
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.phantom import USUAL, HeadVariation, make_phantom, save_phantom
@@ -228,6 +230,25 @@ def test_a_labelled_head_serves_as_a_template():
     pose = straighten(other.volume, template=template)
     assert errors(pose, other)[2] < 4.0
     assert known.volume.name in pose.pitch
+
+
+@pytest.mark.skipif(not MICE.is_dir(), reason="the shared mice are not here")
+def test_the_pitch_of_a_cropped_head_is_that_of_the_whole_one():
+    whole = read_volume(MICE / "AKR_J_.nii.gz")
+    rows = json.loads((MICE / "AKR_J_.mrk.json").read_text())["markups"][0]["controlPoints"]
+    points = {row["label"]: np.array(row["position"]) for row in rows}
+    a, b = (
+        np.array([points[label] for label in labels]) for labels in (("2", "24", "40"), ("3", "27", "41"))
+    )
+    plane = MidPlane.through((a + b).mean(axis=0) / 2, (a - b).sum(axis=0))
+    left, back = plane.normal, np.linalg.svd(plane.normal[None])[2][1]
+    axes = np.stack([left, back, np.cross(left, back)], axis=1)
+    T_scan_head = RigidTransform.from_parts(axes, plane.nearest(np.zeros(3)), dst="scan", src="head")
+    template = HeadTemplate.of(whole, T_scan_head.inverse())
+    cropped = bone_of(Volume(whole.array[:96], whole.T_scan_voxel))[1]
+    assert cropped.radius < 0.9 * template.radius  # the radius tells nothing of how large the head is
+    turn = axes.T @ front_and_up(cropped, plane, template, Report()).axes
+    assert np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))) < 1.0
 
 
 def test_a_mirrored_point_lies_as_far_behind_the_plane():
