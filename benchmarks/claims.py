@@ -3,8 +3,10 @@
 Run from the top of a checkout: ``python benchmarks/claims.py labelled/``, labelled animals as for gp-core.
 Each is estimated with an atlas that has seen nothing of it, by the paper's six touched features. It takes
 half a minute; ``--seed N`` draws other touches. ``--probe FILE...`` prints, alone, what files of real touches
-give by themselves, their sides from their names. ``--conditions N`` prints the table of all conditions,
-each side touched N times: that of ``gp-core conditions labelled/ --repeats N``, in some minutes.
+give by themselves, their sides from their names: as the program estimates them, without a shared error
+(``--shared-error 0`` of gp-core), and with the variance of no touch raised, as an earlier version had it.
+``--conditions N`` prints the table of all conditions, each side touched N times: that of ``gp-core
+conditions labelled/ --repeats N``, in some minutes.
 """
 
 from __future__ import annotations
@@ -12,7 +14,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -38,7 +40,10 @@ from gp_core.atlas.sampling import draw_animal  # noqa: E402
 from gp_core.cli.conditions import condition_lines  # noqa: E402
 from gp_core.frames import angle_between_deg  # noqa: E402
 from gp_core.io.file_names import named_side  # noqa: E402
-from gp_core.landmarks.anatomy import with_cochlea_origin  # noqa: E402
+from gp_core.landmarks.anatomy import mirror_right, with_cochlea_origin  # noqa: E402
+from gp_core.pose.robust import defining_points, pose_covariance, touch_model  # noqa: E402
+from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM, SystematicError  # noqa: E402
+from gp_core.registration.named_points import fit_named_points  # noqa: E402
 from gp_core.study.trials import make_trial  # noqa: E402
 from gp_core.validation import FloatArray  # noqa: E402
 
@@ -139,17 +144,39 @@ def _summary(values: FloatArray, animals: Sequence[str]) -> str:
 
 def probe_files(paths: Sequence[str]) -> Iterator[str]:
     """Files of real touches, the published atlas: the noise that they show, and their own regions."""
-    rows = []
-    for path in paths:
-        side = named_side(path)
-        if side is None:
-            raise SystemExit(f"{path}: its name must tell the side, as SkullA_Left.dat does")
-        pose = estimate_pose(read_touches(path, side), side)
-        assert pose.probe_noise is not None
-        plain = pose.plain_radius_95, float(np.degrees(pose.plain_cone_95))
-        rows.append((pose.probe_noise, pose.radius_95, float(np.degrees(pose.cone_95)), *plain))
-        yield f"{Path(path).name}: {_region(rows[-1])}, {pose.state}"
-    yield f"median of {len(rows)}: {_region(np.median(rows, axis=0))}"
+    for shared_error, words in ((DEFAULT_SHARED_ERROR_MM, "shared error 0.2 mm"), (0.0, "no shared error")):
+        rows = []
+        for path in paths:
+            side = named_side(path)
+            if side is None:
+                raise SystemExit(f"{path}: its name must tell the side, as SkullA_Left.dat does")
+            touches = read_touches(path, side)
+            pose = estimate_pose(touches, side, shared_error=shared_error)
+            assert pose.probe_noise is not None
+            plain = pose.plain_radius_95, float(np.degrees(pose.plain_cone_95))
+            row = pose.probe_noise, pose.radius_95, float(np.degrees(pose.cone_95)), *plain
+            rows.append((*row, *_unraised(touches)))
+            yield f"{words}, {Path(path).name}: {_region(row)}, {pose.state}"
+        medians = np.median(rows, axis=0)
+        yield f"{words}, median of {len(rows)}: {_region(medians[:5])}"
+    yield f"and no variance raised, median: 95 % within {medians[5]:.2f} mm, {medians[6]:.0f} deg (as named)"
+
+
+class _UnraisedVariances(SystematicError):  # noqa: N818 - an error of touches, no exception
+    """No shared error, and no touch gets the variance that its deviation shows."""
+
+    outlier_squared = np.inf
+
+
+def _unraised(touches: LandmarkSet) -> tuple[float, float]:
+    """Return radius, mm, and cone, degrees, as an earlier version gave them."""
+    atlas = Atlas.published()
+    model = touch_model(touches, atlas, None)
+    fit = fit_named_points(model, mirror_right(touches.array(model.codes), touches.side))
+    defining = defining_points(atlas, model, fit)
+    covariance = pose_covariance(atlas, model, fit, defining, touches.side, _UnraisedVariances(0.0))
+    pose = replace(estimate_pose(touches, touches.side), covariance=covariance)
+    return pose.plain_radius_95, float(np.degrees(pose.plain_cone_95))
 
 
 def _region(row: Sequence[float] | FloatArray) -> str:

@@ -19,7 +19,8 @@ _FEWEST = 3
 _BY_CHANCE = 0.01
 """So rarely do skull features that have not moved lie as far apart as ones that have."""
 
-_UNMOVED_MM = 1e-6
+_LEAST_NOISE_MM = 0.1
+"""Noise of a touch that is assumed at least, mm a coordinate: a few features may fit better by chance."""
 
 
 @dataclass(frozen=True)
@@ -125,8 +126,7 @@ def _is_motion(n: int, before: float, after: float) -> bool:
     """
     from scipy.special import fdtrc  # here: estimates of one ear need not wait for it
 
-    if before**0.5 < _UNMOVED_MM:
-        return False
     freedom = 3 * n - 6
-    ratio = ((before - after) / 6) / max(after / freedom, np.finfo(float).tiny)
+    noise = max(n * after / freedom, 2 * _LEAST_NOISE_MM**2)
+    ratio = n * (before - after) / 6 / noise
     return float(fdtrc(6, freedom, ratio)) < _BY_CHANCE

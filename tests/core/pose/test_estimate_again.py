@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import pickle
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -128,3 +131,39 @@ def test_a_pose_with_its_inputs_goes_to_other_processes(animals: list[Specimen])
     pose = estimate_pose(_touches("L", animals[0]), "L")
     again: CochleaPose = pickle.loads(pickle.dumps(pose))
     assert again.content() == pose.content()
+
+
+_AGAIN = """
+import json, sys, gp_core
+print(json.dumps([gp_core.estimate_again(gp_core.read_pose(path)).as_dict() for path in sys.argv[1:]]))
+"""
+
+
+def test_another_processor_gives_the_same_to_1e_9(animals: list[Specimen], tmp_path: Path) -> None:
+    """OpenBLAS, where NumPy has it, is told to be on an old processor; other libraries ignore that."""
+    touches = _touches("L", animals[0])
+    poses = [
+        estimate_pose(touches, "L"),
+        estimate_pose(touches, "L", method="jrmpc", specimens=animals[1:]),
+    ]
+    files = [tmp_path / f"{pose.method}.json" for pose in poses]
+    for pose, file in zip(poses, files, strict=True):
+        pose.save(file)
+    environment = {**os.environ, "OPENBLAS_CORETYPE": "Prescott"}
+    done = subprocess.run(
+        [sys.executable, "-c", _AGAIN, *map(str, files)], env=environment, capture_output=True, check=True
+    )
+    for pose, other in zip(poses, json.loads(done.stdout), strict=True):
+        mine = pose.as_dict()
+        assert [key for key in mine if not _is_near(mine[key], other[key])] == []
+
+
+def _is_near(one: Any, other: Any) -> bool:
+    """Whether two values of a pose file agree, numbers to 1e-9."""
+    if isinstance(one, dict):
+        return one.keys() == other.keys() and all(_is_near(one[key], other[key]) for key in one)
+    if isinstance(one, list | tuple):
+        return len(one) == len(other) and all(map(_is_near, one, other))
+    if isinstance(one, float):
+        return bool(abs(one - other) <= 1e-9)
+    return bool(one == other)

@@ -18,6 +18,7 @@ from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.pose_report import PoseReport
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.pose.panel import PosePanel
+from gp_labeler.views.panels.pose.touch_table_model import NAME
 from gp_labeler.views.theme import DARK, apply_theme
 
 ATLAS = Atlas.published()
@@ -121,3 +122,21 @@ def test_ears_in_different_frames_are_not_compared(workspace, panel) -> None:
     touch(workspace, R, how=TouchHow.SCAN)
     assert workspace.pose.ears is None
     assert "ears" not in notices(panel)
+
+
+def test_a_row_shows_how_often_a_feature_was_touched_and_the_mean_that_is_used(workspace, panel) -> None:
+    touch(workspace, L)
+    table, model = panel.touches.table, panel.touches.model
+    row = model.row_of("MN")
+    once = table.viewport().grab(table.visualRect(model.index(row, NAME))).toImage()
+    assert model.rows[row].label == "MN"
+    at = np.array(workspace.document.state.touches[L, "MN"].position)
+    earlier = tuple(tuple((at + off).tolist()) for off in ([0.1, 0, 0], [-0.1, 0.1, 0]))
+    last = Touch(tuple((at + np.array([0, 0, 4])).tolist()), TouchHow.TRACKED, "", "AB", earlier=earlier)
+    workspace.document.do(RecordTouch(L, "MN", last))
+    shown = model.rows[row]
+    assert shown.label == "MN ×3"  # noqa: RUF001 - times
+    used = workspace.pose.estimate.pose.repeats["MN"].mean
+    assert shown.position == pytest.approx(used.tolist())  # without the outlier, which came last
+    several = table.viewport().grab(table.visualRect(model.index(row, NAME))).toImage()
+    assert several.copy(once.rect()) != once

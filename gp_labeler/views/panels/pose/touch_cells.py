@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 from qtpy.QtCore import QPointF, QRectF, Qt
 from qtpy.QtGui import QColor, QFont, QPainter
-from qtpy.QtWidgets import QWidget
+from qtpy.QtWidgets import QAbstractItemView, QWidget
 
 from gp_core.landmarks.features import FEATURES
 from gp_labeler.views.chips import draw_chip
@@ -20,7 +20,8 @@ from gp_labeler.views.theme import Theme
 __all__ = ["column_widths", "names_width", "paint_cell", "paint_ground"]
 
 _PAD, _CHIP, _BAR, _WIDE_BAR, _GAP = 8, 12, 20, 50, 6
-_WIDEST_NUMBER, _WIDEST_RESIDUAL, _WIDEST_CODE = "\N{MINUS SIGN}1000.00", "10.00", "RWM"
+_WIDEST_NUMBER, _WIDEST_RESIDUAL = "\N{MINUS SIGN}1000.00", "10.00"
+_WIDEST_CODE, _WIDEST_REPEATED = "RWM", "RWM \N{MULTIPLICATION SIGN}9"
 _ASKED = "touch, or type x y z"
 _MIDDLE = Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | _MIDDLE
@@ -43,7 +44,7 @@ def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) ->
     number = text_width(view, _WIDEST_NUMBER) + _GAP
     residual = _residual_width(view) + pixels(view, _BAR) + 2 * _GAP
     columns = {
-        NAME: _left(view) + text_width(view, _WIDEST_CODE, bold=True) + _GAP,
+        NAME: _left(view) + _code_width(view) + _GAP,
         XYZ: max(3 * number, text_width(view, _ASKED) + _GAP),
         RESIDUAL: residual,
         USE: pixels(view, 13) + 2 * _PAD,
@@ -60,6 +61,13 @@ def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) ->
 def names_width(view: QWidget) -> int:
     """Return what the longest name of a feature takes behind its code, logical pixels."""
     return text_width(view, *(row.name for row in FEATURES if row.external)) + _GAP
+
+
+def _code_width(view: QWidget) -> int:
+    """Return what the longest code takes, with the number of touches where there are several of one."""
+    rows = getattr(view.model(), "rows", ()) if isinstance(view, QAbstractItemView) else ()
+    repeated = any(row.n_touches > 1 for row in rows)
+    return text_width(view, _WIDEST_REPEATED if repeated else _WIDEST_CODE, bold=True)
 
 
 def _left(view: QWidget) -> int:
@@ -119,16 +127,16 @@ def _paint_name(painter: QPainter, view: QWidget, box: QRectF, row: TouchRow, th
     painter.setFont(bold)
     painter.setPen(QColor(theme.faint if _is_out(row) else theme.text))
     left = _left(view)
-    painter.drawText(box.adjusted(left, 0, 0, 0), _MIDDLE, row.name)
+    painter.drawText(box.adjusted(left, 0, 0, 0), _MIDDLE, row.label)
     painter.setFont(plain)
-    words = box.adjusted(left + text_width(view, _WIDEST_CODE, bold=True) + _GAP, 0, 0, 0)
+    words = box.adjusted(left + _code_width(view) + _GAP, 0, 0, 0)
     if words.width() >= names_width(view):
         painter.setPen(QColor(theme.muted))
         painter.drawText(words, _MIDDLE, name_of(row.name))
 
 
 def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme) -> None:
-    if row.touch is None:
+    if row.position is None:
         painter.setPen(QColor(theme.accent_text))
         painter.drawText(box, _RIGHT, _ASKED if row.target else "")
         return
@@ -137,7 +145,7 @@ def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme)
     font.setStrikeOut(_is_out(row))
     painter.setFont(font)
     width = box.width() / 3
-    for n, value in enumerate(row.touch.position):
+    for n, value in enumerate(row.position):
         cell = QRectF(box.left() + n * width, box.top(), width, box.height())
         painter.drawText(cell, _RIGHT, f"{value:.2f}".replace("-", _MINUS))
 

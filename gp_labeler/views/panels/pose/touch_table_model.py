@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
-import numpy as np
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, Qt
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES
+from gp_core.landmarks.repeats import combine_repeats
 from gp_labeler.document.touches import Touch, TouchHow, frame_of
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.pose.wording import fine_mm, parse_position, touch_text, triple
@@ -50,6 +51,25 @@ class TouchRow:
     def is_skull(self) -> bool:
         """Whether it is a skull feature, which serves the registration only."""
         return self.name not in CODES
+
+    @property
+    def n_touches(self) -> int:
+        """How often it was touched."""
+        return 0 if self.touch is None else len(self.touch.positions)
+
+    @property
+    def label(self) -> str:
+        """Its name, with the number of touches where there are several: ``MN ×3``."""
+        return f"{self.name} ×{self.n_touches}" if self.n_touches > 1 else self.name  # noqa: RUF001 - times
+
+    @cached_property
+    def position(self) -> tuple[float, float, float] | None:
+        """Position that the estimate uses, mm: the mean of the touches, without an outlier among them."""
+        if self.touch is None or self.n_touches < 2:
+            return None if self.touch is None else self.touch.position
+        (one,) = combine_repeats({self.name: self.touch.positions}).values()
+        x, y, z = one.mean.tolist()
+        return x, y, z
 
 
 class TouchTableModel(QAbstractTableModel):
@@ -172,7 +192,7 @@ class TouchTableModel(QAbstractTableModel):
         if role == ROW_ROLE:
             return row
         if role == Qt.ItemDataRole.EditRole and index.column() == XYZ:
-            return "" if row.touch is None else " ".join(f"{x:.6g}" for x in row.touch.position)
+            return "" if row.position is None else " ".join(f"{x:.6g}" for x in row.position)
         if role == Qt.ItemDataRole.DisplayRole:
             return self._words(row, index.column())
         if role in (Qt.ItemDataRole.ToolTipRole, Qt.ItemDataRole.AccessibleTextRole):
@@ -186,10 +206,9 @@ class TouchTableModel(QAbstractTableModel):
 
     def _words(self, row: TouchRow, column: int) -> str:
         if column == NAME:
-            n = 0 if row.touch is None else len(row.touch.positions)
-            return f"{row.name} ×{n}" if n > 1 else row.name  # noqa: RUF001 - the sign of times
+            return row.label
         if column == XYZ:
-            return "" if row.touch is None else triple(np.mean(row.touch.positions, axis=0))
+            return "" if row.position is None else triple(row.position)
         return fine_mm(row.residual) if column == RESIDUAL and row.residual is not None else ""
 
     def _hint(self, row: TouchRow, column: int) -> str:
