@@ -9,6 +9,13 @@ from gp_labeler.views.prompts import Prompts
 
 __all__ = ["ScriptPrompts"]
 
+_EARLIER = {
+    "Import nevertheless": "Import anyway",
+    "Left is as the file says": "Left is correct",
+    "Use it nevertheless": "Use it anyway",
+}
+"""What answers were called in earlier versions: their scripts still run."""
+
 
 class ScriptPrompts(Prompts):
     """Answers the window's questions by what the step says."""
@@ -33,8 +40,9 @@ class ScriptPrompts(Prompts):
         self, title: str, text: str, answers: Sequence[str], *, detail: str = "", kind: str = "question"
     ) -> str:
         """Return the first answer offered that the step allows."""
+        allowed = {_EARLIER.get(answer, answer) for answer in self.answers}
         for answer in answers:
-            if answer in self.answers:
+            if answer in allowed:
                 return answer
         self.unanswered.append(f"{text} {detail}".strip())
         return ""

@@ -11,6 +11,7 @@ import pytest
 from gp_core.errors import GpError
 from gp_labeler.document.edit_tables import EDITS
 from gp_labeler.scripting.demo import demo_script
+from gp_labeler.scripting.prompts import ScriptPrompts
 from gp_labeler.scripting.script import StepError, make_script, read_script
 from gp_labeler.scripting.steps import STEPS
 from gp_labeler.scripting.steps.edits import EDIT_STEPS
@@ -148,3 +149,14 @@ def test_a_table_of_texts_is_read(tmp_path):
     file.write_text('[[step]]\ndo = "import"\nfiles = ["a.csv"]\nnames = { "Apex of cochlea" = "CA" }\n')
     (step,) = read_script(file).steps
     assert step.names == {"Apex of cochlea": "CA"}
+
+
+@pytest.mark.parametrize(
+    ("earlier", "now"),
+    [("Import nevertheless", "Import anyway"), ("Left is as the file says", "Left is correct")],
+)
+def test_answers_of_earlier_versions_are_understood(earlier: str, now: str) -> None:
+    prompts = ScriptPrompts()
+    prompts.prepare(answers=[earlier])
+    assert prompts.choose("", "?", ("Cancel", now)) == now
+    assert prompts.choose("", "?", ("Cancel",)) == ""
