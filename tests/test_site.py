@@ -36,6 +36,15 @@ def test_every_public_name_is_in_the_reference(source: Path) -> None:
     assert sorted(named) == sorted(set(gp_core.__all__) - {"__version__"})
 
 
+def test_what_others_may_import_of_the_application_is_in_the_reference(source: Path) -> None:
+    text = "".join(path.read_text() for path in (source / "reference" / "application").iterdir())
+    named = re.findall(r"auto\w+:: gp_labeler\.([\w.]+)", text)
+    assert len(named) == len(set(named))
+    public = {"plotting.plot", "plotting.compare", "autolabel.propose", "autolabel.TemplateLibrary"}
+    public |= {"scripting.script.make_script", "scripting.runner.run_script", "imaging.readers.read_volume"}
+    assert public <= set(named)
+
+
 def test_every_command_has_a_page_with_its_options(source: Path) -> None:
     pages = {path.stem: path.read_text() for path in (source / "reference" / "commands").iterdir()}
     assert {f"gp-labeler-{name}" for name in SUBCOMMANDS} <= pages.keys()

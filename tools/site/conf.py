@@ -21,6 +21,9 @@ extensions = [
 ]
 source_suffix = {".md": "markdown"}
 nitpicky = False
+suppress_warnings = [
+    "ref.python"
+]  # `array` in a docstring is NumPy's, though some of our classes have one too
 default_role = "code"
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist"]
 myst_heading_anchors = 4

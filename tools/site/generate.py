@@ -11,6 +11,7 @@ import inspect
 import re
 import shutil
 from collections.abc import Iterator
+from importlib import import_module
 from importlib.metadata import metadata
 from pathlib import Path
 
@@ -40,6 +41,26 @@ ROOMS = {
     "": "Frames, errors and constants",
 }
 """Headings of the reference by the room of `gp_core` that a name is defined in."""
+
+APPLICATION = {
+    "plotting": ("Plotting", ["plotting"]),
+    "imaging": (
+        "Scans and surfaces",
+        [
+            f"imaging.{name}"
+            for name in ("readers", "volume", "threshold", "surface", "mesh_files", "datasets")
+        ],
+    ),
+    "phantom": ("Synthetic heads", ["phantom"]),
+    "head_pose": ("Straight heads", ["head_pose"]),
+    "autolabel": ("First labels", ["autolabel"]),
+    "tracker": ("Tracked probe", ["tracker"]),
+    "scripting": (
+        "Scripts of the window",
+        [f"scripting.{name}" for name in ("script", "runner", "batch", "window_driver")],
+    ),
+}
+"""Title and modules of each page of the reference of the application, `gp_labeler`."""
 
 
 def in_site(text: str) -> str:
@@ -80,19 +101,41 @@ def python_pages() -> Iterator[tuple[str, str]]:
         here = [name for name in names if room_of(name) == room]
         text = [f"# {title}\n", "Everything here is imported from `gp_core`.\n"]
         text += [
-            python_entry(name) for name in sorted(here, key=lambda name: not callable(getattr(gp_core, name)))
+            python_entry("gp_core", name)
+            for name in sorted(here, key=lambda name: not callable(getattr(gp_core, name)))
         ]
         yield f"reference/python/{room or 'common'}.md", "\n".join(text)
     yield "reference/python/index.md", index("Python", [f"{room or 'common'}" for room in ROOMS])
 
 
-def python_entry(name: str) -> str:
+def application_pages() -> Iterator[tuple[str, str]]:
+    """Yield path and text of a page for each part of the application that other programs may import."""
+    for page, (title, modules) in APPLICATION.items():
+        text = [
+            f"# {title}\n",
+            "These names are not as stable as those of `gp_core`: see [Stability](../../api-stability.md).\n",
+        ]
+        for name in modules:
+            module = f"gp_labeler.{name}"
+            text += [f"Imported from `{module}`:\n"]
+            text += [python_entry(module, each) for each in classes_and_functions(module)]
+        yield f"reference/application/{page}.md", "\n".join(text)
+    yield "reference/application/index.md", index("Python: the application", list(APPLICATION))
+
+
+def classes_and_functions(module: str) -> list[str]:
+    """Return the public names of a module of ours, without constants and types for annotations."""
+    values = {name: getattr(import_module(module), name) for name in import_module(module).__all__}
+    return [name for name, value in values.items() if inspect.isclass(value) or inspect.isfunction(value)]
+
+
+def python_entry(module: str, name: str) -> str:
     """Return the entry of a public name, whose docstring Sphinx reads."""
-    value = getattr(gp_core, name)
+    value = getattr(import_module(module), name)
     kind = "class" if inspect.isclass(value) else "function" if callable(value) else "data"
     if inspect.isclass(value) and issubclass(value, BaseException):
         kind = "exception"
-    lines = [f"## {name}\n", "```{eval-rst}", f".. auto{kind}:: gp_core.{name}"]
+    lines = [f"## {name}\n", "```{eval-rst}", f".. auto{kind}:: {module}.{name}"]
     lines += ["   :no-value:"] if kind == "data" else []
     return "\n".join([*lines, "```\n"])
 
@@ -166,6 +209,7 @@ def assemble(folder: Path) -> None:
     shutil.copytree(ROOT / "docs", folder, dirs_exist_ok=True)
     for page in folder.rglob("*.md"):
         page.write_text(pictures.with_screenshots(page.read_text(encoding="utf-8")), encoding="utf-8")
-    for path, text in [*first_pages(), *python_pages(), *command_pages(), *landmark_atlas.pages()]:
+    generated = (first_pages, python_pages, application_pages, command_pages, landmark_atlas.pages)
+    for path, text in (page for pages in generated for page in pages()):
         (folder / path).parent.mkdir(parents=True, exist_ok=True)
         (folder / path).write_text(text, encoding="utf-8")

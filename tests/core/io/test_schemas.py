@@ -20,6 +20,10 @@ def _written(kind: str, folder: Path) -> Any:
     file = folder / f"{kind}.json"
     if kind == "pose":
         gp_core.estimate_pose(draw_touches(seed=1)[0], "L").save(file)
+    elif kind == "reliability":
+        draw_labels(folder, 2, observers=["AB", "CD"], rounds=2, label_error_mm=0.1)
+        report = gp_core.reliability(gp_core.load_labellings(folder))
+        return json.loads(json.dumps(report.as_dict()))
     elif kind == "atlas":
         gp_core.Atlas.published().save(file)
     else:
@@ -31,7 +35,7 @@ def _schema(kind: str) -> Any:
     return json.loads((_SCHEMAS / f"{kind}.schema.json").read_text())
 
 
-@pytest.mark.parametrize("kind", ["pose", "atlas", "landmarks"])
+@pytest.mark.parametrize("kind", ["pose", "atlas", "landmarks", "reliability"])
 def test_what_is_written_meets_its_schema(kind: str, tmp_path: Path) -> None:
     jsonschema.Draft7Validator.check_schema(_schema(kind))
     jsonschema.validate(_written(kind, tmp_path), _schema(kind))
@@ -50,6 +54,8 @@ def _drop(key: str) -> Callable[[Any], Any]:
         ("atlas", _drop("mean_mm")),
         ("atlas", lambda content: content.update(units="um")),
         ("landmarks", _drop("gpLabeler")),
+        ("reliability", _drop("features")),
+        ("reliability", lambda content: content["overall"]["intra"].update(mean_mm="0.1")),
         ("landmarks", lambda content: content["markups"][0].update(coordinateSystem="RAS")),
     ],
 )
