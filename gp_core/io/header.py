@@ -84,7 +84,7 @@ class FileHeader:
         Parameters
         ----------
         value : object
-            The parsed object.
+            A list of the parsed object, or, as in files of earlier versions, the object itself.
         file : path-like
             For messages.
 
@@ -98,6 +98,8 @@ class FileHeader:
         FileFormatError
             Not such an object, or of a later schema.
         """
+        if isinstance(value, list) and len(value) == 1:
+            (value,) = value
         got: dict[str, Any] = value if isinstance(value, dict) else {"specimen": value}
         version = got.get("schemaVersion", SCHEMA_VERSION)
         if isinstance(version, int) and version > SCHEMA_VERSION:

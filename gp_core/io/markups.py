@@ -373,7 +373,8 @@ def write_content(
     GpError
         The file cannot be written, or the header holds what JSON cannot.
     """
-    content = {"@schema": _SCHEMA, "markups": markups, "gpLabeler": header.as_json()}
+    # A list, as markups are: pandas, by which SlicerMorph reads these files, takes no object beside a list.
+    content = {"@schema": _SCHEMA, "markups": markups, "gpLabeler": [header.as_json()]}
     try:
         text = json.dumps(content, indent=4, ensure_ascii=False, allow_nan=False, default=_plain)
     except (TypeError, ValueError) as error:

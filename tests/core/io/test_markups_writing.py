@@ -16,7 +16,7 @@ from landmark_makers import SHARED, needs_shared_data, same_landmarks, some_land
 from markups_schema import SCHEMA
 
 from gp_core.errors import GpError
-from gp_core.io import read_landmarks, read_points, write_csv, write_fcsv, write_markups
+from gp_core.io import load_specimens, read_landmarks, read_points, write_csv, write_fcsv, write_markups
 from gp_core.landmarks.features import CODES
 from gp_core.landmarks.sets import LandmarkSet, Status
 
@@ -154,7 +154,7 @@ def test_the_old_file_is_whole_until_the_new_one_is(file, monkeypatch):
     with pytest.raises(GpError, match="Input/output error"):
         write_markups(file, some_landmarks(seed=1), specimen="GP01")
     assert file.read_bytes() == before
-    assert json.loads(drafts[0])["gpLabeler"]["specimen"] == "GP01"
+    assert json.loads(drafts[0])["gpLabeler"][0]["specimen"] == "GP01"
 
 
 def test_a_missing_folder_is_named(tmp_path):
@@ -172,3 +172,27 @@ def test_a_link_stays_a_link_and_permissions_stay(tmp_path):
     assert link.is_symlink()
     assert stat.S_IMODE(target.stat().st_mode) == 0o640
     assert read_landmarks(target).status("CA") is Status.PLACED
+
+
+def test_slicermorph_reads_what_is_written(tmp_path):
+    """Its module GPA takes positions as below, by pandas, and stops where a point is not defined."""
+    pandas = pytest.importorskip("pandas")
+    file = tmp_path / "GP01_L.mrk.json"
+    landmarks = some_landmarks(seed=1)
+    write_markups(file, landmarks, specimen="GP01")
+    table = pandas.DataFrame(pandas.read_json(file)["markups"][0]["controlPoints"])
+    assert list(table["label"]) == list(CODES)
+    defined = table[table["positionStatus"] == "defined"]
+    read = np.array(defined["position"].tolist())
+    np.testing.assert_allclose(read, [landmarks[code] for code in defined["label"]], atol=1e-9)
+
+
+def test_the_header_of_earlier_versions_an_object_by_itself_is_still_read(tmp_path):
+    file = tmp_path / "left.mrk.json"
+    write_markups(file, some_landmarks(seed=1), specimen="GP01")
+    content = json.loads(file.read_text())
+    (content["gpLabeler"],) = content["gpLabeler"]
+    earlier = tmp_path / "earlier.mrk.json"
+    earlier.write_text(json.dumps(content))
+    assert read_landmarks(earlier).provenance == read_landmarks(file).provenance
+    assert load_specimens(earlier)[0].name == load_specimens(file)[0].name == "GP01"

@@ -92,13 +92,13 @@ def test_what_cannot_be_is_refused_by_name(landmarks: LandmarkSet, tmp_path: Pat
     content = json.loads(path.read_text())
     for key, value in (("certainty", "perhaps"), ("note", 3), ("checked", "yes")):
         wrong = json.loads(json.dumps(content))
-        wrong["gpLabeler"]["provenance"]["CB"][key] = value
+        wrong["gpLabeler"][0]["provenance"]["CB"][key] = value
         path.write_text(json.dumps(wrong))
         with pytest.raises(FileFormatError, match=rf"CB.*its {key} must be"):
             read_landmarks(path)
     for key, value in (("round", 0), ("round", "two"), ("observer", 3)):
         wrong = json.loads(json.dumps(content))
-        wrong["gpLabeler"][key] = value
+        wrong["gpLabeler"][0][key] = value
         path.write_text(json.dumps(wrong))
         with pytest.raises(FileFormatError, match=f"wrong {key}"):
             read_landmarks(path)

@@ -40,7 +40,7 @@ def _told(file, capsys) -> tuple[int, str]:
 def test_distances_come_back_from_a_file(measured, file) -> None:
     write_markups(file, measured, specimen="GP01")
     assert read_landmarks(file).scan_evidence == measured.scan_evidence
-    kept = json.loads(file.read_text())["gpLabeler"]["boneDistanceMm"]
+    kept = json.loads(file.read_text())["gpLabeler"][0]["boneDistanceMm"]
     assert (kept["limit"], kept["threshold"]) == (0.3, 1400.0)
     assert kept["points"]["IN"] == {"distance": 7.93, "outsideScan": False, "position": [1.0, 2.0, 3.0]}
     assert kept["points"]["OS"]["distance"] is None
@@ -107,7 +107,7 @@ def test_nothing_is_said_of_a_file_without_distances(measured, file, capsys, tmp
 def test_damaged_distances_are_refused(measured, file, wrong) -> None:
     write_markups(file, measured, specimen="GP01")
     content = json.loads(file.read_text())
-    content["gpLabeler"]["boneDistanceMm"] = wrong
+    content["gpLabeler"][0]["boneDistanceMm"] = wrong
     file.write_text(json.dumps(content))
     with pytest.raises(FileFormatError, match="boneDistanceMm"):
         read_landmarks(file)

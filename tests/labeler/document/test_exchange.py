@@ -92,7 +92,7 @@ def test_an_exported_file_carries_its_origin_but_no_path(editing, tmp_path):
     (left, _) = export_landmarks(editing.document.state, tmp_path).files
     text = left.read_text()
     assert "private" not in text
-    header = json.loads(text)["gpLabeler"]
+    header = json.loads(text)["gpLabeler"][0]
     assert header["volume"]["checksum"] == "abc"
     assert header["provenance"]["CA"] == {
         "how": "mesh",
@@ -179,7 +179,7 @@ def test_files_of_others(editing, tmp_path):
 def test_labels_of_another_scan_are_told(editing, tmp_path):
     (left, _) = export_landmarks(editing.document.state, tmp_path).files
     content = json.loads(left.read_text())
-    content["gpLabeler"]["provenance"] = {"CA": {"how": "magic"}, "XX": {"how": "mesh"}}
+    content["gpLabeler"][0]["provenance"] = {"CA": {"how": "magic"}, "XX": {"how": "mesh"}}
     left.write_text(json.dumps(content))
     other = Editing(SpecimenState("GP-014"))
     other.document.attach_volume(FakeVolume(checksum="other"))

@@ -49,7 +49,7 @@ def content(path: Path) -> Any:
 def untimed(path: Path) -> str:
     """Return a landmark file without the times at which its points were placed."""
     found = content(path)
-    marks = found["gpLabeler"]["provenance"]
+    marks = found["gpLabeler"][0]["provenance"]
     for mark in marks.values():
         mark.pop("time")
     return re.sub(r" \[time: [^]]*\]|; time: [^]]*", "", json.dumps(found, indent=1))
