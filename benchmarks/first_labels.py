@@ -42,6 +42,7 @@ from gp_core.io import load_specimens  # noqa: E402
 from gp_core.landmarks.features import FEATURES, Side, feature  # noqa: E402
 from gp_labeler.scene.planes import Plane  # noqa: E402
 from gp_labeler.scripting.events import click, press_keys, turn_wheel  # noqa: E402
+from gp_labeler.scripting.steps.first_labels import PATIENCE_SECONDS  # noqa: E402
 from gp_labeler.scripting.steps.scan import Open  # noqa: E402
 from gp_labeler.scripting.window_driver import WindowDriver  # noqa: E402
 from gp_labeler.views.panels.label.suggest_row import SuggestRow  # noqa: E402
@@ -159,9 +160,9 @@ def suggest(hand: Hand, library: Path) -> tuple[float, str]:
     memory = PeakMemory()
     driver.prompts.prepare(files=[library], answers=(FOLDER, AS_THE_FILE))
     button = driver.window.findChild(SuggestRow).button
-    hand.click(button, button.width() / 2, button.height() / 2)
-    hand.done["clicks"] += 3  # the folder, its name, and which side is left
-    driver.wait_until_idle()
+    click(button, button.width() / 2, button.height() / 2)
+    hand.done["clicks"] += 4  # this one, the folder, its name, and which side is left
+    driver.wait_until_idle(patience=PATIENCE_SECONDS)
     if driver.workspace.first_labels.proposal is None:
         raise GpError(driver.trouble(0) or "nothing was suggested")
     return cpu_seconds() - begun, f"{before:.0f} MB before, {memory.stop():.0f} at most"

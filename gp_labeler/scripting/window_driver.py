@@ -115,21 +115,23 @@ class WindowDriver:
 
     # Waiting
 
-    def wait_until_idle(self, *, in_passing: bool = True) -> None:
+    def wait_until_idle(self, *, in_passing: bool = True, patience: float = _PATIENCE_SECONDS) -> None:
         """Wait until all background work is done and delivered, and all is drawn.
 
         Parameters
         ----------
         in_passing : bool
             Whether to wait also for what changes only how points look.
+        patience : float
+            Seconds after which it gives up.
         """
-        end = time.monotonic() + _PATIENCE_SECONDS
+        end = time.monotonic() + patience
         while any(in_passing or not task.key.startswith(_IN_PASSING) for task in self.workspace.jobs.running):
             self.app.processEvents()
             time.sleep(_PAUSE_SECONDS)  # QTest.qWait would keep Python's lock from the work it waits for
             if time.monotonic() > end:
                 titles = ", ".join(task.job.title for task in self.workspace.jobs.running)
-                raise GpError(f"still not finished after {_PATIENCE_SECONDS:g} s: {titles}")
+                raise GpError(f"still not finished after {patience:g} s: {titles}")
         self.app.processEvents()
 
     # What is there

@@ -9,7 +9,10 @@ from gp_core.errors import GpError
 from gp_labeler.scripting.step import Step
 from gp_labeler.scripting.window_driver import WindowDriver
 
-__all__ = ["SuggestLike"]
+__all__ = ["PATIENCE_SECONDS", "SuggestLike"]
+
+PATIENCE_SECONDS = 6 * 3600.0
+"""The first time, every labelled scan is predicted from every other, which may take long on a busy machine."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class SuggestLike(Step):
         before = model.proposal
         labelled = [driver.to_read(each) for each in self.labelled]
         model.suggest(labelled, left_confirmed=self.left_confirmed)
-        driver.wait_until_idle()
+        driver.wait_until_idle(patience=PATIENCE_SECONDS)
         if model.proposal is None or model.proposal is before:
             raise GpError("suggest_like: nothing was suggested")
         proposal = model.proposal
