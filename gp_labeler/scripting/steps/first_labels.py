@@ -12,7 +12,7 @@ from gp_labeler.scripting.window_driver import WindowDriver
 __all__ = ["PATIENCE_SECONDS", "SuggestLike"]
 
 PATIENCE_SECONDS = 6 * 3600.0
-"""The first time, every labelled scan is predicted from every other, which may take long on a busy machine."""
+"""The first time, every labelled scan is predicted from every other; a busy machine takes long for that."""
 
 
 @dataclass(frozen=True)
