@@ -34,6 +34,7 @@ def test_a_new_scan_gets_suggestions_from_a_folder(qtbot, make_window, tmp_path,
     answers.answers = ["From a folder…", "Left is correct"]
     button.click()
     assert answers.asked == ["Suggest from my scans", "Left and right"]
+    assert button.text() == "Stop"
     wait_until_idle(qtbot, window)
     suggested = [window.workspace.document.landmarks(side).suggested for side in Side]
     assert [len(each) for each in suggested] == [4, 5]

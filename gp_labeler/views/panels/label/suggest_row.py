@@ -11,6 +11,8 @@ from gp_labeler.views.signals import follow
 
 __all__ = ["SuggestRow"]
 
+_OFFER, _STOP = "Suggest…", "Stop"
+
 
 class SuggestRow(QWidget):
     """A button, shown while a scan has no label and no suggestion yet, and while suggestions are made.
@@ -26,10 +28,9 @@ class SuggestRow(QWidget):
     def __init__(self, workspace: Workspace, actions: Actions, parent: QWidget | None = None) -> None:
         super().__init__(parent)
         self._workspace = workspace
-        words = "Suggest…"
         self.button = action_button(
             actions["point.suggest_like"],
-            words,
+            _OFFER,
             "Suggests first labels from labelled scans; click again to stop",
         )
         row = QHBoxLayout(self)
@@ -46,4 +47,5 @@ class SuggestRow(QWidget):
         running = self._workspace.first_labels.is_running
         sides = [self._workspace.document.landmarks(side) for side in Side]
         is_new = not any(landmarks.placed or landmarks.suggested for landmarks in sides)
+        self.button.setText(_STOP if running else _OFFER)
         self.setVisible(running or (is_new and self._workspace.scan.volume is not None))
