@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from platformdirs import user_cache_path
+
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.volume import Volume
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
     from gp_labeler.autolabel import Proposal
     from gp_labeler.head_pose import HeadPose
 
-__all__ = ["FirstLabels", "SuggestFromScans"]
+__all__ = ["FirstLabels", "SuggestFromScans", "templates_folder"]
 
 _MODULES = (
     "scipy.ndimage",
@@ -29,6 +31,11 @@ _MODULES = (
     "gp_labeler.phantom",
 )
 _PROPOSED = 0.95
+
+
+def templates_folder(directory: Path | None = None) -> Path:
+    """Return where what is prepared of labelled scans is kept, by default in the user's cache."""
+    return (directory or user_cache_path("gp-labeler", appauthor=False)) / "templates"
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from platformdirs import user_cache_path
 from psygnal import Signal
 
 from gp_core.errors import GpError
@@ -18,7 +17,7 @@ from gp_labeler.autolabel.labelled_scan import flat_points
 from gp_labeler.document.edits import SuggestPoints, point_text
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How
-from gp_labeler.jobs.first_labels import FirstLabels, SuggestFromScans
+from gp_labeler.jobs.first_labels import FirstLabels, SuggestFromScans, templates_folder
 from gp_labeler.jobs.runner import Jobs, Task
 from gp_labeler.models.head import HeadModel
 from gp_labeler.models.labels import LabelsModel
@@ -70,7 +69,7 @@ class FirstLabelsModel:
     ) -> None:
         self._document, self._scan, self._labels, self._head = document, scan, labels, head
         self._jobs, self._messages = jobs, messages
-        self._folder = (directory or user_cache_path("gp-labeler", appauthor=False)) / "templates"
+        self._folder = templates_folder(directory)
         self.proposal: Proposal | None = None
         """What was suggested last for the specimen that is open."""
         document.reset.connect(self._on_reset)

@@ -16,6 +16,8 @@ from gp_labeler.document.paths import absolute_path
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_list import ListedSpecimen
 from gp_labeler.jobs.contact_sheet import MakeContactSheets, SheetsMade
+from gp_labeler.jobs.first_labels import templates_folder
+from gp_labeler.jobs.library_check import CheckLibrary, LibraryChecked
 from gp_labeler.jobs.runner import Jobs
 from gp_labeler.jobs.specimen_list import CountProblems, ExportSpecimens, ListSpecimens
 from gp_labeler.models.atlas import AtlasModel
@@ -60,6 +62,7 @@ class SpecimenListModel:
     ) -> None:
         self._document, self._atlas, self._jobs, self._messages = document, atlas, jobs, messages
         self._file = None if directory is None else directory / "specimen_list.json"
+        self._templates = templates_folder(directory)
         self.folders = self._recalled()
         self._every: tuple[ListedSpecimen, ...] = ()
         self._problems: Mapping[Path, int] = {}
@@ -182,7 +185,25 @@ class SpecimenListModel:
         job = MakeContactSheets(tuple(files), Path(where), all_labellings)
         self._jobs.submit(job, self._take_sheets, key="contact sheets")
 
+    def check_library(self, where: str | PathLike[str], rows: Iterable[ListedSpecimen] | None = None) -> None:
+        """Check the labels of specimens against each other in the background, and draw what is found.
+
+        Parameters
+        ----------
+        where : path
+            A ``.pdf`` file, or a folder for one file each.
+        rows : iterable of ListedSpecimen, optional
+            By default all that are shown.
+        """
+        job = CheckLibrary(self._files(rows), self._templates, Path(where))
+        self._jobs.submit(job, self._take_check, key="check library")
+
     # Inside
+
+    def _take_check(self, checked: LibraryChecked) -> None:
+        for file in checked.files:
+            self._messages.wrote.emit("check of the library", file)
+        self._tell(checked.lines)
 
     def _is_of_kind(self, row: ListedSpecimen) -> bool:
         tests = {

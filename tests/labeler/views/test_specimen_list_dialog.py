@@ -129,3 +129,14 @@ def test_a_thumbnail_is_painted_in_its_row(dialog, workspace, folder):
     picture = dialog.model.data(dialog.model.index(2, 0), Qt.ItemDataRole.DecorationRole)
     assert picture.width() == 128
     assert dialog.model.data(dialog.model.index(1, 0), Qt.ItemDataRole.DecorationRole) is None
+
+
+def test_labels_are_checked_against_each_other(dialog, workspace, prompts, tmp_path, qtbot):
+    failed = []
+    workspace.jobs.failed.connect(lambda task: failed.append((task.key, task.message)))
+    prompts.prepare(saves=[tmp_path / "review.pdf"])
+    qtbot.mouseClick(dialog.check, Qt.MouseButton.LeftButton)
+    deliver(workspace)
+    ((key, message),) = failed  # these specimens have no scan
+    assert key == "check library"
+    assert "there is no labelled scan" in message

@@ -75,7 +75,7 @@ class SpecimenListDialog(QDialog):
                 self.search.setText(model.words)
         self.table.setVisible(bool(model.every) or bool(model.folders))
         has_rows = any(row.is_begun and not row.problem for row in model.rows)
-        for button in (self.export, self.fit_atlas, self.sheets):
+        for button in (self.export, self.fit_atlas, self.sheets, self.check):
             button.setEnabled(has_rows)
         self.every.setEnabled(has_rows and any(len(row.labellings) > 1 for row in model.rows))
         self.next.setEnabled(any(not (row.is_finished or row.problem) for row in model.every))
@@ -125,6 +125,8 @@ class SpecimenListDialog(QDialog):
         self.sheets = button(
             "Contact sheets…", "PDF with every label on its best slice and on bone", self._sheets
         )
+        hint = "Compare each specimen with what the others predict, and draw the labels that contradict them"
+        self.check = button("Check labels…", hint, self._check)
         self.every = QCheckBox("Of all labellings")
         self.every.setToolTip("Contact sheets have pages for each labelling, not only for the one in work")
         self.next = button("Next unfinished", "Open the next unfinished specimen", self._next)
@@ -137,7 +139,7 @@ class SpecimenListDialog(QDialog):
         top.addWidget(self.add_folder)
         top.addWidget(self.forget)
         foot = FlowLayout()
-        for widget in (self.next, self.export, self.fit_atlas, self.sheets, self.every):
+        for widget in (self.next, self.export, self.fit_atlas, self.check, self.sheets, self.every):
             foot.addWidget(widget)
         layout = QVBoxLayout(self)
         layout.setContentsMargins(16, 14, 16, 12)
@@ -180,6 +182,12 @@ class SpecimenListDialog(QDialog):
 
     def _fit(self) -> None:
         attempt(self._workspace, lambda: self._workspace.specimens.fit(self.chosen))
+
+    def _check(self) -> None:
+        path = self._prompts.save_file("Labels that contradict the others", "labels.pdf", _SHEETS)
+        if path is not None:
+            model = self._workspace.specimens
+            attempt(self._workspace, lambda: model.check_library(path, self.chosen))
 
     def _sheets(self) -> None:
         path = self._prompts.save_file("Contact sheets", "contact.pdf", _SHEETS)
