@@ -24,6 +24,8 @@ __all__ = ["check_fields", "checks_arguments", "checks_arguments_but", "is_scala
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
 
+_UNIONS = (typing.Union, types.UnionType)
+
 _MANY = 1000
 """Elements of a sequence that are looked at."""
 
@@ -147,7 +149,7 @@ def _fits(value: Any, hint: Any) -> bool:
     anything, origin, arguments = _parts(hint)
     if anything:
         return True
-    if origin in (typing.Union, types.UnionType):
+    if origin in _UNIONS:
         return any(_fits(value, one) for one in arguments)
     if origin is None:
         return _fits_class(value, hint)
@@ -170,10 +172,22 @@ def _fits(value: Any, hint: Any) -> bool:
 @functools.cache
 def _parts(hint: Any) -> tuple[bool, Any, tuple[Any, ...]]:
     """Return whether anything fits, and what an annotation is made of."""
+    hint = _meant(hint)
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    # ArrayLike is a union, which a union with anything else takes in
-    anything = hint is Any or all(one in arguments for one in typing.get_args(ArrayLike))
-    return anything, origin, arguments
+    return hint is Any or _takes_arrays(hint), origin, arguments
+
+
+def _meant(hint: Any) -> Any:
+    """Return what an annotation stands for: NumPy 2.5 and later name theirs as aliases of Python 3.12."""
+    return getattr(hint, "__value__", hint)
+
+
+def _takes_arrays(hint: Any) -> bool:
+    """Whether an annotation is ArrayLike, or a union with it, which may have taken its members in."""
+    if typing.get_origin(hint) not in _UNIONS:
+        return False
+    arguments = typing.get_args(hint)
+    return ArrayLike in arguments or all(one in arguments for one in typing.get_args(_meant(ArrayLike)))
 
 
 def _fits_class(value: Any, hint: Any) -> bool:
@@ -236,10 +250,11 @@ def _is_numeric(value: Any) -> bool:
 
 def _words(hint: Any) -> str:
     """Say an annotation in words."""
-    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
-    if hint == ArrayLike:
+    if hint in (ArrayLike, _meant(ArrayLike)):
         return "numbers"
-    if origin in (typing.Union, types.UnionType):
+    hint = _meant(hint)
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin in _UNIONS:
         words = list(dict.fromkeys(_words(one) for one in arguments if one is not type(None)))
         words += ["None"] if type(None) in arguments else []
         return " or ".join(words)
