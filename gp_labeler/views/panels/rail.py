@@ -204,9 +204,9 @@ class _RailButton(QAbstractButton):
             draw_chip(painter, "checked", QRectF(left, 5 if has_icon else 1, side, side), theme)
         painter.setFont(font_of(self, bold=self.isChecked()))
         painter.setPen(QColor(colour))
-        words = painter.fontMetrics().elidedText(
-            f"{self._number} {self.text()}", Qt.TextElideMode.ElideRight, round(box.width())
-        )
+        room = self.sizeHint().width() - 8  # the name of an added panel may be longer than those of the steps
+        words = f"{self._number} {self.text()}"
+        words = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room)
         top = self._icon_height - 2 if has_icon else 0
         painter.drawText(box.adjusted(0, top, 0, -2 if has_icon else 0), Qt.AlignmentFlag.AlignCenter, words)
         painter.end()

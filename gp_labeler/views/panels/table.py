@@ -5,6 +5,7 @@ from __future__ import annotations
 import traceback
 from collections.abc import Callable, Iterator
 
+from qtpy.QtCore import Qt
 from qtpy.QtWidgets import QWidget
 
 from gp_core.errors import GpError
@@ -40,6 +41,8 @@ def added_panels(workspace: Workspace, actions: Actions) -> Iterator[tuple[str, 
         except Exception as error:  # whatever a package does
             yield name, PANELS.failure(name, error)
         else:
+            panel.setAttribute(Qt.WidgetAttribute.WA_StyledBackground)
+            panel.setProperty("role", "panel")  # the ground of all panels
             yield name, panel
 
 
