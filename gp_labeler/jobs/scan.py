@@ -9,6 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gp_labeler.imaging.mapped_file import can_map
 from gp_labeler.imaging.progress import Progress as Told
 from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.readers import ImportPlan, inspect_volume, read_volume
@@ -44,6 +45,7 @@ class InspectScan:
     def run(self, progress: Progress) -> ImportPlan:
         """Read headers and names."""
         load_modules("gp_labeler.imaging.readers.probe")
+        can_map()  # the first answer loads a compiler: here, and not while the window takes the plan
         return inspect_volume(self.path, progress=progress, cancel=progress.cancelled, **self.options)
 
 

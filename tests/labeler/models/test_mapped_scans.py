@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from window_cases import MIDDLE, write_ball
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.state import How
-from gp_labeler.imaging import readers
+from gp_labeler.imaging import mapped_file, readers
 from gp_labeler.jobs.runner import QueueDispatcher
 from gp_labeler.models.workspace import Workspace
 
@@ -34,6 +35,23 @@ def opened(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[Wo
     assert workspace.scan.volume.voxels.in_file
     yield workspace, path, wait
     workspace.close()
+
+
+def test_whether_files_can_be_mapped_is_found_out_while_the_window_answers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[threading.Thread] = []
+    guarded = mapped_file.maps_can_be_guarded
+    monkeypatch.setattr(
+        mapped_file, "maps_can_be_guarded", lambda: (asked.append(threading.current_thread()), guarded())[1]
+    )
+    dispatcher = QueueDispatcher()
+    workspace = Workspace(tmp_path / "state", dispatcher)
+    monkeypatch.setattr(readers, "MAPPED_FROM", 1)
+    workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
+    dispatcher.deliver_until_idle(workspace.jobs, timeout=60)
+    workspace.close()
+    assert asked[0] is not threading.main_thread()
 
 
 def _label(workspace: Workspace) -> None:
