@@ -77,7 +77,7 @@ def test_which_ear_a_path_winds_in() -> None:
     assert winding_side(np.outer(np.linspace(-3, 3, 20), [0.1, 1, 0.01])) is None
     left, right, _ = _poses()
     for pose in (left, right):
-        with pytest.raises(GpError, match="said to be of a right ear, but winds as in a left one"):
+        with pytest.raises(GpError, match="declared as that of a right ear, but winds as in a left ear"):
             carry_path(_spiral(), pose, path_side="R")
 
 

@@ -429,7 +429,7 @@ def test_a_log_that_disagrees_with_the_slices_is_named(tmp_path: Path) -> None:
     assert codes(inspect_volume(folder)) == ([], ["scout", "log-prefix", "log-sections"])
     (folder / "gp04_head__rec.log").write_text(LOG.replace("(pixels)=72", "(pixels)=144"), "latin-1")
     with pytest.raises(
-        VolumeError, match=r"speaks of 144 x 66 pixels, the slices have 72 x 66.*--spacing 0.1411"
+        VolumeError, match=r"states 144 x 66 pixels, the slices have 72 x 66.*--spacing 0.1411"
     ):
         read_volume(folder)
 

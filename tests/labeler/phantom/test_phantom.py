@@ -268,7 +268,7 @@ def test_written_files_give_the_phantom_back(tmp_path):
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("")
     box = np.array([[60.0, 0, 0], [61.0, 1, 1]])
-    with pytest.raises(GpError, match="phantom cannot be written"):
+    with pytest.raises(GpError, match="file: cannot be made"):
         write_phantom(make_phantom(box=box), tmp_path / "file")
 
 
