@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from document_cases import head_frame
 from qtpy.QtGui import QImage
+from qtpy.QtTest import QTest
 from window_cases import BALL_MM, MIDDLE, image_bytes, wait_until_idle
 
+from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.scene.planes import Plane
+from gp_labeler.views.panels.scan.head_card import HeadCard
 
 INSIDE = MIDDLE + np.array([2.125, -1.625, 0.125])
 ON_BONE = MIDDLE + np.array([0.0, -BALL_MM, 0.0])
@@ -62,3 +66,19 @@ def test_a_marked_point_is_drawn_on_bone_and_is_no_landmark(qtbot, window) -> No
     assert "midline" in view.overlay.names
     x, y = view.pixel_at(ON_BONE)
     assert view.scene.mark_at(x, y) is None
+
+
+def test_the_card_has_room_for_what_it_says_while_the_head_is_turned_by_hand(qtbot, window) -> None:
+    window.set_step("scan")
+    card = window.findChild(HeadCard)
+    window.workspace.document.do(SetHeadFrame(head_frame()))
+    window.commands.run("head.by_hand")
+
+    def fits() -> bool:
+        return card.height() >= card.layout().heightForWidth(card.width())
+
+    qtbot.waitUntil(lambda: card.isVisible() and fits())
+    window.workspace.head.turn("pitch", 0.1)  # what it says is put in again
+    QTest.qWait(20)
+    qtbot.waitUntil(fits, timeout=5000)
+    window.commands.run("head.by_hand")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from qtpy.QtCore import QTimer
 from qtpy.QtWidgets import QCheckBox, QPushButton, QToolButton, QVBoxLayout, QWidget
 
 from gp_labeler.models.head import FREE_POINTS
@@ -33,6 +34,8 @@ class HeadCard(Card):
         self._workspace = workspace
         self.state = text_label("", "hint", wrap=True)
         self.add(self.state)
+        self._measure_timer = QTimer(self, interval=0, singleShot=True)
+        self._measure_timer.timeout.connect(self.updateGeometry)
         self._notices = QVBoxLayout()
         self._notices.setSpacing(6)
         self.add(self._notices)
@@ -93,6 +96,7 @@ class HeadCard(Card):
         self.forget_points.setVisible(bool(head.points))
         for name, button in self.points.items():
             button.setText(f"{name.capitalize()} {_TICK}" if name in head.points else name.capitalize())
+        self._measure_timer.start()  # what was put in shows a turn later: only then is its room known
 
     def _lay_out_points(self, actions: Actions) -> None:
         self.points = {n: action_button(actions[f"head.{n}"], n.capitalize()) for n in FREE_POINTS}
