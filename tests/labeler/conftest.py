@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import qtpy
 
 os.environ.setdefault("QT_QPA_PLATFORM", "offscreen")
 
 from pytestqt.qtbot import QtBot
-from window_cases import PATIENCE_MS, Answers, ball_volume, close, wait_until_idle
+from window_cases import PATIENCE_MS, Answers, ball_volume, close, left_behind, wait_until_idle
 
 from gp_labeler.imaging.volume import Volume
 
@@ -19,6 +21,27 @@ if os.environ.get("GP_LABELER_CANVAS") == "native":  # before the application is
     from gp_labeler.views.canvas_choice import share_contexts
 
     share_contexts()
+
+
+_DRAWN = ("views", "scene")
+"""Folders of tests that show or draw something; `scripting/test_leaks.py` looks at whole scripts."""
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_teardown(item: pytest.Item, nextitem: pytest.Item | None) -> Iterator[None]:
+    """After the tests of a file, nothing that they showed or drew is alive: no widget, no scene of VTK."""
+    yield
+    if (nextitem is None or nextitem.path != item.path) and _is_checked(item):
+        getattr(item, "funcargs", {}).clear()  # pytest keeps what the last test was given a little longer
+        left = left_behind()
+        assert not left, f"left behind by the tests of {item.path.name}"
+
+
+def _is_checked(item: pytest.Item) -> bool:
+    """Whether what a file leaves is looked for: with the usual binding and canvas, if nothing failed."""
+    usual = qtpy.PYSIDE6 and os.environ.get("GP_LABELER_CANVAS") != "native"
+    any_failed = bool(item.session.testsfailed)  # its traceback keeps what it showed
+    return usual and not any_failed and item.path.parent.name in _DRAWN and "qtpy.QtWidgets" in sys.modules
 
 
 class PatientBot(QtBot):

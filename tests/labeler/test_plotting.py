@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import pyvista
 from PIL import ImageColor
 
 from gp_core import PROBE, Atlas, GpError, RigidTransform, Side, Specimen, estimate_pose
@@ -26,6 +27,13 @@ IN_SCAN = RigidTransform.identity(dst="scan", src="tracker")
 def pose_of(side: Side = Side.LEFT, shift: float = 0.0):
     mirror = np.array([1.0 if side is Side.LEFT else -1.0, 1.0, 1.0])
     return estimate_pose({code: mirror * ATLAS[code] + [shift, 0, 0] for code in PROBE}, side, ATLAS)
+
+
+@pytest.fixture(autouse=True)
+def _closed():
+    """Let pyvista, which keeps every plotter, forget those that a test or an example leaves open."""
+    yield
+    pyvista.close_all()
 
 
 @pytest.fixture(scope="module")

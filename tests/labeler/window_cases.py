@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
@@ -114,6 +116,24 @@ def close(window) -> None:
     window.close()
     window.deleteLater()
     QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+
+
+def left_behind() -> Counter[str]:
+    """Count the widgets, and the actors, renderers and render windows of VTK, that are alive, by type."""
+    if _widgets_and_scenes():
+        gc.collect()  # a window and its parts know each other; collecting takes long, so only where need be
+    return _widgets_and_scenes()
+
+
+def _widgets_and_scenes() -> Counter[str]:
+    from qtpy.QtCore import QCoreApplication, QEvent
+    from qtpy.QtWidgets import QApplication
+
+    QCoreApplication.sendPostedEvents(None, QEvent.Type.DeferredDelete)
+    drawn = ("vtkRenderWindow", "vtkRenderer", "vtkProp")
+    types = Counter(map(type, gc.get_objects()))
+    scenes = {t.__name__: n for t, n in types.items() if any(base.__name__ in drawn for base in t.__mro__)}
+    return Counter(type(widget).__name__ for widget in QApplication.allWidgets()) + Counter(scenes)
 
 
 def wait_until_idle(qtbot, window, seconds: float = PATIENCE_MS / 1000) -> None:
