@@ -17,6 +17,9 @@ from gp_core import PROBE, Atlas, GpError, LandmarkSet, Specimen, estimate_pose
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.sampling import draw_animal
 
+pytestmark = pytest.mark.machine
+"""Checks follow annotations, which Python and NumPy change: the newest of both are on a bare Debian."""
+
 ATLAS = Atlas.published()
 TOUCHES = {code: ATLAS[code] for code in PROBE}
 POSE = estimate_pose(TOUCHES, "L", ATLAS)
