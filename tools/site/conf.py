@@ -1,5 +1,6 @@
 """Configuration of the site for Sphinx, which tools/site/build runs."""
 
+import os
 import sys
 from pathlib import Path
 
@@ -18,8 +19,20 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_copybutton",
     "sphinxcontrib.mermaid",
+    "sphinx_gallery.gen_gallery",
 ]
-source_suffix = {".md": "markdown"}
+source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery",
+    "gallery_dirs": "auto_gallery",
+    "filename_pattern": r"/plot_",
+    "image_scrapers": ("pyvista", "matplotlib"),
+    "abort_on_example_error": True,
+    "show_memory": False,
+    "plot_gallery": os.environ.get("GALLERY") == "1",  # tools/site/build --gallery runs the scripts
+    "remove_config_comments": True,
+}
+exclude_patterns = ["gallery/*"]
 nitpicky = False
 suppress_warnings = [
     "ref.python"
