@@ -73,7 +73,7 @@ def test_one_list_holds_both_sides_and_the_point_that_they_share(tmp_path, label
 def test_a_point_without_a_side_among_others_with_one_is_named(tmp_path) -> None:
     file = tmp_path / "GP01.csv"
     file.write_text(_both("{code}_{side}").replace("RWA_R", "RWA"), encoding="utf-8")
-    with pytest.raises(FeatureError, match=r"RWA: tells no side.*RWA_L or RWA_R"):
+    with pytest.raises(FeatureError, match=r"RWA: gives no side.*RWA_L or RWA_R"):
         sides_of(read_points(file))
 
 
@@ -239,7 +239,7 @@ def test_without_the_table_the_first_unknown_name_is_said(tmp_path) -> None:
     [
         ("apex,CAX\n", r"apex: cannot stand for 'CAX', which is no feature"),
         ("apex,CA\nApex,CB\n", r"Apex: has two codes"),
-        ("apex,CA\napex,CB\n", r"apex: stands twice"),
+        ("apex,CA\napex,CB\n", r"apex: occurs twice"),
         ("apex\n", "line 1 does not hold two columns"),
         ("# nothing\n", "holds no names"),
     ],

@@ -171,7 +171,7 @@ def test_a_file_named_for_the_other_side_is_held_back_until_the_user_says_so(
     other = file.rename(tmp_path / "GP7_Right.csv")
     words = ["estimate", str(other), "--side", "L", "--tfm", str(tfm)]
     assert main(words) == 3
-    assert "by its name GP7_Right.csv is of the right side" in capsys.readouterr().out
+    assert "GP7_Right.csv indicates the right side" in capsys.readouterr().out
     assert not tfm.exists()
     assert main([*words, "--accept-warnings"]) == 0
     assert main(["estimate", str(other.rename(tmp_path / "GP7_Left.csv")), "--side", "L"]) == 0
