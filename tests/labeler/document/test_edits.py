@@ -196,7 +196,7 @@ def test_what_cannot_be_done_says_why():
         LockPoints(((R, "CC"),)).apply(state)
     with pytest.raises(GpError, match="CC right is not placed"):
         CheckPoint(R, "CC").apply(state)
-    with pytest.raises(GpError, match="must do as a file name, got 'a/b'"):
+    with pytest.raises(GpError, match="must be a valid file name, got 'a/b'"):
         RenameSpecimen("a/b").apply(state)
     with pytest.raises(GpError, match="threshold must be finite"):
         SetThreshold(float("nan")).apply(state)

@@ -194,7 +194,7 @@ def test_a_full_disk_refuses_the_edit_and_keeps_the_journal(tmp_path, monkeypatc
 
     with monkeypatch.context() as patch:
         patch.setattr(journal_module.os, "fsync", full)
-        with pytest.raises(GpError, match=r"cannot be kept safe: No space left.*It was not made"):
+        with pytest.raises(GpError, match=r"cannot be stored safely: No space left.*It was not made"):
             document.do(SetNotes("lost"))
     assert (document.state.notes, document.undo_text, heard) == ("kept", "edit notes", [])
     document.do(SetThreshold(5))

@@ -220,7 +220,7 @@ def test_three_free_points_are_enough():
     assert (deg < 0.5, mm < 0.15, whole < 3.0) == (True, True, True)
     other = straighten_by_points(phantom.volume, midline=left["IN"], left=right["MN"], right=left["MN"])
     assert "on the right according" in other.warnings[-1]
-    with pytest.raises(HeadPoseError, match="too near"):
+    with pytest.raises(HeadPoseError, match="too close"):
         straighten_by_points(phantom.volume, midline=left["IN"], left=left["MN"], right=left["MN"])
 
 

@@ -86,7 +86,7 @@ def test_a_fill_changes_nothing(place: str, dtype: str, value: float, tmp_path: 
     array[nothing] = value
     volume = read(tmp_path, array)
     measured = head()[~nothing]
-    assert any("not measured" in note for note in volume.notes)
+    assert any("fill values" in note for note in volume.notes)
     assert volume.fill == volume.array.min() < measured.min()
     np.testing.assert_array_equal(volume.array == volume.fill, nothing)
     np.testing.assert_array_equal(volume.array[~nothing], measured)

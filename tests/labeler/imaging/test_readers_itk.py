@@ -354,7 +354,7 @@ def test_a_nii_beside_a_nii_gz_is_not_read_in_its_place(tmp_path: Path) -> None:
     write_nifti(decoy, tmp_path / "head.nii")
     assert (SimpleITK.GetArrayFromImage(SimpleITK.ReadImage(str(right))) == 7).all()  # what the guard is for
     assert_same_scan(right, scan)
-    assert any("head.nii lies beside it" in note for note in read_volume(right).notes)
+    assert any("head.nii is beside it" in note for note in read_volume(right).notes)
     assert_same_scan(tmp_path / "head.nii", decoy)
 
 

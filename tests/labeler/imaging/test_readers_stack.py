@@ -88,11 +88,11 @@ def test_jpeg_slices_are_close(tmp_path: Path) -> None:
         ({"resolution": (72, 72), "resolutionunit": 2}, None, "72 dpi are a screen's"),
         ({"resolution": (96, 96), "resolutionunit": 2}, None, "96 dpi are a screen's"),
         ({"resolution": (300, 300), "resolutionunit": 2}, None, "300 dpi are a screen's"),
-        ({"resolution": (720, 720), "resolutionunit": 2}, 25.4 / 720, "pixels of 0.0352778 mm, but nothing"),
+        ({"resolution": (720, 720), "resolutionunit": 2}, 25.4 / 720, "pixels of 0.0352778 mm, but not"),
         (
             {"resolution": (250, 250), "resolutionunit": 3},
             0.04,
-            "pixels of 0.04 mm, but nothing gives the distance",
+            "pixels of 0.04 mm, but not the distance",
         ),
         ({"resolution": (1, 1), "resolutionunit": 2}, None, "not in the file"),
     ],
@@ -451,7 +451,7 @@ def test_a_broken_slice_is_named(suffix: str, content: bytes, tmp_path: Path) ->
     folder = write_image_stack(cropped(), tmp_path / "s", f"a{{:03d}}.{suffix}")
     (folder / f"a030.{suffix}").write_bytes(content)
     with pytest.raises(
-        VolumeError, match=rf"a030.{suffix}: it is (no image|empty).*remove it from the stack"
+        VolumeError, match=rf"a030.{suffix}: it is (not an image|empty).*remove it from the stack"
     ):
         read_volume(folder, spacing=SPACING)
 

@@ -166,7 +166,7 @@ def test_both_methods_once_jrmpc_is_ready(editing, estimating, atlas):
     estimating.set_joint_ready()
     assert set(estimating.estimate.poses) == {"robust", "jrmpc"}
     touching.clear_touches(editing.document, "L", "RWP")
-    assert "begins at the round window and needs RWP" in estimating.estimate.problems["jrmpc"]
+    assert "starts at the round window and needs RWP" in estimating.estimate.problems["jrmpc"]
     editing.atlas.use(atlas)
     assert "labelled" in estimating.estimate.problems["jrmpc"]
     assert "--" not in estimating.estimate.problems["jrmpc"], "no options of a command in the window"

@@ -51,8 +51,8 @@ def test_single_precision_is_made_rigid_exactly() -> None:
     [
         (lambda m: m * np.nan, "finite"),
         (lambda m: m @ np.diag([1.02, 1.02, 1.02, 1]), "scales by 1.020"),
-        (lambda m: m @ np.diag([-1.0, 1, 1, 1]), "mirrors"),
-        (lambda m: m @ np.diag([0.0, 1, 1, 1]), "flat"),
+        (lambda m: m @ np.diag([-1.0, 1, 1, 1]), "reflection"),
+        (lambda m: m @ np.diag([0.0, 1, 1, 1]), "singular"),
         (lambda m: m @ np.array([[1, 0.1, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]), "shears"),
     ],
 )

@@ -119,7 +119,7 @@ def test_a_covered_marker_is_said_and_records_nothing(swaying, bench) -> None:
     refused = bench.press()
     assert isinstance(refused, RefusedTouch)
     assert refused.fault is Fault.HIDDEN
-    assert "not seen (out of view)" in refused.reason
+    assert "not visible (out of view)" in refused.reason
     assert bench.link.state.phase is LinkPhase.CONNECTED
     swaying.do("show")
     swaying.do("hide reference")

@@ -199,7 +199,7 @@ def test_a_press_for_one_feature_is_never_recorded_as_another(workspace, simulat
     else:
         workspace.document.begin()
     until(lambda: bool(refusals), workspace.tracker.poll, "a refusal")
-    assert refusals[0].startswith("RWA is no longer asked for")
+    assert refusals[0].startswith("RWA is no longer requested")
     end = time.monotonic() + 0.8
     until(lambda: time.monotonic() > end, workspace.tracker.poll, "the end of a window")
     assert not workspace.document.state.touches

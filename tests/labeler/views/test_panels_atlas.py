@@ -217,7 +217,7 @@ def test_an_atlas_that_is_gone_at_the_next_start_is_told_until_another_is_chosen
     again.commands.run("atlas.show")
     notice = again.findChild(AtlasCard).notices
     assert notice.isVisible()
-    assert "The atlas of own.json cannot be had any more" in notice.shown[0][1]
+    assert "The atlas of own.json is no longer available" in notice.shown[0][1]
     qtbot.mouseClick(again.findChild(AtlasCard).published, CLICK)
     wait_until_idle(qtbot, again)
     assert not notice.isVisible()
