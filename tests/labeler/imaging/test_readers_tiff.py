@@ -91,10 +91,7 @@ def test_imagej_without_a_unit_or_slice_distance_is_asked_for(tmp_path: Path) ->
         plan = inspect_volume(path)
         assert [problem.code for problem in plan.errors] == ["spacing-missing"]
     assert plan.suggested_spacing == pytest.approx((SPACING,) * 3, rel=1e-5)
-    assert (
-        "ImageJ's description gives pixels of 0.1411 mm, but not the distance"
-        in plan.errors[0].text
-    )
+    assert "ImageJ's description gives pixels of 0.1411 mm, but not the distance" in plan.errors[0].text
 
 
 @pytest.mark.parametrize(
