@@ -164,7 +164,7 @@ class LabellingError:
             rows = [(row["feature"], row[kind]) for row in report["features"] if row[kind] is not None]
             sd = {code: _drawn(float(found["sd_mm"]), found["n_pairs"], overall) for code, found in rows}
             n, observers = int(report["n_animals"]), len(report["observers"])
-        except (KeyError, TypeError, ValueError, IndexError):
+        except (KeyError, TypeError, ValueError, OverflowError, IndexError):
             raise GpError(
                 "is not a reliability report",
                 remedy="Make it with: gp-core reliability SPECIMENS --json FILE",

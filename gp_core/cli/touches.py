@@ -119,5 +119,5 @@ def _tip(word: str) -> FloatArray:
     content = read_json(word, what="pivot calibration", remedy=remedy)
     try:
         return np.array(content["tip_offset_mm"], dtype=np.float64)
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, OverflowError):
         raise FileFormatError("holds no tip_offset_mm", file=word, remedy=remedy) from None

@@ -112,7 +112,7 @@ def free_name(kind: str, taken: Iterable[str]) -> str:
 def _position(point: object, name: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(value) for value in point)  # type: ignore[attr-defined]
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         x = y = z = math.nan
     if not all(map(math.isfinite, (x, y, z))):
         raise GpError(f"each point of {name} must be three finite numbers in mm, got {point!r:.60}")

@@ -148,7 +148,7 @@ def _rows(points: Mapping[str, ArrayLike], names: Sequence[str], frame: str) -> 
     for row, name in enumerate(names):
         try:
             rows[row] = as_points(np.asarray(points[name])[None], "position")
-        except (GpError, TypeError, ValueError):
+        except (GpError, TypeError, ValueError, OverflowError):
             raise GpError(
                 f"position in the {frame} frame must be three finite numbers in mm, got {points[name]!r}",
                 landmark=name,

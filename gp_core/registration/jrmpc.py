@@ -40,7 +40,7 @@ THREADS_FROM_WORK = 200_000
 def _is_number(value: Any, allowed: Callable[[float], bool]) -> bool:
     try:
         return bool(np.isfinite(value) and allowed(value))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return False
 
 
@@ -448,7 +448,7 @@ def _as_sizes(sizes: Sequence[int]) -> NDArray[np.int64]:
 def _as_problems(problems: ArrayLike, n_points: int) -> FloatArray:
     try:
         points = np.asarray(problems, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise GpError(f"problems must be numbers in (B, {n_points}, 3)") from None
     if points.ndim != 3 or points.shape[1:] != (n_points, 3):
         raise GpError(f"problems must have the shape (B, {n_points}, 3), got {points.shape}")

@@ -275,7 +275,7 @@ def _as_weights(weights: ArrayLike | None, n: int) -> FloatArray:
         return np.ones(n)
     try:
         values = np.asarray(weights, dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise GpError("weights must be numbers") from None
     if values.shape != (n,):
         raise GpError(f"weights must have the shape ({n},), got {values.shape}")

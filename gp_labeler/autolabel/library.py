@@ -194,7 +194,7 @@ class TemplateLibrary:
             return found
         try:
             return {str(name): np.array(xyz, dtype=np.float64) for name, xyz in read_json(path).items()}
-        except (GpError, AttributeError, ValueError):
+        except (GpError, AttributeError, ValueError, OverflowError):
             return None
 
     def _keep(

@@ -67,7 +67,7 @@ def as_position(value: ArrayLike, code: str) -> Position:
     """Return a point as three Python floats, mm; raises `GpError` naming the landmark for anything else."""
     try:
         x, y, z = (float(v) for v in as_points(np.reshape(np.asarray(value), (1, -1)), "position")[0])
-    except (GpError, TypeError, ValueError):
+    except (GpError, TypeError, ValueError, OverflowError):
         raise GpError(f"position must be three finite numbers in mm, got {value!r}", landmark=code) from None
     return x, y, z
 

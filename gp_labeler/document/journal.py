@@ -300,7 +300,7 @@ def _entries(document: Document, records: list[dict[str, Any]]) -> tuple[list[En
                 state_of(changed)  # what it builds on is lost: it may not fit
                 kind = "edit" if n != expected and kind != "change" else kind  # nor what it undoes be there
             entries.append(Entry(kind, record["text"], record["time"], changed, record.get("edit")))
-        except (GpError, KeyError, TypeError, ValueError, IndexError, AttributeError):
+        except (GpError, KeyError, TypeError, ValueError, OverflowError, IndexError, AttributeError):
             n_lost += 1
             continue
         n_lost += max(n - expected, 0)

@@ -40,7 +40,7 @@ class Probe:
         remedy = "Give x, y, z of the tip in the marker's frame, in mm, or make a pivot calibration."
         try:
             offset = np.array(tip_offset, dtype=np.float64)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise GpError("the tip offset must be three numbers", remedy=remedy) from None
         if offset.shape != (3,) or not np.isfinite(offset).all():
             raise GpError(

@@ -55,7 +55,7 @@ class CanvasTiming:
         """Return what was remembered, None where that is no timing."""
         try:
             return cls(str(values["renderer"]), float(values["painted_ms"]), float(values["native_ms"]))
-        except (KeyError, TypeError, ValueError):
+        except (KeyError, TypeError, ValueError, OverflowError):
             return None
 
 

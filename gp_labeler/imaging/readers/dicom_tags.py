@@ -451,7 +451,7 @@ def _rescaling(rescale: Any, tags: Any) -> tuple[float, float, str]:
 def _number(said: Any) -> float | None:
     try:
         return float(said)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         return None
 
 
@@ -478,7 +478,7 @@ def _numbers(tags: Any, name: str, n: int) -> tuple[float, ...] | None:
     try:
         value = tags.get(name)
         numbers = tuple(float(part) for part in _listed(value))
-    except (TypeError, ValueError, AttributeError):
+    except (TypeError, ValueError, OverflowError, AttributeError):
         return None
     return numbers if len(numbers) == n and np.isfinite(numbers).all() else None
 

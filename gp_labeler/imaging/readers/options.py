@@ -97,7 +97,7 @@ def as_spacing(value: Any) -> Spacing:
     """
     try:
         x, y, z = (float(v) for v in np.broadcast_to(np.asarray(value, dtype=np.float64), (3,)))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise GpError(f"spacing must be one length in mm, or three (x y z), got {value!r}") from None
     if not (np.isfinite([x, y, z]).all() and min(x, y, z) > 0):
         raise GpError(f"spacing must be positive lengths in mm, got {value!r}")
@@ -107,7 +107,7 @@ def as_spacing(value: Any) -> Spacing:
 def _as_region(value: Any) -> Region:
     try:
         (i0, i1), (j0, j1), (k0, k1) = ((int(low), int(high)) for low, high in value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise GpError(f"region must be ((i0, i1), (j0, j1), (k0, k1)) voxels, got {value!r}") from None
     if min(i0, j0, k0) < 0 or i1 <= i0 or j1 <= j0 or k1 <= k0:
         raise GpError(f"region must be ranges of voxels from 0 with low < high, got {value!r}")

@@ -94,7 +94,7 @@ def _imagej(meta: Mapping[str, Any], x: float, y: float) -> PixelSize:
     warnings: tuple[str, ...] = ()
     try:
         depth = float(meta.get("spacing", 0))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         depth = 0.0
     if depth < 0:
         warnings = (f"ImageJ's description gives a spacing of {depth:g}; its size counts, as in ImageJ",)

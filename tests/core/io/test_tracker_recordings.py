@@ -303,6 +303,15 @@ def test_what_is_named_wrongly_is_said_before_anything_is_written(tmp_path, caps
     assert not csv.exists()
 
 
+@pytest.mark.parametrize("tip", [[10**400, 0, 100], [0, 0], "far", None])
+def test_a_tip_that_no_pivot_wrote_is_refused(tmp_path, capsys, tip) -> None:
+    file, csv = _mha(tmp_path / "a.mha", _touching(_PLACES).poses), tmp_path / "t.csv"
+    calibration = _text(tmp_path / "tip.json", json.dumps({"tip_offset_mm": tip}))
+    assert main(["touches", str(file), "--tip", str(calibration), "-o", str(csv)]) == 2
+    assert "tip" in capsys.readouterr().err
+    assert not csv.exists()
+
+
 def test_from_the_shell_a_pivot_and_touches_of_sequences(tmp_path, capsys) -> None:
     pivot, touched = tmp_path / "pivot.igs.mha", tmp_path / "stylus.igs.mha"
     _mha(pivot, _turning())
