@@ -61,17 +61,18 @@ def place_labels(
     inside: NDArray[np.bool_] = np.all((marks > 0) & (marks < np.array(view)), axis=1)
     corners, shown = np.zeros((len(marks), 2)), np.zeros(len(marks), dtype=bool)
     half = gap[inside, None] / 2
-    taken = np.concatenate([marks[inside] - half, marks[inside] + half], axis=1)
-    weights = np.full(len(taken), _MARK_WEIGHT)
+    own_places = np.concatenate([marks[inside] - half, marks[inside] + half], axis=1)
     placed = np.flatnonzero(inside & size.all(axis=1))  # what has no size only keeps its place free
-    for n in placed[np.argsort(-rank[placed], kind="stable")]:
-        boxes = _pushed_inside(_candidates(marks[n], size[n], gap[n]), view)
-        bad = (_covered(boxes, taken) @ weights + _outside(boxes, view)) / size[n].prod()
-        best = int((bad + _RELUCTANCE * np.arange(len(boxes))).argmin())
+    boxes = _pushed_inside(_candidates(marks[placed], size[placed], gap[placed]), view)
+    bad = _MARK_WEIGHT * _covered(boxes, own_places).sum(axis=2) + _outside(boxes, view)
+    area, reluctance = size[placed].prod(axis=1), _RELUCTANCE * np.arange(boxes.shape[1])
+    for row in np.argsort(-rank[placed], kind="stable"):
+        n, share = placed[row], bad[row] / area[row]
+        best = int((share + reluctance).argmin())
         allowed = _COVERED_AT_MOST if rank[n] >= 0 else _COVERED_AT_MOST_MINOR
-        if bad[best] <= allowed or rank[n] > 0:
-            corners[n], shown[n] = boxes[best, :2], True
-            taken, weights = np.vstack([taken, boxes[best]]), np.append(weights, 1.0)
+        if share[best] <= allowed or rank[n] > 0:
+            corners[n], shown[n] = boxes[row, best, :2], True
+            bad += _covered(boxes, boxes[row, [best]])[..., 0]
     return corners, shown
 
 
@@ -100,29 +101,30 @@ def lines_within(text: str, width: float, measure: Callable[[str], float]) -> li
 _DOT = "\N{MIDDLE DOT}"
 
 
-def _candidates(mark: FloatArray, size: FloatArray, gap: float) -> FloatArray:
-    """Boxes (left, top, right, bottom) around a mark: each side of it, near and then farther off."""
-    corner = mark + gap * _STEPS + _SHARES * size
-    return np.concatenate([corner, corner + size], axis=1)
+def _candidates(marks: FloatArray, sizes: FloatArray, gaps: FloatArray) -> FloatArray:
+    """(P, C, 4) boxes (left, top, right, bottom) around P marks: each side, near and then farther off."""
+    corners = marks[:, None] + gaps[:, None, None] * _STEPS + _SHARES * sizes[:, None]
+    return np.concatenate([corners, corners + sizes[:, None]], axis=2)
 
 
 def _pushed_inside(boxes: FloatArray, view: tuple[int, int]) -> FloatArray:
     """Return boxes moved so far that they lie inside the view; one too long for it begins at its edge."""
-    room = np.maximum(np.array(view) - (boxes[:, 2:] - boxes[:, :2]), 0)
-    shift = np.clip(boxes[:, :2], 0, room) - boxes[:, :2]
+    room = np.maximum(np.array(view) - (boxes[..., 2:] - boxes[..., :2]), 0)
+    shift = np.clip(boxes[..., :2], 0, room) - boxes[..., :2]
     return boxes + np.tile(shift, 2)
 
 
 def _covered(boxes: FloatArray, taken: FloatArray) -> FloatArray:
-    """(C, T) areas that C boxes share with T others."""
-    low = np.maximum(boxes[:, None, :2], taken[None, :, :2])
-    high = np.minimum(boxes[:, None, 2:], taken[None, :, 2:])
-    areas: FloatArray = np.clip(high - low, 0, None).prod(axis=2)
+    """(P, C, T) areas that P by C boxes share with T others."""
+    left, top, right, bottom = (boxes[..., None, side] for side in range(4))
+    wide = np.minimum(right, taken[:, 2]) - np.maximum(left, taken[:, 0])
+    tall = np.minimum(bottom, taken[:, 3]) - np.maximum(top, taken[:, 1])
+    areas: FloatArray = np.maximum(wide, 0) * np.maximum(tall, 0)
     return areas
 
 
 def _outside(boxes: FloatArray, view: tuple[int, int]) -> FloatArray:
-    """(C,) areas that lie outside the view."""
+    """(P, C) areas that lie outside the view."""
     whole = np.array([[0.0, 0.0, *view]])
-    areas: FloatArray = (boxes[:, 2:] - boxes[:, :2]).prod(axis=1) - _covered(boxes, whole)[:, 0]
+    areas: FloatArray = (boxes[..., 2:] - boxes[..., :2]).prod(axis=-1) - _covered(boxes, whole)[..., 0]
     return areas
