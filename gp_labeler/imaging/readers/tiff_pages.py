@@ -196,4 +196,4 @@ def orientation_problems(orientations: set[int]) -> list[Problem]:
     if not turned:
         return []
     values = " and ".join(map(str, turned))
-    return [warning("orientation", f"rows and columns are oriented by the tag Orientation ({values}) says")]
+    return [warning("orientation", f"rows and columns are oriented as the tag Orientation ({values}) says")]

@@ -293,7 +293,7 @@ def test_orientation_is_obeyed_whatever_the_packing(
     assert said == (
         []
         if orientation == 1
-        else [f"rows and columns are oriented by the tag Orientation ({orientation}) says"]
+        else [f"rows and columns are oriented as the tag Orientation ({orientation}) says"]
     )
 
 
