@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.fitting import fit_atlas
 from gp_core.cli.options import (
     AtlasSource,
@@ -30,11 +29,12 @@ from gp_core.io import read_touches
 from gp_core.io.file_names import named_side
 from gp_core.io.pose_export import pose_text
 from gp_core.io.pose_json import is_pose_file, read_pose
-from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.answer import WITHHELD, pose_answer
 from gp_core.pose.both_ears import EarComparison, compare_ears
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
-from gp_core.pose.estimate import estimate_pose
+from gp_core.pose.estimate import estimate_from
+from gp_core.pose.estimate_inputs import EstimateInputs
 from gp_core.pose.gate import GateReason, PoseGate, named_for_other_side
 from gp_core.pose.hypothesis_check import read_as, with_names_exchanged
 from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_before_centre, write_path
@@ -204,18 +204,19 @@ def run(args: argparse.Namespace) -> int:
     """
     path = _path_of(args)
     given = _given(args)
+    asked = given.inputs
     own_atlas = f" with atlas {' '.join(args.atlas)}" if args.atlas not in (None, ["published"]) else ""
     with blaming(args.touches + own_atlas):
         touches, pose, taken = _estimated(args, given)
         next_touches = (
             ()
-            if given.atlas is None
-            else gains(touches, given.atlas, probe_noise=given.probe_noise, shared_error=given.shared_error)
+            if asked.atlas is None
+            else gains(touches, asked.atlas, probe_noise=asked.probe_noise, shared_error=asked.shared_error)
         )
     check = _checked(args, given, touches, pose)
     if check is not None:
         pose, ears = check
-    others = [*_other_reasons(given.source, pose, taken), *([] if check is None else _of_ears(ears))]
+    others = [*_other_reasons(asked.source, pose, taken), *([] if check is None else _of_ears(ears))]
     answer = pose_answer(pose, others, accept_warnings=args.accept_warnings)
     if check is not None:
         answer["other_ear"] = ears.as_dict()
@@ -246,55 +247,39 @@ def run(args: argparse.Namespace) -> int:
 class _Given:
     """What the command line gives to estimate from: touches, or a pose file with what it was made from."""
 
-    touches: LandmarkSet
-    atlas: Atlas | None
-    specimens: Sequence[Specimen] | None
-    method: str
-    round_window: str
-    probe_noise: float | None
-    shared_error: float
-    times: Mapping[str, float] | None = None
-    source: str = ""
+    inputs: EstimateInputs
     pose: CochleaPose | None = None
 
     def estimate(self, touches: LandmarkSet) -> CochleaPose:
         """Estimate touches in this way."""
-        pose = estimate_pose(
-            touches,
-            touches.side,
-            self.atlas,
-            method=self.method,
-            specimens=self.specimens,
-            probe_noise=self.probe_noise,
-            round_window=self.round_window,
-            shared_error=self.shared_error,
-            times=self.times,
-        )
-        assert pose.inputs is not None
-        return replace(pose, inputs=replace(pose.inputs, source=self.source))
+        return estimate_from(replace(self.inputs, touches=touches))
 
 
 def _given(args: argparse.Namespace) -> _Given:
     """Return what the command line gives; a pose file's own settings hold unless an option overrules them."""
-    given = _given_pose(args) if is_pose_file(args.touches) else _given_touches(args)
+    given = _given_pose(args) if is_pose_file(args.touches) else _Given(_given_touches(args))
     if args.exchange is not None:
         with blaming(args.touches):
-            given = replace(given, touches=with_names_exchanged(given.touches, args.exchange))
+            exchanged = with_names_exchanged(given.inputs.touches, args.exchange)
+            given = replace(given, inputs=replace(given.inputs, touches=exchanged))
     return given
 
 
-def _given_touches(args: argparse.Namespace) -> _Given:
+def _given_touches(args: argparse.Namespace) -> EstimateInputs:
     if args.side is None:
         raise GpError("--side L or --side R is needed with a file of touches", file=args.touches)
     touches = read_touches(args.touches, args.side, names=lab_names(args))
     method = args.method or "robust"
-    return _Given(
-        touches,
-        *_atlas_for(args.atlas or ["published"], method),
+    atlas, specimens = _atlas_for(args.atlas or ["published"], method)
+    return EstimateInputs(
+        touches=touches,
         method=method,
         round_window=args.round_window or ROUND_WINDOWS[0],
         probe_noise=args.probe_noise,
         shared_error=DEFAULT_SHARED_ERROR_MM if args.shared_error is None else args.shared_error,
+        times=None,
+        atlas=atlas,
+        specimens=tuple(specimens or ()),
         source=Path(args.touches).name,
     )
 
@@ -310,21 +295,13 @@ def _given_pose(args: argparse.Namespace) -> _Given:
         )
     if args.side not in (None, made.touches.side.value):
         raise GpError(f"is of the {made.touches.side.word} side", file=args.touches)
-    method = args.method or made.method
-    atlas: AtlasSource = (made.atlas, list(made.specimens) or None)
+    names = ("method", "round_window", "probe_noise", "shared_error")
+    overruled = {name: value for name in names if (value := getattr(args, name)) is not None}
+    inputs = replace(made, **overruled)
     if args.atlas is not None:
-        atlas = _atlas_for(args.atlas, method)
-    return _Given(
-        made.touches,
-        *atlas,
-        method=method,
-        round_window=args.round_window or made.round_window,
-        probe_noise=made.probe_noise if args.probe_noise is None else args.probe_noise,
-        shared_error=made.shared_error if args.shared_error is None else args.shared_error,
-        times=made.times,
-        source=made.source,
-        pose=pose,
-    )
+        atlas, specimens = _atlas_for(args.atlas, inputs.method)
+        inputs = replace(inputs, atlas=atlas, specimens=tuple(specimens or ()))
+    return _Given(inputs, pose)
 
 
 def _atlas_for(words: list[str], method: str) -> AtlasSource:
@@ -378,11 +355,11 @@ def _two_names(text: str) -> tuple[str, str]:
 
 def _estimated(args: argparse.Namespace, given: _Given) -> tuple[LandmarkSet, CochleaPose, Hypothesis | None]:
     """Estimate the touches as they are named; with ``--take-best``, under the likeliest hypothesis."""
-    pose = given.estimate(given.touches)
+    pose = given.estimate(given.inputs.touches)
     best = pose.likelier_hypothesis
     if best is None or not args.take_best:
-        return given.touches, pose, None
-    touches = read_as(given.touches, best)
+        return given.inputs.touches, pose, None
+    touches = read_as(given.inputs.touches, best)
     return touches, given.estimate(touches), best
 
 
