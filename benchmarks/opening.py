@@ -69,7 +69,7 @@ def main() -> None:
         rest_of_start(window)
         report_opening(window, path)
         window.workspace.document.abandon()
-        window.ui.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
+        window.prompts.choose = lambda *a, **k: "Do not save"  # type: ignore[method-assign]
         window.close()
 
 
