@@ -212,7 +212,7 @@ class NamedFit:
 
     @cached_property
     def squared_residuals(self) -> FloatArray:
-        """(n,) squared distance of each touch residual, mm^2."""
+        """(n,) squared residual of each touch, mm^2."""
         squared: FloatArray = (self.residual**2).reshape(-1, 3).sum(axis=1)
         return squared
 

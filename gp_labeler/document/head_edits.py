@@ -1,4 +1,4 @@
-"""Edits of orientation of the head in its scan; see `edits` for what an edit is."""
+"""Edits of the orientation of the head in its scan; see `edits` for what an edit is."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class SetHeadFrame:
 
 @dataclass(frozen=True)
 class ClearHeadFrame:
-    """Remove the head frame in its scan."""
+    """Remove the frame of the head from its scan."""
 
     do: ClassVar[str] = "clear_head_frame"
 
