@@ -22,7 +22,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gp_core.errors import FileFormatError, GpError
+from gp_core.errors import AlreadyExistsError, FileFormatError, GpError
 from gp_core.terminal import printable
 
 try:
@@ -37,6 +37,7 @@ __all__ = [
     "check_file",
     "is_protected",
     "is_stream",
+    "make_room",
     "protect",
     "protected_inputs",
     "read_bytes",
@@ -255,6 +256,35 @@ def write_bytes(path: AnyPath, content: bytes) -> None:
     """
     with atomic_file(path) as draft:
         draft.write_bytes(content)
+
+
+def make_room(folder: AnyPath, files: Iterable[AnyPath], *, overwrite: bool) -> None:
+    """Make a folder for files, and check that none of them is there already.
+
+    Parameters
+    ----------
+    folder : path-like
+        Made where it is not there.
+    files : iterable of path-like
+        Files to be written into it.
+    overwrite : bool
+        Whether files may be replaced.
+
+    Raises
+    ------
+    AlreadyExistsError
+        A file would be replaced.
+    GpError
+        The folder cannot be made.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GpError(f"cannot be made: {error.strerror}", file=folder) from None
+    there = [path for path in files if Path(path).exists()]
+    if there and not overwrite:
+        remedy = "Choose another folder, or overwrite it."
+        raise AlreadyExistsError("exists already", file=there[0], remedy=remedy)
 
 
 @contextmanager

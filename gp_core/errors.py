@@ -64,6 +64,10 @@ class GeometryError(GpError):
     """Points do not determine the requested result (too few, collinear, not finite, implausible size)."""
 
 
+class AlreadyExistsError(GpError):
+    """A file would be replaced, which was not asked for."""
+
+
 class FrameError(GpError):
     """Coordinates of different frames are combined."""
 

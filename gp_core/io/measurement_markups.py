@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.argument_types import checks_arguments
+from gp_core.disk import make_room
 from gp_core.errors import FileFormatError, GpError
 from gp_core.io.header import FileHeader
 from gp_core.io.labelled_points import LabelledPoint
@@ -97,13 +98,7 @@ def write_measurements(
         raise GpError("nothing is measured", specimen=specimen, remedy="Place a ruler or an angle first.")
     names = measurement_file_names(specimen, [each.name for each in measurements])
     paths = [Path(folder) / names[each.name] for each in measurements]
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GpError(f"cannot be made: {error.strerror}", file=folder) from None
-    there = [path for path in paths if path.exists()]
-    if there and not overwrite:
-        raise GpError("exists already", file=there[0], remedy="Choose another folder, or overwrite it.")
+    make_room(folder, paths, overwrite=overwrite)
     header = FileHeader(specimen=specimen, volume=volume)
     for path, measurement in zip(paths, measurements, strict=True):
         write_content(path, [_as_json(measurement)], header)

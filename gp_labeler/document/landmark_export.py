@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from gp_core.disk import make_room
 from gp_core.errors import GpError
 from gp_core.io import landmark_file_name, write_csv, write_fcsv, write_markups, write_suggestions
 from gp_core.landmarks.features import CODES, Side, feature
@@ -140,7 +141,7 @@ def export_landmarks(
     files = {folder / name: job for name, job in _files(state, suffixes, suggested).items()}
     if not files:
         raise _nothing_placed(state)
-    _make_room(folder, files, overwrite)
+    make_room(folder, files, overwrite=overwrite)
     for path, (write, side, labelling) in files.items():
         write(path, labelling.described_side(side), labelling)
     sides = [side for side in Side if _is_labelled(state, side)]
@@ -203,13 +204,3 @@ def _is_labelled(state: SpecimenState, side: Side) -> bool:
 
 def _codes(landmarks: LandmarkSet, status: Status) -> tuple[str, ...]:
     return tuple(code for code in CODES if landmarks.status(code) is status)
-
-
-def _make_room(folder: Path, files: Iterable[Path], overwrite: bool) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GpError(f"cannot be made: {error.strerror}", file=folder) from None
-    there = [path for path in files if path.exists()]
-    if there and not overwrite:
-        raise GpError("exists already", file=there[0], remedy="Choose another folder, or overwrite it.")

@@ -8,7 +8,7 @@ from pathlib import Path
 from uuid import uuid4
 
 from gp_core.disk import read_bytes, write_bytes
-from gp_core.errors import GpError
+from gp_core.errors import AlreadyExistsError, GpError
 from gp_labeler.document.edit_tables import edit_table
 from gp_labeler.document.edits import Edit
 from gp_labeler.document.journal import Journal, read_journal
@@ -194,7 +194,8 @@ class SpecimenStore:
         if overwrite or not target.exists():
             return
         if moves:
-            raise GpError("exists already", file=target, remedy="Choose another name, or overwrite it.")
+            remedy = "Choose another name, or overwrite it."
+            raise AlreadyExistsError("exists already", file=target, remedy=remedy)
         if digest(target) != self._saved:
             raise GpError(
                 "was changed by another program after it was opened",

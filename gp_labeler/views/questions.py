@@ -8,7 +8,7 @@ from typing import Any
 
 from qtpy.QtWidgets import QWidget
 
-from gp_core.errors import GpError
+from gp_core.errors import AlreadyExistsError
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.landmark_import import OffBoneError, import_landmarks
 from gp_labeler.document.recovery import Recovery
@@ -130,9 +130,7 @@ def export_asking(workspace: Workspace, folder: Path, prompts: Prompts) -> None:
     state = workspace.document.measured_state
     try:
         report = export_landmarks(state, folder)
-    except GpError as error:
-        if "exists already" not in error.problem:
-            raise
+    except AlreadyExistsError as error:
         if not prompts.choose("Replace?", str(error), ["Replace"], kind="warning"):
             return
         report = export_landmarks(state, folder, overwrite=True)

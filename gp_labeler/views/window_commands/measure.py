@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
-from gp_core.errors import GpError
+from gp_core.errors import AlreadyExistsError
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.measure.dialog import MeasureDialog
 from gp_labeler.views.prompts import Prompts
@@ -43,9 +43,7 @@ def ask_export_measurements(workspace: Workspace, prompts: Prompts) -> None:
         return
     try:
         workspace.measure.export(folder)
-    except GpError as error:
-        if "exists already" not in error.problem:
-            raise
+    except AlreadyExistsError as error:
         if prompts.choose("Replace?", str(error), ["Replace"], kind="warning"):
             workspace.measure.export(folder, overwrite=True)
 
