@@ -36,7 +36,7 @@ def add(commands: Subparsers) -> None:
         type=int,
         default=DEFAULT_PORT,
         metavar="N",
-        help="default: %(default)s; port; 0: any free port, which the first line tells",
+        help="port; default: %(default)s; 0: any free port, which the first line tells",
     )
     parser.add_argument(
         "--atlas",

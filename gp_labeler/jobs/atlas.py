@@ -177,7 +177,7 @@ class RefitAtlas:
 
 @dataclass(frozen=True)
 class AtlasTrial:
-    """Estimates each animal's cochlea from the other animals.
+    """How well each animal's cochlea is estimated from the other animals.
 
     Parameters
     ----------

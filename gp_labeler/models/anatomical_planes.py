@@ -222,7 +222,7 @@ class AnatomicalPlanesModel:
     def _lacks(self, codes: str, what: str) -> GpError:
         side = self._labels.active.side.word
         return GpError(
-            f"where the {what} of the {side} side is not known yet",
+            f"the position of the {what} of the {side} side is not known yet",
             remedy=f"Place {codes}, or three features, from which their positions are predicted.",
         )
 

@@ -39,14 +39,14 @@ _ROOMY_ROW = 24
 """Height of a row where there is room, logical pixels at the normal text size."""
 
 _FEWEST_ROWS = 6
-"""SliceViewport in a low window, which scrolls the table."""
+"""Rows that are shown in a low window, which scrolls the table."""
 
 _WIDEST_STATES = (*(state.value for state in PointState), "automatic", "99.9 mm")
 _CHIP, _PAD = 12, 8
 
 
 class LandmarkTable(QWidget):
-    """The table; a click or the arrow keys go to a point, a right click says open the menu of the point.
+    """The table; a click or the arrow keys go to a point, a right click opens the menu of the point.
 
     Parameters
     ----------

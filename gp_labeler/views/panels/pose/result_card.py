@@ -186,7 +186,7 @@ class _TwoPoses(QWidget):
                 cell.setText(value)
         apart = estimate.apart()
         if apart is not None:
-            self.apart.setText(f"They differ by {fine_mm(apart[0])} and {apart[1]:.1f}° apart")
+            self.apart.setText(f"They differ by {fine_mm(apart[0])} and {apart[1]:.1f}°")
 
 
 def _column(word: str, pose: CochleaPose) -> tuple[str, ...]:
