@@ -28,6 +28,7 @@ from gp_core.pose.skull_link import SkullLink, link_by_skull
 from gp_core.validation import FloatArray, as_points, as_vectors, freeze_arrays
 
 __all__ = [
+    "FEWEST_PAIRS",
     "EarCheck",
     "EarComparison",
     "MirrorPlane",
@@ -37,7 +38,9 @@ __all__ = [
     "mirror_plane",
 ]
 
-_FEWEST_PAIRS = 3
+FEWEST_PAIRS = 3
+"""So many features must be touched on both sides for a mid-plane."""
+
 _PAIR_SD_MM = 0.5
 """Standard deviation by which the two sides of a head differ in a touched feature, mm a coordinate."""
 
@@ -250,16 +253,16 @@ def mirror_plane(left: LandmarkSet, right: LandmarkSet, *, midline: Iterable[str
     """
     _check_sides(left, right)
     codes = tuple(c for c in EXTERNAL if c in left and c in right and not feature(c).shared)
-    if len(codes) < _FEWEST_PAIRS:
+    if len(codes) < FEWEST_PAIRS:
         raise GpError(
-            f"the mid-plane needs {_FEWEST_PAIRS} features that are touched on both sides, got {len(codes)}",
+            f"the mid-plane needs {FEWEST_PAIRS} features that are touched on both sides, got {len(codes)}",
             remedy="Touch the same features on both ears.",
         )
     shared = [c for c in EXTERNAL if feature(c).shared and (c in left or c in right)]
     middle = {name: _shared_point(left, right, name) for name in (*shared, *midline)}
     plane = _plane_of(left, right, codes, middle)
     pairs_mm, rest_mm = {}, {}
-    if len(codes) > _FEWEST_PAIRS:
+    if len(codes) > FEWEST_PAIRS:
         for code in codes:
             others = _plane_of(left, right, tuple(c for c in codes if c != code), middle)
             image = others.mirror(right[code][None])[0]

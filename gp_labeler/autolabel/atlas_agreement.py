@@ -10,6 +10,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import Deviation, check_side
 from gp_core.atlas.labelling_error import LABELLING_NOISE_MM, LabellingError
+from gp_core.constants import CHI2_3_95
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_labeler.autolabel.labelled_scan import side_and_code
@@ -17,7 +18,7 @@ from gp_labeler.autolabel.proposal import Guess
 
 __all__ = ["compare_with_atlas", "disagreement_text"]
 
-_RADIUS_95_PER_SD = 2.795
+_RADIUS_95_PER_SD = CHI2_3_95**0.5
 """95 % radius over the standard deviation of one coordinate, of a Gaussian error in three dimensions."""
 
 _LARGEST_SD_MM = 5.0

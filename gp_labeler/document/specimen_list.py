@@ -23,7 +23,7 @@ __all__ = ["SIDE_TOTAL", "ListedSpecimen", "list_specimens", "specimen_files"]
 SIDE_TOTAL = len(CODES)
 """Features of a side, CO with them."""
 
-_FEWEST_LEVELS = 4
+_MOST_LEVELS = 4
 """So deep folders are searched: a lab keeps a folder for each animal, and one for each study."""
 
 
@@ -133,7 +133,7 @@ def specimen_files(places: Iterable[str | PathLike[str]]) -> list[Path]:
         path = Path(place)
         if not path.exists():
             raise GpError("does not exist", file=path, remedy="Name a folder, or specimen files.")
-        found |= dict.fromkeys([path] if path.is_file() else _within(path, _FEWEST_LEVELS))
+        found |= dict.fromkeys([path] if path.is_file() else _within(path, _MOST_LEVELS))
     return sorted(found, key=lambda file: natural_key(str(file)))
 
 
@@ -196,7 +196,7 @@ def _within(folder: Path, levels: int) -> Iterator[Path]:
             yield from _within(entry, levels - 1)
 
 
-def _scans_within(folder: Path, levels: int = _FEWEST_LEVELS) -> Iterator[Path]:
+def _scans_within(folder: Path, levels: int = _MOST_LEVELS) -> Iterator[Path]:
     entries = _entries(folder)
     if is_slice_folder(entries):
         yield folder

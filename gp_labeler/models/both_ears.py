@@ -6,12 +6,11 @@ from dataclasses import dataclass, replace
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
-from gp_core.pose.both_ears import EarComparison, compare_ears
+from gp_core.pose.both_ears import FEWEST_PAIRS, EarComparison, compare_ears
 from gp_labeler.models.estimate import SideEstimate
 
 __all__ = ["BothEars", "compare_sides"]
 
-_FEWEST_PAIRS = 3
 _METHOD = "robust"
 """The method that knows names, and its own errors."""
 
@@ -63,7 +62,7 @@ def compare_sides(own: SideEstimate, other: SideEstimate | None) -> BothEars:
     if other is None or _METHOD not in own.poses or _METHOD not in other.poses:
         return nothing
     paired = [code for code in own.touches.placed if code in other.touches and not feature(code).shared]
-    if len(paired) < _FEWEST_PAIRS or own.touches.frame != other.touches.frame:
+    if len(paired) < FEWEST_PAIRS or own.touches.frame != other.touches.frame:
         return nothing
     touched = own.touches.extra.keys() | other.touches.extra.keys()
     midline = [name for name in own.settings.midline if name in touched]
