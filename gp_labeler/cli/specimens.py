@@ -58,10 +58,13 @@ def run_list(arguments: Sequence[str]) -> int:
         A folder does not exist, or the file cannot be written.
     """
     args = make_list_parser().parse_args(arguments)
-    from gp_labeler.document.specimen_list import list_specimens  # here: `--help` need not wait
+    from gp_labeler.document.specimen_list import (  # here: `--help` need not wait
+        list_specimens,
+        progress_text,
+    )
 
     rows = list_specimens(args.places)
-    n_finished, n = sum(row.is_finished for row in rows), len(rows)
+    n = len(rows)
     shown = [row for row in rows if not (args.unfinished and row.is_finished)]
     if args.json is not None:
         with protected_inputs([row.path for row in rows]):
@@ -69,9 +72,7 @@ def run_list(arguments: Sequence[str]) -> int:
     width = max((len(row.specimen) for row in shown), default=8)
     for row in shown:
         sys.stdout.write(f"{_line(row, width)}\n")
-    n_new = sum(not row.is_begun for row in rows)
-    not_begun = f", {n_new} not begun" if n_new else ""
-    sys.stdout.write(f"{n} specimen{'' if n == 1 else 's'}, {n_finished} finished{not_begun}\n")
+    sys.stdout.write(f"{n} specimen{'' if n == 1 else 's'}, {progress_text(rows)}\n")
     return 0
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from os import PathLike
@@ -18,7 +18,7 @@ from gp_labeler.document.specimen_file import SUFFIX, read_document, state_in, t
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.readers.formats import volume_stem
 
-__all__ = ["SIDE_TOTAL", "ListedSpecimen", "list_specimens", "specimen_files"]
+__all__ = ["SIDE_TOTAL", "ListedSpecimen", "list_specimens", "progress_text", "specimen_files"]
 
 SIDE_TOTAL = len(CODES)
 """Features of a side, CO with them."""
@@ -135,6 +135,13 @@ def specimen_files(places: Iterable[str | PathLike[str]]) -> list[Path]:
             raise GpError("does not exist", file=path, remedy="Name a folder, or specimen files.")
         found |= dict.fromkeys([path] if path.is_file() else _within(path, _MOST_LEVELS))
     return sorted(found, key=lambda file: natural_key(str(file)))
+
+
+def progress_text(rows: Collection[ListedSpecimen]) -> str:
+    """Return how many of some specimens are finished, and not begun: ``7 finished, 3 not begun``."""
+    n_new = sum(not row.is_begun for row in rows)
+    not_begun = f", {n_new} not begun" if n_new else ""
+    return f"{sum(row.is_finished for row in rows)} finished{not_begun}"
 
 
 def list_specimens(

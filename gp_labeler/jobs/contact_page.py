@@ -23,6 +23,7 @@ from gp_labeler.jobs.picture_page import (
     bone_picture,
     grey_picture,
     picture_page,
+    picture_plane,
 )
 
 if TYPE_CHECKING:
@@ -70,7 +71,7 @@ def feature_pictures(
         if row.code not in landmarks:
             yield FeaturePictures(row.code, heading, note)
             continue
-        plane = row.view if row.view in ("axial", "coronal", "sagittal") else "axial"
+        plane = picture_plane(row)
         near = CloseUp(volume, landmarks[row.code], _ACROSS_MM, PIXELS)
         grey = grey_picture(near.slice(PICTURE_AXES[plane].turned(turn)), low, high)
         bone = bone_picture(near.bone(PICTURE_AXES[side.value].turned(turn), threshold))

@@ -27,6 +27,7 @@ from gp_labeler.jobs.picture_page import (
     marked,
     pdf_file,
     picture_page,
+    picture_plane,
 )
 
 if TYPE_CHECKING:
@@ -192,8 +193,7 @@ def _side_of(place: _Place, middle: float) -> Side:
 
 def _plane_of(name: str) -> str:
     known = side_and_code(name)
-    view = "axial" if known is None else feature(known[1]).view
-    return view if view in ("axial", "coronal", "sagittal") else "axial"
+    return picture_plane(None if known is None else feature(known[1]))
 
 
 def _block(place: _Place, side: Side, note: str, volume: Volume, threshold: float) -> PictureBlock:

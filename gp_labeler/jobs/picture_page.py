@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from gp_core.disk import atomic_file
 from gp_core.errors import GpError
+from gp_core.landmarks.features import Feature
 from gp_labeler.imaging.close_up import PictureAxes
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ __all__ = [
     "marked",
     "pdf_file",
     "picture_page",
+    "picture_plane",
 ]
 
 PIXELS = 150
@@ -115,6 +117,11 @@ class PageLayout:
         """Return where a block begins, pixels."""
         width, height = self.block_size
         return n % self.columns * width, n // self.columns * height
+
+
+def picture_plane(row: Feature | None) -> str:
+    """Return in which plane a feature is pictured: its best one, or axial where that is no slice."""
+    return row.view if row is not None and row.view in ("axial", "coronal", "sagittal") else "axial"
 
 
 def grey_picture(values: NDArray[np.float32], low: float, high: float) -> NDArray[np.float32]:

@@ -14,7 +14,7 @@ from gp_core.errors import GpError
 from gp_core.validation import check_option
 from gp_labeler.document.paths import absolute_path
 from gp_labeler.document.specimen_document import SpecimenDocument
-from gp_labeler.document.specimen_list import ListedSpecimen
+from gp_labeler.document.specimen_list import ListedSpecimen, progress_text
 from gp_labeler.jobs.contact_sheet import MakeContactSheets, SheetsMade
 from gp_labeler.jobs.first_labels import templates_folder
 from gp_labeler.jobs.library_check import CheckLibrary, LibraryChecked
@@ -97,9 +97,7 @@ class SpecimenListModel:
             return "No specimens yet" if self.folders else "Choose a folder of specimens"
         many = "" if n == 1 else "s"
         count = f"{n} specimen{many}" if shown == n else f"{shown} of {n} specimens"
-        n_new = sum(not row.is_begun for row in self._every)
-        not_begun = f", {n_new} not begun" if n_new else ""
-        return f"{count}, {sum(row.is_finished for row in self._every)} finished{not_begun}"
+        return f"{count}, {progress_text(self._every)}"
 
     def n_problems(self, row: ListedSpecimen) -> int | None:
         """Return how many labels of a specimen are doubtful; None while that is not known."""
