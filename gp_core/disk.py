@@ -37,6 +37,7 @@ __all__ = [
     "check_file",
     "is_protected",
     "is_stream",
+    "make_folder",
     "make_room",
     "protect",
     "protected_inputs",
@@ -258,6 +259,25 @@ def write_bytes(path: AnyPath, content: bytes) -> None:
         draft.write_bytes(content)
 
 
+def make_folder(folder: AnyPath) -> None:
+    """Make a folder, and those that it lies in, where they are not there yet.
+
+    Parameters
+    ----------
+    folder : path-like
+        The folder.
+
+    Raises
+    ------
+    GpError
+        It cannot be made.
+    """
+    try:
+        Path(folder).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GpError(f"cannot be made: {error.strerror}", file=folder) from None
+
+
 def make_room(folder: AnyPath, files: Iterable[AnyPath], *, overwrite: bool) -> None:
     """Make a folder for files, and check that none of them is there already.
 
@@ -277,10 +297,7 @@ def make_room(folder: AnyPath, files: Iterable[AnyPath], *, overwrite: bool) -> 
     GpError
         The folder cannot be made.
     """
-    try:
-        Path(folder).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GpError(f"cannot be made: {error.strerror}", file=folder) from None
+    make_folder(folder)
     there = [path for path in files if Path(path).exists()]
     if there and not overwrite:
         remedy = "Choose another folder, or overwrite it."

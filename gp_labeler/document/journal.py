@@ -20,7 +20,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from gp_core.disk import read_bytes, write_bytes
+from gp_core.disk import make_folder, read_bytes, write_bytes
 from gp_core.errors import FileFormatError, GpError
 from gp_labeler.document.json_changes import difference, dumped, patched
 from gp_labeler.document.specimen_file import application
@@ -129,10 +129,7 @@ class Journal:
         GpError
             It cannot be written.
         """
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise GpError(f"cannot be made: {error.strerror}", file=path.parent) from None
+        make_folder(path.parent)
         line = base_line(base, specimen_file, saved)
         write_bytes(path, line)
         return cls(path, n_bytes=len(line), n_records=1, document=base)

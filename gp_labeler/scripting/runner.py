@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from gp_core.disk import make_folder
 from gp_core.errors import GpError
 from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.scripting.report import RunReport, StepRecord
@@ -41,7 +42,7 @@ def run_script(script: Script, output: Path, *, tell: Tell | None = None) -> Run
     RunReport
         With `error` where a step failed: the rest was not done, and what had been labelled is saved.
     """
-    _make(output)
+    make_folder(output)
     report = RunReport(script.name)
     driver = WindowDriver(output, script.folder)
     try:
@@ -94,13 +95,6 @@ def _rescue(driver: WindowDriver) -> None:
     if document.dirty:
         with suppress(GpError):
             driver.wrote(document.save(driver.output / f"{document.state.specimen}{SUFFIX}", overwrite=True))
-
-
-def _make(folder: Path) -> None:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise GpError(f"cannot be made: {error.strerror}", file=folder) from None
 
 
 def _line(record: StepRecord) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 from qtpy.QtCore import QCoreApplication, QEvent
 from qtpy.QtTest import QTest
 
-from gp_core.disk import protect
+from gp_core.disk import make_folder, protect
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature, index_of
 from gp_core.validation import FloatArray
@@ -102,10 +102,7 @@ class WindowDriver:
     def to_write(self, path: str) -> Path:
         """Return a path to write, relative to the output folder, which is made if need be."""
         file = self.output / path
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise GpError(f"cannot be made: {error.strerror}", file=file.parent) from None
+        make_folder(file.parent)
         return file
 
     def wrote(self, *files: Path) -> str:
