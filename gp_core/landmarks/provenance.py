@@ -85,11 +85,6 @@ class LabelProvenance:
         texts = (self.how, self.observer, self.time, self.certainty, self.note)
         return LabelProvenance, (*texts, self.checked, self.checked_by, dict(self.more))
 
-    @property
-    def checked_text(self) -> str:
-        """``checked by AB``, or empty where nobody looked at it again."""
-        return f"checked by {self.checked_by or _UNNAMED}" if self.checked else ""
-
     def as_json(self) -> dict[str, Any]:
         """Return the provenance for a file; unknown items have no key.
 

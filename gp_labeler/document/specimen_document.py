@@ -230,8 +230,7 @@ class SpecimenDocument:
         """
         self._check_thread()
         specimen = _loaded(specimen)
-        kept = self.dirty and self.state is not self._abandoned  # edited since: a scan takes seconds to load
-        name = self.state.specimen
+        kept, name = self._keeps_edits, self.state.specimen
         self.close()
         self._hold(specimen)
         self.reset.emit()
@@ -241,6 +240,11 @@ class SpecimenDocument:
     def abandon(self) -> None:
         """Give up the unsaved edits so far, once something else is loaded or the program ends."""
         self._abandoned = self.state
+
+    @property
+    def _keeps_edits(self) -> bool:
+        """Whether there are unsaved edits that nobody gave up: some come while a scan is loading."""
+        return self.dirty and self.state is not self._abandoned
 
     def _hold(self, specimen: LoadedSpecimen) -> None:
         self.history, self.store = specimen.history, specimen.store
@@ -475,8 +479,7 @@ class SpecimenDocument:
         Unsaved edits stay in the journal, and are offered at the next start, unless they were given up by
         `abandon`, or all are to `discard`.
         """
-        discard = discard or self.state is self._abandoned
-        self.store.close(keep_journal=self.dirty and not discard)
+        self.store.close(keep_journal=self._keeps_edits and not discard)
         self._volume = self.measure = None
 
 
