@@ -62,8 +62,8 @@ class SkullLink:
             return f"the head did not move between the ears: {n} skull features agree{doubtful}"
         return (
             f"the head moved against its reference between the ears: {n} skull features lie "
-            f"{self.apart_mm:.2f} mm apart{doubtful}; the other ear was moved back by them "
-            f"(FRE {self.fre_mm:.2f} mm)"
+            f"{self.apart_mm:.2f} mm apart{doubtful}; the touches of the other ear were "
+            f"moved back by them (FRE {self.fre_mm:.2f} mm)"
         )
 
     def as_dict(self) -> dict[str, Any]:

@@ -44,8 +44,9 @@ _WORST = 4
 """Labels that are shown where a finding concerns all."""
 
 _LEGEND = (
-    "Ring: the label. Diamond: where the other scans expect it; faint where it lies off the slice. Left: the "
-    "slice through the label. Middle: through the expected place. Right: bone, cut away before the label."
+    "Ring: the label. Diamond: where the other scans expect it; faint where it lies off the slice. "
+    "Left: the slice through the label. Middle: through the expected place. "
+    "Right: bone, cut away in front of the label."
 )
 
 

@@ -39,6 +39,14 @@ class BothEars:
         """Whether there is nothing to say: too little was touched on both sides."""
         return self.comparison is None and not self.problem
 
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether to look again: the ears contradict each other, or the head moved between them."""
+        if self.comparison is None:
+            return bool(self.problem)
+        link = self.comparison.link
+        return not self.comparison.check.agrees or (link is not None and link.has_moved)
+
     def is_of(self, own: SideEstimate, other: SideEstimate | None) -> bool:
         """Whether it was made of these very estimates."""
         return self.own is own and self.other is other

@@ -94,7 +94,7 @@ class SpecimenListModel:
         """Such as ``12 of 40 specimens, 7 finished, 3 not begun``."""
         n, shown = len(self._every), len(self.rows)
         if not n:
-            return "No specimens yet" if self.folders else "Choose a folder of specimens"
+            return "No specimens yet" if self.folders else "Add a folder of specimens or scans"
         many = "" if n == 1 else "s"
         count = f"{n} specimen{many}" if shown == n else f"{shown} of {n} specimens"
         return f"{count}, {progress_text(self._every)}"

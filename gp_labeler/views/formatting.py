@@ -12,6 +12,7 @@ __all__ = [
     "TIMES",
     "degrees_text",
     "mm_text",
+    "number_text",
     "position_text",
     "size_text",
     "spacing_text",
@@ -25,12 +26,17 @@ _MINUS = "\N{MINUS SIGN}"
 _AXES = (("L", "R"), ("P", "A"), ("S", "I"))
 
 
+def number_text(value: float, digits: int) -> str:
+    """Return a number with a true minus sign, and none before a zero."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", _MINUS)
+
+
 def mm_text(length: float) -> str:
     """Return a length such as ``2.6 mm``; finer below a tenth of a millimetre."""
     if not math.isfinite(length):
         return NONE
     digits = 1 if abs(length) >= 0.995 else 2 if abs(length) >= 0.0995 else 3
-    return f"{length:.{digits}f} mm".replace("-", _MINUS)
+    return f"{number_text(length, digits)} mm"
 
 
 def suggestion_text(suggestion: Suggestion) -> str:
@@ -43,7 +49,7 @@ def suggestion_text(suggestion: Suggestion) -> str:
 
 def degrees_text(angle_rad: float) -> str:
     """Return an angle in radians such as ``4.3°``."""
-    return f"{math.degrees(angle_rad):.1f}°".replace("-", _MINUS) if math.isfinite(angle_rad) else NONE
+    return f"{number_text(math.degrees(angle_rad), 1)}°" if math.isfinite(angle_rad) else NONE
 
 
 def position_text(position: Iterable[float]) -> str:

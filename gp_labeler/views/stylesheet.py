@@ -60,13 +60,13 @@ QPushButton[role="primary"] {
 }
 QPushButton[role="primary"]:hover { background: $accent_hover; }
 QPushButton[role="primary"]:focus { border: 2px solid $accent_text; padding: 4px 11px; }
-QPushButton[role="primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
+QPushButton[role="primary"]:disabled { background: transparent; border-color: $border; color: $faint; }
 QPushButton[role="huge"] { font-size: $px22; padding: 8px 20px; }
 QPushButton[role="huge-primary"] {
     font-size: $px28; font-weight: 600; background: $accent; border-color: $accent; color: $on_accent;
 }
 QPushButton[role="huge-primary"]:hover { background: $accent_hover; }
-QPushButton[role="huge-primary"]:disabled { background: $raised; border-color: $border; color: $faint; }
+QPushButton[role="huge-primary"]:disabled { background: transparent; border-color: $border; color: $faint; }
 QPushButton[role="link"] {
     background: transparent; border: 1px solid transparent; color: $accent_text;
     text-align: left; padding: 3px 6px;

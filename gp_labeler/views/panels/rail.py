@@ -42,6 +42,8 @@ STEPS = (
     WorkStep("pose", "Pose", "pose", "Estimate the cochlea from touched points"),
 )
 _PAD = 8
+_LONGEST = 88
+"""Room for the name of an added panel, logical pixels at the normal text size; longer ones are shortened."""
 
 
 class Rail(QWidget):
@@ -84,7 +86,7 @@ class Rail(QWidget):
         layout.addStretch(1)
         layout.addWidget(self.keys_button)
         self.buttons["scan"].setChecked(True)
-        fit(self, lambda: self.setFixedWidth(self.keys_button.sizeHint().width()))
+        fit(self, self._fit_width)
         for signal in (workspace.scan.opened, workspace.document.reset, workspace.document.landmarks_changed):
             follow(self, signal, self._refresh)
         self._refresh()
@@ -106,6 +108,7 @@ class Rail(QWidget):
         self.buttons[step.id] = self._button(len(self.buttons) + 1, step)
         self._needs_scan.add(step.id)
         self._steps.addWidget(self.buttons[step.id])
+        self._fit_width()
         self._refresh()
 
     def remove_step(self, step: str) -> None:
@@ -114,6 +117,7 @@ class Rail(QWidget):
         button = self.buttons.pop(step)
         button.hide()
         button.deleteLater()
+        self._fit_width()
 
     def _button(self, number: int, step: WorkStep) -> _RailButton:
         button = _RailButton(step.id, step.title, str(number), step.icon, self)
@@ -123,6 +127,10 @@ class Rail(QWidget):
         button.clicked.connect(lambda: self.step_chosen.emit(step.id))
         self._group.addButton(button)
         return button
+
+    def _fit_width(self) -> None:
+        """Be as wide as the longest name."""
+        self.setFixedWidth(max(button.sizeHint().width() for button in self.buttons.values()))
 
     def _refresh(self, *_: object) -> None:
         document, labels = self._workspace.document, self._workspace.labels
@@ -156,7 +164,9 @@ class _RailButton(QAbstractButton):
 
     def sizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         words = text_width(self, *(f"{n} {step.title}" for n, step in enumerate(STEPS, 1)), bold=True)
-        return QSize(max(words + 2 * _PAD, pixels(self, 72)), self._icon_height + line_height(self) + 10)
+        added = min(text_width(self, f"{self._number} {self.text()}", bold=True), pixels(self, _LONGEST))
+        width = max(max(words, added) + 2 * _PAD, pixels(self, 72))
+        return QSize(width, self._icon_height + line_height(self) + 10)
 
     def minimumSizeHint(self) -> QSize:  # noqa: N802 - Qt's name
         """Return the room for the words alone: in a low window the icons go."""
@@ -204,7 +214,7 @@ class _RailButton(QAbstractButton):
             draw_chip(painter, "checked", QRectF(left, 5 if has_icon else 1, side, side), theme)
         painter.setFont(font_of(self, bold=self.isChecked()))
         painter.setPen(QColor(colour))
-        room = self.sizeHint().width() - 8  # the name of an added panel may be longer than those of the steps
+        room = self.width() - _PAD
         words = f"{self._number} {self.text()}"
         words = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room)
         top = self._icon_height - 2 if has_icon else 0

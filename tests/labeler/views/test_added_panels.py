@@ -16,6 +16,7 @@ from gp_labeler.document.recovery import find_recoveries
 from gp_labeler.document.state import How
 from gp_labeler.views import main_window
 from gp_labeler.views.application import report_fault
+from gp_labeler.views.fonts import text_width
 from gp_labeler.views.panels import table
 
 _MODULE = """
@@ -88,6 +89,20 @@ def test_a_panel_of_a_package_is_a_step_once_a_scan_is_open(added, make_window, 
     assert not window.workspace.interaction.is_labelling, "a click beside it moves no landmark"
     window.rail.buttons["label"].click()
     assert window.steps["label"].isVisible()
+
+
+def test_the_rail_has_room_for_the_name_of_a_panel_and_gives_it_back(added, make_window, ball, qtbot) -> None:
+    added(measurements="sound")
+    window = make_window()
+    rail, button = window.rail, window.rail.buttons["measurements"]
+    plain = rail.keys_button.sizeHint().width()
+    for size in (100, 150):
+        window.set_text_size(size)
+        QCoreApplication.processEvents()
+        assert rail.width() >= text_width(button, "5 Measurements", bold=True)
+    window.set_text_size(100)
+    rail.remove_step("measurements")
+    assert rail.width() == plain
 
 
 def test_panels_that_cannot_be_made_are_named_and_left_out(added, make_window) -> None:

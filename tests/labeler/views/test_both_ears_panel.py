@@ -100,7 +100,10 @@ def test_a_mistouch_is_named_and_no_axis_is_made_of_ears_that_disagree(workspace
     touch(workspace, R, RWP=np.array([0, 0, 2.5]))
     workspace.pose.choose(both_ears=True)
     assert "The two ears disagree" in notices(panel)
-    assert "touch it again on both ears" in notices(panel)
+    assert "RWP is 2." in notices(panel)
+    assert "Touch RWP again on both ears" in notices(panel)
+    assert "the axis is that of this ear alone" in notices(panel)
+    assert panel.result.verdict.label.text() == "Check first"
     assert workspace.pose.ears.comparison.check.suspects[0] == "RWP"
     assert not workspace.pose.estimate.pose.of_both_ears
 

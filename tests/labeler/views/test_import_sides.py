@@ -87,7 +87,7 @@ def test_the_preview_is_straightened_where_bone_tells_how(workspace, stack, pare
     monkeypatch.setattr(head_pose, "straighten", lambda volume, **_: pose)
     dialog = ImportDialog(workspace, inspect_volume(stack), parent=parent)
     deliver(workspace)
-    assert dialog.straight.text().startswith("The head as its bone lies")
+    assert dialog.straight.text().startswith("The head is shown straightened")
     assert "nothing in the scan can prove" in dialog.straight.text()
     assert all(picture.plane.aspect == 1.0 for picture in dialog.pictures)
     dialog.reject()

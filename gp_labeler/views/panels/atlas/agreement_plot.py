@@ -10,6 +10,7 @@ from qtpy.QtWidgets import QWidget
 
 from gp_core.study.limits_of_agreement import AgreementPanel
 from gp_labeler.views.fonts import pixels
+from gp_labeler.views.formatting import number_text
 from gp_labeler.views.theme import theme_of
 
 __all__ = ["AgreementPlot"]
@@ -98,4 +99,4 @@ def _height(area: QRectF, value: float, largest: float) -> float:
 
 
 def _text(value: float) -> str:
-    return f"{value:.1f}".replace("-", "\N{MINUS SIGN}")
+    return number_text(value, 1)

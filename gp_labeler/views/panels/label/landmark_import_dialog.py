@@ -162,7 +162,7 @@ class LandmarkImportDialog(QDialog):
         found = [("info", f"{file.name}: {' and '.join(_words(landmarks) for landmarks in sets)}")]
         wrong = [text for landmarks in sets for text in self._workspace.head.wrong_sides_in(landmarks)]
         if wrong:
-            rest = f", and {len(wrong) - 1} more on the other side too" if len(wrong) > 1 else ""
+            rest = f", and {len(wrong) - 1} more on the wrong side too" if len(wrong) > 1 else ""
             left = self._workspace.head.left_text
             found.append(("warning", f"{wrong[0]}{rest}. Are left and right exchanged? {left}"))
         return found

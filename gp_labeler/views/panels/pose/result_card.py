@@ -10,7 +10,8 @@ from qtpy.QtWidgets import QGridLayout, QWidget
 
 from gp_core.constants import METHOD_NAMES
 from gp_core.pose.cochlea_pose import CochleaPose
-from gp_core.pose.quality import pose_quality
+from gp_core.pose.quality import PoseQuality, pose_quality
+from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import SideEstimate
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.fonts import HEADING, TITLE, styled
@@ -82,7 +83,7 @@ class ResultCard(Card):
             self.two.show_poses(estimate)
         self.verdict.setVisible(pose is not None)
         if pose is not None:
-            trust = pose_quality(pose)
+            trust = _quality(pose, model.ears)
             self.verdict.show_verdict(trust.level, trust.word, trust.reason)
         wrong = pose is not None and (pose.side_state == "wrong" or bool(self._workspace.pose.misnamed))
         self._offer_readings(pose, wrong=wrong)
@@ -201,6 +202,14 @@ def _likely(pose: CochleaPose | None, pair: tuple[str, str] | None) -> tuple[str
     side = sum(reading.probability for reading in readings if reading.exchanged is None)
     swap = sum(reading.probability for reading in readings if reading.exchanged == pair)
     return likely_text(side), likely_text(swap)
+
+
+def _quality(pose: CochleaPose, ears: BothEars | None) -> PoseQuality:
+    """Return the rating of a pose: none is good while a warning about the two ears stands below it."""
+    rated = pose_quality(pose)
+    if ears is None or not ears.is_doubtful or rated.word not in ("Good", "Fair"):
+        return rated
+    return PoseQuality("warning", "Check first", "Use this pose only if none of the warnings below applies.")
 
 
 def _heading(estimate: SideEstimate | None) -> str:

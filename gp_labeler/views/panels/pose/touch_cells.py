@@ -11,6 +11,7 @@ from qtpy.QtWidgets import QAbstractItemView, QWidget
 from gp_core.landmarks.features import FEATURES
 from gp_labeler.views.chips import draw_chip
 from gp_labeler.views.fonts import heading_width, pixels, text_width
+from gp_labeler.views.formatting import number_text
 from gp_labeler.views.icons import draw_icon
 from gp_labeler.views.painting.strokes import round_pen
 from gp_labeler.views.panels.pose.touch_table_model import CLEAR, NAME, RESIDUAL, USE, XYZ, TouchRow
@@ -25,7 +26,6 @@ _WIDEST_CODE, _WIDEST_REPEATED = "RWM", "RWM \N{MULTIPLICATION SIGN}9"
 _ASKED = "touch, or type x y z"
 _MIDDLE = Qt.AlignmentFlag.AlignVCenter
 _RIGHT = Qt.AlignmentFlag.AlignRight | _MIDDLE
-_MINUS = "\N{MINUS SIGN}"
 
 
 def column_widths(view: QWidget, headings: Mapping[int, str], width: int = 0) -> dict[int, int]:
@@ -147,7 +147,7 @@ def _paint_position(painter: QPainter, box: QRectF, row: TouchRow, theme: Theme)
     width = box.width() / 3
     for n, value in enumerate(row.position):
         cell = QRectF(box.left() + n * width, box.top(), width, box.height())
-        painter.drawText(cell, _RIGHT, f"{value:.2f}".replace("-", _MINUS))
+        painter.drawText(cell, _RIGHT, number_text(value, 2))
 
 
 def _paint_residual(

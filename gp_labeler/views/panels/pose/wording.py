@@ -15,7 +15,7 @@ from gp_core.pose.next_touch import TouchGain
 from gp_labeler.document.touches import Touch, TouchHow
 from gp_labeler.models.both_ears import BothEars
 from gp_labeler.models.estimate import SideEstimate
-from gp_labeler.views.formatting import NONE, degrees_text
+from gp_labeler.views.formatting import NONE, degrees_text, number_text
 
 __all__ = [
     "allowance_text",
@@ -74,12 +74,12 @@ def name_of(name: str) -> str:
 
 def triple(position: Iterable[float]) -> str:
     """Return a position such as ``12.34  -4.50  101.22``, with true minus signs."""
-    return "   ".join(f"{value:.2f}".replace("-", _MINUS) for value in position)
+    return "   ".join(number_text(value, 2) for value in position)
 
 
 def unit_triple(direction: Iterable[float]) -> str:
     """Return a direction to three digits."""
-    return "   ".join(f"{value:.3f}".replace("-", _MINUS) for value in direction)
+    return "   ".join(number_text(value, 3) for value in direction)
 
 
 def fine_mm(length: float | None) -> str:
@@ -123,18 +123,30 @@ def ear_notices(ears: BothEars | None, *, wanted: bool) -> Iterator[tuple[str, .
         use = ". The axis is that of both" if wanted else ""
         yield ("info", f"The two ears agree: {apart}{use}.")
     else:
-        yield ("warning", f"The two ears disagree: {apart}.", _ear_remedy(check))
+        alone = " Until they agree, the axis is that of this ear alone." if wanted else ""
+        yield ("warning", f"The two ears disagree: {_difference(check, apart)}.", _ear_remedy(check) + alone)
     if link is not None and link.has_moved:
         yield ("warning", sentence(link.text), "Fix the head or its marker before the next touches.")
 
 
-def _ear_remedy(check: EarCheck) -> str:
+def _difference(check: EarCheck, apart: str) -> str:
+    """Return what is more than expected: of a suspect feature, else of the pose or of all pairs."""
     if check.suspects:
         code = check.suspects[0]
+        far, limit = check.plane.pairs_mm[code], check.expected_pairs_mm[code]
         return (
-            f"{code} is {fine_mm(check.plane.pairs_mm[code])} from being mirrored "
-            f"({fine_mm(check.expected_pairs_mm[code])} is possible): touch it again on both ears."
+            f"{code} is {fine_mm(far)} from the mirror image of the other ear's "
+            f"(expected: up to {fine_mm(limit)})"
         )
+    if check.origin_mm > check.expected_mm or check.axis_deg > check.expected_deg:
+        return apart
+    far, limit = check.plane.residual_mm, check.expected_residual_mm
+    return f"their touches are {fine_mm(far)} from being mirror images (expected: up to {fine_mm(limit)})"
+
+
+def _ear_remedy(check: EarCheck) -> str:
+    if check.suspects:
+        return f"Touch {check.suspects[0]} again on both ears."
     return "Check sides and names, and that head and reference did not move between the ears."
 
 

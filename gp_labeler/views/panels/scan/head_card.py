@@ -81,7 +81,7 @@ class HeadCard(Card):
             self._notices.addWidget(Notice("warning", head.refusal))
         wrong = head.wrong_sides()
         if wrong:
-            rest = f", and {len(wrong) - 1} more on the other side too" if len(wrong) > 1 else ""
+            rest = f", and {len(wrong) - 1} more on the wrong side too" if len(wrong) > 1 else ""
             self._notices.addWidget(Notice("warning", f"{wrong[0]}{rest}. Are left and right exchanged?"))
         if head.asks_left:
             self._notices.addWidget(Notice("info", head.left_text))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 from qtpy.QtCore import Qt
@@ -23,6 +24,7 @@ from gp_labeler.jobs.head import StraightPreview
 from gp_labeler.jobs.runner import Task
 from gp_labeler.jobs.scan import InspectScan
 from gp_labeler.models.workspace import Workspace
+from gp_labeler.views.fonts import fit
 from gp_labeler.views.panels.parts import (
     ElidedLabel,
     Facts,
@@ -146,7 +148,12 @@ class ImportDialog(QDialog):
             column_of_captions(caption)
             form.addWidget(caption, row, 0, Qt.AlignmentFlag.AlignTop)
             form.addWidget(widget, row, 1)
+            fit(caption, partial(self._level, caption))
         return form
+
+    def _level(self, caption: QWidget) -> None:
+        """Have a caption level with the first line of what it stands beside."""
+        caption.setMinimumHeight(self.stride.sizeHint().height())
 
     def _sides_box(self) -> QWidget:
         """Return pictures with R and L, and the choice to reverse."""
@@ -275,8 +282,8 @@ class ImportDialog(QDialog):
             return
         self._show_planes(planes)
         self.straight.setText(
-            "The head as its bone lies, straightened. Left and right are those of the file: a head and its "
-            "mirror image look alike, so nothing in the scan can prove them."
+            "The head is shown straightened. L and R are assumed from the order of the slices: a head and "
+            "its mirror image look alike, so nothing in the scan can prove them."
         )
 
     def _show_planes(self, planes: tuple[PreviewPlane, PreviewPlane]) -> None:

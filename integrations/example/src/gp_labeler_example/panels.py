@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
+from qtpy.QtCore import Qt
 from qtpy.QtGui import QAction
-from qtpy.QtWidgets import QTableWidget, QTableWidgetItem, QVBoxLayout, QWidget
+from qtpy.QtWidgets import QLabel, QTableWidget, QTableWidgetItem, QVBoxLayout, QWidget
 
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.parts import Card
 from gp_labeler.views.signals import follow
+
+_EMPTY = "Place two or more features, and select one of them in the step Label."
 
 
 class DistancesPanel(QWidget):
@@ -31,6 +34,14 @@ class DistancesPanel(QWidget):
         self.table = QTableWidget(0, 2)
         self.table.setHorizontalHeaderLabels(["Feature", "mm"])
         self.table.cellClicked.connect(self._go)
+        self.table.setEditTriggers(QTableWidget.EditTrigger.NoEditTriggers)
+        self.table.verticalHeader().hide()
+        header = self.table.horizontalHeader()
+        header.setStretchLastSection(True)
+        header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
+        self.hint = QLabel()
+        self.hint.setWordWrap(True)
+        self.card.add(self.hint)
         self.card.add(self.table)
         QVBoxLayout(self).addWidget(self.card)
         for signal in (
@@ -46,6 +57,7 @@ class DistancesPanel(QWidget):
         active = self._workspace.labels.active
         landmarks = self._workspace.document.landmarks(active.side)
         codes = [code for code in landmarks.placed if code != active.code] if active.code in landmarks else []
+        self.hint.setText(f"From {active.code} on the {active.side.word} to:" if codes else _EMPTY)
         self.table.setRowCount(len(codes))
         for row, code in enumerate(codes):
             mm = float(np.linalg.norm(landmarks[code] - landmarks[active.code]))

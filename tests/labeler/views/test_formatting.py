@@ -1,0 +1,24 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from gp_labeler.views.formatting import degrees_text, mm_text, number_text
+from gp_labeler.views.panels.pose.wording import triple
+
+
+@pytest.mark.parametrize(
+    ("value", "digits", "text"),
+    [(-0.004, 2, "0.00"), (-0.0, 1, "0.0"), (-0.006, 2, "\N{MINUS SIGN}0.01"), (12.345, 1, "12.3")],
+)
+def test_a_zero_has_no_sign_and_a_minus_is_a_true_one(value, digits, text) -> None:
+    assert number_text(value, digits) == text
+
+
+def test_lengths_angles_and_positions_write_their_numbers_so() -> None:
+    assert mm_text(-1e-5) == "0.000 mm"
+    assert degrees_text(math.radians(-0.01)) == "0.0°"
+    assert triple((-0.001, -2, 3)) == "0.00   \N{MINUS SIGN}2.00   3.00"
