@@ -9,11 +9,15 @@ from typing import Any
 
 import numpy as np
 
+from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.prediction import Prediction
 
-__all__ = ["LibraryCheck", "LibraryFinding", "check_predictions"]
+__all__ = ["LibraryCheck", "LibraryFinding", "check_predictions", "require_enough"]
+
+_FEWEST_SCANS = 3
+"""Two others say which of two labels that differ is wrong."""
 
 _FAR = 5.0
 """Times the expected distance beyond which a label is far from its prediction (benchmarks/autolabel.py)."""
@@ -109,6 +113,12 @@ class _Head:
     def distances(self) -> FloatArray:
         found: FloatArray = np.linalg.norm(self.labels - self.expected, axis=1)
         return found
+
+
+def require_enough(scans: Sequence[LabelledScan]) -> None:
+    """Raise `GpError` where scans are too few to be checked against each other."""
+    if len(scans) < _FEWEST_SCANS:
+        raise GpError(f"three labelled scans or more are needed, got {len(scans)}")
 
 
 def check_predictions(scans: Sequence[LabelledScan], predictions: dict[str, Prediction]) -> LibraryCheck:

@@ -60,9 +60,8 @@ def run_check_library(arguments: Sequence[str]) -> int:
         The labelled scans cannot be read, or there are fewer than three.
     """
     args = make_check_library_parser().parse_args(arguments)
-    from gp_core.errors import GpError  # here: `--help` need not wait
-    from gp_core.study.parallel import open_executor
-    from gp_labeler.autolabel.cross_check import check_predictions
+    from gp_core.study.parallel import open_executor  # here: `--help` need not wait
+    from gp_labeler.autolabel.cross_check import check_predictions, require_enough
     from gp_labeler.autolabel.registration import COARSER, engine_named
     from gp_labeler.autolabel.registration_process import HereRegistration
     from gp_labeler.jobs.library_sheet import draw_library_check
@@ -71,8 +70,7 @@ def run_check_library(arguments: Sequence[str]) -> int:
     if engine == "demons":
         sys.stderr.write(f"gp-labeler: {COARSER}\n")
     library = library_of(args.labelled, args)
-    if len(library.scans) < 3:
-        raise GpError(f"three labelled scans or more are needed, got {len(library.scans)}")
+    require_enough(library.scans)
     with protected_inputs(args.labelled), open_executor(args.workers, args.scheduler) as executor:
         prepare(library, engine, executor)
         predictions = library.held_out(HereRegistration(engine))

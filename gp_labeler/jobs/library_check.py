@@ -5,14 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from gp_core.errors import GpError
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
-__all__ = ["FEWEST_LABELLED", "CheckLibrary", "LibraryChecked"]
-
-FEWEST_LABELLED = 3
-"""Two others say which of two labels that differ is wrong."""
+__all__ = ["CheckLibrary", "LibraryChecked"]
 
 _MODULES = (
     "scipy.ndimage",
@@ -88,7 +84,7 @@ class CheckLibrary:
         """
         load_modules(*_MODULES)
         from gp_labeler.autolabel import TemplateLibrary
-        from gp_labeler.autolabel.cross_check import check_predictions
+        from gp_labeler.autolabel.cross_check import check_predictions, require_enough
         from gp_labeler.autolabel.registration import engine_named
         from gp_labeler.autolabel.registration_process import ProcessRegistration
         from gp_labeler.document.labelled_scans import read_labelled_scans
@@ -97,8 +93,7 @@ class CheckLibrary:
 
         progress(0.0, "Reading the labelled scans")
         found = read_labelled_scans(self.files)
-        if len(found.scans) < FEWEST_LABELLED:
-            raise GpError(f"three labelled scans or more are needed, got {len(found.scans)}")
+        require_enough(found.scans)
         library = TemplateLibrary(found.scans, self.folder)
         with ProcessRegistration(engine_named()) as registration:
             report = Report(
