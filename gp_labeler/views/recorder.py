@@ -324,8 +324,6 @@ class Recorder(QObject):
         if what == "measurements":
             self.tables.append(step("export_measurements"))
             return
-        if what == "contact sheet":
-            return  # written by its job, which knows of which specimens it is
         if what == "reliability":
             specimens = [str(path.absolute()) for path in self._window.workspace.reliability.paths]
             self.tables.append(step("reliability", specimens=specimens, path=[file.name]))
@@ -333,6 +331,8 @@ class Recorder(QObject):
         if what == "atlas":
             self.tables.append(step("action", id="atlas.save", files=[file.name]))
             return
+        if what not in ("pose", "report", "path"):
+            return  # contact sheets are recorded by their job; no step checks labels against each other
         self.tables += self._estimated([file.name] if what == "pose" else [])
         if what == "report":
             side = self._window.workspace.pose.side.value

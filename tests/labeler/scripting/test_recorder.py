@@ -491,6 +491,14 @@ def test_contact_sheets_of_several_specimens_are_made_again(recording) -> None:
     ]
 
 
+def test_a_check_of_labels_against_each_other_leaves_no_step(recording) -> None:
+    recording.begin()
+    place_three(recording)
+    n_before = len(recording.recorder.tables)
+    recording.workspace.messages.wrote.emit("check of the library", recording.folder / "labels.pdf")
+    assert recording.recorder.tables[n_before:] == []
+
+
 def test_work_that_was_begun_before_is_kept_beside_the_script(recording) -> None:
     place_three(recording)
     recording.begin()
