@@ -114,13 +114,6 @@ class Voxels(ABC):
         for k in range(self.shape[0]):
             yield self.read(slice(k, k + 1), slice(None), slice(None))[0]
 
-    def plane(self, axis: int, index: int) -> GreyArray:
-        """Return the plane of one index along the axis x (0), y (1) or z (2), (z, y, x) without that axis."""
-        kji: list[slice] = [slice(None)] * 3
-        kji[2 - axis] = slice(index, index + 1)
-        plane: GreyArray = self.read(*kji).squeeze(axis=2 - axis)
-        return plane
-
     def rows(self, n: int) -> GreyArray:
         """Return the values of about `n` voxels at most, (N,): whole rows, spread over planes and columns.
 
