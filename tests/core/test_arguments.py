@@ -269,3 +269,21 @@ def test_the_message_names_the_argument_what_it_must_be_and_what_it_was() -> Non
         with pytest.raises(GpError) as caught:
             measured(*arguments)  # type: ignore[arg-type]
         assert str(caught.value).rstrip(".") == message
+
+
+def test_a_named_alias_means_what_it_stands_for() -> None:
+    """NumPy 2.5 and later name their types by such aliases, which Python 3.12 brought."""
+    aliases = pytest.importorskip("typing_extensions")
+    number = aliases.TypeAliasType("number", float | None)
+    lengths = aliases.TypeAliasType("lengths", dict[str, float])
+
+    def measured(one: Any, many: Any) -> int:
+        return 1
+
+    measured.__annotations__.update(one=number, many=lengths)
+    checked = checks_arguments(measured)
+    assert checked(2.5, {"CL": 1}) == checked(None, {}) == 1
+    with pytest.raises(GpError, match="one must be a number or None, got 'x'"):
+        checked("x", {})
+    with pytest.raises(GpError, match=r"many must be a mapping of text to number, got \[1\]"):
+        checked(1, [1])

@@ -158,6 +158,8 @@ def test_skull_features_tell_that_the_head_moved_between_the_ears_and_bring_it_b
         assert after.link is not None
         moved += after.link.has_moved
         assert after.check.plane.residual_mm < before.check.plane.residual_mm + 0.5
+        assert after.check.origin_mm == pytest.approx(before.check.origin_mm, abs=1.0)
+        assert after.check.axis_deg == pytest.approx(before.check.axis_deg, abs=3.0)
         assert after.poses[Side.RIGHT].radius_95 == pytest.approx(
             before.poses[Side.RIGHT].radius_95, rel=1e-6
         )
@@ -167,6 +169,18 @@ def test_skull_features_tell_that_the_head_moved_between_the_ears_and_bring_it_b
     assert after.as_dict()["skull"]["moved"] is True
     two = replace(touches[Side.LEFT], extra={"S1": [0, 0, 0], "S2": [1, 0, 0]})
     assert link_by_skull(two, two) is None
+
+
+@pytest.mark.parametrize(("shift_mm", "has_moved"), [(0.0, False), (0.02, False), (1.0, True)])
+def test_a_shift_that_no_hand_could_tell_is_no_motion(shift_mm: float, has_moved: bool) -> None:
+    """However well the features of one ear may be laid on those of the other."""
+    places = {"S1": [0.0, 0, 0], "S2": [12.0, 0, 1], "S3": [3.0, 9, 0], "S4": [5.0, 2, 8]}
+    ear = replace(_head(0)[1][Side.LEFT], extra=places)
+    other = replace(ear, extra={name: np.add(at, [shift_mm, 0, 0]) for name, at in places.items()})
+    link = link_by_skull(ear, other)
+    assert link is not None
+    assert link.has_moved is has_moved
+    assert link.apart_mm == pytest.approx(shift_mm)
 
 
 def test_skull_features_of_the_midline_determine_the_plane_better() -> None:

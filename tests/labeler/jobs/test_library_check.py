@@ -9,7 +9,7 @@ from small_heads import save_markups, save_volume, small_head
 from gp_core.errors import GpError
 from gp_labeler.autolabel.library import TemplateLibrary
 from gp_labeler.autolabel.prediction import Prediction
-from gp_labeler.jobs.library_check import CheckLibrary
+from gp_labeler.jobs.library_check import CheckLibrary, LibraryChecked
 from gp_labeler.jobs.runner import Progress
 
 
@@ -54,3 +54,25 @@ def test_two_specimens_are_too_few(heads):
         file.unlink()
     with pytest.raises(GpError, match="three labelled scans or more are needed, got 2"):
         CheckLibrary((folder,), folder, folder / "x.pdf").run(Progress(lambda fraction, text: None))
+
+
+def test_a_head_that_was_not_found_is_told_and_not_counted(heads, monkeypatch):
+    folder, truth = heads
+    told = {name: Prediction(dict.fromkeys("abc", points), None) for name, points in truth.items()}
+    del told["small-0"]
+    monkeypatch.setattr(TemplateLibrary, "held_out", lambda self, registration, report: told)
+    job = CheckLibrary((folder,), folder / "templates", folder / "review.pdf")
+    checked = job.run(Progress(lambda fraction, text: None))
+    assert checked.n_checked == 2
+    assert [text.partition(":")[0] for text in checked.problems] == ["small-0"]
+
+
+@pytest.mark.parametrize("n", [0, 1, 3, 5])
+def test_however_many_findings_there_are_few_lines_tell_of_all(n):
+    findings = tuple(f"GP{k}: finding {k}" for k in range(n))
+    lines = LibraryChecked(findings, (), 7, ("GP9: a problem.",)).lines
+    assert lines[-1] == "GP9: a problem."
+    shown = [line for line in lines if line.removesuffix(".") in findings]
+    rest = [line for line in lines[1 + len(shown) : -1] if str(n - len(shown)) in line]
+    assert len(shown) == min(n, 3)
+    assert len(rest) == len(lines) - 2 - len(shown) == int(n > 3)

@@ -153,7 +153,11 @@ def test_a_table_of_texts_is_read(tmp_path):
 
 @pytest.mark.parametrize(
     ("earlier", "now"),
-    [("Import nevertheless", "Import anyway"), ("Left is as the file says", "Left is correct")],
+    [
+        ("Import nevertheless", "Import anyway"),
+        ("Left is as the file says", "Left is correct"),
+        ("Use it nevertheless", "Use it anyway"),
+    ],
 )
 def test_answers_of_earlier_versions_are_understood(earlier: str, now: str) -> None:
     prompts = ScriptPrompts()
