@@ -26,9 +26,10 @@ _MINUS = "\N{MINUS SIGN}"
 _AXES = (("L", "R"), ("P", "A"), ("S", "I"))
 
 
-def number_text(value: float, digits: int) -> str:
-    """Return a number with a true minus sign, and none before a zero."""
-    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", _MINUS)
+def number_text(value: float, digits: int, *, signed: bool = False) -> str:
+    """Return a number with a true minus sign, `signed` with a plus sign too; a zero has neither."""
+    shown = round(float(value), digits) + 0.0
+    return f"{shown:{'+' if signed and shown else ''}.{digits}f}".replace("-", _MINUS)
 
 
 def mm_text(length: float) -> str:

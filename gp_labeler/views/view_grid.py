@@ -12,7 +12,7 @@ from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.planes import Plane
 from gp_labeler.views.filter_words import filter_hint, filter_words
 from gp_labeler.views.fonts import HEADING, fit, line_height, pixels, text_width
-from gp_labeler.views.formatting import value_text
+from gp_labeler.views.formatting import number_text, value_text
 from gp_labeler.views.icons import icon
 from gp_labeler.views.scene_view import SceneView
 from gp_labeler.views.signals import follow
@@ -390,7 +390,7 @@ class ViewGrid(QWidget):
         view = self._workspace.view
         words = view.frame.position_text(view.planes[plane.value], position)
         if view.is_turned(plane.value):
-            words = f"{position + 0.0:+.1f} mm"
+            words = f"{number_text(position, 1, signed=True)} mm"
         elif view.frame.name == "head":
             words += " in the head"
         self.frames[plane.value].header.say_where(words)

@@ -20,6 +20,7 @@ WINDOW = (1440, 900)
 SCREENSHOTS: dict[str, list[dict[str, object]]] = {
     "tracker": [
         {"do": "open", "empty": True, "discard": True},
+        {"do": "observer", "name": "AB"},
         {"do": "view", "panel": "pose", "size": WINDOW},
         {"do": "touches", "side": "L", "points": "touches.csv", "how": "tracked probe"},
         {"do": "estimate", "side": "L"},

@@ -18,6 +18,13 @@ def test_a_zero_has_no_sign_and_a_minus_is_a_true_one(value, digits, text) -> No
     assert number_text(value, digits) == text
 
 
+@pytest.mark.parametrize(
+    ("value", "text"), [(-0.04, "0.0"), (0.0, "0.0"), (0.06, "+0.1"), (-0.8, "\N{MINUS SIGN}0.8")]
+)
+def test_the_place_of_a_slice_has_a_sign_unless_it_is_zero(value, text) -> None:
+    assert number_text(value, 1, signed=True) == text
+
+
 def test_lengths_angles_and_positions_write_their_numbers_so() -> None:
     assert mm_text(-1e-5) == "0.000 mm"
     assert degrees_text(math.radians(-0.01)) == "0.0°"
