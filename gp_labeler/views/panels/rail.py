@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from qtpy.QtCore import QEvent, QRectF, QSize, Qt, Signal
-from qtpy.QtGui import QColor, QKeyEvent, QPainter, QPaintEvent
+from qtpy.QtGui import QColor, QFontMetricsF, QKeyEvent, QPainter, QPaintEvent
 from qtpy.QtWidgets import QAbstractButton, QButtonGroup, QSizePolicy, QVBoxLayout, QWidget
 
 from gp_core.landmarks.features import Side
@@ -216,7 +216,7 @@ class _RailButton(QAbstractButton):
         painter.setPen(QColor(colour))
         room = self.width() - _PAD
         words = f"{self._number} {self.text()}"
-        words = painter.fontMetrics().elidedText(words, Qt.TextElideMode.ElideRight, room)
+        words = QFontMetricsF(painter.font()).elidedText(words, Qt.TextElideMode.ElideRight, room)
         top = self._icon_height - 2 if has_icon else 0
         painter.drawText(box.adjusted(0, top, 0, -2 if has_icon else 0), Qt.AlignmentFlag.AlignCenter, words)
         painter.end()

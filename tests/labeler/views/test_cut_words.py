@@ -9,7 +9,8 @@ import os
 
 import pytest
 from cut_words import cut_words
-from qtpy.QtGui import QFontDatabase
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QFontDatabase, QPainter, QPaintEvent
 from qtpy.QtWidgets import QApplication, QCheckBox, QDialog, QHBoxLayout, QLabel, QPushButton, QWidget
 from text_states import OWN, walk_states
 
@@ -131,10 +132,20 @@ def test_only_names_of_the_user_may_be_shortened(parent) -> None:
     assert cut_words(parent, own=["a_long_name_of_a_scan"]) != []
 
 
-def test_painted_words_are_looked_at_too(make_window, family) -> None:
+def test_painted_words_are_looked_at_too(parent) -> None:
+    class Painted(QWidget):
+        def paintEvent(self, _: QPaintEvent) -> None:  # noqa: N802 - Qt's name
+            QPainter(self).drawText(self.rect(), Qt.AlignmentFlag.AlignLeft, "Round window")
+
+    widget = Painted()
+    assert seen(parent, widget, 170) == []
+    assert any("paints 'Round window'" in line for line in seen(parent, widget, 30))
+
+
+def test_painted_words_that_are_shortened_are_named(make_window, family) -> None:
     window = make_window()
     window.resize(*USUAL)
     rail = window.rail
     assert cut_words(rail) == []
     rail.setFixedWidth(30)
-    assert any("paints '1 Scan'" in line for line in cut_words(rail))
+    assert any("shortened: '1 Scan'" in line for line in cut_words(rail))
