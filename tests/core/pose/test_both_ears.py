@@ -172,8 +172,8 @@ def test_skull_features_tell_that_the_head_moved_between_the_ears_and_bring_it_b
 
 
 @pytest.mark.parametrize(("shift_mm", "has_moved"), [(0.0, False), (0.02, False), (1.0, True)])
-def test_a_shift_that_no_hand_could_tell_is_no_motion(shift_mm: float, has_moved: bool) -> None:
-    """However well the features of one ear may be laid on those of the other."""
+def test_a_shift_below_the_noise_of_touches_is_no_motion(shift_mm: float, has_moved: bool) -> None:
+    """However well the features of one ear are registered to those of the other."""
     places = {"S1": [0.0, 0, 0], "S2": [12.0, 0, 1], "S3": [3.0, 9, 0], "S4": [5.0, 2, 8]}
     ear = replace(_head(0)[1][Side.LEFT], extra=places)
     other = replace(ear, extra={name: np.add(at, [shift_mm, 0, 0]) for name, at in places.items()})
