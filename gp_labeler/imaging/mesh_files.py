@@ -7,6 +7,7 @@ import re
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 import numpy as np
 
@@ -66,6 +67,8 @@ def read_mesh(path: str | PathLike[str]) -> pv.PolyData:
     head = read_head(file, _HEAD)
     if not (is_whole_ply(file) if suffix == ".ply" else _may_be_whole(file, suffix, head)):
         raise FileFormatError("the mesh is cut off or damaged", file=file, remedy=_REMEDY)
+    if suffix == ".gltf":
+        _check_buffers(file)
     mesh = _read(file)
     if not _has_all(mesh, suffix, head):
         raise FileFormatError("the mesh is cut off or damaged", file=file, remedy=_REMEDY)
@@ -149,6 +152,16 @@ def _to_lps(mesh: pv.PolyData, head: bytes) -> pv.PolyData:
         turned: pv.PolyData = mesh.rotate_z(180.0)
         return turned
     return mesh
+
+
+def _check_buffers(file: Path) -> None:
+    """Refuse a glTF file whose points are to be read from a pipe or a device, where reading would wait."""
+    content = json.loads(file.read_bytes())
+    buffers = content.get("buffers", ()) if isinstance(content, dict) else ()
+    for buffer in buffers if isinstance(buffers, list) else ():
+        uri = buffer.get("uri") if isinstance(buffer, dict) else None
+        if isinstance(uri, str) and not uri.startswith("data:"):
+            check_file(file.parent / unquote(uri), what="mesh", max_bytes=_MAX_BYTES)
 
 
 def _is_json(file: Path) -> bool:

@@ -99,7 +99,8 @@ def _pair(path: Path) -> tuple[Path, Path]:
     if not name.endswith((".hdr", ".img")):
         return path, path
     stem = path.name[: len(name) - 4]
-    there = {file.name.lower(): file for file in path.parent.iterdir() if file.name.startswith(stem)}
+    beside = (file for file in path.parent.iterdir() if file.name.startswith(stem) and file.is_file())
+    there = {file.name.lower(): file for file in beside}
     header, voxels = (
         next((there[n] for end in ("", ".gz") if (n := f"{stem.lower()}{suffix}{end}") in there), None)
         for suffix in (".hdr", ".img")

@@ -578,6 +578,22 @@ def test_analyze_is_placed_by_the_matrix_of_spm_as_nibabel_does(kind: type, tmp_
         assert inspect_volume(tmp_path / given).sides_known
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+@pytest.mark.parametrize("kind", [nibabel.Nifti1Pair, nibabel.Spm99AnalyzeImage])
+@pytest.mark.parametrize("suffix", [".hdr", ".img", ".mat"])
+def test_a_pipe_in_the_place_of_one_of_a_pair_is_not_waited_for(
+    kind: type, suffix: str, tmp_path: Path
+) -> None:
+    nibabel.save(kind(RAW.astype("int16").T, RAS @ affine()), tmp_path / "a.img")
+    (tmp_path / f"a{suffix}").unlink(missing_ok=True)
+    os.mkfifo(tmp_path / f"a{suffix}")
+    if suffix == ".mat":
+        inspect_volume(tmp_path / "a.img")
+    else:
+        with pytest.raises(VolumeError, match=rf"one of a pair, and a\{suffix} is not there"):
+            inspect_volume(tmp_path / {".hdr": "a.img", ".img": "a.hdr"}[suffix])
+
+
 @pytest.mark.parametrize("version", ["4", "5"])
 def test_the_oldest_matrix_of_spm_mirrors_and_leaves_the_sides_unknown(version: str, tmp_path: Path) -> None:
     nibabel.save(nibabel.AnalyzeImage(RAW.astype("int16").T, np.diag([*SPACING, 1])), tmp_path / "a.img")

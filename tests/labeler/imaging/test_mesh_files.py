@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import os
 from pathlib import Path
 
 import numpy as np
@@ -106,3 +108,12 @@ def test_faces_of_many_corners_are_read_and_measured(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-1])
     with pytest.raises(GpError, match="cut off"):
         read_mesh(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_points_are_not_awaited_from_a_pipe(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "points.bin")
+    content = {"asset": {"version": "2.0"}, "buffers": [{"uri": "points.bin", "byteLength": 36}]}
+    (tmp_path / "bone.gltf").write_text(json.dumps(content))
+    with pytest.raises(GpError, match=r"points\.bin: is a device or a pipe"):
+        read_mesh(tmp_path / "bone.gltf")
