@@ -25,8 +25,8 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.pose.answer import MAY_BE_USED, pose_answer
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
-from gp_core.pose.estimate import estimate_from, estimate_pose
-from gp_core.pose.estimate_inputs import versions_now
+from gp_core.pose.estimate import compare_with_other_ear, estimate_from, estimate_pose
+from gp_core.pose.estimate_inputs import EarInputs, versions_now
 from gp_core.pose.gate import named_for_other_side
 from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 
@@ -42,7 +42,7 @@ _TIMEOUT_S = 30.0
 _MOST_POINTS = 10_000
 _KEYS = (
     *("side", "touches", "frame", "times_s", "method", "probe_noise_mm", "round_window", "shared_error_mm"),
-    *("atlas", "source", "accept_warnings"),
+    *("atlas", "source", "accept_warnings", "other_ear", "midline", "both_ears"),
 )
 _OK, _BAD, _FORBIDDEN, _NOT_FOUND, _NO_METHOD, _WITHHELD, _NO_LENGTH, _TOO_LARGE, _FAULT, _BUSY = (
     *(200, 400, 403, 404, 405, 409, 411, 413, 500, 503),
@@ -117,9 +117,10 @@ def _estimated(content: Mapping[str, Any], known: _Known) -> CochleaPose:
         if key not in content:
             raise GpError(f"the request lacks {key!r}", remedy="Side and touches are needed.")
     method = _word(content, "method", "robust")
+    side = Side.parse(_word(content, "side", ""))
     pose = estimate_pose(
-        _touches(content),
-        Side.parse(_word(content, "side", "")),
+        _touches(content, "touches", side),
+        side,
         _atlas(content.get("atlas"), known, method),
         method=method,
         specimens=(known.specimens or None) if method == "jrmpc" else None,
@@ -129,7 +130,21 @@ def _estimated(content: Mapping[str, Any], known: _Known) -> CochleaPose:
         times=_times(content),
     )
     assert pose.inputs is not None
-    return replace(pose, inputs=replace(pose.inputs, source=_word(content, "source", "")))
+    pose = replace(pose, inputs=replace(pose.inputs, source=_word(content, "source", "")))
+    return _with_other_ear(content, pose)
+
+
+def _with_other_ear(content: Mapping[str, Any], pose: CochleaPose) -> CochleaPose:
+    """Return the pose compared with the other ear, where the request brings its touches."""
+    midline, combined = _names(content, "midline"), _flag(content, "both_ears")
+    if "other_ear" not in content:
+        if midline or combined:
+            raise GpError("midline and both_ears need the touches of the other ear", remedy="Give other_ear.")
+        return pose
+    assert pose.inputs is not None
+    touches = _touches(content, "other_ear", pose.side.other)
+    inputs = replace(pose.inputs, touches=touches, times=None, source="")
+    return compare_with_other_ear(pose, EarInputs(inputs, midline, combined))
 
 
 def _atlas(own: Any, known: _Known, method: str) -> Atlas | None:
@@ -139,13 +154,12 @@ def _atlas(own: Any, known: _Known, method: str) -> Atlas | None:
     return Atlas.published() if own == "published" else Atlas.from_dict(_mapping(own, "atlas"))
 
 
-def _touches(content: Mapping[str, Any]) -> LandmarkSet:
-    touches = _mapping(content["touches"], "touches")
+def _touches(content: Mapping[str, Any], key: str, side: Side) -> LandmarkSet:
+    touches = _mapping(content[key], key)
     if not all(isinstance(rows, list) for rows in touches.values()):
         raise GpError("each touch must be [x, y, z], or a list of such, in mm")
     if sum(np.size(rows) for rows in touches.values() if _is_even(rows)) > 3 * _MOST_POINTS:
         raise GpError(f"there are more than {_MOST_POINTS} touches")
-    side = Side.parse(_word(content, "side", ""))
     return LandmarkSet.from_touches(touches, side, frame=_word(content, "frame", "tracker"))
 
 
@@ -174,6 +188,13 @@ def _word(content: Mapping[str, Any], key: str, default: str) -> str:
     if not isinstance(value, str):
         raise GpError(f"{key} must be a text, got {str(value)[:40]}")
     return value
+
+
+def _names(content: Mapping[str, Any], key: str) -> tuple[str, ...]:
+    value = content.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(name, str) for name in value):
+        raise GpError(f"{key} must be a list of names, got {str(value)[:40]}")
+    return tuple(value)
 
 
 def _number(content: Mapping[str, Any], key: str, default: float | None) -> float | None:

@@ -31,10 +31,9 @@ from gp_core.io.pose_export import pose_text
 from gp_core.io.pose_json import is_pose_file, read_pose
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.answer import WITHHELD, pose_answer
-from gp_core.pose.both_ears import EarComparison, compare_ears
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
-from gp_core.pose.estimate import estimate_from
-from gp_core.pose.estimate_inputs import EstimateInputs
+from gp_core.pose.estimate import compare_with_other_ear, estimate_from
+from gp_core.pose.estimate_inputs import EarInputs, EstimateInputs
 from gp_core.pose.gate import GateReason, PoseGate, named_for_other_side
 from gp_core.pose.hypothesis_check import read_as, with_names_exchanged
 from gp_core.pose.insertion_path import UNITS, carry_path, read_path, rows_before_centre, write_path
@@ -162,8 +161,8 @@ def _add_ambiguity(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--accept-warnings",
         action="store_true",
-        help="write all files even where names or side look wrong or are undecided; without it, only --json "
-        "is written then, and the status is 3",
+        help="write all files even where names or side look wrong or are undecided, or the ears disagree; "
+        "without it, only --json is written then, and the status is 3",
     )
 
 
@@ -213,22 +212,16 @@ def run(args: argparse.Namespace) -> int:
             if asked.atlas is None
             else gains(touches, asked.atlas, probe_noise=asked.probe_noise, shared_error=asked.shared_error)
         )
-    check = _checked(args, given, touches, pose)
-    if check is not None:
-        pose, ears = check
-    others = [*_other_reasons(asked.source, pose, taken), *([] if check is None else _of_ears(ears))]
+    pose = _with_other_ear(args, given, pose)
+    others = _other_reasons(asked.source, pose, taken)
     answer = pose_answer(pose, others, accept_warnings=args.accept_warnings)
-    if check is not None:
-        answer["other_ear"] = ears.as_dict()
     held_back = answer["status"] == WITHHELD
     ambiguities = [reason["text"] for reason in answer["reasons"]]
     _write(args, pose, answer, path, held_back=held_back)
     for line in pose_table(pose, Path(args.touches).name, next_touches):
         say(line)
-    if check is not None:
-        say(f"  {'' if ears.check.agrees else '! '}{ears.check.text}")
-        if ears.link is not None:
-            say(f"  {'! ' if ears.link.has_moved else ''}{ears.link.text}")
+    for line in _ear_lines(pose):
+        say(f"  {line}")
     if taken is not None:
         odds = f"{100 * taken.probability:.1f} %"
         say(f"  ! used as {taken.label}, which is more likely than the given names and side ({odds})")
@@ -291,17 +284,30 @@ def _given_pose(args: argparse.Namespace) -> _Given:
         raise GpError(
             "does not contain the touches and the atlas from which it was estimated",
             file=args.touches,
-            remedy="It is of both ears, or of an earlier version: estimate it from the files of touches.",
+            remedy="It is of an earlier version: estimate it from the files of touches.",
         )
     if args.side not in (None, made.touches.side.value):
         raise GpError(f"is of the {made.touches.side.word} side", file=args.touches)
+    inputs = _overruled(args, made)
+    ear = made.other_ear
+    if args.other_ear is not None:
+        inputs = replace(inputs, other_ear=None)
+    elif ear is not None:
+        how = {"midline": args.midline, "combined": args.both_ears or None}
+        chosen = {name: value for name, value in how.items() if value is not None}
+        inputs = replace(inputs, other_ear=replace(ear, inputs=_overruled(args, ear.inputs), **chosen))
+    return _Given(inputs, pose)
+
+
+def _overruled(args: argparse.Namespace, inputs: EstimateInputs) -> EstimateInputs:
+    """Return the inputs of a pose file with the settings that the command line gives."""
     names = ("method", "round_window", "probe_noise", "shared_error")
     overruled = {name: value for name in names if (value := getattr(args, name)) is not None}
-    inputs = replace(made, **overruled)
+    inputs = replace(inputs, **overruled)
     if args.atlas is not None:
         atlas, specimens = _atlas_for(args.atlas, inputs.method)
         inputs = replace(inputs, atlas=atlas, specimens=tuple(specimens or ()))
-    return _Given(inputs, pose)
+    return inputs
 
 
 def _atlas_for(words: list[str], method: str) -> AtlasSource:
@@ -313,23 +319,27 @@ def _atlas_for(words: list[str], method: str) -> AtlasSource:
     return atlas, specimens
 
 
-def _checked(
-    args: argparse.Namespace, given: _Given, touches: LandmarkSet, pose: CochleaPose
-) -> tuple[CochleaPose, EarComparison] | None:
-    """Compare the estimate with that of the other ear, and with ``--both-ears`` make one axis of both."""
+def _with_other_ear(args: argparse.Namespace, given: _Given, pose: CochleaPose) -> CochleaPose:
+    """Compare the estimate with that of the other ear's file, and with ``--both-ears`` combine their axes."""
     if args.other_ear is None:
         option = "--both-ears" if args.both_ears else "--midline" if args.midline else ""
-        if option:
+        if option and given.inputs.other_ear is None:
             raise GpError(f"{option} needs the touches of the other ear", remedy="Give --other-ear FILE.")
-        return None
+        return pose
     with blaming(args.other_ear):
-        other = read_touches(args.other_ear, touches.side.other, names=lab_names(args))
-        found = compare_ears(touches, pose, other, given.estimate(other), midline=args.midline or ())
-        return found.fused(pose.side) if args.both_ears and found.check.agrees else pose, found
+        touches = read_touches(args.other_ear, pose.side.other, names=lab_names(args))
+        source = Path(args.other_ear).name
+        inputs = replace(given.inputs, touches=touches, times=None, source=source, other_ear=None)
+        return compare_with_other_ear(pose, EarInputs(inputs, args.midline or (), args.both_ears))
 
 
-def _of_ears(found: EarComparison) -> list[GateReason]:
-    return [] if found.check.agrees else [GateReason("ears disagree", found.check.text)]
+def _ear_lines(pose: CochleaPose) -> Iterator[str]:
+    """Yield what the comparison with the other ear found."""
+    found = pose.other_ear
+    if found:
+        yield f"{'! ' if pose.ears_disagree else ''}{found['text']}"
+    if skull := found.get("skull"):
+        yield f"{'! ' if skull['moved'] else ''}{skull['text']}"
 
 
 def _compared(pose: CochleaPose, stored: CochleaPose, file: str) -> str:

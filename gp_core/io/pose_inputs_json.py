@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -13,7 +14,7 @@ from gp_core.io.text import shown
 from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.labels import is_skull_feature
 from gp_core.landmarks.sets import LandmarkSet, Specimen
-from gp_core.pose.estimate_inputs import EstimateInputs
+from gp_core.pose.estimate_inputs import EarInputs, EstimateInputs
 
 __all__ = ["inputs_from"]
 
@@ -37,6 +38,26 @@ def inputs_from(content: dict[str, Any]) -> EstimateInputs:
         A value cannot be what it should be. A `KeyError`, `TypeError`, `ValueError` or `AttributeError` means
         that the content has another structure.
     """
+    inputs = _of_one_ear(content)
+    return replace(inputs, other_ear=_other_ear(content.get("other_ear"), inputs))
+
+
+def _other_ear(content: Mapping[str, Any] | None, own: EstimateInputs) -> EarInputs | None:
+    """Return the other ear, with atlas and animals of this one where it has none written of its own."""
+    if content is None:
+        return None
+    midline, flags = content["midline"], (content["combined"], content["in_its_frame"])
+    if not isinstance(midline, list) or not all(isinstance(flag, bool) for flag in flags):
+        raise GpError(f"expected a list of names, true or false, got {shown([midline, *flags])}")
+    inputs = _of_one_ear({"atlas": None, "specimens": [], **content["inputs"]})
+    if "atlas" not in content["inputs"]:
+        inputs = replace(inputs, atlas=own.atlas)
+    if "specimens" not in content["inputs"]:
+        inputs = replace(inputs, specimens=own.specimens)
+    return EarInputs(inputs, tuple(map(str, midline)), *flags)
+
+
+def _of_one_ear(content: Mapping[str, Any]) -> EstimateInputs:
     chosen, touched = content["settings"], content["touches"]
     times = content["times_s"]
     noise = chosen["probe_noise_mm"]

@@ -141,9 +141,20 @@ def _pose(content: dict[str, Any]) -> CochleaPose:
         hypotheses=tuple(_hypothesis(entry, frame) for entry in content.get("hypotheses", ())),
         repeats={_text(name): _repeated(one) for name, one in content.get("repeated_touches", {}).items()},
         of_both_ears=content.get("axis_of_both_ears", False) is True,
+        other_ear=_ears(content.get("other_ear", {})),
         stamp=_stamp(content.get("stamp", "")),
         inputs=None if content.get("inputs") is None else inputs_from(content["inputs"]),
     )
+
+
+def _ears(content: dict[str, Any]) -> dict[str, Any]:
+    """Return what was found of the other ear; files of earlier versions have no text."""
+    if not content:
+        return {}
+    if not isinstance(content["agrees"], bool):
+        raise GpError(f"expected true or false, got {shown(content['agrees'])}")
+    word = "agree" if content["agrees"] else "disagree"
+    return {**content, "text": _text(content.get("text", f"the two ears {word}"))}
 
 
 def _repeated(content: dict[str, Any]) -> RepeatedTouches:

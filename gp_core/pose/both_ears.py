@@ -14,18 +14,19 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from gp_core.argument_types import checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.constants import CHI2_3_95
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform, angle_between_deg, cross_matrix
-from gp_core.landmarks.features import CODES, EXTERNAL, Side, feature
+from gp_core.landmarks.features import CODES, Side
 from gp_core.landmarks.sets import LandmarkSet
 from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.estimate_inputs import EarInputs, EstimateInputs, same_touches
+from gp_core.pose.mid_plane import FEWEST_PAIRS, MirrorPlane, mirror_plane
 from gp_core.pose.skull_link import SkullLink, link_by_skull
-from gp_core.validation import FloatArray, as_points, as_vectors, freeze_arrays
+from gp_core.validation import FloatArray
 
 __all__ = [
     "FEWEST_PAIRS",
@@ -34,15 +35,11 @@ __all__ = [
     "MirrorPlane",
     "check_ears",
     "compare_ears",
+    "compared_as",
     "fuse_ears",
     "mirror_plane",
+    "not_comparable",
 ]
-
-FEWEST_PAIRS = 3
-"""So many features must be touched on both sides for a mid-plane."""
-
-_PAIR_SD_MM = 0.5
-"""Standard deviation by which the two sides of a head differ in a touched feature, mm a coordinate."""
 
 _ASYMMETRY_MM, _RESIDUAL_FACTOR = 0.3, 1.5
 """How much the two sides of a head differ, mm a coordinate; factor by which pairs may exceed that."""
@@ -56,78 +53,6 @@ plane of the other pairs at a pair, mm a coordinate."""
 
 _PAIR_SQUARED = 16.3
 """Squared Mahalanobis distance of a pair from being mirror images; 1 ordinary pair of 1000 exceeds it."""
-
-
-@dataclass(frozen=True)
-class MirrorPlane:
-    """The mid-sagittal plane of a head, from touches of both ears.
-
-    Attributes
-    ----------
-    normal : (3,) array
-        Unit normal, towards the left ear, in the frame of the touches.
-    offset : float
-        The plane is ``normal @ x = offset``, mm.
-    residual_mm : float
-        RMS distance of the pairs from being mirror images.
-    codes : tuple of str
-        Features that it is made from.
-    normal_sd_deg, offset_sd_mm : float
-        Standard deviation of its direction, and of its place at the middle of the pairs.
-    pairs_mm : mapping of str to float
-        By feature, how far its two touches are from being mirror images in the plane of all *other* features;
-        empty where too few are left for that.
-    rest_mm : mapping of str to float
-        By feature, the RMS distance of those others.
-    """
-
-    normal: FloatArray
-    offset: float
-    residual_mm: float
-    codes: tuple[str, ...]
-    normal_sd_deg: float
-    offset_sd_mm: float
-    pairs_mm: Mapping[str, float] = field(default_factory=dict)
-    rest_mm: Mapping[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        freeze_arrays(self)
-        for name in ("pairs_mm", "rest_mm"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-
-    def mirror(self, points: ArrayLike) -> FloatArray:
-        """Return points mirrored in the plane.
-
-        Parameters
-        ----------
-        points : (N, 3) array_like
-            In the frame of the touches, mm.
-
-        Returns
-        -------
-        (N, 3) array
-            Their mirror images, mm.
-        """
-        rows = as_points(points, "points", missing_allowed=True)
-        mirrored: FloatArray = rows - 2 * np.outer(rows @ self.normal - self.offset, self.normal)
-        return mirrored
-
-    def mirror_direction(self, vector: ArrayLike) -> FloatArray:
-        """Return a direction mirrored in the plane.
-
-        Parameters
-        ----------
-        vector : (..., 3) array_like
-            In the frame of the touches.
-
-        Returns
-        -------
-        (..., 3) array
-            Of the same length.
-        """
-        given = as_vectors(vector, "a direction")
-        mirrored: FloatArray = given - 2 * (given @ self.normal)[..., None] * self.normal
-        return mirrored
 
 
 @dataclass(frozen=True)
@@ -203,6 +128,7 @@ class EarCheck:
         """
         return {
             "agrees": self.agrees,
+            "text": self.text,
             "origin_mm": self.origin_mm,
             "axis_deg": self.axis_deg,
             "expected_mm": self.expected_mm,
@@ -216,115 +142,6 @@ class EarCheck:
             "expected_pairs_mm": dict(self.expected_pairs_mm),
             "suspect": list(self.suspects),
         }
-
-
-@checks_arguments
-def mirror_plane(left: LandmarkSet, right: LandmarkSet, *, midline: Iterable[str] = ()) -> MirrorPlane:
-    """Return the mid-sagittal plane of a head from touches of both ears, in one frame.
-
-    Parameters
-    ----------
-    left, right : LandmarkSet
-        Touches of the two sides, mm.
-    midline : iterable of str
-        Skull features (``S1``, ...) that lie in the plane, touched with either ear.
-
-    Returns
-    -------
-    MirrorPlane
-        In the frame of the touches.
-
-    Raises
-    ------
-    GpError
-        The frames differ, fewer than three features were touched on both sides, a feature of the midline was
-        not touched, or the pairs do not lie about one plane.
-
-    Examples
-    --------
-    >>> from gp_core import Atlas
-    >>> atlas = Atlas.published()
-    >>> points = {code: atlas[code] + [0, 20, 0] for code in ("CL", "MN", "OS", "RWA")}
-    >>> left = LandmarkSet.from_mapping(points, "L", frame="tracker")
-    >>> mirrored = {code: point * [1, -1, 1] for code, point in points.items()}
-    >>> right = LandmarkSet.from_mapping(mirrored, "R", frame="tracker")
-    >>> bool(mirror_plane(left, right).normal[1] > 0.999)
-    True
-    """
-    _check_sides(left, right)
-    codes = tuple(c for c in EXTERNAL if c in left and c in right and not feature(c).shared)
-    if len(codes) < FEWEST_PAIRS:
-        raise GpError(
-            f"the mid-plane needs {FEWEST_PAIRS} features that are touched on both sides, got {len(codes)}",
-            remedy="Touch the same features on both ears.",
-        )
-    shared = [c for c in EXTERNAL if feature(c).shared and (c in left or c in right)]
-    middle = {name: _shared_point(left, right, name) for name in (*shared, *midline)}
-    plane = _plane_of(left, right, codes, middle)
-    pairs_mm, rest_mm = {}, {}
-    if len(codes) > FEWEST_PAIRS:
-        for code in codes:
-            others = _plane_of(left, right, tuple(c for c in codes if c != code), middle)
-            image = others.mirror(right[code][None])[0]
-            pairs_mm[code] = float(np.linalg.norm(image - left[code]))
-            rest_mm[code] = others.residual_mm
-    return replace(plane, pairs_mm=pairs_mm, rest_mm=rest_mm)
-
-
-def _plane_of(
-    left: LandmarkSet, right: LandmarkSet, codes: tuple[str, ...], middle: Mapping[str, FloatArray]
-) -> MirrorPlane:
-    """Return the plane of some pairs, and of points that lie in it."""
-    one, other = left.array(codes), right.array(codes)
-    half = (one - other) / 2
-    on_plane = np.vstack([(one + other) / 2, *middle.values()])
-    normal = _normal(half, on_plane)
-    offset = float((on_plane @ normal).mean())
-    plane = MirrorPlane(normal, offset, 0.0, (*codes, *middle), 0.0, 0.0)
-    residual = float(np.sqrt(((plane.mirror(other) - one) ** 2).sum(axis=1).mean()))
-    # each pair turns the normal by its error over its width, as a lever
-    levers = float(np.sqrt((half**2).sum() + ((on_plane - on_plane.mean(axis=0)) ** 2).sum()))
-    spread = max(_PAIR_SD_MM, residual / np.sqrt(3)) / np.sqrt(2)
-    return replace(
-        plane,
-        residual_mm=residual,
-        normal_sd_deg=float(np.degrees(spread / levers)),
-        offset_sd_mm=float(spread / np.sqrt(len(on_plane))),
-    )
-
-
-def _normal(half: FloatArray, on_plane: FloatArray) -> FloatArray:
-    """Return the direction that half distances of pairs have, and that points of the plane do not."""
-    about = on_plane - on_plane.mean(axis=0)
-    values, vectors = np.linalg.eigh(half.T @ half - about.T @ about)
-    normal: FloatArray = vectors[:, -1]
-    along = half @ normal
-    if values[-1] <= 0 or np.abs(along).min() <= 0 or abs(np.sign(along).sum()) < len(along):
-        raise GpError(
-            "the touches of the two ears do not lie about one plane",
-            remedy="Check sides and names; touch both ears without moving the head.",
-        )
-    return normal if along[0] > 0 else -normal
-
-
-def _shared_point(left: LandmarkSet, right: LandmarkSet, name: str) -> FloatArray:
-    """Return a point of the plane: the mean of its touches with both ears."""
-    found = [point for one in (left, right) if (point := one.extra.get(name)) is not None]
-    found += [one[name] for one in (left, right) if name in CODES and name in one]
-    if not found:
-        raise GpError(
-            f"{name} is to lie in the mid-plane, and was touched with neither ear",
-            remedy="Name skull features that were touched, such as S1.",
-        )
-    points: FloatArray = np.mean(found, axis=0)
-    return points
-
-
-def _check_sides(left: LandmarkSet, right: LandmarkSet) -> None:
-    if (left.side, right.side) != (Side.LEFT, Side.RIGHT):
-        raise GpError(f"the touches must be of the left and of the right, got {left.side} and {right.side}")
-    if left.frame != right.frame:
-        raise GpError(f"the ears were touched in different frames, {left.frame} and {right.frame}")
 
 
 @checks_arguments
@@ -383,7 +200,8 @@ class EarComparison:
     check : EarCheck
         Whether they agree.
     poses : mapping of Side to CochleaPose
-        Both, in the frame of the first ear, as they were estimated.
+        Both, in the frame of the first ear, as they were estimated, each with the finding as its
+        `CochleaPose.other_ear`.
     link : SkullLink or None
         What the skull features say that were touched with both ears; None with fewer than three.
     """
@@ -416,7 +234,13 @@ class EarComparison:
         GpError
             The two ears disagree.
         """
-        return fuse_ears(self.poses[Side.LEFT], self.poses[Side.RIGHT], self.check.plane)[side]
+        if not self.check.agrees:
+            raise _disagreement(self.check)
+        pose = _fused(self.poses[side], self.poses[side.other], self.check.plane)
+        inputs = self.poses[side].inputs
+        if inputs is None or inputs.other_ear is None:
+            return pose
+        return replace(pose, inputs=replace(inputs, other_ear=replace(inputs.other_ear, combined=True)))
 
     def as_dict(self) -> dict[str, Any]:
         """Return the comparison for a JSON file, mm and degrees.
@@ -472,6 +296,7 @@ def compare_ears(
     >>> compare_ears(left, estimate_pose(left, "L"), right, estimate_pose(right, "R")).check.agrees
     True
     """
+    made = _inputs(touches, pose, other_touches, other_pose, tuple(midline))
     link = link_by_skull(touches, other_touches)
     if link is not None and link.T_ear_other is not None:
         other_touches = other_touches.moved(link.T_ear_other)
@@ -482,7 +307,90 @@ def compare_ears(
         raise GpError("two ears of a head are needed, a left and a right one")
     plane = mirror_plane(sets[Side.LEFT], sets[Side.RIGHT], midline=midline)
     check = check_ears(poses[Side.LEFT], poses[Side.RIGHT], plane)
-    return EarComparison(check, MappingProxyType(poses), link)
+    found = EarComparison(check, poses, link)
+    told = {
+        side: replace(one, other_ear=found.as_dict(), inputs=made.get(side)) for side, one in poses.items()
+    }
+    return replace(found, poses=MappingProxyType(told))
+
+
+def _inputs(
+    touches: LandmarkSet,
+    pose: CochleaPose,
+    other_touches: LandmarkSet,
+    other_pose: CochleaPose,
+    midline: tuple[str, ...],
+) -> dict[Side, EstimateInputs]:
+    """Return what the two were made from, each with the other; empty where that is not known."""
+    own, other = _own_inputs(touches, pose), _own_inputs(other_touches, other_pose)
+    if own is None or other is None:
+        return {}
+    return {
+        pose.side: replace(own, other_ear=EarInputs(other, midline)),
+        other_pose.side: replace(other, other_ear=EarInputs(own, midline, in_its_frame=True)),
+    }
+
+
+def _own_inputs(touches: LandmarkSet, pose: CochleaPose) -> EstimateInputs | None:
+    """Return what a pose alone was made from; None where it is not known, or was changed since."""
+    made = pose.inputs
+    if made is None or pose.of_both_ears or not same_touches(made.touches, touches):
+        return None
+    if made.other_ear is not None and made.other_ear.in_its_frame:
+        return None
+    return replace(made, other_ear=None)
+
+
+def compared_as(pose: CochleaPose, other: CochleaPose, ear: EarInputs) -> CochleaPose:
+    """Return a pose compared with that of the other ear, and combined with it where that is asked.
+
+    Parameters
+    ----------
+    pose, other : CochleaPose
+        The estimates, with what they were made from.
+    ear : EarInputs
+        How they are compared.
+
+    Returns
+    -------
+    CochleaPose
+        With the finding as its `other_ear`; with the axis of both ears where that is asked and they agree.
+
+    Raises
+    ------
+    GpError
+        As for `compare_ears`.
+    """
+    first, second = (other, pose) if ear.in_its_frame else (pose, other)
+    assert first.inputs is not None
+    assert second.inputs is not None
+    found = compare_ears(first.inputs.touches, first, second.inputs.touches, second, midline=ear.midline)
+    if ear.combined and found.check.agrees:
+        return found.fused(pose.side)
+    told = found.poses[pose.side]
+    return told if told.inputs is None else replace(told, inputs=replace(told.inputs, other_ear=ear))
+
+
+def not_comparable(pose: CochleaPose, ear: EarInputs, problem: GpError) -> CochleaPose:
+    """Return a pose that says that it cannot be compared with the other ear, so that no robot is sent it.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        An estimate.
+    ear : EarInputs
+        How it was to be compared.
+    problem : GpError
+        Why it cannot be.
+
+    Returns
+    -------
+    CochleaPose
+        The same, with the problem as its `other_ear`.
+    """
+    told = {"agrees": False, "text": f"the two ears cannot be compared: {problem.problem}"}
+    inputs = None if pose.inputs is None else replace(pose.inputs, other_ear=ear)
+    return replace(pose, other_ear=told, inputs=inputs)
 
 
 def _moved(pose: CochleaPose, T: RigidTransform) -> CochleaPose:
@@ -532,9 +440,30 @@ def fuse_ears(left: CochleaPose, right: CochleaPose, plane: MirrorPlane) -> Mapp
     """
     check = check_ears(left, right, plane)
     if not check.agrees:
-        raise GpError(f"no estimate is made of both ears: {check.text}", remedy="Touch both ears again.")
+        raise _disagreement(check)
+    found = _comparison_by(plane, left, right)
+    if found is not None:
+        return {side: found.fused(side) for side in Side}
     poses = {Side.LEFT: left, Side.RIGHT: right}
     return {side: _fused(pose, poses[side.other], plane) for side, pose in poses.items()}
+
+
+def _disagreement(check: EarCheck) -> GpError:
+    return GpError(f"no estimate is made of both ears: {check.text}", remedy="Touch both ears again.")
+
+
+def _comparison_by(plane: MirrorPlane, left: CochleaPose, right: CochleaPose) -> EarComparison | None:
+    """Return the comparison that leads to this very plane; None where the plane is from elsewhere."""
+    if left.inputs is None or right.inputs is None:
+        return None
+    midline = [name for name in plane.codes if name not in CODES]
+    try:
+        found = compare_ears(left.inputs.touches, left, right.inputs.touches, right, midline=midline)
+    except GpError:
+        return None
+    moved = found.link is not None and found.link.has_moved
+    same = np.array_equal(found.check.plane.normal, plane.normal) and found.check.plane.offset == plane.offset
+    return found if same and not moved else None
 
 
 def _fused(pose: CochleaPose, other: CochleaPose, plane: MirrorPlane) -> CochleaPose:

@@ -79,6 +79,10 @@ class CochleaPose:
         The touches of each feature that was touched more than once.
     of_both_ears : bool
         Whether its axis was made of both ears' (`gp_core.fuse_ears`).
+    other_ear : mapping of str to object
+        What the comparison with the other ear gave, as `gp_core.EarComparison.as_dict` returns it: whether
+        it ``agrees``, the finding as ``text``, and its figures; empty where none was made. A pose whose ears
+        disagree is not for a robot.
     stamp : str
         When it was estimated, ISO 8601 in UTC; empty where that is not known.
     inputs : EstimateInputs or None
@@ -104,6 +108,7 @@ class CochleaPose:
     hypotheses: tuple[Hypothesis, ...] = ()
     repeats: Mapping[str, RepeatedTouches] = field(default_factory=dict)
     of_both_ears: bool = False
+    other_ear: Mapping[str, Any] = field(default_factory=dict)
     stamp: str = field(default="", compare=False)
     inputs: EstimateInputs | None = field(default=None, repr=False, compare=False)
 
@@ -137,9 +142,15 @@ class CochleaPose:
         return quaternion_xyzw(self.transform_to_touches.rotation)
 
     @property
+    def ears_disagree(self) -> bool:
+        """Whether it was compared with the other ear, and the two contradict each other."""
+        return bool(self.other_ear) and not self.other_ear["agrees"]
+
+    @property
     def state(self) -> str:
-        """Both states, such as ``side undecided, names clear``."""
-        return f"side {self.side_state}, names {self.names_state}"
+        """The states, such as ``side undecided, names clear``; with ``ears disagree`` where they do."""
+        ears = ", ears disagree" if self.ears_disagree else ""
+        return f"side {self.side_state}, names {self.names_state}{ears}"
 
     @cached_property
     def radius_95(self) -> float:
@@ -194,7 +205,7 @@ class CochleaPose:
         rows = [
             ("origin CO", f"{origin} mm", f"95 % within {self.radius_95:.2f} mm"),
             ("axis CB->CA", axis, f"95 % within {np.degrees(self.cone_95):.1f} deg"),
-            ("state", f"side {self.side_state}, names {self.names_state}", ""),
+            ("state", self.state, str(self.other_ear["text"]) if self.ears_disagree else ""),
             *(("warning", warning, "") for warning in self.warnings),
         ]
         title = f"Cochlea, {self.side.word} side, method {self.method}, atlas {self.atlas}"
@@ -241,6 +252,8 @@ class CochleaPose:
         }
         if self.of_both_ears:
             content["axis_of_both_ears"] = True
+        if self.other_ear:
+            content["other_ear"] = dict(self.other_ear)
         if self.repeats:
             content["repeated_touches"] = {code: one.as_dict() for code, one in self.repeats.items()}
         return content

@@ -18,8 +18,9 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.plausible_size import check_plausible_size
 from gp_core.landmarks.repeats import repeat_warnings
 from gp_core.landmarks.sets import LandmarkSet, Specimen
+from gp_core.pose.both_ears import compared_as, not_comparable
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS, CochleaPose
-from gp_core.pose.estimate_inputs import EstimateInputs, utc_now, versions_now
+from gp_core.pose.estimate_inputs import EarInputs, EstimateInputs, utc_now, versions_now
 from gp_core.pose.hypothesis_check import hypothesis_warnings
 from gp_core.pose.jrmpc_estimator import estimate_jrmpc
 from gp_core.pose.robust import estimate_robust
@@ -27,7 +28,14 @@ from gp_core.pose.systematic_error import DEFAULT_SHARED_ERROR_MM
 from gp_core.pose.touched_window import towards_touched_window
 from gp_core.validation import check_option
 
-__all__ = ["ESTIMATORS", "EstimatorInput", "estimate_again", "estimate_from", "estimate_pose"]
+__all__ = [
+    "ESTIMATORS",
+    "EstimatorInput",
+    "compare_with_other_ear",
+    "estimate_again",
+    "estimate_from",
+    "estimate_pose",
+]
 
 
 @checks_arguments_but("touches")
@@ -168,7 +176,8 @@ def estimate_from(inputs: EstimateInputs) -> CochleaPose:
     Returns
     -------
     CochleaPose
-        As `estimate_pose`, with the same source.
+        As `estimate_pose`, with the same source; compared or combined with the other ear, where the inputs
+        hold one.
 
     Raises
     ------
@@ -187,7 +196,55 @@ def estimate_from(inputs: EstimateInputs) -> CochleaPose:
         times=inputs.times,
     )
     assert pose.inputs is not None
-    return replace(pose, inputs=replace(pose.inputs, source=inputs.source))
+    pose = replace(pose, inputs=replace(pose.inputs, source=inputs.source))
+    if inputs.other_ear is None:
+        return pose
+    try:
+        return compare_with_other_ear(pose, inputs.other_ear)
+    except GpError as problem:
+        return not_comparable(pose, inputs.other_ear, problem)
+
+
+def compare_with_other_ear(
+    pose: CochleaPose, ear: EarInputs, other: CochleaPose | None = None
+) -> CochleaPose:
+    """Return a pose compared with the other ear, and combined with it where that is asked and the two agree.
+
+    The ears of a JRMPC pose are compared by the robust method, as its side and names are: the regions of
+    JRMPC do not cover the errors of touches.
+
+    Parameters
+    ----------
+    pose : CochleaPose
+        An estimate, with what it was made from.
+    ear : EarInputs
+        The other ear, and how the two are compared.
+    other : CochleaPose, optional
+        The estimate of the other ear; by default it is made.
+
+    Returns
+    -------
+    CochleaPose
+        With the finding as its `other_ear`.
+
+    Raises
+    ------
+    GpError
+        The ears cannot be compared, see `gp_core.compare_ears`, or axes of JRMPC are to be combined.
+    """
+    assert pose.inputs is not None
+    if pose.method == "jrmpc" and ear.combined:
+        raise GpError("axes of both ears are combined by the robust method only", remedy="Choose robust.")
+    own = pose if pose.method != "jrmpc" else estimate_from(_by_names(pose.inputs))
+    told = compared_as(own, other or estimate_from(_by_names(ear.inputs)), ear)
+    if own is pose:
+        return told
+    return replace(pose, other_ear=told.other_ear, inputs=replace(pose.inputs, other_ear=ear))
+
+
+def _by_names(inputs: EstimateInputs) -> EstimateInputs:
+    """Return the inputs of the same touches for the method that knows names."""
+    return replace(inputs, method="robust" if inputs.method == "jrmpc" else inputs.method, other_ear=None)
 
 
 @dataclass(frozen=True)

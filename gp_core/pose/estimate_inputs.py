@@ -17,7 +17,7 @@ import numpy as np
 from gp_core.atlas.atlas import Atlas
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 
-__all__ = ["EstimateInputs", "utc_now", "versions_now"]
+__all__ = ["EarInputs", "EstimateInputs", "same_touches", "utc_now", "versions_now"]
 
 _PACKAGES = ("gp-labeler", "numpy", "scipy", "numba")
 
@@ -40,6 +40,8 @@ class EstimateInputs:
         The file of the touches; empty where they came from elsewhere.
     versions : mapping of str to str
         Of the packages and of Python, and the machine's processor and system.
+    other_ear : EarInputs or None
+        The other ear of the head, with which the estimate was compared or combined.
     """
 
     touches: LandmarkSet
@@ -52,6 +54,7 @@ class EstimateInputs:
     specimens: tuple[Specimen, ...] = ()
     source: str = ""
     versions: Mapping[str, str] = field(default_factory=dict)
+    other_ear: EarInputs | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the inputs as the JSON file of a pose holds them.
@@ -80,7 +83,63 @@ class EstimateInputs:
             "versions": dict(self.versions),
             "atlas": None if self.atlas is None else self.atlas.as_dict(),
             "specimens": [_specimen(animal) for animal in self.specimens],
+            "other_ear": None if self.other_ear is None else self._other_ear(self.other_ear),
         }
+
+    def _other_ear(self, ear: EarInputs) -> dict[str, Any]:
+        """Return the other ear without its atlas and animals where they are those of this one."""
+        content = ear.inputs.as_dict()
+        if ear.inputs.atlas is self.atlas:
+            del content["atlas"]
+        if list(map(id, ear.inputs.specimens)) == list(map(id, self.specimens)):
+            del content["specimens"]
+        return {
+            "inputs": content,
+            "midline": list(ear.midline),
+            "combined": ear.combined,
+            "in_its_frame": ear.in_its_frame,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class EarInputs:
+    """The other ear of a head, with which an estimate was compared.
+
+    Parameters
+    ----------
+    inputs : EstimateInputs
+        Of its own estimate.
+    midline : tuple of str
+        Skull features that lie in the mid-plane; see `gp_core.mirror_plane`.
+    combined : bool
+        Whether the axis is to be that of both ears, if they agree.
+    in_its_frame : bool
+        Whether the pose is in the frame of the other ear: that matters where the head moved between them.
+    """
+
+    inputs: EstimateInputs
+    midline: tuple[str, ...] = ()
+    combined: bool = False
+    in_its_frame: bool = False
+
+
+def same_touches(one: LandmarkSet, other: LandmarkSet) -> bool:
+    """Whether two sets hold the same touches of the same side, repeats and skull features among them.
+
+    Parameters
+    ----------
+    one, other : LandmarkSet
+        Touches, mm.
+
+    Returns
+    -------
+    bool
+        Equal to the last bit.
+    """
+    if one is other:
+        return True
+    here, there = ((each.side, each.frame, _points(each), _extra(each)) for each in (one, other))
+    return here == there
 
 
 def _points(touches: LandmarkSet) -> dict[str, list[list[float]]]:

@@ -126,7 +126,7 @@ class PoseGate:
 
 
 def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
-    """Yield the reasons against the side and the names of a pose, which no limit and no person can override.
+    """Yield the reasons that no limit and no person can override: side, names, and ears that disagree.
 
     Parameters
     ----------
@@ -136,7 +136,7 @@ def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
     Yields
     ------
     GateReason
-        One for the side, and one for the names, where they are not clear.
+        One for the side, and one for the names, where they are not clear; one where the ears disagree.
     """
     other = pose.side.other.word
     words = {
@@ -156,6 +156,8 @@ def reasons_of_ambiguity(pose: CochleaPose) -> Iterator[GateReason]:
     }
     if pose.names_state in words:
         yield GateReason(*words[pose.names_state])
+    if pose.ears_disagree:
+        yield GateReason("ears disagree", str(pose.other_ear["text"]))
 
 
 def named_for_other_side(file: str, side: Side) -> GateReason:
@@ -177,7 +179,7 @@ def named_for_other_side(file: str, side: Side) -> GateReason:
 
 
 def reasons_against_writing(pose: CochleaPose) -> tuple[GateReason, ...]:
-    """Return why a pose must not be written for a robot: side or names wrong, undecided or unchecked.
+    """Return why a pose must not be written for a robot: side or names are not clear, or the ears disagree.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def pose_quality(pose: CochleaPose) -> PoseQuality:
 
 
 def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
-    """Return the rating of touches that may be of the other side, or wrongly named."""
+    """Return the rating of touches of the other side, wrongly named, or contradicted by the other ear."""
     if pose.side_state == "wrong":
         return PoseQuality("danger", "Check the side", "The touches look like those of the other ear.")
     if pose.names_state == "wrong":
@@ -88,5 +88,9 @@ def _ambiguity(pose: CochleaPose) -> PoseQuality | None:
             "warning",
             "Side undecided",
             "The touches may be those of the other ear; touch one more feature.",
+        )
+    if pose.ears_disagree:
+        return PoseQuality(
+            "warning", "Ears disagree", "This estimate and that of the other ear contradict each other."
         )
     return None

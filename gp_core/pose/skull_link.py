@@ -80,6 +80,7 @@ class SkullLink:
             "apart_mm": self.apart_mm,
             "fre_mm": self.fre_mm,
             "suspect": list(self.suspects),
+            "text": self.text,
             "moved": self.has_moved,
             "T_ear_other": None if T is None else T.matrix.tolist(),
         }

@@ -6,7 +6,11 @@ from dataclasses import dataclass, replace
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import feature
-from gp_core.pose.both_ears import FEWEST_PAIRS, EarComparison, compare_ears
+from gp_core.pose.both_ears import EarComparison, compare_ears, not_comparable
+from gp_core.pose.cochlea_pose import CochleaPose
+from gp_core.pose.estimate import compare_with_other_ear
+from gp_core.pose.estimate_inputs import EarInputs
+from gp_core.pose.mid_plane import FEWEST_PAIRS
 from gp_labeler.models.estimate import SideEstimate
 
 __all__ = ["BothEars", "compare_sides"]
@@ -51,11 +55,26 @@ class BothEars:
         """Whether it was made of these very estimates."""
         return self.own is own and self.other is other
 
-    def joined(self, own: SideEstimate) -> SideEstimate:
-        """Return an estimate with the axis of both ears, where they agree; else the estimate itself."""
-        if self.comparison is None or not self.comparison.check.agrees:
+    def told(self, own: SideEstimate, *, combined: bool) -> SideEstimate:
+        """Return an estimate whose poses say how the ears agree, so that none is sent where they do not.
+
+        Parameters
+        ----------
+        own : SideEstimate
+            Of the side in work.
+        combined : bool
+            Whether the axis is to be that of both ears, where they agree.
+        """
+        if self.is_empty or self.other is None:
             return own
-        return replace(own, poses={**own.poses, _METHOD: self.comparison.fused(own.side)})
+        other = self.other.poses[_METHOD]
+        assert other.inputs is not None
+        midline = _midline(own, self.other)
+        poses = {
+            method: _compared(pose, other, EarInputs(other.inputs, midline, combined and method == _METHOD))
+            for method, pose in own.poses.items()
+        }
+        return replace(own, poses=poses)
 
 
 def compare_sides(own: SideEstimate, other: SideEstimate | None) -> BothEars:
@@ -72,12 +91,27 @@ def compare_sides(own: SideEstimate, other: SideEstimate | None) -> BothEars:
     paired = [code for code in own.touches.placed if code in other.touches and not feature(code).shared]
     if len(paired) < FEWEST_PAIRS or own.touches.frame != other.touches.frame:
         return nothing
-    touched = own.touches.extra.keys() | other.touches.extra.keys()
-    midline = [name for name in own.settings.midline if name in touched]
     try:
         found = compare_ears(
-            own.touches, own.poses[_METHOD], other.touches, other.poses[_METHOD], midline=midline
+            own.touches,
+            own.poses[_METHOD],
+            other.touches,
+            other.poses[_METHOD],
+            midline=_midline(own, other),
         )
     except GpError as error:
         return replace(nothing, problem=str(error))
     return replace(nothing, comparison=found)
+
+
+def _midline(own: SideEstimate, other: SideEstimate) -> tuple[str, ...]:
+    """Return the chosen skull features of the mid-plane that were touched with either ear."""
+    touched = own.touches.extra.keys() | other.touches.extra.keys()
+    return tuple(name for name in own.settings.midline if name in touched)
+
+
+def _compared(pose: CochleaPose, other: CochleaPose, ear: EarInputs) -> CochleaPose:
+    try:
+        return compare_with_other_ear(pose, ear, other)
+    except GpError as problem:
+        return not_comparable(pose, ear, problem)

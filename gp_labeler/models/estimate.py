@@ -41,8 +41,8 @@ __all__ = [
 ]
 
 REGISTRATIONS = ("auto", "features", "skull")
-_DERIVED = ("quaternion_xyzw",)
-"""What a pose tells twice, and verdicts of earlier versions do not hold."""
+_DERIVED = ("quaternion_xyzw", "other_ear")
+"""What verdicts of earlier versions do not hold, and a pose tells elsewhere too, as `transform`, `state`."""
 
 _SAME_MM, _SAME_DEG = 0.001, 0.01
 """Up to here a pose is the one that was judged: it is computed again each time."""

@@ -11,6 +11,7 @@ from gp_core.constants import METHODS
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.labels import is_skull_feature
 from gp_core.landmarks.sets import Specimen
 from gp_core.pose.cochlea_pose import ROUND_WINDOWS
 from gp_core.pose.systematic_error import SystematicError
@@ -56,7 +57,7 @@ class PoseEstimator:
         self._known: dict[Side, RigidTransform] = {}
         self._made: dict[tuple[Side, bool], _Made] = {}
         self._ears: dict[Side, BothEars] = {}
-        self._joined: dict[Side, tuple[BothEars, SideEstimate]] = {}
+        self._told: dict[Side, tuple[BothEars, SideEstimate]] = {}
 
     def choose(self, **fields: Any) -> bool:
         """Change settings, fields of `EstimateSettings`; return whether they differ.
@@ -79,6 +80,9 @@ class PoseEstimator:
             check_option(method, "method", METHODS)
         check_option(settings.registration, "registration", REGISTRATIONS)
         check_option(settings.round_window, "round window", ROUND_WINDOWS)
+        for name in settings.midline:
+            if not is_skull_feature(name):
+                raise GpError(f"{name} is no skull feature", remedy="Name touched ones, such as S1, S4.")
         differs = settings != self.settings
         if differs:
             self.settings = settings
@@ -115,15 +119,18 @@ class PoseEstimator:
     def of_side(self, state: SpecimenState, side: Side) -> SideEstimate | None:
         """Return the estimate of a side; None without an atlas or with fewer than three touches.
 
-        Where that is chosen, and both ears were touched and agree, its axis is that of both.
+        Where both ears were touched, its poses say how the two agree; where that is chosen and they do, its
+        axis is that of both.
         """
         own = self._own(state, side)
-        if own is None or not self.settings.both_ears:
+        if own is None:
+            return None
+        compared, combined = self._compared(state, side, own), self.settings.both_ears
+        if compared.is_empty:
             return own
-        compared = self._compared(state, side, own)
-        made = self._joined.get(side)
+        made = self._told.get(side)
         if made is None or made[0] is not compared:
-            made = self._joined[side] = compared, compared.joined(own)
+            made = self._told[side] = compared, compared.told(own, combined=combined)
         return made[1]
 
     def ears(self, state: SpecimenState, side: Side) -> BothEars | None:

@@ -124,8 +124,11 @@ class PoseReport:
 
     def _both_ears(self) -> str:
         """Say how the two ears agree, and whether the axis is that of both."""
-        if self.ears is None or self.ears.comparison is None:
+        if self.ears is None or self.ears.is_empty:
             return ""
+        if self.ears.comparison is None:
+            text = f"The two ears cannot be compared: {self.ears.problem}"
+            return f'<p style="color:{_BAD}">{escape(text)}</p>'
         pose = self.estimate.poses.get("robust")
         joined = pose is not None and pose.of_both_ears
         text = "; ".join(self.ears.comparison.texts) + ("; the axis is that of both ears" if joined else "")

@@ -61,6 +61,7 @@ class Estimated:
             "method": self.pose.method,
             "side_state": self.pose.side_state,
             "names_state": self.pose.names_state,
+            "ears_agree": None if not self.pose.other_ear else not self.pose.ears_disagree,
             "shared_error_mm": self.pose.shared_error,
             "radius_95_mm": self.pose.radius_95,
             "cone_95_deg": float(np.degrees(self.pose.cone_95)),
@@ -101,7 +102,7 @@ class EstimateStep(Step):
     shared_error : float
         RMS length of one offset that all touches share, mm; it widens the 95 % region.
     accept_warnings : bool
-        Write files for a robot although side or names are in doubt.
+        Write files for a robot although side or names are in doubt, or the ears disagree.
     take_best : bool
         Where the other ear, or an exchange of two names, is likelier than what is given, take that; the pose
         is then of the side that was taken.

@@ -10,12 +10,14 @@ from panel_cases import PANEL_WIDTH, actions_of, cut_words, deliver
 from qtpy.QtCore import QPoint, Qt
 from scipy.spatial.transform import Rotation
 
-from gp_core import PROBE, Atlas, RigidTransform, Side, read_pose
+from gp_core import PROBE, Atlas, GpError, RigidTransform, Side, estimate_again, read_pose
 from gp_core.atlas.sampling import draw_animal
 from gp_labeler.document.touch_edits import RecordTouch
 from gp_labeler.document.touches import Touch, TouchHow
 from gp_labeler.jobs.runner import QueueDispatcher
+from gp_labeler.models.estimate import verdict_on
 from gp_labeler.models.pose_report import PoseReport
+from gp_labeler.models.pose_sending import PoseSending
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.pose.panel import PosePanel
 from gp_labeler.views.panels.pose.touch_table_model import NAME
@@ -103,9 +105,69 @@ def test_a_mistouch_is_named_and_no_axis_is_made_of_ears_that_disagree(workspace
     assert "RWP is 2." in notices(panel)
     assert "Touch RWP again on both ears" in notices(panel)
     assert "the axis is that of this ear alone" in notices(panel)
-    assert panel.result.verdict.label.text() == "Check first"
+    assert panel.result.verdict.label.text() == "Ears disagree"
     assert workspace.pose.ears.comparison.check.suspects[0] == "RWP"
     assert not workspace.pose.estimate.pose.of_both_ears
+    assert "nothing is sent to a robot" in notices(panel)
+
+
+def test_ears_that_disagree_hold_the_pose_back_from_files_and_robots(workspace, panel, tmp_path) -> None:
+    touch(workspace, L)
+    workspace.pose.choose(side=L)
+    workspace.pose.record_verdict("accept", by="AB")
+    touch(workspace, R, RWP=np.array([0, 0, 2.5]))
+    assert verdict_on(workspace.pose.estimate, workspace.document.state) == ""  # it was not known then
+    with pytest.raises(GpError, match="the two ears DISAGREE"):
+        workspace.pose.export(tmp_path / "pose.tfm")
+    read = read_pose(workspace.pose.export(tmp_path / "pose.json"))
+    assert read.ears_disagree
+    assert estimate_again(read).as_dict() == read.as_dict()
+    workspace.pose.record_verdict("accept", by="AB")
+    sending, held = PoseSending(), []
+    sending.held_back.connect(held.append)
+    sending.start(0, None, "T")
+    try:
+        sending.update(workspace.pose.estimate, workspace.document.state, (), None)
+    finally:
+        sending.stop()
+    assert held[0].startswith("the two ears DISAGREE")
+    touch(workspace, R)  # corrected
+    assert not workspace.pose.estimate.pose.ears_disagree
+    workspace.pose.record_verdict("accept", by="AB")
+    assert workspace.pose.export(tmp_path / "pose.tfm").exists()
+
+
+def test_ears_that_cannot_be_compared_hold_the_pose_back_too(workspace, panel, tmp_path) -> None:
+    touch(workspace, L)
+    for name, point in workspace.document.state.touched(L).as_mapping().items():
+        workspace.document.do(RecordTouch(R, name, Touch(tuple(point.tolist()), TouchHow.TYPED, "", "AB")))
+    deliver(workspace)
+    assert "The two ears cannot be compared: The touches of the two ears do not lie" in notices(panel)
+    assert workspace.pose.estimate.pose.ears_disagree
+    read = read_pose(workspace.pose.export(tmp_path / "pose.json"))
+    assert estimate_again(read).as_dict() == read.as_dict()
+
+
+def test_skull_features_of_the_mid_plane_are_typed_in_the_card(workspace, panel, qtbot) -> None:
+    field = panel.head.midline
+    assert not field.isVisible()
+    touch(workspace, L, skull=True)
+    touch(workspace, R, skull=True)
+    assert field.isVisible()
+    qtbot.keyClicks(field, "s1, S4")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert workspace.pose.settings.midline == ("S1", "S4")
+    assert field.text() == "S1, S4"
+    assert workspace.pose.ears.comparison.check.plane.codes[-2:] == ("S1", "S4")
+    field.selectAll()
+    qtbot.keyClicks(field, "OS")
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert workspace.pose.settings.midline == ("S1", "S4")
+    assert field.text() == "S1, S4"
+    field.clear()
+    qtbot.keyClick(field, Qt.Key.Key_Return)
+    assert workspace.pose.settings.midline == ()
+    assert list(cut_words(panel)) == []
 
 
 def test_a_head_that_moved_between_the_ears_is_brought_back_by_its_skull_features(workspace, panel) -> None:

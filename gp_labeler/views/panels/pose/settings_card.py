@@ -20,6 +20,7 @@ __all__ = ["EstimateSettingsCard"]
 _METHODS = {"robust": ("robust",), "jrmpc": ("jrmpc",), "both": ("robust", "jrmpc")}
 _SHARED = "Error common to all touches, mm"
 _EACH = "Touches of each feature"
+_MIDLINE = "Skull features in the mid-plane"
 _HINTS = {
     "robust": "Uses the names of the touches, and down-weights a wrong one",
     "jrmpc": "The published method; needs an atlas fitted here to labelled animals",
@@ -71,6 +72,13 @@ class EstimateSettingsCard(Card):
             "If both ears were touched in one frame and agree, the axis is estimated from both. CO is not "
             "changed"
         )
+        self.midline = QLineEdit()
+        self.midline.setAccessibleName(_MIDLINE)
+        self.midline.setPlaceholderText("none")
+        self.midline.setToolTip(
+            "Touched skull features that lie in the mid-plane of the head, such as S1, S4. They help to "
+            "determine the plane in which the two ears are compared"
+        )
         self.atlas = ElidedLabel()
         self.problem = text_label("", "warning", wrap=True)
         self.problem.setAccessibleName("Why the atlas chosen last time is not in use")
@@ -83,6 +91,7 @@ class EstimateSettingsCard(Card):
         self.shared.value_chosen.connect(lambda mm: self._choose(shared_error=mm))
         self.each.value_chosen.connect(lambda n: self._choose(touches_each=round(n)))
         self.ears.clicked.connect(lambda on: self._choose(both_ears=on))
+        self.midline.editingFinished.connect(self._choose_midline)
         do_action(self.to_atlas, actions["atlas.show"])
         self.specimen.editingFinished.connect(self._rename)
         do_action(self.new, actions["file.new"])
@@ -108,7 +117,11 @@ class EstimateSettingsCard(Card):
         atlas = self._workspace.atlas.current
         self.each.set_value(settings.touches_each)
         self.ears.setChecked(settings.both_ears)
-        self.ears.setEnabled(settings.both_ears or self._workspace.pose.ears is not None)
+        compared = self._workspace.pose.ears is not None
+        self.ears.setEnabled(settings.both_ears or compared)
+        self._in_plane.setVisible(compared or bool(settings.midline))
+        if not self.midline.isModified():
+            self.midline.setText(", ".join(settings.midline))
         self.atlas.set_words("loading…" if atlas is None else atlas.name)
         problem = self._workspace.atlas.problem
         self.problem.setText(breakable(f"{problem} The published atlas is used.") if problem else "")
@@ -144,9 +157,25 @@ class EstimateSettingsCard(Card):
         each.addWidget(text_label(_EACH, "hint"))
         each.addWidget(self.each)
         each.addStretch(1)
+        self._in_plane = QWidget()
+        in_plane = QHBoxLayout(self._in_plane)
+        in_plane.setContentsMargins(0, 0, 0, 0)
+        in_plane.setSpacing(6)
+        in_plane.addWidget(text_label(_MIDLINE, "hint"))
+        in_plane.addWidget(self.midline, 1)
         atlas.addWidget(self.atlas, 1)
         atlas.addWidget(self.to_atlas)
-        for what in (self._named, choices, noise, shared, each, self.ears, atlas, self.problem):
+        for what in (
+            self._named,
+            choices,
+            noise,
+            shared,
+            each,
+            self.ears,
+            self._in_plane,
+            atlas,
+            self.problem,
+        ):
             self.add(what)
 
     def _rename(self) -> None:
@@ -155,6 +184,12 @@ class EstimateSettingsCard(Card):
         if name != self._workspace.document.state.specimen:
             attempt(self._workspace, lambda: self._workspace.document.do(RenameSpecimen(name)))
             self.refresh()
+
+    def _choose_midline(self) -> None:
+        """Take the typed names; where they are none, say so and show the chosen ones again."""
+        self.midline.setModified(False)
+        names = self.midline.text().upper().replace(",", " ").replace(";", " ").split()
+        self._choose(midline=tuple(dict.fromkeys(names)))
 
     def _on_edited(self, text: str) -> None:
         if not text.strip():

@@ -112,7 +112,8 @@ def ear_notices(ears: BothEars | None, *, wanted: bool) -> Iterator[tuple[str, .
     if ears is None:
         return
     if ears.comparison is None:
-        yield ("warning", f"The two ears cannot be compared: {sentence(ears.problem)}")
+        problem = f"The two ears cannot be compared: {sentence(ears.problem)}"
+        yield ("warning", problem, "Nothing is sent to a robot until they can be.")
         return
     check, link = ears.comparison.check, ears.comparison.link
     apart = (
@@ -123,7 +124,8 @@ def ear_notices(ears: BothEars | None, *, wanted: bool) -> Iterator[tuple[str, .
         use = ". The axis is that of both" if wanted else ""
         yield ("info", f"The two ears agree: {apart}{use}.")
     else:
-        alone = " Until they agree, the axis is that of this ear alone." if wanted else ""
+        alone = " Until they agree, nothing is sent to a robot"
+        alone += ", and the axis is that of this ear alone." if wanted else "."
         yield ("warning", f"The two ears disagree: {_difference(check, apart)}.", _ear_remedy(check) + alone)
     if link is not None and link.has_moved:
         yield ("warning", sentence(link.text), "Fix the head or its marker before the next touches.")
