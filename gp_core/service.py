@@ -171,10 +171,10 @@ def _is_even(rows: list[Any]) -> bool:
 
 
 def _times(content: Mapping[str, Any]) -> dict[str, float] | None:
-    times = content.get("times_s")
-    if times is None:
+    if content.get("times_s") is None:
         return None
-    return {name: _number(_mapping(times, "times_s"), name, 0.0) for name in times}  # type: ignore[misc]
+    times = _mapping(content["times_s"], "times_s")
+    return {name: _number(times, name, 0.0) for name in times}  # type: ignore[misc]
 
 
 def _mapping(value: Any, name: str) -> dict[str, Any]:
@@ -203,7 +203,10 @@ def _number(content: Mapping[str, Any], key: str, default: float | None) -> floa
         return default
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise GpError(f"{key} must be a number, got {str(value)[:40]}")
-    return float(value)
+    try:
+        return float(value)
+    except OverflowError:
+        raise GpError(f"{key} is too large a number") from None
 
 
 def _flag(content: Mapping[str, Any], key: str) -> bool:

@@ -230,7 +230,7 @@ def run(args: argparse.Namespace) -> int:
     if held_back:
         say(f"  ! {_what_was_held_back(args, ambiguities)}")
     elif ambiguities:
-        say("  ! written although side or names are ambiguous: --accept-warnings was given")
+        say("  ! written in spite of these warnings: --accept-warnings was given")
     if given.pose is not None:
         say(f"  {_compared(pose, given.pose, args.touches)}")
     return HELD_BACK if held_back else 0
@@ -390,7 +390,7 @@ def _what_was_held_back(args: argparse.Namespace, ambiguities: Sequence[str]) ->
     what = f"not written: {' '.join(files)}, as {why}" if files else why
     if old := [file for file in files if Path(file).exists()]:
         what += f". Files of an earlier estimate are still there: {' '.join(old)}"
-    return f"{what}. Check side and names, or give --accept-warnings"
+    return f"{what}. Check side, names and touches, or give --accept-warnings"
 
 
 def _write(

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from os import PathLike
 from typing import Any
 
-from gp_core.errors import FeatureError, FileFormatError
+from gp_core.errors import FeatureError, FileFormatError, GpError
 from gp_core.frames import FRAMES
 from gp_core.io.text import shown
 from gp_core.landmarks.features import Side
@@ -154,9 +154,9 @@ def _side(value: object, file: str | PathLike[str]) -> Side | None:
 def _scan_evidence(value: object, file: str | PathLike[str]) -> ScanEvidence | None:
     try:
         return None if value is None else ScanEvidence.from_json(value)
-    except ValueError as error:
+    except GpError as error:
         raise FileFormatError(
-            f"its gpLabeler object has a wrong boneDistanceMm ({error})",
+            f"its gpLabeler object has a wrong boneDistanceMm ({error.problem})",
             file=file,
             remedy="Export the landmarks again, or remove the entry.",
         ) from None

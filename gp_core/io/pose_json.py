@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from datetime import datetime
 from os import PathLike
 from typing import Any
@@ -204,7 +205,7 @@ def _numbers(content: dict[str, Any], key: str, shape: tuple[int, ...]) -> Float
 
 
 def _number(value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
         raise GpError(f"expected a number, got {shown(value)}")
     return float(value)
 

@@ -50,7 +50,11 @@ class Measurement:
                 remedy="Such as Ruler 1.",
             )
         object.__setattr__(self, "name", name)
-        object.__setattr__(self, "points", tuple(_position(point, name) for point in self.points))
+        try:
+            points = tuple(self.points)
+        except TypeError:
+            raise GpError(f"the points of {name} must be positions, got {self.points!r:.60}") from None
+        object.__setattr__(self, "points", tuple(_position(point, name) for point in points))
         if len(self.points) not in KINDS.values():
             raise GpError(
                 f"{name} must have two points (a ruler) or three (an angle), got {len(self.points)}"

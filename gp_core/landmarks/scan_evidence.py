@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.argument_types import checks_arguments
+from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
 from gp_core.validation import FloatArray
 
@@ -138,7 +139,7 @@ class ScanEvidence:
 
         Raises
         ------
-        ValueError
+        GpError
             The content has another form.
         """
         try:
@@ -150,8 +151,8 @@ class ScanEvidence:
                 {code: _position(point["position"]) for code, point in points.items()},
                 None if content.get("threshold") is None else _number(content["threshold"]),
             )
-        except (KeyError, TypeError, AttributeError) as error:
-            raise ValueError(f"no distances from bone: {error}") from None
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+            raise GpError(f"no distances from bone: {error}") from None
 
 
 def _number(value: object) -> float:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from gp_core.argument_types import checks_arguments
+from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.atlas.atlas import Atlas
 from gp_core.constants import CHI2_3_95
 from gp_core.errors import GpError
@@ -82,6 +82,7 @@ class EarCheck:
     expected_pairs_mm: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         object.__setattr__(self, "expected_pairs_mm", MappingProxyType(dict(self.expected_pairs_mm)))
 
     @property

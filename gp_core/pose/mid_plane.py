@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
-from gp_core.argument_types import checks_arguments
+from gp_core.argument_types import check_fields, checks_arguments
 from gp_core.errors import GpError
 from gp_core.landmarks.features import CODES, EXTERNAL, Side, feature
 from gp_core.landmarks.sets import LandmarkSet
@@ -57,6 +57,7 @@ class MirrorPlane:
     rest_mm: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        check_fields(self)
         freeze_arrays(self)
         for name in ("pairs_mm", "rest_mm"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))

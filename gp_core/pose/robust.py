@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import compress
@@ -194,7 +195,7 @@ def touch_model(touches: LandmarkSet, atlas: Atlas, probe_noise: float | None) -
     GpError
         `probe_noise` is not a positive number.
     """
-    if probe_noise is not None and not (np.isfinite(probe_noise) and probe_noise > 0):
+    if probe_noise is not None and not (math.isfinite(probe_noise) and probe_noise > 0):
         raise GpError(f"probe noise must be a positive number of mm, got {probe_noise!r}")
     codes = touched_features(touches)
     usable = tuple(code for code in codes if code in atlas.codes)

@@ -8,6 +8,7 @@ The inner loops are compiled (`gp_core.registration.jrmpc_kernels`) and loaded o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
@@ -39,7 +40,7 @@ THREADS_FROM_WORK = 200_000
 
 def _is_number(value: Any, allowed: Callable[[float], bool]) -> bool:
     try:
-        return bool(np.isfinite(value) and allowed(value))
+        return math.isfinite(value) and allowed(value)
     except (TypeError, ValueError, OverflowError):
         return False
 
@@ -75,6 +76,9 @@ class JrmpcSettings:
             raise GpError(f"gamma must be a number from {_LEAST_GAMMA:g}, got {self.gamma!r}")
         if not _is_number(self.epsilon, lambda e: e >= 0):
             raise GpError(f"epsilon must be a number from 0, got {self.epsilon!r}")
+        object.__setattr__(self, "epsilon", float(self.epsilon))
+        if self.gamma is not None:
+            object.__setattr__(self, "gamma", float(self.gamma))
 
 
 DEFAULTS = JrmpcSettings()

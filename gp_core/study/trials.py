@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -111,5 +112,5 @@ def check_noise(noise: float) -> None:
     GpError
         It is not a number of mm from 0.
     """
-    if not (np.isfinite(noise) and noise >= 0):
+    if not (math.isfinite(noise) and noise >= 0):
         raise GpError(f"the noise must be 0 mm or more, got {noise!r}")

@@ -25,6 +25,7 @@ TOUCHES = {code: ATLAS[code] for code in PROBE}
 POSE = estimate_pose(TOUCHES, "L", ATLAS)
 SIDE = LandmarkSet.from_mapping(TOUCHES, "L", frame="tracker")
 PLANE = gp_core.MirrorPlane(np.array([0.0, 1.0, 0.0]), 0.0, 0.0, ("CL",), 1.0, 0.1)
+CHECK = gp_core.EarCheck(PLANE, 0.1, 1.0, 1.0, 10.0, 1.0)
 ANIMAL = draw_animal(ATLAS, rng=np.random.default_rng(0))
 OTHER = object()
 
@@ -33,6 +34,7 @@ ODD: dict[str, Any] = {
     "a number": 1.5,
     "not a number": np.nan,
     "beyond a float": 10**400,
+    "beyond a machine's integer": -(10**30),
     "a text": "x",
     "bytes": b"x",
     "numbers": [1, 2, 3],
@@ -101,6 +103,12 @@ CALLS: dict[str, Callable[[Any], Any]] = {
     "vectors": lambda x: POSE.transform_to_touches.apply_vector(x),
     "mirrored points": lambda x: PLANE.mirror(x),
     "mirrored direction": lambda x: PLANE.mirror_direction(x),
+    "points of a measurement": lambda x: gp_core.Measurement("Ruler 1", x),
+    "scan evidence": lambda x: gp_core.ScanEvidence.from_json(x),
+    "pairs of a plane": lambda x: replace(PLANE, pairs_mm=x),
+    "expected pairs": lambda x: replace(CHECK, expected_pairs_mm=x),
+    "epsilon": lambda x: gp_core.JrmpcSettings(epsilon=-1 if isinstance(x, float) else x),
+    "gamma": lambda x: gp_core.JrmpcSettings(gamma=-1 if x is None or isinstance(x, float) else x),
     "held_out": lambda x: gp_core.leave_one_out([ANIMAL] * 3, held_out=[] if x is None else x),
 }
 
@@ -110,6 +118,9 @@ _FINE = {
     ("probe_noise", "a number"),
     ("shared_error", "a number"),
     ("times", "a number"),
+    ("times", "beyond a machine's integer"),
+    ("epsilon", "an array of no dimension"),
+    ("gamma", "an array of no dimension"),
     ("extra", "numbers"),
     ("position", "numbers"),
     ("unseen", "a mapping of nothing"),  # gone through, it is a list of codes
@@ -117,6 +128,7 @@ _FINE = {
     ("rows of an atlas", "a mapping of nothing"),
     ("features of a labelling error", "a mapping of nothing"),
     ("suggestion", "a number"),
+    ("suggestion", "beyond a machine's integer"),
     ("suggestion", "an array of no dimension"),
     ("radius", "a number"),
     ("radius", "an array of no dimension"),

@@ -122,6 +122,8 @@ GOOD: dict[str, Any] = {"side": "L", "touches": {"CL": [1, 2, 3], "MN": [9, 2, 3
         ({**GOOD, "method": "magic"}, "method must be one of"),
         ({**GOOD, "method": "jrmpc"}, "labelled specimens"),
         ({**GOOD, "shared_error_mm": "a"}, "must be a number"),
+        ({**GOOD, "probe_noise_mm": 10**400}, "too large a number"),
+        ({**GOOD, "times_s": 3}, "times_s must be a JSON object"),
         ({**GOOD, "shared_error_mm": 1e9}, "shared error must be"),
         ({**GOOD, "probe_noise_mm": True}, "must be a number"),
         ({**GOOD, "times_s": [1]}, "times_s must be"),
