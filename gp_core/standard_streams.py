@@ -46,6 +46,7 @@ _MAGIC = (
     (b"ObjectType", ".mha"),
     (b"NDims", ".mha"),
 )
+_TOML = re.compile(r"(?:#[^\n]*\n|\s)*(?:\[\[?\s*[A-Za-z_]|[A-Za-z_]+\s*=)")
 _NUMBERS = re.compile(r"[-+0-9.eE\s]+")
 
 
@@ -210,6 +211,8 @@ def _text_kind(head: bytes) -> str:
     text = head.decode("utf-16" if utf16 else "utf-8-sig", errors="ignore").lstrip()
     if "\0" in text or not text:
         raise _unknown()
+    if _TOML.match(text):
+        return ".toml"
     if text[0] in "{[":
         return ".mrk.json" if '"markups"' in text or "markups-schema" in text else ".json"
     if text.startswith("#") and ("Markups fiducial" in text or "CoordinateSystem" in text):

@@ -59,7 +59,7 @@ _ENDINGS = {
 _READ = (
     *("touches", "specimens", "atlas", "recording", "poses", "ct_landmarks", "bone", "path", "names", "tip"),
     "other_ear",
-    *("left", "right", "labelling_error"),
+    *("left", "right", "labelling_error", "physical"),
 )
 """Options and arguments whose files are read."""
 

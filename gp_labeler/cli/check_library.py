@@ -10,6 +10,7 @@ from pathlib import Path
 
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, write_text
+from gp_core.standard_streams import standard_streams
 from gp_labeler.cli.propose import add_library_options, library_of, prepare
 
 __all__ = ["make_check_library_parser", "run_check_library"]
@@ -60,6 +61,11 @@ def run_check_library(arguments: Sequence[str]) -> int:
         The labelled scans cannot be read, or there are fewer than three.
     """
     args = make_check_library_parser().parse_args(arguments)
+    with standard_streams(args, {"json": ".json", "pictures": ".pdf"}, ("labelled",)):
+        return _check(args)
+
+
+def _check(args: argparse.Namespace) -> int:
     from gp_core.study.parallel import open_executor  # here: `--help` need not wait
     from gp_labeler.autolabel.cross_check import check_predictions, require_enough
     from gp_labeler.autolabel.registration import COARSER, engine_named

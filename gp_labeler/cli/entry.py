@@ -10,6 +10,7 @@ from pathlib import Path
 from gp_core import __version__
 from gp_core.command_line import CommandParser, add_completion
 from gp_core.errors import GpError
+from gp_core.standard_streams import STANDARD
 from gp_core.terminal import leave_output, plain_terminal
 from gp_labeler.cli.subcommands import SUBCOMMANDS, with_subcommands
 from gp_labeler.system.installation import explain_import
@@ -131,6 +132,10 @@ def _window(args: argparse.Namespace) -> int:
         from gp_labeler.scripting.command import run_offscreen
 
         return run_offscreen(args.offscreen, args.output, args.specimens)
+    if str(args.path) == STANDARD:
+        raise GpError(
+            "the window opens files by name, not from a stream", remedy="Give a path in place of -."
+        )
     if args.path is not None and not args.path.exists():
         raise GpError(
             "does not exist", file=args.path, remedy="Give a scan, a folder of slices or a specimen."

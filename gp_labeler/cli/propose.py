@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs
 from gp_core.errors import GpError
+from gp_core.standard_streams import standard_streams
 from gp_labeler.cli.mesh import add_import_options, import_options
 
 if TYPE_CHECKING:
@@ -104,6 +105,11 @@ def run_propose(arguments: Sequence[str]) -> int:
         An option is wrong, or the labelled scans cannot be read.
     """
     args = make_propose_parser().parse_args(arguments)
+    with standard_streams(args, {}, ("volumes", "like", "points"), folders=("output",)):
+        return _propose(args)
+
+
+def _propose(args: argparse.Namespace) -> int:
     from gp_core.study.parallel import open_executor, run_map  # here: `--help` need not wait
     from gp_labeler.autolabel.head_run import HeadRun
     from gp_labeler.autolabel.registration import engine_named

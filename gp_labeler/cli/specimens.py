@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from gp_core.command_line import CommandParser
 from gp_core.disk import protected_inputs, write_text
 from gp_core.landmarks.features import Side
+from gp_core.standard_streams import standard_streams
 
 if TYPE_CHECKING:
     from gp_labeler.document.specimen_list import ListedSpecimen
@@ -58,6 +59,11 @@ def run_list(arguments: Sequence[str]) -> int:
         A folder does not exist, or the file cannot be written.
     """
     args = make_list_parser().parse_args(arguments)
+    with standard_streams(args, {"json": ".json"}, ("places",)):
+        return _list(args)
+
+
+def _list(args: argparse.Namespace) -> int:
     from gp_labeler.document.specimen_list import (  # here: `--help` need not wait
         list_specimens,
         progress_text,
@@ -119,6 +125,11 @@ def run_contact_sheet(arguments: Sequence[str]) -> int:
         There are no specimens, none could be opened, or a file cannot be written.
     """
     args = make_contact_sheet_parser().parse_args(arguments)
+    with standard_streams(args, {"output": ".pdf"}, ("specimens",)):
+        return _make_sheets(args)
+
+
+def _make_sheets(args: argparse.Namespace) -> int:
     from gp_core.errors import GpError
     from gp_labeler.document.specimen_list import specimen_files
     from gp_labeler.jobs.contact_sheet import MakeContactSheets

@@ -79,8 +79,15 @@ class Script:
         return make_script(_replaced(self.tables, name), name=self.name, folder=self.folder, file=self.file)
 
 
-def read_script(path: str | PathLike[str]) -> Script:
+def read_script(path: str | PathLike[str], *, shown_as: str | None = None) -> Script:
     """Read a script, ``.toml`` (``[[step]]`` tables) or ``.json`` (a list, or ``{"step": [...]}``).
+
+    Parameters
+    ----------
+    path : path-like
+        The file.
+    shown_as : str, optional
+        What messages call it; by default its path.
 
     Raises
     ------
@@ -89,12 +96,12 @@ def read_script(path: str | PathLike[str]) -> Script:
     StepError
         One of its steps is not one.
     """
-    file = Path(path)
+    file = Path(path if shown_as is None else shown_as)
     try:
-        text = read_bytes(file, what="script").decode()
+        text = read_bytes(path, what="script").decode()
     except UnicodeDecodeError:
         raise GpError("is not a text file", file=file, remedy="Scripts are TOML or JSON.") from None
-    content = _parsed(text, file)
+    content = _parsed(text, Path(path), file)
     if isinstance(content, list):
         content = {"step": content}
     if not isinstance(content, dict) or not isinstance(content.get("step"), list):
@@ -107,7 +114,7 @@ def read_script(path: str | PathLike[str]) -> Script:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise GpError(f"specimens must be a list of texts, got {names!r:.60}", file=file)
     return make_script(
-        content["step"], name=file.stem, folder=file.absolute().parent, specimens=names, file=file
+        content["step"], name=file.stem, folder=Path(path).absolute().parent, specimens=names, file=file
     )
 
 
@@ -151,16 +158,16 @@ def _is_step(kind: object) -> bool:
     return isinstance(kind, type) and issubclass(kind, Step)
 
 
-def _parsed(text: str, file: Path) -> Any:
+def _parsed(text: str, path: Path, file: Path) -> Any:
     try:
-        if file.suffix.lower() == ".json":
+        if path.suffix.lower() == ".json":
             return json.loads(text)
         toml = importlib.import_module("tomllib" if sys.version_info >= (3, 11) else "tomli")
         return toml.loads(text)
     except ImportError:
         raise GpError("TOML needs Python 3.11", file=file, remedy="Write the script as JSON.") from None
     except (ValueError, RecursionError) as error:
-        kind = "JSON" if file.suffix.lower() == ".json" else "TOML"
+        kind = "JSON" if path.suffix.lower() == ".json" else "TOML"
         raise GpError(f"is not {kind}: {error}", file=file) from None
 
 
