@@ -16,13 +16,13 @@ import os
 import re
 import stat
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from gp_core.errors import AlreadyExistsError, FileFormatError, GpError
+from gp_core.errors import AlreadyExistsError, FileFormatError, GpError, blaming
 from gp_core.terminal import printable
 
 try:
@@ -39,6 +39,7 @@ __all__ = [
     "is_stream",
     "make_folder",
     "make_room",
+    "parse_json",
     "protect",
     "protected_inputs",
     "read_bytes",
@@ -181,13 +182,53 @@ def read_json(path: AnyPath, *, what: str = "file", remedy: str | None = None) -
     Raises
     ------
     FileFormatError
-        As for `read_bytes`, or the file is not JSON.
+        As for `read_bytes`, the file is not JSON, or gives a name twice.
     """
     content = read_bytes(path, what=what)
     try:
-        return json.loads(content)
+        with blaming(path):
+            return parse_json(content)
     except (ValueError, RecursionError):
         raise FileFormatError("is not JSON: damaged or cut off", file=path, remedy=remedy) from None
+
+
+def parse_json(
+    text: str | bytes,
+    *,
+    parse_constant: Callable[[str], Any] | None = None,
+    remedy: str = "Keep one of them.",
+) -> Any:
+    """Parse JSON in which no object gives a name twice: of two values, Python would silently take the last.
+
+    Parameters
+    ----------
+    text : str or bytes
+        The content of a file, or of a request.
+    parse_constant : callable, optional
+        Called with ``NaN`` and the like; by default they are taken.
+    remedy : str
+        What to do about a name that is given twice.
+
+    Returns
+    -------
+    object
+        The parsed content.
+
+    Raises
+    ------
+    FileFormatError
+        A name is given twice. A `ValueError` or a `RecursionError` means that it is not JSON.
+    """
+
+    def once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found = dict(pairs)
+        if len(found) < len(pairs):
+            names = [name for name, _ in pairs]
+            twice = next(name for name in names if names.count(name) > 1)
+            raise FileFormatError(f"{twice[:40]!r} is given twice", remedy=remedy)
+        return found
+
+    return json.loads(text, parse_constant=parse_constant, object_pairs_hook=once)
 
 
 def _check_kind(status: os.stat_result, path: AnyPath, what: str, max_bytes: int) -> None:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.atlas.atlas import Atlas
+from gp_core.disk import parse_json
 from gp_core.errors import GpError
 from gp_core.io.file_names import named_side
 from gp_core.io.pose_export import pose_text
@@ -409,22 +410,14 @@ def _error(problem: str, **about: str) -> str:
 def _parsed(body: bytes) -> Any:
     """Parse a request; names that are given twice, and numbers that are none, are refused."""
     try:
-        return json.loads(body.decode("utf-8-sig"), parse_constant=_no_number, object_pairs_hook=_once)
+        return parse_json(
+            body.decode("utf-8-sig"),
+            parse_constant=_no_number,
+            remedy="Give all touches of a feature as one list of positions.",
+        )
     except (ValueError, RecursionError):
         raise GpError("the request is not JSON", remedy="Send one JSON object in UTF-8.") from None
 
 
 def _no_number(word: str) -> float:
     raise GpError(f"{word} is not a JSON number", remedy="Leave out what was not seen.")
-
-
-def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
-        names = [name for name, _ in pairs]
-        twice = next(name for name in names if names.count(name) > 1)
-        raise GpError(
-            f"{twice[:40]!r} is given twice",
-            remedy="Give all touches of a feature as one list of positions.",
-        )
-    return found

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from os import PathLike
 from pathlib import Path
 
-from gp_core.errors import FeatureError, FileFormatError
+from gp_core.disk import parse_json
+from gp_core.errors import FeatureError, FileFormatError, blaming
 from gp_core.io.table import read_rows
 from gp_core.io.text import of_csv_cell
 from gp_core.io.text_files import read_text
@@ -53,7 +53,8 @@ def read_lab_names(path: str | PathLike[str]) -> LabelNames:
 
 def _json_pairs(path: str | PathLike[str]) -> list[tuple[str, str]]:
     try:
-        content = json.loads(read_text(path))
+        with blaming(path):
+            content = parse_json(read_text(path))
     except (ValueError, RecursionError) as error:
         raise FileFormatError(f"is not JSON ({error})", file=path, remedy=_FORM) from None
     if not isinstance(content, dict) or not all(isinstance(code, str) for code in content.values()):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from datetime import datetime
 from os import PathLike
@@ -12,8 +11,8 @@ import numpy as np
 
 from gp_core.argument_types import checks_arguments
 from gp_core.constants import METHODS
-from gp_core.disk import read_head
-from gp_core.errors import FileFormatError, GpError
+from gp_core.disk import parse_json, read_head
+from gp_core.errors import FileFormatError, GpError, blaming
 from gp_core.extensions import added_names
 from gp_core.frames import FRAMES, RigidTransform
 from gp_core.io.pose_inputs_json import inputs_from
@@ -88,7 +87,8 @@ def is_pose_file(path: str | PathLike[str]) -> bool:
 
 def _load(path: str | PathLike[str]) -> dict[str, Any]:
     try:
-        content = json.loads(read_text(path))
+        with blaming(path):
+            content = parse_json(read_text(path))
     except (ValueError, RecursionError):
         raise FileFormatError("is not JSON: damaged or cut off", file=path, remedy=_REMEDY) from None
     if not isinstance(content, dict) or "gpPose" not in content:

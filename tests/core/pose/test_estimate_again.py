@@ -20,6 +20,7 @@ import gp_core
 from gp_core import PROBE, Atlas, CochleaPose, GpError, LandmarkSet, estimate_again, estimate_pose, read_pose
 from gp_core.cli.entry import main
 from gp_core.errors import FileFormatError
+from gp_core.io.lab_names import read_lab_names
 from gp_core.landmarks.sets import Specimen
 
 
@@ -167,3 +168,22 @@ def _is_near(one: Any, other: Any) -> bool:
     if isinstance(one, float):
         return bool(abs(one - other) <= 1e-9)
     return bool(one == other)
+
+
+@pytest.mark.parametrize("kind", ["pose", "atlas", "names"])
+def test_a_name_that_a_json_file_gives_twice_is_refused(
+    kind: str, animals: list[Specimen], tmp_path: Path
+) -> None:
+    file = tmp_path / f"{kind}.json"
+    read: Any = {"pose": read_pose, "atlas": Atlas.load, "names": read_lab_names}[kind]
+    name = {"pose": "MN", "atlas": "features", "names": "mallear notch"}[kind]
+    if kind == "pose":
+        estimate_pose(_touches("L", animals[0]), "L").save(file)
+    elif kind == "atlas":
+        Atlas.published().save(file)
+    else:
+        file.write_text('{"mallear notch": "MN"}')
+    read(file)
+    file.write_text(file.read_text().replace(f'"{name}":', f'"{name}": 0, "{name}":', 1))
+    with pytest.raises(FileFormatError, match=f"{kind}.json: '{name}' is given twice"):
+        read(file)
