@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from os import PathLike
 from pathlib import Path
@@ -63,6 +63,8 @@ class ListedSpecimen:
         Why it cannot be read; empty where it can.
     is_begun : bool
         Whether there is a specimen file.
+    stamp : (int, int)
+        Time of the last change of the file, ns, and its size: a file with the same is not read again.
     """
 
     path: Path
@@ -82,6 +84,7 @@ class ListedSpecimen:
     state: SpecimenState | None = None
     problem: str = ""
     is_begun: bool = True
+    stamp: tuple[int, int] = (0, 0)
 
     def done(self, side: Side) -> int:
         """Return how many features of a side are placed, computed or cannot be seen."""
@@ -145,7 +148,10 @@ def progress_text(rows: Collection[ListedSpecimen]) -> str:
 
 
 def list_specimens(
-    places: Iterable[str | PathLike[str]], tell: Callable[[float], object] = lambda fraction: None
+    places: Iterable[str | PathLike[str]],
+    tell: Callable[[float], object] = lambda fraction: None,
+    *,
+    known: Iterable[ListedSpecimen] = (),
 ) -> list[ListedSpecimen]:
     """Read the specimen files in some folders, and find the scans that have none.
 
@@ -155,17 +161,19 @@ def list_specimens(
         Folders, and specimen files.
     tell : callable
         Receives the fraction done, and may raise to stop.
+    known : iterable of ListedSpecimen
+        What was read before: files that have not changed since are not read again.
 
     Returns
     -------
     list of ListedSpecimen
         One for each file, and for each scan that none of them is of; a file that cannot be read says why.
     """
-    places = list(places)
+    places, before = list(places), {row.path: row for row in known}
     files, found = specimen_files(places), []
     for n, file in enumerate(files):
         tell(n / len(files))
-        found.append(_listed(file))
+        found.append(_listed(file, before.get(file)))
     found += _not_begun(places, found)
     return sorted(found, key=lambda row: natural_key(str(row.path)))
 
@@ -221,12 +229,17 @@ def _entries(folder: Path) -> list[Path]:
         raise GpError(f"cannot be searched ({error.strerror})", file=folder) from None
 
 
-def _listed(file: Path) -> ListedSpecimen:
+def _listed(file: Path, known: ListedSpecimen | None) -> ListedSpecimen:
     name = file.name.removesuffix(SUFFIX)
     try:
+        status = file.stat()
+        stamp = status.st_mtime_ns, status.st_size
+        if known is not None and known.stamp == stamp and known.state is not None:
+            there = _scan_is_there(known.state)
+            return known if there is known.scan_is_there else replace(known, scan_is_there=there)
         document = read_document(file)
         state = state_in(document, file)
-        changed = datetime.fromtimestamp(file.stat().st_mtime, timezone.utc).isoformat(timespec="seconds")
+        changed = datetime.fromtimestamp(status.st_mtime, timezone.utc).isoformat(timespec="seconds")
     except GpError as error:
         return ListedSpecimen(file, name, problem=error.problem)
     except OSError as error:
@@ -245,11 +258,17 @@ def _listed(file: Path) -> ListedSpecimen:
         changed=changed,
         notes=state.notes,
         scan="" if volume is None else volume.name,
-        scan_is_there=volume is not None and (volume.path is None or Path(volume.path).exists()),
+        scan_is_there=_scan_is_there(state),
         n_notes=sum(bool(mark.note) or mark.certainty == "guess" for mark in state.landmarks.values()),
         thumbnail=thumbnail_in(document),
         state=state,
+        stamp=stamp,
     )
+
+
+def _scan_is_there(state: SpecimenState) -> bool:
+    volume = state.volume
+    return volume is not None and (volume.path is None or Path(volume.path).exists())
 
 
 def _labellings(state: SpecimenState) -> tuple[str, ...]:

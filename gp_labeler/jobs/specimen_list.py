@@ -19,14 +19,23 @@ __all__ = ["CountProblems", "ExportSpecimens", "ListSpecimens"]
 
 @dataclass(frozen=True)
 class ListSpecimens:
-    """Read the specimen files of folders."""
+    """Read the specimen files of folders.
+
+    Parameters
+    ----------
+    folders : tuple of Path
+        Folders, and specimen files.
+    known : tuple of ListedSpecimen
+        What was read before; only files that have changed are read again.
+    """
 
     folders: tuple[Path, ...]
+    known: tuple[ListedSpecimen, ...] = ()
     title = "Reading the list of specimens"
 
     def run(self, progress: Progress) -> list[ListedSpecimen]:
         """Read them."""
-        return list_specimens(self.folders, progress)
+        return list_specimens(self.folders, progress, known=self.known)
 
 
 @dataclass(frozen=True, eq=False)

@@ -66,8 +66,12 @@ class SpecimenListModel:
         self.folders = self._recalled()
         self._every: tuple[ListedSpecimen, ...] = ()
         self._problems: Mapping[Path, int] = {}
+        self._counted: Mapping[Path, ListedSpecimen] = {}
+        self._counted_by: tuple[object, object] = (None, None)
         self.words, self.kind = "", FILTERS[0]
         document.saved.connect(self._on_saved)
+        for signal in (atlas.changed, atlas.details_changed):
+            signal.connect(self._on_atlas_changed)
 
     @property
     def every(self) -> tuple[ListedSpecimen, ...]:
@@ -126,7 +130,7 @@ class SpecimenListModel:
             if task.key == _LISTING:
                 task.cancel()
         there = tuple(folder for folder in self.folders if folder.exists())
-        self._jobs.submit(ListSpecimens(there), self._take, key=_LISTING)
+        self._jobs.submit(ListSpecimens(there, self._every), self._take, key=_LISTING)
 
     def show(self, *, words: str | None = None, kind: str | None = None) -> None:
         """Filter the list by words, or by one of `FILTERS`."""
@@ -223,16 +227,26 @@ class SpecimenListModel:
 
     def _take(self, rows: list[ListedSpecimen]) -> None:
         self._every = tuple(rows)
-        self._problems = {path: n for path, n in self._problems.items() if any(r.path == path for r in rows)}
+        there = {row.path for row in rows}
+        self._problems = {path: n for path, n in self._problems.items() if path in there}
         self.changed.emit()
-        if self._atlas.check is not None:
-            self._jobs.submit(
-                CountProblems(self._every, self._atlas.check), self._take_problems, key=_LISTING
-            )
+        self._count_problems()
 
-    def _take_problems(self, problems: Mapping[Path, int]) -> None:
-        self._problems = problems
-        self.changed.emit()
+    def _count_problems(self) -> None:
+        """Check the labels of the rows that were read since, or of all where the atlas is another one."""
+        rows = self._every
+        if self._atlas.check is None or not rows:
+            return
+        by = self._atlas.current, self._atlas.labelling_error
+        known = self._counted if by == self._counted_by else {}
+        changed = tuple(row for row in rows if known.get(row.path) is not row)
+
+        def take(problems: Mapping[Path, int]) -> None:
+            self._counted, self._counted_by = {row.path: row for row in rows}, by
+            self._problems = {**self._problems, **problems}
+            self.changed.emit()
+
+        self._jobs.submit(CountProblems(changed, self._atlas.check), take, key=_LISTING)
 
     def _take_sheets(self, made: SheetsMade) -> None:
         for file in made.files:
@@ -241,6 +255,10 @@ class SpecimenListModel:
 
     def _tell(self, lines: tuple[str, ...]) -> None:
         self._messages.say("  ".join(lines), "info" if len(lines) == 1 else "warning")
+
+    def _on_atlas_changed(self) -> None:
+        if self._counted_by != (self._atlas.current, self._atlas.labelling_error):
+            self._count_problems()
 
     def _on_saved(self, file: Path) -> None:
         if any(row.path == file for row in self._every) or any(f in file.parents for f in self.folders):

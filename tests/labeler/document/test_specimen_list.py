@@ -102,6 +102,38 @@ def test_scans_that_nobody_has_begun_are_listed_by_their_names(folder, workspace
     assert model.text == "6 of 11 specimens, 2 finished, 6 not begun"
 
 
+def test_only_what_has_changed_is_read_and_checked_again(folder, workspace):
+    before = list_specimens([folder])
+    file = folder / "GP10.gpspecimen.json"
+    write_specimen(file, replace(read_specimen(file), notes="a broken bulla"))
+    (folder / "GP20.gpspecimen.json").write_bytes(file.read_bytes())
+    after = list_specimens([folder], known=before)
+    kept = [row.path for row in after if any(row is each for each in before)]
+    assert {path.name for path in kept} == {"GP0.gpspecimen.json", "GP1.gpspecimen.json"}
+    assert {row.path.name: row.notes for row in after}["GP10.gpspecimen.json"] == "a broken bulla"
+    assert [replace(row, stamp=(0, 0)) for row in after if row.is_begun] == [
+        replace(row, stamp=(0, 0)) for row in list_specimens([folder]) if row.is_begun
+    ]
+    model = workspace.specimens
+    model.add(folder)
+    deliver(workspace)
+    assert {model.n_problems(row) for row in model.every} == {None}
+    workspace.atlas.load()  # later than the list, it checks what is there
+    deliver(workspace)
+    counted = {row.path: model.n_problems(row) for row in model.every if not row.problem}
+    state = read_specimen(file)
+    moved = {key: replace(mark, position=(0.0, 0.0, 0.0)) for key, mark in state.landmarks.items()}
+    some = {key: moved[key] if n == 0 else mark for n, (key, mark) in enumerate(state.landmarks.items())}
+    write_specimen(file, replace(state, landmarks=some))
+    model.refresh()
+    deliver(workspace)
+    now = {row.path: model.n_problems(row) for row in model.every if not row.problem}
+    assert now[file] > counted[file]
+    assert {path: n for path, n in now.items() if path != file} == {
+        path: n for path, n in counted.items() if path != file
+    }
+
+
 def test_hundreds_of_specimens_take_seconds(folder):
     content = (folder / "study" / "GP0.gpspecimen.json").read_bytes()
     many = folder / "many"

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from panel_cases import cut_words, deliver
-from qtpy.QtCore import Qt
+from qtpy.QtCore import QPoint, Qt
 from repeated_cases import write_repeated
 
 from gp_labeler.document.specimen_file import read_specimen, write_specimen
@@ -81,6 +81,27 @@ def test_words_and_the_box_filter_it(dialog, qtbot):
     dialog.kind.setCurrentText("With notes")
     assert cells(dialog, 1) == []
     assert not dialog.export.isEnabled()
+
+
+def test_a_click_on_a_header_sorts_it(dialog, qtbot):
+    header = dialog.table.horizontalHeader()
+
+    def click(column):
+        at = QPoint(header.sectionViewportPosition(column) + 8, header.height() // 2)
+        qtbot.mouseClick(header.viewport(), Qt.MouseButton.LeftButton, pos=at)
+
+    click(2)
+    assert cells(dialog, 1) == ["damaged", "GP0", "GP1", "GP2"]
+    click(2)
+    assert cells(dialog, 2) == ["20/20", "20/20", "7/20", "\N{EN DASH}"]
+    qtbot.keyClicks(dialog.search, "cd")  # the filter keeps the order
+    assert cells(dialog, 1) == ["GP1", "GP2", "GP0"]
+    click(1)
+    assert cells(dialog, 1) == ["GP0", "GP1", "GP2"]
+    for column in (4, 5, 6, 7):
+        click(column)
+        assert len(cells(dialog, 1)) == 3
+    assert list(cut_words(dialog)) == []
 
 
 def test_rows_and_the_next_unfinished_open(dialog, folder, qtbot):

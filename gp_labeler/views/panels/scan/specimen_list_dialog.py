@@ -96,6 +96,8 @@ class SpecimenListDialog(QDialog):
         header.setDefaultAlignment(Qt.AlignmentFlag.AlignLeft | Qt.AlignmentFlag.AlignVCenter)
         header.setResizeContentsPrecision(50)  # hundreds of rows are not all measured
         header.setSectionResizeMode(len(COLUMNS) - 1, QHeaderView.ResizeMode.Stretch)
+        header.setSortIndicator(-1, Qt.SortOrder.AscendingOrder)  # in the order of the files, until asked
+        self.table.setSortingEnabled(True)
         self.table.activated.connect(self._open_row)
 
     def _make_filter(self) -> None:

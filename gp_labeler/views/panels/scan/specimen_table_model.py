@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from qtpy.QtCore import QAbstractTableModel, QModelIndex, QObject, QPersistentModelIndex, QSize, Qt
 from qtpy.QtGui import QFont, QPixmap
 
+from gp_core.io.file_names import natural_key
 from gp_core.landmarks.features import Side
 from gp_labeler.document.specimen_list import SIDE_TOTAL, ListedSpecimen
 from gp_labeler.imaging.thumbnail import THUMBNAIL_SIZE
@@ -46,6 +49,7 @@ class SpecimenTableModel(QAbstractTableModel):
         super().__init__(parent)
         self._workspace = workspace
         self.rows: tuple[ListedSpecimen, ...] = ()
+        self._column, self._descending = -1, False
         self._pixmaps: dict[bytes, QPixmap] = {}
         follow(self, workspace.specimens.changed, self.refresh)
         follow(self, workspace.document.reset, self.refresh)
@@ -54,8 +58,19 @@ class SpecimenTableModel(QAbstractTableModel):
     def refresh(self, *_: object) -> None:
         """Read the list again."""
         self.beginResetModel()
-        self.rows = self._workspace.specimens.rows
+        self.rows = self._sorted(self._workspace.specimens.rows)
         self.endResetModel()
+
+    def sort(self, column: int, order: Qt.SortOrder = Qt.SortOrder.AscendingOrder) -> None:  # noqa: D102
+        self._column, self._descending = column, order == Qt.SortOrder.DescendingOrder
+        self.refresh()
+
+    def _sorted(self, rows: tuple[ListedSpecimen, ...]) -> tuple[ListedSpecimen, ...]:
+        """Return rows by the chosen column; within equal ones, and without a column, in the list's order."""
+        if self._column < 0:
+            return rows
+        key = partial(_sort_key, self._workspace.specimens.n_problems, self._column)
+        return tuple(sorted(rows, key=key, reverse=self._descending))
 
     def rowCount(self, parent: Index = QModelIndex()) -> int:  # noqa: B008, D102, N802 - Qt's
         return 0 if parent.isValid() else len(self.rows)
@@ -118,6 +133,18 @@ class SpecimenTableModel(QAbstractTableModel):
         noted = f"{row.n_notes} noted" if row.n_notes else ""
         lost = "" if row.scan_is_there else "scan not found" if row.scan else "no scan"
         return "; ".join(filter(None, (" ".join(row.notes.split()), noted, lost)))
+
+
+def _sort_key(n_problems: Callable[[ListedSpecimen], int | None], column: int, row: ListedSpecimen) -> Any:
+    """Return what rows are ordered by: numbers as numbers, names with theirs, times as times."""
+    if column in (2, 3):
+        side = tuple(Side)[column - 2]
+        return row.done(side), row.suggested.get(side, 0)
+    if column == 4:
+        n = n_problems(row)
+        return -1 if n is None else n
+    texts = {1: row.specimen, 5: _labellings(row), 6: row.changed, 7: row.problem or row.notes}
+    return natural_key(texts.get(column, ""))
 
 
 def _labellings(row: ListedSpecimen) -> str:
