@@ -20,6 +20,9 @@ from gp_labeler.imaging.progress import Report
 __all__ = ["Agreement", "agreement_of", "clipped_distances", "refined_by_points", "search_planes"]
 
 _N_NORMALS, _N_POINTS = 320, 1200
+_N_LIKELY, _N_FEW_POINTS = 90, 300
+"""All normals are scored with few points, and the likeliest again with all."""
+
 _REACH, _STEP = 0.6, 0.45
 """How far from the centroid planes are tried (in radii), and how densely (in clipping distances)."""
 
@@ -97,24 +100,38 @@ def clipped_distances(bone: Bone, clip: float) -> tuple[NDArray[np.float32], NDA
 
 def _scored_on_grid(bone: Bone, report: Report) -> list[MidPlane]:
     clip = bone.radius / _CLIP
-    field, size = clipped_distances(bone, clip)
-    points = bone.points[:_N_POINTS]
-    index = bone.scan.indices(points) + 1.0
+    field = clipped_distances(bone, clip)
     offsets = np.arange(-_REACH * bone.radius, _REACH * bone.radius + 1e-9, _STEP * clip)
-    scored = []
     normals = _hemisphere(_N_NORMALS)
-    for n, normal in enumerate(normals):
-        if n % 32 == 0:
-            report(n / len(normals))
-        heights = (points - bone.centre) @ normal
-        step = bone.scan.T_index_scan[:3, :3] @ normal
-        at = np.rint(index - 2 * (heights - offsets[:, None])[..., None] * step).astype(np.intp)
-        i, j, k = np.moveaxis(np.clip(at, 0, size - 1), -1, 0)
-        score = field[(k * size[1] + j) * size[0] + i].mean(axis=1)
-        best = int(score.argmin())
-        scored.append((float(score[best]), MidPlane.through(bone.centre + offsets[best] * normal, normal)))
+    first = [_best_offset(bone, normal, offsets, field, _N_FEW_POINTS)[0] for normal in normals]
+    report(0.4)
+    scored = []
+    for n in np.argsort(first)[:_N_LIKELY]:
+        score, offset = _best_offset(bone, normals[n], offsets, field, _N_POINTS)
+        scored.append((score, MidPlane.through(bone.centre + offset * normals[n], normals[n])))
+    report(1.0)
     scored.sort(key=lambda pair: pair[0])
     return distinct([plane for _, plane in scored], _APART_DEG)[:_KEPT]
+
+
+def _best_offset(
+    bone: Bone,
+    normal: FloatArray,
+    offsets: FloatArray,
+    distances: tuple[NDArray[np.float32], NDArray[np.intp]],
+    n_points: int,
+) -> tuple[float, float]:
+    """Return the least mean distance of mirror images in planes of one normal, and the plane's offset."""
+    field, size = distances
+    points = bone.points[:n_points]
+    index = bone.scan.indices(points) + 1.0
+    heights = (points - bone.centre) @ normal
+    step = bone.scan.T_index_scan[:3, :3] @ normal
+    at = np.rint(index - 2 * (heights - offsets[:, None])[..., None] * step).astype(np.intp)
+    i, j, k = np.moveaxis(np.clip(at, 0, size - 1), -1, 0)
+    score = field[(k * size[1] + j) * size[0] + i].mean(axis=1)
+    best = int(score.argmin())
+    return float(score[best]), float(offsets[best])
 
 
 def _hemisphere(n: int) -> FloatArray:

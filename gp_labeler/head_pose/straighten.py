@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -38,6 +39,9 @@ _WHOLE = (0.65, 0.7, 0.12)
 _PART = (0.82, 0.25, 0.05)
 """The same where much of the head is missing: agreement must be higher."""
 
+_GAIN = 0.15
+"""By how much the fit of grey values raises agreement or overlap at most; what is farther behind is left."""
+
 _THIN_MARGIN = 0.03
 
 
@@ -49,9 +53,17 @@ class _Found:
 
     @property
     def accepted(self) -> bool:
+        return self._passes(0.0)
+
+    @property
+    def is_hopeless(self) -> bool:
+        """Whether a finer fit will not make it acceptable either."""
+        return not self._passes(_GAIN)
+
+    def _passes(self, slack: float) -> bool:
         c = self.confidence
         return any(
-            c.agreement >= agreement and c.overlap >= overlap and c.margin >= margin
+            c.agreement + slack >= agreement and c.overlap + slack >= overlap and c.margin + slack >= margin
             for agreement, overlap, margin in (_WHOLE, _PART)
         )
 
@@ -117,18 +129,46 @@ def _mid_plane(
     problem: GpError | None = None
     for level in levels:
         try:
-            coarse_bones, fine_bones = Bone.islands(coarse, level), Bone.islands(fine, level)
+            bones = Bone.islands(coarse, level)
         except GpError as error:
             problem = error
             continue
-        for bone in coarse_bones:
-            found = _best_plane(bone, _counterpart(bone, fine_bones), report)
+        fine_islands = cache(partial(Bone.islands, fine, level))
+        for bone in bones:
+            found = _best_plane(bone, fine_islands, report)
             tried.append(found)
             if found.accepted:
                 return found
     if not tried:
         raise problem or GpError("there is no bone", file=volume.path)
     raise HeadPoseError(_why(max(tried, key=lambda f: f.confidence.agreement)), file=volume.path)
+
+
+def _best_plane(bone: Bone, fine_islands: Callable[[], list[Bone]], report: Report) -> _Found:
+    """Return the plane in which the two halves agree best, and its lead over the others.
+
+    Most of the time goes into the fit of grey values, so it is spent only on planes that may be accepted: a
+    quick fit first, of those that may turn out to be the best, then the whole fit of the best one.
+    """
+    judged = [(agreement_of(bone, plane), plane) for plane in search_planes(bone, report.part(0.0, 0.6))]
+    judged = judged[:_REFINED]
+    found = _leading(bone, judged)
+    if found.is_hopeless:
+        return found
+    values = GreyValues(_counterpart(bone, fine_islands()))
+    least = found.confidence.agreement - _GAIN
+    for n, (agreement, plane) in enumerate(judged):
+        report(0.6 + 0.3 * n / len(judged))
+        if agreement.share >= least:
+            plane = refined_by_grey_values(values, plane, quick=True)
+            judged[n] = (agreement_of(bone, plane), plane)
+    found = _leading(bone, judged)
+    if found.is_hopeless:
+        return found
+    report(0.9)
+    others = [pair for pair in judged if pair[1] is not found.plane]
+    plane = refined_by_grey_values(values, found.plane)
+    return _leading(bone, [(agreement_of(bone, plane), plane), *others])
 
 
 def _counterpart(bone: Bone, others: list[Bone]) -> Bone:
@@ -139,15 +179,8 @@ def _counterpart(bone: Bone, others: list[Bone]) -> Bone:
     )
 
 
-def _best_plane(bone: Bone, fine: Bone, report: Report) -> _Found:
-    """Return the plane in which the two halves agree best, and its lead over the others."""
-    starts = search_planes(bone, report.part(0.0, 0.6))[:_REFINED]
-    values = GreyValues(fine)
-    judged: list[tuple[Agreement, MidPlane]] = []
-    for n, start in enumerate(starts):
-        report(0.6 + 0.4 * n / len(starts))
-        plane = refined_by_grey_values(values, start)
-        judged.append((agreement_of(bone, plane), plane))
+def _leading(bone: Bone, judged: list[tuple[Agreement, MidPlane]]) -> _Found:
+    """Return the best plane, and its lead over those of other directions."""
     seen = [pair for pair in judged if pair[0].overlap >= _LEAST_OVERLAP] or judged
     best, plane = max(seen, key=lambda pair: pair[0].share)
     rivals = [a.share for a, other in seen if other.angle_to_deg(plane) > _RIVAL_DEG]
