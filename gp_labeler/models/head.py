@@ -70,11 +70,14 @@ class HeadModel:
         self._document, self._view, self._scan = document, view, scan
         self._jobs, self._messages = jobs, messages
         self._points: dict[str, Position] = {}
+        self._awaited: tuple[object, bool] | None = None
+        """File and order of slices of a scan that shall be straightened once it is open."""
         self.refusal = ""
         """Why the last attempt found nothing, and what to do; empty where it did."""
         document.reset.connect(self._on_reset)
         document.head_frame_changed.connect(self.changed.emit)
         document.landmarks_changed.connect(self._on_landmarks)
+        scan.opened.connect(self._on_opened)
         for signal in (jobs.started, jobs.done, jobs.cancelled):
             signal.connect(self._on_task)
         jobs.failed.connect(self._on_failed)
@@ -256,6 +259,21 @@ class HeadModel:
         """Keep that a person knows left to be left."""
         self._document.do(ConfirmLeft())
 
+    def reopen_mirrored(self) -> None:
+        """Read the scan again with its slices in reverse order, as a new specimen; straighten it if it was.
+
+        Raises
+        ------
+        GpError
+            There is no scan, or it is not in a file.
+        """
+        volume = self._volume()
+        if volume.path is None:
+            raise GpError("only a scan in a file can be read again", remedy="Mirror it where it was made.")
+        reverse = not volume.choices.get("reverse", False)
+        self._awaited = None if self.frame is None else (volume.path, reverse)
+        self._scan.open(volume.path, **{**volume.choices, "reverse": reverse})
+
     def take(self, pose: HeadPose, *, left_confirmed: bool = False) -> None:
         """Turn the views into the frame of a head that was found.
 
@@ -328,6 +346,11 @@ class HeadModel:
         self._points.clear()
         self.refusal = ""
         self.changed.emit()
+
+    def _on_opened(self, volume: Volume) -> None:
+        awaited, self._awaited = self._awaited, None
+        if awaited == (volume.path, bool(volume.choices.get("reverse"))) and self.frame is None:
+            self.straighten()
 
     def _on_landmarks(self, changed: frozenset[tuple[Side, str]]) -> None:
         self._say_wrong_sides(changed)

@@ -47,7 +47,7 @@ def ask_position(workspace: Workspace, prompts: Prompts) -> None:
     """Ask for a scan position, and bring it into every view."""
     view, volume = workspace.view, workspace.scan.volume
     here = where_text(view.crosshair).removesuffix(" mm")
-    text = prompts.text("Go to", "Position, mm (LPS)", here)
+    text = prompts.text("Go to", "Position in the scan, mm (LPS)", here)
     if text is None or volume is None:
         return
     position = typed_position(text)
@@ -107,7 +107,6 @@ def ask_reopen_mirrored(workspace: Workspace, prompts: Prompts) -> None:
     volume = workspace.scan.volume
     if volume is None or volume.path is None:
         raise GpError("only a scan in a file can be read again", remedy="Mirror it where it was made.")
-    reverse = not volume.choices.get("reverse", False)
     text = "Read the scan again, mirrored?"
     detail = (
         "Its slices are taken in reverse order, which exchanges left and right. It is opened as a new "
@@ -117,7 +116,7 @@ def ask_reopen_mirrored(workspace: Workspace, prompts: Prompts) -> None:
     if prompts.choose("Left and right", text, ["Read it mirrored"], detail=detail) and (
         resolve_unsaved(workspace, prompts)
     ):
-        workspace.scan.open(volume.path, **{**volume.choices, "reverse": reverse})
+        workspace.head.reopen_mirrored()
 
 
 VIEW_COMMANDS: Mapping[str, WindowCommand] = MappingProxyType(

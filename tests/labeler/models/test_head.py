@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from document_cases import head_frame, text_of
 from panel_cases import deliver, place, workspace_with_scan
+from window_cases import write_ball
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -168,6 +169,28 @@ def test_left_is_asked_once_and_the_answer_is_kept(workspace, monkeypatch) -> No
     assert not workspace.head.asks_left
     straightened(workspace, monkeypatch)  # again: left is no other
     assert not workspace.head.asks_left
+
+
+def test_a_scan_that_is_read_again_mirrored_is_straightened_again_if_it_was(
+    workspace, monkeypatch, tmp_path
+) -> None:
+    monkeypatch.setattr(Straighten, "run", lambda job, progress: POSE)
+    with pytest.raises(GpError, match="only a scan in a file"):
+        workspace.head.reopen_mirrored()
+    workspace.scan.open(write_ball(tmp_path / "ball.nrrd"))
+    deliver(workspace)
+    original = workspace.scan.volume
+    workspace.head.reopen_mirrored()
+    deliver(workspace)
+    assert workspace.head.frame is None  # it lay as it was stored
+    straightened(workspace, monkeypatch)
+    workspace.head.reopen_mirrored()  # and back
+    deliver(workspace)
+    assert workspace.scan.volume.checksum == original.checksum
+    assert workspace.head.frame is not None
+    workspace.scan.open(write_ball(tmp_path / "other.nrrd"))
+    deliver(workspace)
+    assert workspace.head.frame is None
 
 
 @pytest.mark.parametrize(("name", "row"), [("pitch", 0), ("roll", 1), ("yaw", 2)])

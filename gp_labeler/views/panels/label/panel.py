@@ -10,6 +10,7 @@ from gp_labeler.views.fonts import fit, pixels
 from gp_labeler.views.panels.action_button import Actions
 from gp_labeler.views.panels.label.feature_card import FeatureCard
 from gp_labeler.views.panels.label.landmark_table import LandmarkTable
+from gp_labeler.views.panels.label.left_row import LeftRow
 from gp_labeler.views.panels.label.observer_row import ObserverRow
 from gp_labeler.views.panels.label.suggest_row import SuggestRow
 from gp_labeler.views.panels.parts import Scrolled
@@ -37,6 +38,7 @@ class LabelPanel(QWidget):
         self.setProperty("role", "panel")
         self.observer = ObserverRow(workspace, actions)
         self.suggest = SuggestRow(workspace, actions)
+        self.left = LeftRow(workspace, actions)
         self.card = FeatureCard(workspace, actions)
         self.table = LandmarkTable(workspace)
         content = QWidget()
@@ -50,6 +52,7 @@ class LabelPanel(QWidget):
         head.addWidget(self.observer, 1)
         head.addWidget(self.suggest, 0, Qt.AlignmentFlag.AlignBottom)
         column.addLayout(head)
+        column.addWidget(self.left)
         column.addWidget(self.card, 1)
         column.addWidget(self.table, 2)
         column.addStretch(0)
