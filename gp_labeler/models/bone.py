@@ -33,6 +33,8 @@ _NEAR = ("CA", "CB", "RWA", "RWP", "RWL", "RWM", "FPA", "FPP", "OS", "OI", "LLI"
 _MARGIN_MM = 2.0
 """An ear is not meshed again before its middle has moved by more."""
 
+_SOME_POINTS = 4000
+
 
 class BoneModel:
     """Keeps the meshes of the bone in step with scan, threshold and the places of the ears.
@@ -64,6 +66,7 @@ class BoneModel:
         self._scan, self._labels, self._jobs, self._messages = scan, labels, jobs, messages
         self._smallest_mm = SMALLEST_PART_MM
         self._meshes = self._overview = Meshes()
+        self._some_points = np.zeros((0, 3))
         self._ears: Mapping[Side, FloatArray] = {}
         """The (2, 3) box of each ear that is meshed, or about to be, mm."""
         self._half = EAR_HALF_MM
@@ -81,6 +84,11 @@ class BoneModel:
     def quick_surfaces(self) -> tuple[Surface, ...]:
         """A coarse mesh to draw while the camera moves; may be empty."""
         return self._meshes.quick
+
+    @property
+    def some_points(self) -> FloatArray:
+        """(N, 3) mm: points all over the bone, few enough to ask where it lies in each picture."""
+        return self._some_points
 
     @property
     def smallest_part_mm(self) -> float:
@@ -143,6 +151,7 @@ class BoneModel:
 
     def _forget(self) -> None:
         self._meshes = self._overview = Meshes()
+        self._some_points = np.zeros((0, 3))
         self._ears = {}
 
     def _on_reset(self) -> None:
@@ -208,4 +217,7 @@ class BoneModel:
 
     def _show(self, meshes: Meshes) -> None:
         self._meshes = meshes
+        step = 1 + sum(len(part.points) for part in meshes.parts) // _SOME_POINTS
+        some = [part.points[::step].astype(np.float64) for part in meshes.parts]
+        self._some_points = np.concatenate([np.zeros((0, 3)), *some])
         self.surfaces_changed.emit()

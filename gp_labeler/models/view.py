@@ -153,6 +153,8 @@ class ViewModel:
     """The crosshair, (3,) mm in the scan frame."""
     planes_changed = Signal()
     """The slice views show other planes, or name directions in another frame."""
+    turning_changed = Signal(bool)
+    """Whether a hand is turning the planes: what takes long is drawn coarsely meanwhile."""
     planes_turned = Signal(str, float)
     """(view, angle): a hand has turned the planes of the two other views, by `rotate_planes`."""
     point_shown = Signal(object)
@@ -173,6 +175,7 @@ class ViewModel:
         self._document = document
         self._frame, self._planes = SCAN_FRAME, MappingProxyType(SCAN_FRAME.planes())
         self._titles: Mapping[str, str] = MappingProxyType({})
+        self._turning = False
         document.reset.connect(self._on_reset)
         document.head_frame_changed.connect(self._on_head_frame)
 
@@ -217,6 +220,17 @@ class ViewModel:
     def is_turned(self, name: str) -> bool:
         """Whether a view shows another plane than the one of its name in the frame."""
         return not self._planes[name].same_as(self._frame.plane(name))
+
+    @property
+    def is_turning(self) -> bool:
+        """Whether a hand is turning the planes right now."""
+        return self._turning
+
+    def set_turning(self, on: bool) -> None:
+        """Take down that a hand begins to turn the planes, or has ended."""
+        if on != self._turning:
+            self._turning = on
+            self.turning_changed.emit(on)
 
     @property
     def planes_are_turned(self) -> bool:

@@ -22,6 +22,8 @@ _FINEST, _COARSEST = 1e-4, 10.0
 """Limits of zoom, mm per pixel."""
 
 _MARGIN = 1.06
+_ROOM = 0.06
+"""Around the points that a view is fitted to, over how long they are: soft tissue around bone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +51,34 @@ class SliceViewport:
     size: tuple[int, int]
 
     @classmethod
-    def fitted(cls, source: VolumeSlicer, plane: SlicePlane, size: tuple[int, int]) -> SliceViewport:
-        """Make the view that shows the whole of the middle slice of a volume."""
+    def fitted(
+        cls,
+        source: VolumeSlicer,
+        plane: SlicePlane,
+        size: tuple[int, int],
+        *,
+        around: FloatArray | None = None,
+    ) -> SliceViewport:
+        """Make the view that shows the whole of the middle slice of a volume.
+
+        Parameters
+        ----------
+        source : VolumeSlicer
+        plane : SlicePlane
+        size : (int, int)
+            Width and height, pixels.
+        around : (N, 3) array, mm, optional
+            Show what lies over these points, as far as the slice reaches: that of a volume cut askew is
+            mostly empty.
+        """
         position = source.snap(plane, plane.position_of(source.corners.mean(axis=0)))
         outline = source.section(plane, position)
         low, high = outline.min(axis=0), outline.max(axis=0)
+        if around is not None and len(around):
+            flat = plane.flat(around)
+            room = _ROOM * np.ptp(flat, axis=0).max()
+            low = np.maximum(low, flat.min(axis=0) - room)
+            high = np.minimum(high, flat.max(axis=0) + room)
         zoom = float(((high - low) / np.maximum(size, 1)).max()) * _MARGIN
         return cls(plane, position, (low + high) / 2, zoom, size)
 

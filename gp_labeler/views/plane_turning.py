@@ -64,6 +64,7 @@ class PlaneTurning:
             return False
         if max(abs(x - self._start[0]), abs(y - self._start[1])) >= CLICK_PIXELS:
             self.is_turning = True
+            self._workspace.view.set_turning(True)
         if self.is_turning:
             angle = self.arms(shown, ratio).angle_of(x, y)
             self._workspace.view.rotate_planes(self._name, angle - self._angle)
@@ -74,6 +75,7 @@ class PlaneTurning:
     def release(self) -> bool:
         """Take a release; return whether the planes were turned. What turns the head is one edit."""
         turned, self.is_turning, self._start = self.is_turning, False, None
+        self._workspace.view.set_turning(False)
         if turned and self._workspace.interaction.tool != "turn":
             self._workspace.view.planes_turned.emit(self._name, self._turned)
         elif turned:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from qtpy.QtCore import QEvent, Qt, Signal
+from qtpy.QtCore import QEvent, Qt, QTimer, Signal
 from qtpy.QtGui import QEnterEvent, QKeyEvent, QMouseEvent, QPainter, QPaintEvent, QWheelEvent
 from qtpy.QtWidgets import QWidget
 
@@ -42,6 +42,9 @@ _ARROWS = {
 }
 _FREES = Modifier.ALT | Modifier.SHIFT
 """Held while a point is dragged, either lets it leave the bone."""
+
+_REST_MS = 200
+"""A plane that a hand turns is drawn at full resolution when it pauses for so long."""
 
 _NEAR_EDGE_PIXELS = 48.0
 _NEAR_PIXELS = 8.0
@@ -91,6 +94,9 @@ class SliceView(QWidget):
         self._pointer: tuple[float, float] | None = None
         self._grip = np.zeros(3)
         self._edge: BoneEdge | None = None
+        self._has_bone = False
+        self._at_rest = QTimer(self, interval=_REST_MS, singleShot=True)
+        self._at_rest.timeout.connect(self.update)
         self._listen()
 
     # What is shown
@@ -103,7 +109,7 @@ class SliceView(QWidget):
     def reset(self) -> None:
         """Show the whole slice."""
         if self.source is not None:
-            self._whole = SliceViewport.fitted(self.source, self.slice_plane, self._size())
+            self._whole = self._fitted(self.source)
             self._take(self._whole.at(self._position()))
 
     def go_to(self, position: FloatArray) -> None:
@@ -161,6 +167,8 @@ class SliceView(QWidget):
         follow(self, workspace.document.reset, self._on_reset)
         follow(self, workspace.view.crosshair_changed, self._on_crosshair)
         follow(self, workspace.view.planes_changed, self._on_planes)
+        follow(self, workspace.view.turning_changed, self._on_turning)
+        follow(self, workspace.bone.surfaces_changed, self._on_surfaces)
         follow(self, workspace.view.point_shown, self.go_to)
         for signal in (
             workspace.interaction.replacing_changed,
@@ -218,13 +226,40 @@ class SliceView(QWidget):
         if self.source is None or shown is None or shown.plane is self.slice_plane:
             self.update()
             return
-        if self._whole is not None and shown.looks_like(self._whole):
+        turning = self._workspace.view.is_turning
+        if turning:
+            self._at_rest.start()
+        if self._whole is not None and shown.looks_like(self._whole) and not turning:
             self.reset()
         else:
             on_screen = shown.plane.flat(self._workspace.view.crosshair[None])[0] - shown.centre
             centre = self.slice_plane.flat(self._workspace.view.crosshair[None])[0] - on_screen
             self._take(replace(shown, plane=self.slice_plane, position=self._position(), centre=centre))
         self.moved.emit(self._position())
+
+    def _fitted(self, source: VolumeSlicer) -> SliceViewport:
+        """Return the view of the whole slice; of one that is cut askew, of what lies around bone."""
+        around = self._workspace.bone.some_points if source.is_oblique(self.slice_plane) else None
+        return SliceViewport.fitted(source, self.slice_plane, self._size(), around=around)
+
+    def _on_surfaces(self) -> None:
+        """Fit a whole oblique slice to the bone, once there is some."""
+        had_bone, self._has_bone = self._has_bone, len(self._workspace.bone.some_points) > 0
+        whole, shown = self._whole, self.shown
+        if self.source is not None and whole is not None and shown is not None:
+            oblique = self.source.is_oblique(self.slice_plane)
+            if oblique and self._has_bone and not had_bone and shown.looks_like(whole):
+                self.reset()
+
+    @property
+    def draws_coarsely(self) -> bool:
+        """Whether it shall paint quickly: a hand is turning its plane, and has not paused."""
+        return self._at_rest.isActive()
+
+    def _on_turning(self, on: bool) -> None:
+        if not on and self._at_rest.isActive():
+            self._at_rest.stop()
+            self.update()
 
     def _position(self) -> float:
         return self.slice_plane.position_of(self._workspace.view.crosshair)
@@ -241,7 +276,7 @@ class SliceView(QWidget):
         """Return the view at the widget's size: the whole slice if it was whole, else the same, larger."""
         whole = self._whole
         if self.source is not None and whole is not None and shown.looks_like(whole):
-            self._whole = SliceViewport.fitted(self.source, self.slice_plane, self._size())
+            self._whole = self._fitted(self.source)
             return self._whole.at(shown.position)
         return shown.resized(*self._size()).zoomed(min(self._size()) / min(shown.size))
 

@@ -43,6 +43,9 @@ __all__ = ["SlicePainter", "SlicePoints", "reach_of"]
 _Where = tuple[VolumeSlicer, SlicePlane, float, float]
 """What a picture of a slice is of: scan, plane, position and step of sampling, mm."""
 
+_COARSER = 3.0
+"""Times, of a slab or a denoised slice while its plane is turned: a slab has so many fewer layers as well."""
+
 _REACH_MM = 1.0
 _CLOSE_PIXELS = 12.0
 """From so many logical pixels a millimetre on, points beside the slice are named too."""
@@ -176,7 +179,8 @@ class SlicePainter:
         view, workspace = self._view.window_level(), self._workspace
         state = workspace.view.state
         filters = (state.slab, state.denoise)
-        looks = (view, self._preview, workspace.scan.threshold, state.outline_visible, filters)
+        coarsely = self._coarseness > 1
+        looks = (view, self._preview, workspace.scan.threshold, state.outline_visible, filters, coarsely)
         kept = self._ground
         if kept is None or kept[1] is not source or kept[2] != looks or not _alike(kept[0], shown, source):
             picture = QPixmap(*shown.size)
@@ -191,7 +195,8 @@ class SlicePainter:
 
     def _paint_image(self, painter: QPainter, source: VolumeSlicer, shown: SliceViewport) -> None:
         position = source.snap(shown.plane, shown.position)
-        where = (source, shown.plane, position, source.sampling_step(shown.plane, shown.mm_per_pixel))
+        step = self._coarseness * source.sampling_step(shown.plane, shown.mm_per_pixel)
+        where = (source, shown.plane, position, step)
         if self._slice is None or self._slice_is_old(where):
             self._slice = source.image(*where[1:], at_once=True)
             self._where = where
@@ -204,6 +209,13 @@ class SlicePainter:
             self._picture = (wanted, _picture(self._to_show(where), window, self._preview))
         (left, top), (right, bottom) = shown.image_corners(self._slice)
         painter.drawImage(QRectF(left, top, right - left, bottom - top), self._picture[1])
+
+    @property
+    def _coarseness(self) -> float:
+        """How many times coarser an oblique slice is sampled: what takes long, while a hand turns it."""
+        state = self._workspace.view.state
+        is_slow = state.slab is not None or state.denoise is not None
+        return _COARSER if is_slow and self._view.draws_coarsely else 1.0
 
     def _to_show(self, where: _Where) -> SliceImage:
         """Return what is seen of the slice: a slab, or less noise; while a threshold is chosen, itself."""

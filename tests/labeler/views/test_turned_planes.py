@@ -7,14 +7,17 @@ import pytest
 from document_cases import head_frame
 from qtpy.QtCore import QPoint, QPointF, Qt
 from qtpy.QtTest import QTest
-from window_cases import BALL_MM, MIDDLE, VOXEL_MM, wait_until_idle
+from window_cases import BALL_MM, MIDDLE, VOXEL_MM, image_bytes, wait_until_idle
 
 from gp_core.landmarks.features import Side
 from gp_labeler.document.head_edits import SetHeadFrame
 from gp_labeler.document.state import How
+from gp_labeler.imaging.slab import Slab
+from gp_labeler.imaging.volume import Volume
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.events import click, drag, turn_wheel
 from gp_labeler.views.painting.slice_painter import reach_of
+from gp_labeler.views.panels.label.left_row import LeftRow
 from gp_labeler.views.panels.scan.head_card import HeadCard
 
 LEFT, NO_KEYS = Qt.MouseButton.LeftButton, Qt.KeyboardModifier.NoModifier
@@ -71,6 +74,48 @@ def test_dragging_an_arm_turns_the_other_planes_with_it(window, plane) -> None:
     QTest.keyClick(view, Qt.Key.Key_0)
     assert not model.planes_are_turned
     assert window.grid.frames[plane.value].header.title.text() == plane.value.capitalize()
+
+
+def test_a_slab_is_coarse_while_its_plane_is_turned_and_whole_when_the_hand_pauses(qtbot, window) -> None:
+    axial, coronal = (window.grid.slice_views[plane] for plane in (Plane.AXIAL, Plane.CORONAL))
+    window.workspace.view.update(slab=Slab("mean", 1.0))
+    points = [QPointF(*around(axial, degrees, 70)).toPoint() for degrees in (0, 10, 25)]
+    QTest.mousePress(axial, LEFT, NO_KEYS, points[0])
+    zoom = coronal.shown.mm_per_pixel
+    for point in points[1:]:
+        QTest.mouseMove(axial, point)
+        turned = image_bytes(coronal.grab().toImage())
+    assert coronal.draws_coarsely
+    assert coronal.shown.mm_per_pixel == zoom  # the hand turns it, and does not zoom
+    qtbot.waitUntil(lambda: not coronal.draws_coarsely)
+    whole = image_bytes(coronal.grab().toImage())
+    assert not np.array_equal(turned, whole)
+    QTest.mouseMove(axial, points[1])
+    QTest.mouseMove(axial, points[2])
+    assert coronal.draws_coarsely
+    QTest.mouseRelease(axial, LEFT, NO_KEYS, points[2])
+    assert not coronal.draws_coarsely
+    assert np.abs(image_bytes(coronal.grab().toImage()).astype(int) - whole).mean() < 0.1
+
+
+def test_a_tilted_head_opens_as_large_as_a_straight_one(qtbot, one_window) -> None:
+    z, y, x = np.indices((40, 60, 60)) - np.array([20, 30, 30])[:, None, None, None]
+    values = np.where(np.sqrt(x**2 + y**2 + z**2) < 12, 1400, 600).astype(np.float32)
+    one_window.workspace.scan.begin(Volume.from_parts(values, [0.5] * 3, [0, 0, 0]))
+    wait_until_idle(qtbot, one_window)
+    views = one_window.grid.slice_views.values()
+    straight = [view.shown.mm_per_pixel for view in views]
+    one_window.workspace.document.do(SetHeadFrame(head_frame((40, 30, -35), (15, 15, 10))))
+    bone = one_window.workspace.bone.some_points
+    for view, before in zip(views, straight, strict=True):
+        flat = view.shown.scan_to_pixel(bone)
+        assert flat.min() > 0
+        assert (flat.max(axis=0) < view.shown.size).all()
+        across = np.ptp(flat, axis=0) / view.shown.size
+        assert across.max() > 0.75
+        assert view.shown.mm_per_pixel < before  # though the slices of the tilted scan are larger
+    one_window.workspace.head.show(False)
+    assert [view.shown.mm_per_pixel for view in views] == pytest.approx(straight)
 
 
 def test_a_click_on_an_arm_still_places(window) -> None:
@@ -190,6 +235,18 @@ def test_keys_letters_cube_and_headers_follow_the_frame_and_the_line_says_it(win
     assert workspace.view.frame.name == "scan"
     assert window.status.frame.text() == "Scan frame"
     assert scene.cube.axes == pytest.approx(np.eye(3))
+
+
+def test_who_labels_is_asked_which_side_is_left_until_it_is_answered(window) -> None:
+    window.set_step("label")
+    row = window.findChild(LeftRow)
+    assert not row.isVisible()
+    window.workspace.document.do(SetHeadFrame(head_frame()))
+    assert row.isVisible()
+    window.commands.flush()
+    row.confirm.click()
+    assert not row.isVisible()
+    assert window.workspace.head.frame.left_confirmed
 
 
 def test_the_card_says_how_the_head_lies_and_asks_which_side_is_left(window) -> None:
