@@ -22,7 +22,7 @@ _FINEST, _COARSEST = 1e-4, 10.0
 """Limits of zoom, mm per pixel."""
 
 _MARGIN = 1.06
-_ROOM = 0.06
+_ROOM = 0.1
 """Around the points that a view is fitted to, over how long they are: soft tissue around bone."""
 
 
