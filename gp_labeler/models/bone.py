@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -217,7 +217,13 @@ class BoneModel:
 
     def _show(self, meshes: Meshes) -> None:
         self._meshes = meshes
-        step = 1 + sum(len(part.points) for part in meshes.parts) // _SOME_POINTS
-        some = [part.points[::step].astype(np.float64) for part in meshes.parts]
-        self._some_points = np.concatenate([np.zeros((0, 3)), *some])
+        self._some_points = _some_points(meshes.parts)
         self.surfaces_changed.emit()
+
+
+def _some_points(parts: Sequence[Surface]) -> FloatArray:
+    """Return points all over some surfaces, the same each time; drawn, for corners are in order of place."""
+    rng = np.random.default_rng(0)
+    n = max(1, _SOME_POINTS // max(len(parts), 1))
+    some = [part.points[rng.integers(len(part.points), size=n)] for part in parts if len(part.points)]
+    return np.concatenate([np.zeros((0, 3)), *some])
