@@ -46,7 +46,8 @@ STATUS_WORDS: Mapping[str, Status] = {
 # Marks a suggestion in the description, which 3D Slicer shows and preserves.
 _SUGGESTED = re.compile(
     r"suggested, not confirmed"
-    r"(?: \((?P<source>.*?)(?:; 95 % within (?P<radius>[0-9]{1,6}\.?[0-9]*) mm)?\)(?=\.|$))?",
+    r"(?: \((?P<source>.*?)(?:; 95 % within (?P<radius>[0-9]{1,6}\.?[0-9]*) mm)?"
+    r"(?:; (?P<atlas>[0-9]{1,6}\.?[0-9]*) mm from where the atlas expects it)?\)(?=\.|$))?",
     re.IGNORECASE,
 )
 
@@ -231,8 +232,10 @@ def as_suggested(point: LabelledPoint, source: str = "") -> LabelledPoint:
         return point
     said = _SUGGESTED.match(point.description)
     radius = float(said["radius"]) if said and said["radius"] else 0.0
+    away = float(said["atlas"]) if said and said["atlas"] else 0.0
     x, y, z = point.position.tolist()
-    suggestion = Suggestion((x, y, z), radius or None, (said["source"] if said else "") or source)
+    origin = (said["source"] if said else "") or source
+    suggestion = Suggestion((x, y, z), radius or None, origin, away or None)
     return point._replace(position=None, status=Status.SUGGESTED, suggestion=suggestion)
 
 
@@ -294,7 +297,7 @@ def suggested_description(suggestion: Suggestion, about: str = "") -> str:
     Parameters
     ----------
     suggestion : Suggestion
-        Its source and radius are told.
+        Its source, its radius, and how far the atlas disagrees are told.
     about : str
         What else the description says.
 
@@ -304,7 +307,9 @@ def suggested_description(suggestion: Suggestion, about: str = "") -> str:
         One line.
     """
     radius = "" if suggestion.radius_95 is None else f"; 95 % within {suggestion.radius_95:.3f} mm"
-    origin = f" ({suggestion.source}{radius})" if suggestion.source or radius else ""
+    away = suggestion.atlas_distance
+    atlas = "" if away is None else f"; {away:.3f} mm from where the atlas expects it"
+    origin = f" ({suggestion.source}{radius}{atlas})" if suggestion.source or radius or atlas else ""
     return f"Suggested, not confirmed{origin}. {about}".rstrip()
 
 

@@ -26,16 +26,19 @@ class Suggestion:
         Radius in mm that holds the landmark with 95 % probability; None where it is not known.
     source : str
         What suggests it: ``atlas``, ``mirror``, the name of a program, ...
+    atlas_distance : float, optional
+        Distance in mm from where the atlas expects it; None where the atlas does not disagree.
 
     Raises
     ------
     GpError
-        The position is not three finite numbers, or the radius is not a positive number.
+        The position is not three finite numbers, or a distance is not a positive number.
     """
 
     position: tuple[float, float, float]
     radius_95: float | None = None
     source: str = ""
+    atlas_distance: float | None = None
 
     def __post_init__(self) -> None:
         try:
@@ -49,7 +52,19 @@ class Suggestion:
             )
         object.__setattr__(self, "position", (x, y, z))
         if self.radius_95 is not None:
-            object.__setattr__(self, "radius_95", _radius(self.radius_95))
+            object.__setattr__(self, "radius_95", _positive(self.radius_95, "95 % radius"))
+        if self.atlas_distance is not None:
+            distance = _positive(self.atlas_distance, "distance from the atlas")
+            object.__setattr__(self, "atlas_distance", distance)
+
+    @property
+    def doubt(self) -> tuple[float, float]:
+        """What sorts suggestions by doubt: how far off it may be by the witness that doubts it more, mm.
+
+        Infinite without a radius; then, how far the atlas disagrees.
+        """
+        radius, away = self.radius_95, self.atlas_distance or 0.0
+        return (math.inf if radius is None else max(radius, away)), away
 
     @checks_arguments
     def moved(self, T_dst_src: RigidTransform) -> Suggestion:
@@ -69,14 +84,14 @@ class Suggestion:
         return replace(self, position=(x, y, z))
 
 
-def _radius(value: object) -> float:
+def _positive(value: object, what: str) -> float:
     try:
-        radius = float(value)  # type: ignore[arg-type]
+        length = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError, OverflowError):
-        radius = math.nan
-    if not (math.isfinite(radius) and radius > 0):
+        length = math.nan
+    if not (math.isfinite(length) and length > 0):
         raise GpError(
-            f"the 95 % radius of a suggestion must be a positive number of mm, got {value!r}",
-            remedy="Leave out the radius where it is not known.",
+            f"the {what} of a suggestion must be a positive number of mm, got {value!r}",
+            remedy="Leave it out where it is not known.",
         )
-    return radius
+    return length

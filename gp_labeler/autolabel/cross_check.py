@@ -25,6 +25,9 @@ _FAR = 5.0
 _GAIN = 12.0
 """How much better two labels must fit each other's places, as a sum of squares over expected ones."""
 
+_LEAST = 0.005
+"""Of the size of the labels: nobody labels more exactly than that, so nothing closer is a mistake."""
+
 _OTHER_SCAN = 6.0
 _MOST_PAIRS = 0.5
 
@@ -108,6 +111,7 @@ class _Head:
     labels: FloatArray
     expected: FloatArray
     spreads: FloatArray
+    least: float
 
     @property
     def distances(self) -> FloatArray:
@@ -150,13 +154,19 @@ def _head(scan: LabelledScan, prediction: Prediction) -> _Head:
         np.array([scan.points[name] for name in names]).reshape(-1, 3),
         np.array([prediction.centres[name] for name in names]).reshape(-1, 3),
         np.nan_to_num(np.array([prediction.spreads[name] for name in names])),
+        _LEAST * _size(scan.array),
     )
+
+
+def _size(points: FloatArray) -> float:
+    """Return the root mean square distance of points (N, 3) from their centre, mm; 1 of one place."""
+    return float(np.sqrt(((points - points.mean(axis=0)) ** 2).sum(axis=1).mean())) or 1.0
 
 
 def _usual(head: _Head, others: list[_Head]) -> FloatArray:
     """Return how far each label may be expected to lie, mm; medians, since other labels may be wrong too."""
     every = np.concatenate([other.distances for other in others] or [head.distances])
-    overall = float(np.median(every)) if len(every) else 1.0
+    overall = max(float(np.median(every)) if len(every) else 1.0, head.least)
     own = []
     for name in head.names:
         known = [other.distances[other.names.index(name)] for other in others if name in other.names]

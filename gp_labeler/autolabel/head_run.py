@@ -14,13 +14,13 @@ import numpy as np
 from gp_core.disk import read_json, write_text
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
-from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.library import TemplateLibrary
 from gp_labeler.autolabel.proposal import Proposal
 from gp_labeler.autolabel.propose import Stored, propose
 from gp_labeler.autolabel.registration_process import HereRegistration
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.imaging.readers.formats import volume_stem
+from gp_labeler.imaging.volume import Volume
 
 __all__ = ["HeadResult", "HeadRun", "PrepareRun"]
 
@@ -112,13 +112,15 @@ class HeadRun:
         name = volume_stem(path)
         report = self.output / f"{name}.proposal.json"
         try:
-            key = self._key(path)
+            checksum, volume = self.library.checksums.known(path, self.options), None
+            if checksum is None:
+                volume = self._read(path)
+                checksum = volume.checksum
+            key = self._key(checksum)
             earlier = None if self.again else _earlier(report, key)
             if earlier is not None:
                 return HeadResult(path, (report,), earlier, is_earlier=True)
-            from gp_labeler.imaging.readers import read_volume  # here: not all heads are read
-
-            volume = read_volume(path, **self.options)
+            volume = volume or self._read(path)
             proposal = propose(
                 volume,
                 self.library,
@@ -142,16 +144,20 @@ class HeadRun:
     def _content(self, name: str, key: str, proposal: Proposal) -> dict[str, Any]:
         return {"schema": _SCHEMA, "version": 1, "specimen": name, "key": key, **proposal.as_json()}
 
-    def _key(self, path: Path) -> str:
-        """Return what changes with all that the suggestions depend on."""
-        nothing = {str(n): np.zeros(3) for n in range(3)}
-        scan = LabelledScan("target", nothing, path, self.options).key
-        labelled = [each.key for each in self.library.scans]
+    def _read(self, path: Path) -> Volume:
+        from gp_labeler.imaging.readers import read_volume  # here: not all heads are read
+
+        volume = read_volume(path, **self.options)
+        self.library.checksums.keep(path, self.options, volume.checksum)
+        return volume
+
+    def _key(self, checksum: str) -> str:
+        """Return what changes with all that the suggestions of a scan depend on."""
+        labelled = [(each.name, self.library.key_of(each)) for each in self.library.scans]
         points = {name: np.round(xyz, 6).tolist() for name, xyz in self.placed.items()}
         told = (
-            scan,
+            checksum,
             labelled,
-            self.library.settings.key,
             self.library.most,
             self.engine,
             self.stored,

@@ -74,26 +74,18 @@ class LabelledScan:
         assert self.path is not None
         return read_volume(self.path, **self.options)
 
-    @property
-    def key(self) -> str:
-        """32 hex digits that change with the landmarks, the scan's file, and how it is read."""
+    def key(self, checksum: str) -> str:
+        """Return 32 hex digits that change with the landmarks and the scan, not with names of files.
+
+        Parameters
+        ----------
+        checksum : str
+            Of the scan; see `gp_labeler.imaging.volume.Volume.checksum`.
+        """
         digest = hashlib.blake2b(digest_size=16)
-        digest.update(repr((self.name, list(self.points), dict(self.options))).encode())
+        digest.update(repr((list(self.points), checksum)).encode())
         digest.update((np.round(self.array, 6) + 0.0).tobytes())
-        if self.volume is not None:
-            digest.update(self.volume.checksum.encode())
-        elif self.path is not None:
-            digest.update(repr(_stamps(self.path)).encode())
         return digest.hexdigest()
-
-
-def _stamps(path: Path) -> list[tuple[str, int, int]]:
-    """Return names, sizes and times of a file, or of the files of a folder."""
-    files = sorted(path.iterdir()) if path.is_dir() else [path]
-    try:
-        return [(str(f.absolute()), f.stat().st_size, f.stat().st_mtime_ns) for f in files if f.is_file()]
-    except OSError as error:
-        raise GpError(f"cannot be read ({error})", file=path) from None
 
 
 def flat_name(side: Side, code: str) -> str:

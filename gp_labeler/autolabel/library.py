@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import logging
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -18,9 +18,11 @@ from gp_labeler.autolabel.confidence import GuessConfidence, HeldOut
 from gp_labeler.autolabel.labelled_scan import LabelledScan
 from gp_labeler.autolabel.prediction import Carried, HeadNotFoundError, Prediction, predict
 from gp_labeler.autolabel.registration import Registration
+from gp_labeler.autolabel.scan_checksums import ScanChecksums
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.template import Template
 from gp_labeler.imaging.progress import Report
+from gp_labeler.imaging.volume import Volume
 
 __all__ = ["TemplateLibrary"]
 
@@ -75,6 +77,11 @@ class TemplateLibrary:
     def _carried(self) -> dict[tuple[str, str, str], Carried]:
         return {}
 
+    @property
+    def checksums(self) -> ScanChecksums:
+        """Notes of the checksums of scans, kept in the folder."""
+        return ScanChecksums(self.folder)
+
     def templates(self, report: Report | None = None, *, without: Sequence[str] = ()) -> list[Template]:
         """Return the templates, which are prepared where they are not yet.
 
@@ -103,6 +110,20 @@ class TemplateLibrary:
         if scan.name not in self._templates:
             self._templates[scan.name] = self._template(scan)
         return self._templates[scan.name]
+
+    def checksum_of(self, scan: LabelledScan) -> str:
+        """Return the checksum of one labelled scan, which is read where that is not known yet.
+
+        Raises
+        ------
+        GpError
+            The scan cannot be read.
+        """
+        return self._known_checksum(scan) or self._keep_checksum(scan, scan.load())
+
+    def key_of(self, scan: LabelledScan) -> str:
+        """Return what the template of one labelled scan is known by; see `checksum_of`."""
+        return Template.key_of(scan, self.settings, self.checksum_of(scan))
 
     def confidence(self, registration: Registration, report: Report | None = None) -> GuessConfidence:
         """Predict every labelled scan from the others, and return what that says of guesses.
@@ -168,24 +189,37 @@ class TemplateLibrary:
     def _template(self, scan: LabelledScan) -> Template:
         if self.folder is None:
             return Template.of(scan, self.settings)
-        path = self.folder / "templates" / f"{Template.key_of(scan, self.settings)}.npz"
+        volume = None if self._known_checksum(scan) else scan.load()
+        checksum = self._known_checksum(scan) if volume is None else self._keep_checksum(scan, volume)
+        path = self.folder / "templates" / f"{Template.key_of(scan, self.settings, checksum)}.npz"
         if path.exists():
             try:
-                return Template.load(path)
+                return replace(Template.load(path), name=scan.name)  # the file may be of a copy of the scan
             except FileFormatError:  # half written, or of an earlier version: it is made again
                 pass
-        template = Template.of(scan, self.settings)
+        template = Template.of(replace(scan, volume=volume), self.settings)
         try:
             template.save(path)
         except OSError as error:
             raise GpError(f"the templates cannot be kept ({error})", file=path.parent) from None
         return template
 
+    def _known_checksum(self, scan: LabelledScan) -> str | None:
+        if scan.volume is not None:
+            return scan.volume.checksum
+        assert scan.path is not None
+        return self.checksums.known(scan.path, scan.options)
+
+    def _keep_checksum(self, scan: LabelledScan, volume: Volume) -> str:
+        if scan.path is not None:
+            self.checksums.keep(scan.path, scan.options, volume.checksum)
+        return volume.checksum
+
     def _path(self, scan: LabelledScan, template: Template, registration: Registration) -> Path | None:
         if self.folder is None:
             return None
-        key = Template.key_of(scan, self.settings)
-        return self.folder / "carried" / f"{key}" / f"{template.key}-{registration.name}.json"
+        key = self.key_of(scan)
+        return self.folder / "carried" / key / f"{template.key}-{registration.name}.json"
 
     def _kept(self, scan: LabelledScan, template: Template, registration: Registration) -> Carried | None:
         found = self._carried.get((scan.name, template.name, registration.name))

@@ -13,7 +13,7 @@ from gp_core.landmarks.suggestion import Suggestion
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.labelled_scan import side_and_code
 
-__all__ = ["Guess", "Proposal", "least_certain_first"]
+__all__ = ["Guess", "Proposal", "most_doubtful_first"]
 
 _DOUBTFUL = 2.0
 """A guess is doubtful from the start where its radius is so many times the median radius."""
@@ -51,6 +51,11 @@ class Guess:
     n_templates: int
     is_doubtful: bool = False
     atlas_distance: float | None = None
+
+    @property
+    def doubt(self) -> float:
+        """How far off it may be, mm, by the witness that doubts it more: its radius, or the atlas."""
+        return max(self.radius_95 or 0.0, self.atlas_distance or 0.0)
 
     def as_json(self) -> dict[str, Any]:
         """Return the guess as JSON values."""
@@ -113,7 +118,7 @@ class Proposal:
     def suggestion(self, guess: Guess) -> Suggestion:
         """Return a guess as a suggestion for a person to confirm."""
         x, y, z = guess.position.tolist()
-        return Suggestion((x, y, z), guess.radius_95, self.source)
+        return Suggestion((x, y, z), guess.radius_95, self.source, guess.atlas_distance)
 
     def suggestions(self) -> dict[Side, dict[str, Suggestion]]:
         """Return the guesses of the guinea pig's features by side and code, the most doubtful first."""
@@ -137,12 +142,12 @@ class Proposal:
         }
 
 
-def least_certain_first(guesses: Sequence[Guess]) -> tuple[Guess, ...]:
+def most_doubtful_first(guesses: Sequence[Guess]) -> tuple[Guess, ...]:
     """Return guesses, the most doubtful first, marked where they need a closer look."""
     radii = [guess.radius_95 for guess in guesses if guess.radius_95 is not None]
     limit = _DOUBTFUL * float(np.median(radii)) if radii else np.inf
     marked = [_marked(guess, limit) for guess in guesses]
-    return tuple(sorted(marked, key=lambda guess: -(guess.radius_95 or 0.0)))
+    return tuple(sorted(marked, key=lambda guess: -guess.doubt))
 
 
 def _marked(guess: Guess, limit: float) -> Guess:

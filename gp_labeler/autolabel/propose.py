@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -18,7 +17,7 @@ from gp_labeler.autolabel.confidence import GuessConfidence
 from gp_labeler.autolabel.library import TemplateLibrary
 from gp_labeler.autolabel.pose_search import ACCEPTED
 from gp_labeler.autolabel.prediction import Prediction, predict
-from gp_labeler.autolabel.proposal import Guess, Proposal, least_certain_first
+from gp_labeler.autolabel.proposal import Guess, Proposal, most_doubtful_first
 from gp_labeler.autolabel.registration import COARSER, Registration, engine_named
 from gp_labeler.autolabel.registration_process import HereRegistration
 from gp_labeler.imaging.progress import Progress, Report
@@ -52,7 +51,7 @@ def propose(
     volume : Volume
         The scan.
     library : TemplateLibrary
-        Labelled scans; that of the volume itself, if it is among them, does not count.
+        Labelled scans; that of the volume itself, or a copy of it, if it is among them, does not count.
     placed : mapping of str to (3,) array_like, optional
         Landmarks that are known in the scan, LPS mm; three or more say how the head lies.
     stored : {"as it is", "mirrored"}, optional
@@ -82,13 +81,14 @@ def propose(
     """
     registration = registration or HereRegistration(engine_named())
     report = Report(progress, cancel)
-    own = [scan.name for scan in library.scans if _is_same(volume, scan.path)]
-    if len(own) == len(library.scans):
-        raise GpError("it is the only labelled scan", file=volume.path)
     first = _HISTORY_SHARE if with_history else 0.1
     confidence = GuessConfidence(())
     if with_history:
         confidence = library.confidence(registration, report.part(0.0, first))
+    checksum = volume.find_checksum(report.part(first, first))
+    own = [scan.name for scan in library.scans if library.checksum_of(scan) == checksum]
+    if len(own) == len(library.scans):
+        raise GpError("it is the only labelled scan", file=volume.path)
     scan = replace(volume, T_scan_voxel=_MIRROR @ volume.T_scan_voxel) if stored == "mirrored" else volume
     known = {name: np.asarray(xyz, dtype=np.float64).reshape(3) for name, xyz in (placed or {}).items()}
     if stored == "mirrored":
@@ -110,7 +110,7 @@ def propose(
     score = prediction.pose.score
     uncertain = score if score > ACCEPTED and len(known) < _FEWEST_PLACED else None
     return Proposal(
-        least_certain_first(guesses),
+        most_doubtful_first(guesses),
         prediction.names,
         tuple(outside),
         tuple(prediction.carried),
@@ -170,10 +170,6 @@ _LEFT = {
     "as it is": "left and right are taken from the file, as confirmed",
     "mirrored": "the scan is stored as its mirror image, as stated",
 }
-
-
-def _is_same(volume: Volume, path: Path | None) -> bool:
-    return volume.path is not None and path is not None and path.absolute() == volume.path.absolute()
 
 
 def _mirrored(point: FloatArray) -> FloatArray:

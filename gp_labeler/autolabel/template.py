@@ -102,13 +102,21 @@ class Template:
             grid = SampleGrid.around(own.min(axis=0) - margin, own.max(axis=0) + margin, fine_step)
             part = part_of(volume, fine_step, np.stack([grid.origin, grid.high]))
             regions.append(Region(names, sampled(part, grid, _IDENTITY, bone.threshold)))
-        key = cls.key_of(scan, settings)
+        key = cls.key_of(scan, settings, volume.checksum)
         return cls(scan.name, key, dict(scan.points), HeadSurface.of(bone), image, tuple(regions))
 
     @staticmethod
-    def key_of(scan: LabelledScan, settings: Settings) -> str:
-        """Return what tells a template from those of other scans, landmarks and settings."""
-        return f"{scan.key}-{settings.key}-{_VERSION}"
+    def key_of(scan: LabelledScan, settings: Settings, checksum: str | None = None) -> str:
+        """Return what tells a template from those of other scans, landmarks and settings.
+
+        Parameters
+        ----------
+        scan : LabelledScan
+        settings : Settings
+        checksum : str, optional
+            Of the scan, which is read where this is not given.
+        """
+        return f"{scan.key(checksum or scan.load().checksum)}-{settings.key}-{_VERSION}"
 
     def array(self, names: tuple[str, ...]) -> FloatArray:
         """Return some of the landmarks, (N, 3) LPS mm."""

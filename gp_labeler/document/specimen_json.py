@@ -215,6 +215,8 @@ def _suggestion_out(suggestion: Suggestion) -> Document:
     out: Document = {"position": list(suggestion.position)}
     if suggestion.radius_95 is not None:
         out["radius_95_mm"] = suggestion.radius_95
+    if suggestion.atlas_distance is not None:
+        out["atlas_distance_mm"] = suggestion.atlas_distance
     return out | ({"source": suggestion.source} if suggestion.source else {})
 
 
@@ -289,11 +291,15 @@ def _suggestion_in(document: Mapping[str, Any], where: str) -> Suggestion | None
         return None
     where = f"{where}.suggestion"
     content = _typed(document["suggestion"], dict, where)
-    radius = content.get("radius_95_mm")
+    lengths = [
+        None if content.get(key) is None else _number(content[key], f"{where}.{key}")
+        for key in ("radius_95_mm", "atlas_distance_mm")
+    ]
     return Suggestion(
         _triple(content.get("position"), f"{where}.position"),
-        None if radius is None else _number(radius, f"{where}.radius_95_mm"),
+        lengths[0],
         _typed(content.get("source", ""), str, f"{where}.source"),
+        lengths[1],
     )
 
 

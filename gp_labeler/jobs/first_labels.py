@@ -16,6 +16,7 @@ from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
 
 if TYPE_CHECKING:
+    from gp_core.atlas.atlas import Atlas
     from gp_labeler.autolabel import Proposal
     from gp_labeler.head_pose import HeadPose
 
@@ -76,6 +77,8 @@ class SuggestFromScans:
         Whether to find how the head lies, too, so that suggestions can be looked at in straight views.
     threshold : float, optional
         Where its bone begins, for that.
+    atlas : Atlas, optional
+        What suggestions are compared with; by default the published one.
     """
 
     volume: Volume
@@ -85,6 +88,7 @@ class SuggestFromScans:
     most: int = 5
     straighten: bool = False
     threshold: float | None = None
+    atlas: Atlas | None = None
 
     @property
     def title(self) -> str:
@@ -115,6 +119,7 @@ class SuggestFromScans:
                 placed=self.placed,
                 stored="as it is",
                 registration=registration,
+                atlas=self.atlas,
                 progress=lambda fraction: progress(_PROPOSED * fraction, "Registering"),
                 cancel=progress.cancelled,
             )

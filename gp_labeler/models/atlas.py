@@ -107,6 +107,11 @@ class AtlasModel:
         return self._atlas
 
     @property
+    def expected_by(self) -> Atlas | None:
+        """The atlas in use, or one that lacks the open specimen; None while it is being loaded."""
+        return self._expected_by
+
+    @property
     def specimens(self) -> tuple[Specimen, ...]:
         """The animals that the atlas was fitted to here; none for the published one and those of files."""
         return self._specimens

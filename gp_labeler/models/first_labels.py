@@ -8,7 +8,6 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from psygnal import Signal
 
 from gp_core.errors import GpError
@@ -19,6 +18,7 @@ from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How
 from gp_labeler.jobs.first_labels import FirstLabels, SuggestFromScans, templates_folder
 from gp_labeler.jobs.runner import Jobs, Task
+from gp_labeler.models.atlas import AtlasModel
 from gp_labeler.models.head import HeadModel
 from gp_labeler.models.labels import LabelsModel
 from gp_labeler.models.messages import Messages
@@ -43,9 +43,11 @@ class FirstLabelsModel:
     scan : ScanModel
         The scan that is open.
     labels : LabelsModel
-        The least certain suggestion becomes its active point.
+        The most doubtful suggestion becomes its active point.
     head : HeadModel
         It is straightened too, unless it is already.
+    atlas : AtlasModel
+        Suggestions are compared with its atlas.
     jobs : Jobs
         Where the search runs.
     messages : Messages
@@ -63,11 +65,13 @@ class FirstLabelsModel:
         scan: ScanModel,
         labels: LabelsModel,
         head: HeadModel,
+        atlas: AtlasModel,
         jobs: Jobs,
         messages: Messages,
         directory: Path | None = None,
     ) -> None:
         self._document, self._scan, self._labels, self._head = document, scan, labels, head
+        self._atlas = atlas
         self._jobs, self._messages = jobs, messages
         self._folder = templates_folder(directory)
         self.proposal: Proposal | None = None
@@ -122,6 +126,7 @@ class FirstLabelsModel:
             known,
             straighten=self._head.frame is None,
             threshold=self._document.state.threshold,
+            atlas=self._atlas.expected_by,
         )
         self._jobs.submit(job, partial(self._take, left_confirmed), key=_KEY)
 
@@ -144,16 +149,10 @@ class FirstLabelsModel:
         self.changed.emit()
 
     def _choose_first(self, proposal: Proposal) -> None:
-        """Make the least certain suggestion of the proposal the active point, and show it closely."""
-        radii = {
-            (side, code): suggestion.radius_95 or np.inf
-            for side, suggestions in proposal.suggestions().items()
-            for code, suggestion in suggestions.items()
-            if code in self._document.landmarks(side).suggested
-        }
-        if radii:
-            side, code = max(radii, key=lambda key: radii[key])
-            self._labels.look_closely(side, code)
+        """Make the most doubtful suggestion of the proposal the active point, and show it closely."""
+        still = [one for one in _by_doubt(proposal) if one[1] in self._document.landmarks(one[0]).suggested]
+        if still:
+            self._labels.look_closely(*still[0])
 
     def _on_reset(self) -> None:
         self.proposal = None
@@ -166,22 +165,24 @@ class FirstLabelsModel:
 
 def _told(proposal: Proposal) -> str:
     """Say what was suggested, and what to look at first."""
-    found = [
-        (side, code, suggestion.radius_95)
-        for side, suggestions in proposal.suggestions().items()
-        for code, suggestion in suggestions.items()
-    ]
-    radii = sorted(radius for _, _, radius in found if radius is not None)
+    found = _by_doubt(proposal)
+    radii = sorted(guess.radius_95 for guess in proposal.guesses if guess.radius_95 is not None)
     within = f", 95 % within {radii[len(radii) // 2]:.2f} mm (median)" if radii else ""
     words = [f"{len(found)} points suggested from {proposal.source}{within}"]
     uncertain = {guess.name for guess in proposal.guesses if guess.is_doubtful}
     if uncertain:
-        worst = [point_text(side, code) for side, code, radius in _by_radius(found)][: min(len(uncertain), 4)]
+        worst = [point_text(side, code) for side, code in found[: min(len(uncertain), 4)]]
         words.append(f"look closely at {', '.join(worst)}")
     if proposal.outside:
         words.append(f"beyond the edge of the scan: {', '.join(proposal.outside[:6])}")
     return "; ".join([*words, *proposal.warnings])
 
 
-def _by_radius(found: list[tuple[Side, str, float | None]]) -> list[tuple[Side, str, float | None]]:
-    return sorted(found, key=lambda one: -(one[2] or np.inf))
+def _by_doubt(proposal: Proposal) -> list[tuple[Side, str]]:
+    """Return the suggested features, the most doubtful first."""
+    found = {
+        (side, code): suggestion.doubt
+        for side, suggestions in proposal.suggestions().items()
+        for code, suggestion in suggestions.items()
+    }
+    return sorted(found, key=lambda key: found[key], reverse=True)

@@ -6,8 +6,6 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 
-import numpy as np
-
 from gp_core.atlas.label_check import Finding
 from gp_core.landmarks.features import CODES, FEATURES, Side, feature
 from gp_labeler.document.edits import point_text
@@ -119,7 +117,8 @@ def placing_order(ghosts: Mapping[str, Ghost]) -> tuple[str, ...]:
 def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Active:
     """Return what to place after `active`: round this side, then the other side, then what was left standing.
 
-    What is suggested on a side comes after what is to do there, the least certain first.
+    What is suggested on a side comes after what is to do there, the most doubtful first: in doubt by its
+    radius, or because the atlas disagrees.
 
     Returns
     -------
@@ -135,17 +134,17 @@ def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Act
             mark = state.landmark(side, code)
             if not mark.decided and mark.suggestion is None:
                 return Active(side, code)
-        if suggested := _least_certain_first(state, side, after=active.code if side is active.side else None):
+        if suggested := _most_doubtful_first(state, side, after=active.code if side is active.side else None):
             return Active(side, suggested[0])
     if active.code is not None and not state.landmark(active.side, active.code).decided:
         return active
     return Active(active.side)
 
 
-def _least_certain_first(state: SpecimenState, side: Side, *, after: str | None) -> list[str]:
-    """Return what is suggested on one side, the least certain first; round from `after`, which comes last."""
-    radii = {code: found.radius_95 for code, found in state.side(side).suggested.items()}
-    order = sorted(radii, key=lambda code: -(radii[code] or np.inf))
+def _most_doubtful_first(state: SpecimenState, side: Side, *, after: str | None) -> list[str]:
+    """Return what is suggested on one side, the most doubtful first; round from `after`, which comes last."""
+    suggested = state.side(side).suggested
+    order = sorted(suggested, key=lambda code: suggested[code].doubt, reverse=True)
     at = order.index(after) + 1 if after in order else 0
     return order[at:] + order[:at]
 

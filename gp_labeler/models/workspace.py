@@ -86,7 +86,7 @@ class Workspace:
         self.bone = BoneModel(document, self.scan, self.labels, jobs, messages)
         self.head = HeadModel(document, self.view, self.scan, jobs, messages)
         self.first_labels = FirstLabelsModel(
-            document, self.scan, self.labels, self.head, jobs, messages, directory
+            document, self.scan, self.labels, self.head, self.atlas, jobs, messages, directory
         )
         document.picture = self._thumbnail
         self.pose = PoseModel(document, self.atlas, self.view, jobs, messages)

@@ -42,10 +42,10 @@ def mm_text(length: float) -> str:
 
 def suggestion_text(suggestion: Suggestion) -> str:
     """Return what a suggestion says of itself, such as ``atlas, 95 % within 0.86 mm``; empty for nothing."""
-    radius = suggestion.radius_95
-    return ", ".join(
-        filter(None, (suggestion.source, f"95 % within {mm_text(radius)}" if radius is not None else ""))
-    )
+    radius, away = suggestion.radius_95, suggestion.atlas_distance
+    within = "" if radius is None else f"95 % within {mm_text(radius)}"
+    atlas = "" if away is None else f"the atlas expects it {mm_text(away)} away"
+    return ", ".join(filter(None, (suggestion.source, within, atlas)))
 
 
 def degrees_text(angle_rad: float) -> str:

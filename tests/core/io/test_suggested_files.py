@@ -49,6 +49,17 @@ def test_a_suggestion_is_no_position_in_a_landmark_file(tmp_path: Path, ending: 
     assert back.status("RWP") is Status.TO_DO
 
 
+@pytest.mark.parametrize("source", ["5 labelled scans", ""])
+@pytest.mark.parametrize("radius", [0.412, None])
+def test_a_file_of_suggestions_tells_where_the_atlas_disagrees(
+    tmp_path: Path, source: str, radius: float | None
+) -> None:
+    said = Suggestion((1, 2, 3), radius, source, 1.25)
+    file = tmp_path / "GP1_L_suggested.mrk.json"
+    write_suggestions(file, LandmarkSet.empty("L").with_suggestions({"RWP": said}), specimen="GP1")
+    assert dict(read_landmarks(file).suggested) == {"RWP": said}
+
+
 def test_a_file_of_suggestions_says_so_of_each_point_and_is_read_as_such(tmp_path: Path) -> None:
     file = tmp_path / landmark_file_name("GP1", _side().side, suggested=True)
     assert file.name == "GP1_L_suggested.mrk.json"

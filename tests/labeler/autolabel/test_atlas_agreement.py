@@ -9,7 +9,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.sampling import draw_animal
 from gp_labeler.autolabel.atlas_agreement import compare_with_atlas, disagreement_text
 from gp_labeler.autolabel.labelled_scan import flat_points
-from gp_labeler.autolabel.proposal import Guess, least_certain_first
+from gp_labeler.autolabel.proposal import Guess, most_doubtful_first
 
 
 @pytest.fixture(scope="module")
@@ -40,7 +40,7 @@ def test_a_guess_that_lies_elsewhere_is_doubtful_and_both_are_named(guesses, atl
     (found,) = [guess for guess in told if guess.atlas_distance is not None]
     assert found.name == name
     assert found.atlas_distance == pytest.approx(3.0, abs=1.0)
-    assert next(g for g in least_certain_first(told) if g.name == name).is_doubtful
+    assert next(g for g in most_doubtful_first(told) if g.name == name).is_doubtful
     text = disagreement_text(told)
     assert "the atlas and the labelled scans disagree" in text
     assert f"{name} by {found.atlas_distance:.1f} mm" in text

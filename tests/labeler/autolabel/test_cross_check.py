@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from gp_labeler.autolabel import LabelledScan
 from gp_labeler.autolabel.cross_check import check_predictions
@@ -74,6 +75,17 @@ def test_exchanged_sides_and_another_animal_are_one_finding_each():
     (found,) = check_predictions(with_labels(scans, **strange), predictions).findings
     assert found.kind == "other scan"
     assert found.as_json()["specimen"] == "GP2"
+
+
+@pytest.mark.filterwarnings("error")
+def test_labels_that_equal_their_predictions_agree_and_one_that_does_not_is_still_named():
+    scans, predictions = library(noise=0.0)
+    assert check_predictions(scans, predictions).findings == ()
+    moved = {"MN_L": scans[2].points["MN_L"] + np.array([0, 0, 2.0])}
+    (found,) = check_predictions(with_labels(scans, **moved), predictions).findings
+    assert (found.kind, found.names) == ("far", ("MN_L",))
+    tiny = {"MN_L": scans[2].points["MN_L"] + np.array([0, 0, 0.05])}
+    assert check_predictions(with_labels(scans, **tiny), predictions).findings == ()
 
 
 def test_a_head_that_was_not_found_is_not_checked():

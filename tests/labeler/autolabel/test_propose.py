@@ -1,6 +1,7 @@
 """First labels: a head is found however it lies, its landmarks are guessed, and never taken as labels."""
 
 import json
+import os
 from dataclasses import replace
 from functools import cache
 
@@ -127,6 +128,12 @@ def test_a_pose_is_accepted_if_it_fits_stands_out_and_shows_enough(score, rival,
     assert found.is_certain is (accepted and score <= 0.5)
 
 
+def test_a_copy_of_the_scan_does_not_suggest_its_own_labels():
+    copy = replace(small_head(0)[0], name="a copy")
+    with pytest.raises(GpError, match="only labelled scan"):
+        propose(copy, TemplateLibrary([labelled(0)]), with_history=False)
+
+
 def test_it_stops_when_it_is_asked_to():
     with pytest.raises(Cancelled):
         propose(small_head(7)[0], TemplateLibrary([labelled(0)]), cancel=lambda: True)
@@ -138,6 +145,12 @@ def test_what_was_kept_is_made_again_when_a_label_or_a_setting_changes():
     keys = {Template.key_of(scan, Settings()), Template.key_of(moved, Settings())}
     assert len(keys | {Template.key_of(scan, Settings(fine=50))}) == 3
     assert Template.key_of(labelled(0), Settings()) in keys
+    volume = scan.volume
+    other = volume.voxels.read(slice(None), slice(None), slice(None)).copy()
+    other[3, 4, 5] += 1
+    changed = replace(scan, volume=replace(volume, voxels=other))
+    assert Template.key_of(changed, Settings()) not in keys
+    assert Template.key_of(replace(scan, name="renamed"), Settings()) in keys
 
 
 @pytest.fixture(scope="module")
@@ -174,9 +187,14 @@ def test_the_command_suggests_any_scheme_for_a_folder_and_goes_on_where_it_was(l
     assert {guess["name"] for guess in content["guesses"]} == set(OWN)
 
     before = (lab / "out" / "small-3_suggested.mrk.json").stat().st_mtime_ns
+    packs = sorted((lab / "kept").glob("templates/*"))
+    assert len(packs) == 2
+    for scan in (*(lab / "labelled").iterdir(), lab / "new" / "small-3.nrrd"):
+        os.utime(scan, (0, 0))  # touched, as copying and unpacking do; the scan is the same
     (lab / "new" / "broken.nrrd").write_text("no scan")
     assert proposing(lab) == 2  # and the other head is not lost
     assert (lab / "out" / "small-3_suggested.mrk.json").stat().st_mtime_ns == before
+    assert sorted((lab / "kept").glob("templates/*")) == packs
     said = capsys.readouterr()
     assert "kept from an earlier run" in said.out
     assert said.err.count("broken.nrrd") >= 1

@@ -2,11 +2,14 @@
 
 import time
 
+import numpy as np
 import pytest
 from small_heads import TURN, save_markups, save_volume, small_head
 
+from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
+from gp_labeler.autolabel import Guess, Proposal
 from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.head_pose.result import HeadPoseError
 from gp_labeler.imaging.progress import Cancelled
@@ -64,6 +67,31 @@ def test_suggestions_arrive_the_least_certain_first_and_placed_points_stay(works
     made.document.undo()
     made.document.undo()
     assert not made.document.landmarks(Side.RIGHT).suggested
+
+
+def test_the_atlas_in_use_is_asked_and_what_it_doubts_is_looked_at_first(workspace, labelled, monkeypatch):
+    made, calls = workspace
+    atlas, asked = Atlas.published(), []
+    made.atlas.use(atlas)
+
+    def told(volume, library, **options):
+        asked.append(options["atlas"])
+        guesses = [
+            Guess("CA_L", np.zeros(3), 0.9, 0.1, 0.1, 3),
+            Guess("OI_L", np.ones(3), 0.3, 0.1, 0.1, 3, is_doubtful=True, atlas_distance=1.4),
+        ]
+        return Proposal(tuple(guesses), ("CA_L", "OI_L"), (), ("a", "b", "c"), 0.3, "greedy", "confirmed")
+
+    monkeypatch.setattr("gp_labeler.autolabel.propose", told)
+    monkeypatch.setattr("gp_labeler.head_pose.straighten", lambda volume, **options: None)
+    said = []
+    made.messages.said.connect(lambda text, level: said.append(text))
+    made.first_labels.suggest([labelled])
+    calls.deliver_until_idle(made.jobs)
+    assert asked == [atlas]
+    assert made.document.landmarks(Side.LEFT).suggested["OI"].atlas_distance == 1.4
+    assert made.labels.active == Active(Side.LEFT, "OI")
+    assert any("look closely at OI left" in text for text in said)
 
 
 def test_it_is_stopped_within_two_seconds_while_images_are_registered(labelled, tmp_path):

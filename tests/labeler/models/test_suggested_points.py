@@ -14,8 +14,9 @@ from gp_core.atlas.sampling import draw_animal
 from gp_core.errors import GpError
 from gp_core.io import load_specimens, read_landmarks
 from gp_core.landmarks.features import Side
+from gp_core.landmarks.suggestion import Suggestion
 from gp_labeler.document import touching
-from gp_labeler.document.edits import CheckPoint, LockPoints, PlacePoint, SwapPoints
+from gp_labeler.document.edits import CheckPoint, LockPoints, PlacePoint, SuggestPoints, SwapPoints
 from gp_labeler.document.landmark_export import export_landmarks
 from gp_labeler.document.landmark_import import import_landmarks
 from gp_labeler.document.opening import open_specimen, recover_specimen
@@ -24,7 +25,7 @@ from gp_labeler.document.specimen_file import read_specimen
 from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import How
 from gp_labeler.models.pose_report import PoseReport
-from gp_labeler.models.workflow import Active, PointState
+from gp_labeler.models.workflow import Active, PointState, next_point
 
 L, R = Side.LEFT, Side.RIGHT
 OPENING = ("CA", "RWP", "OS")
@@ -133,6 +134,29 @@ def test_what_is_suggested_comes_after_what_is_to_do_the_least_certain_first() -
         visited.append(editing.labels.active.code)
         editing.labels.confirm()
     assert visited == ["MN", "ZL", "IN", "CB"]
+
+
+def test_a_suggestion_with_which_the_atlas_disagrees_comes_first_and_is_saved(tmp_path: Path) -> None:
+    editing = Editing(directory=tmp_path / "state")
+    x, y, z = (float(value) for value in shape()["CB"])
+    told = {"CB": (0.5, None), "ZL": (0.4, 1.5), "MN": (1.0, None)}
+    found = {code: Suggestion((x, y, z), r, "5 labelled scans", away) for code, (r, away) in told.items()}
+    for code in PLACEABLE:
+        if code not in found:
+            editing.labels.place(shape()[code], side=L, code=code)
+    editing.document.do(SuggestPoints(L, found, MARK))
+    file = editing.document.save(tmp_path / "GP1.gpspecimen.json")
+    assert dict(read_specimen(file).side(L).suggested) == found
+    visited = [next_point(editing.document.state, Active(L, "OS"), editing.labels.ghosts).code]
+    editing.labels.set_active(Active(L, "ZL"))
+    for _ in range(2):
+        editing.labels.confirm()
+        visited.append(editing.labels.active.code)
+    assert visited == ["ZL", "MN", "CB"]
+    editing.document.close()
+    (recovery,) = find_recoveries(tmp_path / "state")
+    again = Editing(recover_specimen(recovery, tmp_path / "state"))
+    assert text_of(again.document.state) == text_of(editing.document.state)
 
 
 def test_a_suggestion_is_saved_journalled_and_recovered_as_one(tmp_path: Path) -> None:
