@@ -97,6 +97,16 @@ class LibraryCheck:
     checked: tuple[str, ...]
     unchecked: tuple[str, ...] = ()
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the check as JSON values, as it is written to a file."""
+        return {
+            "schema": "gp-labeler library check",
+            "version": 1,
+            "checked": list(self.checked),
+            "notFound": list(self.unchecked),
+            "findings": [finding.as_json() for finding in self.findings],
+        }
+
     def of(self, specimen: str) -> tuple[LibraryFinding, ...]:
         """Return what was found in one scan."""
         return tuple(finding for finding in self.findings if finding.specimen == specimen)

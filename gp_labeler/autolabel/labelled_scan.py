@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from gp_core.errors import GpError
+from gp_core.frames import RigidTransform
 from gp_core.landmarks.features import FEATURES, Side
 from gp_core.landmarks.labels import parse_label
 from gp_core.landmarks.sets import LandmarkSet
@@ -39,6 +40,8 @@ class LabelledScan:
         How it is read: options of `gp_labeler.imaging.readers.read_volume`.
     volume : Volume, optional
         The scan itself, where it is in memory; else it is read from `path`.
+    T_head_scan : RigidTransform, optional
+        How the head lies in the scan, where that was said of the specimen; for pictures alone.
 
     Raises
     ------
@@ -51,6 +54,7 @@ class LabelledScan:
     path: Path | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
     volume: Volume | None = None
+    T_head_scan: RigidTransform | None = None
 
     def __post_init__(self) -> None:
         if len(self.points) < FEWEST_LANDMARKS:

@@ -82,14 +82,7 @@ def _check(args: argparse.Namespace) -> int:
         predictions = library.held_out(HereRegistration(engine))
         check = check_predictions(library.scans, predictions)
         if args.json is not None:
-            content = {
-                "schema": "gp-labeler library check",
-                "version": 1,
-                "checked": list(check.checked),
-                "notFound": list(check.unchecked),
-                "findings": [finding.as_json() for finding in check.findings],
-            }
-            write_text(args.json, json.dumps(content, indent=1) + "\n")
+            write_text(args.json, json.dumps(check.as_json(), indent=1) + "\n")
         drawn = draw_library_check(check, library.scans, predictions, args.pictures) if args.pictures else ()
     for name in check.checked:
         found = check.of(name)

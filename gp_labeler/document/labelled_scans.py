@@ -8,6 +8,7 @@ from os import PathLike
 from pathlib import Path
 
 from gp_core.errors import FileFormatError, GpError
+from gp_core.frames import RigidTransform
 from gp_core.io import (
     PointList,
     load_specimens,
@@ -95,7 +96,8 @@ class _Finding:
         points = flat_points({side: state.side(side) for side in Side})
         volume = state.volume
         path = None if volume is None or volume.path is None else Path(volume.path)
-        self._take(state.specimen, points, path, file, dict(state.import_choices))
+        head = None if state.head_frame is None else state.head_frame.T_head_scan
+        self._take(state.specimen, points, path, file, dict(state.import_choices), head)
 
     def take_landmarks(self, files: list[Path]) -> None:
         """Take in landmark files, the sides of an animal together."""
@@ -126,6 +128,7 @@ class _Finding:
         path: Path | None,
         file: Path,
         options: Mapping[str, object],
+        head: RigidTransform | None = None,
     ) -> None:
         if name in self.scans:
             self.skipped.append(Skipped(file.name, f"{name} already exists"))
@@ -134,7 +137,7 @@ class _Finding:
         elif path is None or not path.exists():
             self.skipped.append(Skipped(file.name, "its scan is not there"))
         else:
-            self.scans[name] = LabelledScan(name, dict(points), path, options)
+            self.scans[name] = LabelledScan(name, dict(points), path, options, T_head_scan=head)
 
 
 def _placed(read: PointList) -> dict[str, FloatArray]:

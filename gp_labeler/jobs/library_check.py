@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from gp_labeler.jobs.loading import load_modules
 from gp_labeler.jobs.runner import Progress
@@ -38,12 +40,15 @@ class LibraryChecked:
         Specimens that were predicted from the others.
     problems : tuple of str
         Specimens that were not, and why.
+    content : mapping
+        All of it as JSON values; see `gp_labeler.autolabel.cross_check.LibraryCheck.as_json`.
     """
 
     findings: tuple[str, ...]
     files: tuple[Path, ...]
     n_checked: int
     problems: tuple[str, ...] = ()
+    content: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -111,4 +116,4 @@ class CheckLibrary:
         problems = [skipped.text for skipped in found.skipped]
         problems += [f"{name}: the head was not found." for name in check.unchecked]
         told = tuple(f"{finding.specimen}: {finding.text}" for finding in check.findings)
-        return LibraryChecked(told, files, len(check.checked), tuple(problems))
+        return LibraryChecked(told, files, len(check.checked), tuple(problems), check.as_json())

@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.landmarks.labels import parse_label
+from gp_core.landmarks.sets import LandmarkSet
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.cross_check import LibraryCheck, LibraryFinding
-from gp_labeler.autolabel.labelled_scan import LabelledScan, side_and_code
+from gp_labeler.autolabel.labelled_scan import LabelledScan, side_and_code, sides_of_points
 from gp_labeler.autolabel.prediction import Prediction
+from gp_labeler.head_pose import straighten_by_landmarks
 from gp_labeler.imaging.close_up import PICTURE_AXES, CloseUp
 from gp_labeler.imaging.threshold import propose_threshold
 from gp_labeler.imaging.volume import Volume
@@ -33,7 +36,7 @@ from gp_labeler.jobs.picture_page import (
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_library_check", "finding_blocks", "library_sheet_name"]
+__all__ = ["draw_library_check", "finding_blocks", "head_rotation", "library_sheet_name"]
 
 _LAYOUT = PageLayout(columns=3, rows=4, n_pictures=3)
 _LEAST_MM, _MOST_MM = 12.0, 60.0
@@ -116,7 +119,9 @@ def _pages(
     scan: LabelledScan, findings: Sequence[LibraryFinding], prediction: Prediction
 ) -> Iterator[Figure]:
     volume = scan.load()
-    blocks = finding_blocks(scan, findings, prediction, volume, propose_threshold(volume))
+    turn = head_rotation(scan, prediction, volume)
+    frame = "along the axes of the scan" if turn is None else "in the frame of the head"
+    blocks = finding_blocks(scan, findings, prediction, volume, propose_threshold(volume), turn)
     each_page = _LAYOUT.columns * _LAYOUT.rows
     many = "1 finding" if len(findings) == 1 else f"{len(findings)} findings"
     for first in range(0, len(blocks), each_page):
@@ -124,9 +129,26 @@ def _pages(
             blocks[first : first + each_page],
             _LAYOUT,
             title=f"{scan.name}   labels that the other scans contradict",
-            about=f"{many}   ·   {volume.name}   ·   views along the axes of the scan",
+            about=f"{many}   ·   {volume.name}   ·   views {frame}",
             legend=_LEGEND,
         )
+
+
+def head_rotation(scan: LabelledScan, prediction: Prediction, volume: Volume) -> FloatArray | None:
+    """Return the rotation from the frame of the head into that of the scan, where it is known.
+
+    It is the one that was said of the specimen, or the one of its landmarks: where the other scans expect them,
+    since labels may be exchanged. None for other schemes than the
+    guinea pig's features, and where they do not determine the frame.
+    """
+    T_head_scan, sides = scan.T_head_scan, sides_of_points(prediction.centres)
+    if T_head_scan is None and sides is not None:
+        placed = {side: LandmarkSet.from_mapping(points, side) for side, points in sides.items()}
+        try:
+            T_head_scan = straighten_by_landmarks(volume, placed, refine=False).T_head_scan
+        except GpError:
+            return None
+    return None if T_head_scan is None else T_head_scan.rotation.T
 
 
 def finding_blocks(
@@ -135,6 +157,7 @@ def finding_blocks(
     prediction: Prediction,
     volume: Volume,
     threshold: float,
+    turn: FloatArray | None = None,
 ) -> list[PictureBlock]:
     """Return the pictures of all labels that are named, or of the worst where a finding concerns all.
 
@@ -149,19 +172,24 @@ def finding_blocks(
         The scan itself.
     threshold : float
         Where its bone begins.
+    turn : (3, 3) array, optional
+        Rotation from the head's frame, in which the pictures are made, into the scan's.
     """
+    turn = np.eye(3) if turn is None else turn
     places = {
         name: _Place(name, scan.points[name], prediction.centres[name])
         for name in prediction.names
         if name in scan.points
     }
-    middle = float(np.mean(scan.array[:, 0]))
+    left = turn[:, 0]
+    middle = float(np.mean(scan.array @ left))
     blocks = []
     for finding in findings:
         worst = sorted(places, key=lambda name: -places[name].distance)[:_WORST]
         for name in finding.names or worst:
-            side = _side_of(places[name], middle)
-            blocks.append(_block(places[name], side, _note(finding, places[name]), volume, threshold))
+            side = parse_label(name).side
+            side = side or (Side.LEFT if places[name].label @ left >= middle else Side.RIGHT)
+            blocks.append(_block(places[name], side, _note(finding, places[name]), volume, threshold, turn))
     return blocks
 
 
@@ -186,25 +214,21 @@ def _short(name: str) -> str:
     return name if known is None or feature(known[1]).shared else f"{known[1]} {known[0].word}"
 
 
-def _side_of(place: _Place, middle: float) -> Side:
-    """Return from which side a label is looked at: as its name says, else where it lies."""
-    said = parse_label(place.name).side
-    return said or (Side.LEFT if place.label[0] >= middle else Side.RIGHT)
-
-
 def _plane_of(name: str) -> str:
     known = side_and_code(name)
     return picture_plane(None if known is None else feature(known[1]))
 
 
-def _block(place: _Place, side: Side, note: str, volume: Volume, threshold: float) -> PictureBlock:
+def _block(
+    place: _Place, side: Side, note: str, volume: Volume, threshold: float, turn: FloatArray
+) -> PictureBlock:
     across = float(np.clip(_AROUND * place.distance, _LEAST_MM, _MOST_MM))
     plane = _plane_of(place.name)
     low, high = volume.intensity_range
     pictures, marks = [], []
     views = ((plane, place.label), (plane, place.expected), (side.value, place.label))
     for n, (look, through) in enumerate(views):
-        axes = PICTURE_AXES[look]
+        axes = PICTURE_AXES[look].turned(turn)
         middle = (place.label + place.expected) / 2
         centre = middle + axes.away * float((through - middle) @ axes.away)
         near = CloseUp(volume, centre, across, PIXELS)

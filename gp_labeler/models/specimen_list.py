@@ -69,6 +69,8 @@ class SpecimenListModel:
         self._counted: Mapping[Path, ListedSpecimen] = {}
         self._counted_by: tuple[object, object] = (None, None)
         self.words, self.kind = "", FILTERS[0]
+        self.library_checked: LibraryChecked | None = None
+        """What the last check of labels against each other found."""
         document.saved.connect(self._on_saved)
         for signal in (atlas.changed, atlas.details_changed):
             signal.connect(self._on_atlas_changed)
@@ -197,12 +199,18 @@ class SpecimenListModel:
         rows : iterable of ListedSpecimen, optional
             By default all that are shown.
         """
-        job = CheckLibrary(self._files(rows), self._templates, Path(where))
+        self.check_library_of(self._files(rows), where)
+
+    def check_library_of(self, labelled: Iterable[Path], where: str | PathLike[str]) -> None:
+        """Check labelled scans against each other: specimen files, landmark files, and folders of them."""
+        self.library_checked = None
+        job = CheckLibrary(tuple(labelled), self._templates, Path(where))
         self._jobs.submit(job, self._take_check, key="check library")
 
     # Inside
 
     def _take_check(self, checked: LibraryChecked) -> None:
+        self.library_checked = checked
         for file in checked.files:
             self._messages.wrote.emit("check of the library", file)
         self._tell(checked.lines)

@@ -27,6 +27,7 @@ from gp_labeler.document.specimen_json import document_of
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.contact_sheet import MakeContactSheets
+from gp_labeler.jobs.library_check import CheckLibrary
 from gp_labeler.jobs.mesh import SaveMesh
 from gp_labeler.jobs.runner import Task
 from gp_labeler.models.added_meshes import AddedMesh
@@ -388,6 +389,9 @@ class Recorder(QObject):
             self.tables.append(step("mesh", save=Path(task.job.path).name))
         elif isinstance(task.job, MakeContactSheets):
             self.tables.append(self._sheets_made(task.job))
+        elif isinstance(task.job, CheckLibrary):
+            labelled = [str(file.absolute()) for file in task.job.files]
+            self.tables.append(step("check_library", labelled=labelled, path=task.job.where.name))
 
     def _sheets_made(self, job: MakeContactSheets) -> Table:
         """Return the step that makes these contact sheets; of the open one as a script saves it."""

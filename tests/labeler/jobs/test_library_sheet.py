@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from gp_core.atlas.atlas import Atlas
+from gp_core.atlas.sampling import mean_animal
+from gp_core.frames import RigidTransform
 from gp_labeler.autolabel import LabelledScan
 from gp_labeler.autolabel.cross_check import LibraryCheck, LibraryFinding
+from gp_labeler.autolabel.labelled_scan import flat_points
 from gp_labeler.autolabel.prediction import Prediction
 from gp_labeler.imaging.volume import Volume
-from gp_labeler.jobs.library_sheet import draw_library_check, finding_blocks
+from gp_labeler.jobs.library_sheet import draw_library_check, finding_blocks, head_rotation
 from gp_labeler.jobs.picture_page import PIXELS
 
 LABEL, EXPECTED = np.array([4.0, -2.0, 1.0]), np.array([4.0, 0.0, 1.0])
@@ -42,6 +49,34 @@ def test_both_places_are_marked_on_the_balls_that_lie_there():
     assert faint == [(0, "expected"), (1, "label")]
     side = [mark for mark in block.marks if mark.picture == 2]
     assert side[1].x - side[0].x == pytest.approx(2.0 / 12.0 * PIXELS)  # from the left, posterior is right
+
+
+def test_pictures_are_made_in_the_frame_of_a_head_that_lies_turned():
+    """The same head, turned in its scan by a quarter about x: the pictures are the same."""
+    turn = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])  # from the head into the scan
+    plain, balls = SCAN.load(), small_balls()
+    matrix = np.eye(4)
+    matrix[:3, :3] = turn
+    volume = replace(balls, T_scan_voxel=matrix @ balls.T_scan_voxel)
+    points = {name: turn @ at for name, at in POINTS.items()}
+    scan = LabelledScan("GP1", points, volume=volume, T_head_scan=RigidTransform(matrix.T, "head", "scan"))
+    expected = {name: turn @ at for name, at in PREDICTION.centres.items()}
+    (block,) = finding_blocks(scan, [FAR], Prediction({"a": expected}, None), volume, 500.0, turn)
+    (upright,) = finding_blocks(SCAN, [FAR], PREDICTION, plain, 500.0)
+    np.testing.assert_allclose(block.pictures, upright.pictures, atol=0.02)
+    marks = [(mark.picture, round(mark.x, 3), round(mark.y, 3), mark.faint) for mark in block.marks]
+    assert marks == [(mark.picture, round(mark.x, 3), round(mark.y, 3), mark.faint) for mark in upright.marks]
+    np.testing.assert_allclose(head_rotation(scan, PREDICTION, volume), turn)
+
+
+def test_without_a_known_frame_the_predicted_places_tell_it_however_the_labels_lie():
+    sides = mean_animal(Atlas.published())
+    turn = Rotation.from_rotvec([0.4, -0.8, 1.2]).as_matrix()
+    places = {name: turn @ at for name, at in flat_points(sides.sides).items()}
+    told = Prediction({"a": places}, None)
+    wrong = LabelledScan("GP1", places | {"CA_L": places["MN_R"]}, volume=SCAN.volume)
+    np.testing.assert_allclose(head_rotation(wrong, told, SCAN.volume), turn, atol=1e-6)
+    assert head_rotation(SCAN, PREDICTION, SCAN.volume) is None  # a scheme of its own
 
 
 def test_a_pair_shows_both_labels_and_a_whole_head_the_worst():

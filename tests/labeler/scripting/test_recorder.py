@@ -24,6 +24,7 @@ from gp_labeler.document.landmark_import import import_landmarks
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetNotes
 from gp_labeler.document.state import How
 from gp_labeler.document.touches import TouchHow
+from gp_labeler.jobs.library_check import CheckLibrary, LibraryChecked
 from gp_labeler.models.workflow import Active
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.runner import run_script
@@ -491,12 +492,16 @@ def test_contact_sheets_of_several_specimens_are_made_again(recording) -> None:
     ]
 
 
-def test_a_check_of_labels_against_each_other_leaves_no_step(recording) -> None:
+def test_a_check_of_labels_against_each_other_is_one_step(recording, monkeypatch) -> None:
     recording.begin()
     place_three(recording)
-    n_before = len(recording.recorder.tables)
-    recording.workspace.messages.wrote.emit("check of the library", recording.folder / "labels.pdf")
-    assert recording.recorder.tables[n_before:] == []
+    folder, n_before = recording.folder, len(recording.recorder.tables)
+    monkeypatch.setattr(CheckLibrary, "run", lambda job, progress: LibraryChecked((), (job.where,), 3))
+    recording.workspace.specimens.check_library_of([folder / "labelled"], folder / "labels.pdf")
+    wait_until_idle(recording.qtbot, recording.window)
+    assert recording.recorder.tables[n_before:] == [
+        {"do": "check_library", "labelled": [str(folder / "labelled")], "path": "labels.pdf"}
+    ]
 
 
 def test_work_that_was_begun_before_is_kept_beside_the_script(recording) -> None:

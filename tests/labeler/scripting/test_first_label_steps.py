@@ -1,0 +1,47 @@
+"""Steps on labelled scans: a script checks them against each other as the window and the command do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from script_cases import content, run
+from small_heads import save_markups, save_volume, small_head
+
+from gp_labeler.autolabel.library import TemplateLibrary
+from gp_labeler.autolabel.prediction import Prediction
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """Return a folder with three labelled heads, CA and OI of the last exchanged, and known predictions."""
+    labelled, told, rng = tmp_path / "labelled", {}, np.random.default_rng(0)
+    labelled.mkdir()
+    for seed in range(3):
+        volume, points = small_head(seed)
+        told[f"small-{seed}"] = Prediction(
+            {k: {n: at + rng.normal(0, 0.2, 3) for n, at in points.items()} for k in "abc"}, None
+        )
+        if seed == 2:
+            points["CA_L"], points["OI_L"] = points["OI_L"], points["CA_L"]
+        save_volume(labelled / f"small-{seed}.nrrd", volume)
+        for side in "LR":
+            own = {n.removesuffix(f"_{side}"): at for n, at in points.items() if n[-1] in (side, "N")}
+            save_markups(labelled / f"small-{seed}_{side}.mrk.json", own)
+    monkeypatch.setattr(TemplateLibrary, "held_out", lambda self, registration, report: told)
+    return tmp_path
+
+
+def test_a_script_checks_labelled_scans_against_each_other(folder):
+    check = {"do": "check_library", "labelled": ["labelled"], "path": "review.pdf", "findings": "found.json"}
+    report = run(folder, check)
+    assert report.ok, report.error
+    (found,) = content(folder / "out" / "found.json")["findings"]
+    assert (found["specimen"], found["kind"], set(found["names"])) == (
+        "small-2",
+        "exchanged",
+        {"CA_L", "OI_L"},
+    )
+    assert (folder / "out" / "review.pdf").read_bytes().count(b"/Type /Page ") == 1
+    strict = run(folder, {**check, "strict": True})
+    assert not strict.ok
+    assert "CA_L and OI_L seem to be exchanged" in strict.error
