@@ -137,9 +137,8 @@ def _pages(
 def head_rotation(scan: LabelledScan, prediction: Prediction, volume: Volume) -> FloatArray | None:
     """Return the rotation from the frame of the head into that of the scan, where it is known.
 
-    It is the one that was said of the specimen, or the one of its landmarks: where the other scans expect them,
-    since labels may be exchanged. None for other schemes than the
-    guinea pig's features, and where they do not determine the frame.
+    It is the one that was said of the specimen. Else it is that of the guinea pig's features, where the other
+    scans expect them, since labels may be exchanged. None where neither determines it.
     """
     T_head_scan, sides = scan.T_head_scan, sides_of_points(prediction.centres)
     if T_head_scan is None and sides is not None:
