@@ -18,7 +18,7 @@ import itertools
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -53,7 +53,7 @@ def mice(names: list[str] | None = None) -> list[LabelledScan]:
     return [scan for scan in scans if names is None or scan.name in names]
 
 
-def phantoms(seeds: range, varied: bool) -> list[LabelledScan]:
+def phantoms(seeds: Iterable[int], varied: bool) -> list[LabelledScan]:
     """Return phantoms, which are made when they are needed first."""
     scans = []
     for seed in seeds:
@@ -63,11 +63,11 @@ def phantoms(seeds: range, varied: bool) -> list[LabelledScan]:
     return scans
 
 
-def heads_of(kind: str, first: int, n: int) -> list[LabelledScan]:
-    """Return the heads of one kind; n phantoms from a first seed on."""
+def heads_of(kind: str, seeds: list[int]) -> list[LabelledScan]:
+    """Return the heads of one kind, phantoms of some seeds."""
     if kind in ("mice", "dev-mice"):
         return mice(list(CHOSE) if kind == "dev-mice" else None)
-    return phantoms(range(1, 6) if kind == "dev-phantoms" else range(first, first + n), kind == "varied")
+    return phantoms(range(1, 6) if kind == "dev-phantoms" else seeds, kind == "varied")
 
 
 def true_pose(scan: LabelledScan, template: Template) -> np.ndarray:
@@ -230,7 +230,8 @@ def run_guesses(heads: list[LabelledScan], args: argparse.Namespace) -> None:
     """Print errors and radii of every head from subsets of the others."""
     carried = run_carry(heads, args)
     by_name = {scan.name: scan for scan in heads}
-    wanted = [name for name in by_name if args.heads != "mice" or name not in CHOSE]
+    no_target = CHOSE if args.heads == "mice" else (args.library or ())
+    wanted = [name for name in by_name if name not in no_target]
     for k in args.k:
         rows = []
         for name in wanted:
@@ -300,8 +301,7 @@ def main() -> None:
     )
     parser.add_argument("part", choices=("pose", "carry", "guesses", "exchanges"))
     parser.add_argument("--heads", default="mice")
-    parser.add_argument("--first", type=int, default=201, help="seed of the first phantom")
-    parser.add_argument("--n", type=int, default=10, help="phantoms")
+    parser.add_argument("--seeds", type=int, nargs="+", default=list(range(201, 211)), help="of phantoms")
     parser.add_argument("--turns", type=int, default=20)
     parser.add_argument(
         "--kinds",
@@ -319,7 +319,7 @@ def main() -> None:
     args.out.mkdir(parents=True, exist_ok=True)
     heads = [
         replace(scan, volume=scan.load()) if scan.path is None else scan
-        for scan in heads_of(args.heads, args.first, args.n)
+        for scan in heads_of(args.heads, args.seeds)
     ]
     if args.part == "pose":
         run_pose(heads, args)

@@ -102,13 +102,13 @@ class TemplateLibrary:
         wanted = [scan for scan in self.scans if scan.name not in without]
         for n, scan in enumerate(wanted):
             report(n / max(len(wanted), 1))
-            self.template_of(scan)
+            self.template_of(scan, report)
         return [self._templates[scan.name] for scan in wanted]
 
-    def template_of(self, scan: LabelledScan) -> Template:
+    def template_of(self, scan: LabelledScan, report: Report | None = None) -> Template:
         """Return the template of one labelled scan, prepared where it is not yet; see `templates`."""
         if scan.name not in self._templates:
-            self._templates[scan.name] = self._template(scan)
+            self._templates[scan.name] = self._template(scan, report or Report())
         return self._templates[scan.name]
 
     def checksum_of(self, scan: LabelledScan) -> str:
@@ -186,9 +186,9 @@ class TemplateLibrary:
             report=report,
         )
 
-    def _template(self, scan: LabelledScan) -> Template:
+    def _template(self, scan: LabelledScan, report: Report) -> Template:
         if self.folder is None:
-            return Template.of(scan, self.settings)
+            return Template.of(scan, self.settings, report)
         volume = None if self._known_checksum(scan) else scan.load()
         checksum = self._known_checksum(scan) if volume is None else self._keep_checksum(scan, volume)
         path = self.folder / "templates" / f"{Template.key_of(scan, self.settings, checksum)}.npz"
@@ -197,7 +197,7 @@ class TemplateLibrary:
                 return replace(Template.load(path), name=scan.name)  # the file may be of a copy of the scan
             except FileFormatError:  # half written, or of an earlier version: it is made again
                 pass
-        template = Template.of(replace(scan, volume=volume), self.settings)
+        template = Template.of(replace(scan, volume=volume), self.settings, report)
         try:
             template.save(path)
         except OSError as error:

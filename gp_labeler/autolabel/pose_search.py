@@ -167,7 +167,10 @@ def _search(bone: Bone, known: HeadSurface, report: Report) -> FoundPose:
         rough.append((distance_score(bone, known, fit, clip, every=4), fit))
     rough.sort(key=lambda pair: pair[0])
     report(0.85)
-    fine = [refine_pose(bone, known, fit) for _, fit in rough[:_FINER]]
+    fine = []
+    for _, start in rough[:_FINER]:
+        report.check()
+        fine.append(refine_pose(bone, known, start))
     best = min(fine, key=lambda pose: pose.score)
     others = [(pose.score, pose.fit) for pose in fine] + rough
     rivals = [score for score, fit in others if angle_deg(fit.rotation, best.fit.rotation) > _RIVAL_DEG]

@@ -132,9 +132,11 @@ def predict(
                 {name: carried for name, carried in earlier.items() if carried is not None}, None
             )
     base, pose = _pose(volume, templates, placed or {}, report.part(0.0, _POSE_SHARE))
-    poses = {base.name: pose} | {
-        other.name: _pose_of(other, base, pose, volume) for other in templates if other is not base
-    }
+    poses = {base.name: pose}
+    for other in templates:
+        report.check()
+        if other is not base:
+            poses[other.name] = _pose_of(other, base, pose, volume)
     chosen = sorted(templates, key=lambda template: poses[template.name].score)[:most]
     target = TargetScan(volume, pose.bone.threshold, min(t.image.grid.step for t in chosen))
     carried: dict[str, Carried] = {}

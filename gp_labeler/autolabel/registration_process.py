@@ -85,14 +85,10 @@ class ProcessRegistration:
         GpError
             The registration failed, or its process died.
         """
-        connection = self._started()
         try:
+            connection = self._started(cancel)
             connection.send((fixed, moving, step, iterations))
-            while not connection.poll(_LOOK_EVERY_S):
-                if cancel is not None and cancel():
-                    self.close()
-                    raise Cancelled
-            found = connection.recv()
+            found = self._received(connection, cancel)
         except (EOFError, OSError):
             self.close()
             raise GpError(
@@ -112,18 +108,29 @@ class ProcessRegistration:
         if connection is not None:
             connection.close()
 
-    def _started(self) -> Connection:
+    def _started(self, cancel: Callable[[], bool] | None) -> Connection:
+        """Return the connection to the process, once that listens: until then, sending images would wait."""
         if self._connection is None:
             context = worker_context()
             self._connection, theirs = context.Pipe()
             self._process = context.Process(target=_serve, args=(theirs, self.name), daemon=True)
             self._process.start()
             theirs.close()
+            self._received(self._connection, cancel)
         return self._connection
+
+    def _received(self, connection: Connection, cancel: Callable[[], bool] | None) -> Any:
+        """Return what the process sends next; end it where `cancel` says so."""
+        while not connection.poll(_LOOK_EVERY_S):
+            if cancel is not None and cancel():
+                self.close()
+                raise Cancelled
+        return connection.recv()
 
 
 def _serve(connection: Connection, name: str) -> None:
-    """In the process: register what comes, until the other end is closed."""
+    """In the process: say that it listens, and register what comes, until the other end is closed."""
+    connection.send(name)
     while True:
         try:
             fixed, moving, step, iterations = connection.recv()

@@ -26,6 +26,7 @@ from gp_labeler.head_pose.bone import (
     finest_step,
     threshold_candidates,
 )
+from gp_labeler.imaging.progress import Report
 from gp_labeler.imaging.volume import Volume
 
 __all__ = ["Region", "Template", "part_of"]
@@ -79,17 +80,23 @@ class Template:
     regions: tuple[Region, ...] = field(repr=False)
 
     @classmethod
-    def of(cls, scan: LabelledScan, settings: Settings | None = None) -> Template:
+    def of(
+        cls, scan: LabelledScan, settings: Settings | None = None, report: Report | None = None
+    ) -> Template:
         """Prepare a labelled scan.
 
         Raises
         ------
         GpError
             The scan cannot be read, or has no bone.
+        Cancelled
+            The report said so.
         """
-        settings = settings or Settings()
+        settings, report = settings or Settings(), report or Report()
         volume = scan.load()
+        report.check()
         bone = _bone_of(volume)
+        report.check()
         whole_step = max(bone.radius / settings.whole, *volume.spacing)
         margin = settings.margin * bone.radius
         low, high = bone.points.min(axis=0) - margin / 2, bone.points.max(axis=0) + margin / 2
@@ -98,6 +105,7 @@ class Template:
         fine_step = max(bone.radius / settings.fine, *volume.spacing)
         regions = []
         for names in _clusters(scan.points, settings.reach * bone.radius, settings.fewest):
+            report.check()
             own = np.array([scan.points[name] for name in names])
             grid = SampleGrid.around(own.min(axis=0) - margin, own.max(axis=0) + margin, fine_step)
             part = part_of(volume, fine_step, np.stack([grid.origin, grid.high]))

@@ -103,7 +103,9 @@ class SuggestFromScans:
         GpError
             There is no labelled scan, or the head is not found.
         """
-        load_modules(*_MODULES)
+        for module in _MODULES:
+            progress(0.0, "Starting")
+            load_modules(module)
         from gp_labeler.autolabel import TemplateLibrary, propose
         from gp_labeler.autolabel.registration import engine_named
         from gp_labeler.autolabel.registration_process import ProcessRegistration

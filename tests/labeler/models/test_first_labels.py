@@ -1,6 +1,10 @@
 """Suggestions from labelled scans reach the document off the user's thread, and are never taken as labels."""
 
+import multiprocessing
+import os
+import threading
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +14,7 @@ from gp_core.atlas.atlas import Atlas
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_labeler.autolabel import Guess, Proposal
+from gp_labeler.autolabel.registration_process import ProcessRegistration
 from gp_labeler.commands.actions import ACTIONS
 from gp_labeler.head_pose.result import HeadPoseError
 from gp_labeler.imaging.progress import Cancelled
@@ -107,6 +112,34 @@ def test_it_is_stopped_within_two_seconds_while_images_are_registered(labelled, 
     with pytest.raises(Cancelled):
         job.run(progress)
     assert time.monotonic() - stopped[0] < 2.0
+
+
+def test_it_is_stopped_while_the_other_process_still_starts(monkeypatch):
+    """Images are sent once it listens: sending more than a pipe holds would wait for it."""
+
+    held: list[int] = []
+    stopped = []
+
+    class Silent:
+        Pipe = staticmethod(multiprocessing.Pipe)
+
+        def Process(self, target, args, daemon):  # noqa: N802 - as a context has it
+            held.append(os.dup(args[0].fileno()))  # open, and nobody reads
+            return SimpleNamespace(start=int, terminate=int, join=int)
+
+    monkeypatch.setattr("gp_labeler.autolabel.registration_process.worker_context", Silent)
+    image = np.zeros((60, 60, 60), np.float32)
+
+    def register():
+        with pytest.raises(Cancelled):
+            ProcessRegistration("greedy").register(image, image, 1.0, "1", cancel=lambda: True)
+        stopped.append(True)
+
+    thread = threading.Thread(target=register, daemon=True)
+    thread.start()
+    thread.join(5.0)
+    assert stopped
+    os.close(held[0])
 
 
 def test_what_cannot_be_suggested_is_said(workspace, tmp_path):
