@@ -7,7 +7,7 @@ of view into account. A rotation never mirrors, so a scan stored as its mirror i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ __all__ = [
     "ACCEPTED",
     "UNCERTAIN",
     "FoundPose",
+    "converged",
     "find_pose",
     "pose_from_points",
     "refine_pose",
@@ -52,6 +53,7 @@ _NEAR_CELLS, _OUTSIDE = 3.0, -0.3
 
 _APART_DEG, _RIVAL_DEG = 18.0, 25.0
 _TRIED, _FINER = 32, 5
+_MOST_ROUNDS, _STILL_DEG = 6, 0.1
 _MARGIN = 0.6
 
 
@@ -135,7 +137,7 @@ def find_pose(volume: Volume, known: HeadSurface, report: Report | None = None) 
         if best.is_certain:
             break
     assert best is not None
-    return best
+    return converged(best, known)
 
 
 def _bones(volume: Volume, known: HeadSurface) -> list[Bone]:
@@ -188,6 +190,20 @@ def refine_pose(bone: Bone, known: HeadSurface, start: Similarity) -> FoundPose:
     return FoundPose(fit, distance_score(bone, known, fit, clip), 1.0, seen, bone)
 
 
+def converged(pose: FoundPose, known: HeadSurface) -> FoundPose:
+    """Return a pose that is refined until it stays; its scores, by which it was accepted, are as before.
+
+    One refinement may end some degrees before it has arrived.
+    """
+    for _ in range(_MOST_ROUNDS):
+        again = refine_pose(pose.bone, known, pose.fit)
+        turned = angle_deg(again.fit.rotation, pose.fit.rotation)
+        pose = replace(pose, fit=again.fit)
+        if turned < _STILL_DEG:
+            break
+    return pose
+
+
 def pose_from_points(
     volume: Volume, known: HeadSurface, here: FloatArray, there: FloatArray, report: Report | None = None
 ) -> FoundPose:
@@ -215,9 +231,8 @@ def pose_from_points(
             remedy="Place three that are far apart, not on a line.",
         )
     start = fit_similarity(there, here, np.full(n, 1 / n), (1.0, 1.0) if n < 4 else SCALES_OF_A_SPECIES)
-    return min(
-        (refine_pose(bone, known, start) for bone in _bones(volume, known)), key=lambda pose: pose.score
-    )
+    found = (refine_pose(bone, known, start) for bone in _bones(volume, known))
+    return converged(min(found, key=lambda pose: pose.score), known)
 
 
 def _width(points: FloatArray) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray
 from gp_labeler.autolabel.confidence import centre_of, spread_of
-from gp_labeler.autolabel.pose_search import FoundPose, find_pose, pose_from_points, refine_pose
+from gp_labeler.autolabel.pose_search import FoundPose, converged, find_pose, pose_from_points, refine_pose
 from gp_labeler.autolabel.registration import Registration
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.template import Template
@@ -144,7 +144,7 @@ def predict(
         part = report.part(*(_POSE_SHARE + (1 - _POSE_SHARE) * (n + i) / len(chosen) for i in (0, 1)))
         found = known(template)
         if found is None:
-            fit = poses[template.name].fit
+            fit = converged(poses[template.name], template.surface).fit
             found = carry(template, target, fit, registration, settings, part)
             keep(template, found)
         carried[template.name] = found

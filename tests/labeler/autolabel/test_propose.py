@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter, shift
+from scipy.spatial.transform import Rotation
 from small_heads import FEATURES, OWN, TURN, save_markups, save_volume, small_head
 
 from gp_core.errors import GpError
@@ -16,12 +17,13 @@ from gp_core.landmarks.features import Side
 from gp_core.landmarks.sets import Status
 from gp_labeler.autolabel import HeadNotFoundError, LabelledScan, TemplateLibrary, propose
 from gp_labeler.autolabel.labelled_scan import side_and_code
-from gp_labeler.autolabel.pose_search import FoundPose, find_pose
+from gp_labeler.autolabel.pose_search import FoundPose, converged, find_pose, pose_from_points, refine_pose
 from gp_labeler.autolabel.registration import engine_named, register_demons, register_greedy
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.suggestion_files import write_proposal
 from gp_labeler.autolabel.template import Template
 from gp_labeler.cli.entry import main
+from gp_labeler.head_pose.surface_fit import angle_deg
 from gp_labeler.imaging.progress import Cancelled
 from gp_labeler.imaging.volume import Volume
 
@@ -109,6 +111,21 @@ def test_a_ball_is_no_head():
     assert not found.is_accepted
     assert found.refusal in str(HeadNotFoundError(found))
     assert "Place three landmarks" in str(HeadNotFoundError(found))
+
+
+def test_a_pose_is_refined_until_it_stays():
+    known, (volume, truth) = Template.of(labelled(0)).surface, small_head(7, turn=TURN)
+    there = np.array(list(labelled(0).points.values()))
+    found = pose_from_points(volume, known, np.array(list(truth.values())), there)
+    off = Rotation.from_rotvec(np.radians([0, 24, 0])).as_matrix()
+    centre = found.fit.forth(known.centre[None])[0]
+    shift = off @ (found.fit.shift - centre) + centre
+    begun = replace(found.fit, rotation=off @ found.fit.rotation, shift=shift)
+    again = converged(replace(found, fit=begun), known)
+    assert angle_deg(again.fit.rotation, found.fit.rotation) < 0.5
+    once = refine_pose(found.bone, known, begun)  # which ends before it has arrived
+    assert angle_deg(once.fit.rotation, found.fit.rotation) > 1.0
+    assert (again.score, again.rival, again.seen) == (found.score, found.rival, found.seen)
 
 
 @pytest.mark.parametrize(
