@@ -13,7 +13,7 @@ simulated user sees each feature where it truly is, and knows where to look:
   with Ctrl held for the click; the others are confirmed by Enter.
 
 Each key, click and notch of the wheel is an action. A stroke is a turn of the wheel without a pause. Memory
-is the resident memory of the window and of its process for registration.
+is that of the window and of its process for registration, pages that both hold counted once (Linux).
 """
 
 from __future__ import annotations
@@ -177,7 +177,7 @@ class PeakMemory:
         self._thread.start()
 
     def _watch(self) -> None:
-        while not self._over.wait(0.1):
+        while not self._over.wait(0.5):
             self._peak = max(self._peak, resident_mb())
 
     def stop(self) -> float:
@@ -188,16 +188,17 @@ class PeakMemory:
 
 
 def resident_mb() -> float:
-    """Return the resident memory of this process and its children, MB; shared pages count twice (Linux)."""
+    """Return the resident memory of this process and its children, MB; shared pages count once (Linux)."""
     pids, total = [os.getpid()], 0
     for pid in pids:
         try:
-            total += int(Path(f"/proc/{pid}/statm").read_text().split()[1])
+            rollup = Path(f"/proc/{pid}/smaps_rollup").read_text()
+            total += next(int(line.split()[1]) for line in rollup.splitlines() if line.startswith("Pss:"))
             for task in Path(f"/proc/{pid}/task").iterdir():
                 pids += map(int, (task / "children").read_text().split())
-        except OSError:  # it has just ended
+        except (OSError, StopIteration):  # it has just ended
             continue
-    return total * resource.getpagesize() / 2**20
+    return total / 1024
 
 
 def cpu_seconds() -> float:
