@@ -22,7 +22,6 @@ from gp_labeler.autolabel.scan_checksums import ScanChecksums
 from gp_labeler.autolabel.settings import Settings
 from gp_labeler.autolabel.template import Template
 from gp_labeler.imaging.progress import Report
-from gp_labeler.imaging.volume import Volume
 
 __all__ = ["TemplateLibrary"]
 
@@ -74,6 +73,10 @@ class TemplateLibrary:
         return {}
 
     @cached_property
+    def _read_checksums(self) -> dict[str, str]:
+        return {}
+
+    @cached_property
     def _carried(self) -> dict[tuple[str, str, str], Carried]:
         return {}
 
@@ -119,7 +122,8 @@ class TemplateLibrary:
         GpError
             The scan cannot be read.
         """
-        return self._known_checksum(scan) or self._keep_checksum(scan, scan.load())
+        known = self._known_checksum(scan)
+        return known or self._keep_checksum(replace(scan, volume=scan.load()))
 
     def key_of(self, scan: LabelledScan) -> str:
         """Return what the template of one labelled scan is known by; see `checksum_of`."""
@@ -187,17 +191,19 @@ class TemplateLibrary:
         )
 
     def _template(self, scan: LabelledScan, report: Report) -> Template:
+        checksum, loaded = self._known_checksum(scan), scan
+        if checksum is None:
+            loaded = replace(scan, volume=scan.load())
+            checksum = self._keep_checksum(loaded)
         if self.folder is None:
-            return Template.of(scan, self.settings, report)
-        volume = None if self._known_checksum(scan) else scan.load()
-        checksum = self._known_checksum(scan) if volume is None else self._keep_checksum(scan, volume)
+            return Template.of(loaded, self.settings, report)
         path = self.folder / "templates" / f"{Template.key_of(scan, self.settings, checksum)}.npz"
         if path.exists():
             try:
                 return replace(Template.load(path), name=scan.name)  # the file may be of a copy of the scan
             except FileFormatError:  # half written, or of an earlier version: it is made again
                 pass
-        template = Template.of(replace(scan, volume=volume), self.settings, report)
+        template = Template.of(loaded, self.settings, report)
         try:
             template.save(path)
         except OSError as error:
@@ -208,12 +214,17 @@ class TemplateLibrary:
         if scan.volume is not None:
             return scan.volume.checksum
         assert scan.path is not None
+        if self.folder is None:
+            return self._read_checksums.get(scan.name)
         return self.checksums.known(scan.path, scan.options)
 
-    def _keep_checksum(self, scan: LabelledScan, volume: Volume) -> str:
-        if scan.path is not None:
-            self.checksums.keep(scan.path, scan.options, volume.checksum)
-        return volume.checksum
+    def _keep_checksum(self, loaded: LabelledScan) -> str:
+        assert loaded.volume is not None
+        checksum = loaded.volume.checksum
+        self._read_checksums[loaded.name] = checksum
+        if loaded.path is not None:
+            self.checksums.keep(loaded.path, loaded.options, checksum)
+        return checksum
 
     def _path(self, scan: LabelledScan, template: Template, registration: Registration) -> Path | None:
         if self.folder is None:
