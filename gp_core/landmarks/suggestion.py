@@ -58,8 +58,8 @@ class Suggestion:
             object.__setattr__(self, "atlas_distance", distance)
 
     @property
-    def doubt(self) -> tuple[float, float]:
-        """What sorts suggestions by doubt: how far off it may be by the witness that doubts it more, mm.
+    def uncertainty(self) -> tuple[float, float]:
+        """What suggestions are sorted by: the radius or the distance from the atlas, the larger one, mm.
 
         Infinite without a radius; then, how far the atlas disagrees.
         """

@@ -53,8 +53,8 @@ class Guess:
     atlas_distance: float | None = None
 
     @property
-    def doubt(self) -> float:
-        """How far off it may be, mm, by the witness that doubts it more: its radius, or the atlas."""
+    def uncertainty(self) -> float:
+        """How far off it may be, mm: its radius or its distance from the atlas, the larger one."""
         return max(self.radius_95 or 0.0, self.atlas_distance or 0.0)
 
     def as_json(self) -> dict[str, Any]:
@@ -147,7 +147,7 @@ def most_doubtful_first(guesses: Sequence[Guess]) -> tuple[Guess, ...]:
     radii = [guess.radius_95 for guess in guesses if guess.radius_95 is not None]
     limit = _DOUBTFUL * float(np.median(radii)) if radii else np.inf
     marked = [_marked(guess, limit) for guess in guesses]
-    return tuple(sorted(marked, key=lambda guess: -guess.doubt))
+    return tuple(sorted(marked, key=lambda guess: -guess.uncertainty))
 
 
 def _marked(guess: Guess, limit: float) -> Guess:

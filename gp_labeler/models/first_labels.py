@@ -150,7 +150,9 @@ class FirstLabelsModel:
 
     def _choose_first(self, proposal: Proposal) -> None:
         """Make the most doubtful suggestion of the proposal the active point, and show it closely."""
-        still = [one for one in _by_doubt(proposal) if one[1] in self._document.landmarks(one[0]).suggested]
+        still = [
+            one for one in _by_uncertainty(proposal) if one[1] in self._document.landmarks(one[0]).suggested
+        ]
         if still:
             self._labels.look_closely(*still[0])
 
@@ -165,7 +167,7 @@ class FirstLabelsModel:
 
 def _told(proposal: Proposal) -> str:
     """Say what was suggested, and what to look at first."""
-    found = _by_doubt(proposal)
+    found = _by_uncertainty(proposal)
     radii = sorted(guess.radius_95 for guess in proposal.guesses if guess.radius_95 is not None)
     within = f", 95 % within {radii[len(radii) // 2]:.2f} mm (median)" if radii else ""
     words = [f"{len(found)} points suggested from {proposal.source}{within}"]
@@ -178,10 +180,10 @@ def _told(proposal: Proposal) -> str:
     return "; ".join([*words, *proposal.warnings])
 
 
-def _by_doubt(proposal: Proposal) -> list[tuple[Side, str]]:
+def _by_uncertainty(proposal: Proposal) -> list[tuple[Side, str]]:
     """Return the suggested features, the most doubtful first."""
     found = {
-        (side, code): suggestion.doubt
+        (side, code): suggestion.uncertainty
         for side, suggestions in proposal.suggestions().items()
         for code, suggestion in suggestions.items()
     }

@@ -144,7 +144,7 @@ def next_point(state: SpecimenState, active: Active, ghosts_of: GhostsOf) -> Act
 def _most_doubtful_first(state: SpecimenState, side: Side, *, after: str | None) -> list[str]:
     """Return what is suggested on one side, the most doubtful first; round from `after`, which comes last."""
     suggested = state.side(side).suggested
-    order = sorted(suggested, key=lambda code: suggested[code].doubt, reverse=True)
+    order = sorted(suggested, key=lambda code: suggested[code].uncertainty, reverse=True)
     at = order.index(after) + 1 if after in order else 0
     return order[at:] + order[:at]
 

@@ -104,10 +104,10 @@ def test_a_radius_is_a_positive_number(radius: object) -> None:
         Suggestion((1, 2, 3), atlas_distance=radius)  # type: ignore[arg-type]
 
 
-def test_doubt_is_that_of_the_witness_that_doubts_more() -> None:
-    """Where no radius is known, all are in doubt, and first those with which the atlas disagrees."""
+def test_the_uncertainty_is_the_radius_or_the_distance_from_the_atlas() -> None:
+    """Where no radius is known, all are uncertain, and first those with which the atlas disagrees."""
     told = {"radius": (0.4, None), "atlas": (0.3, 1.2), "wide": (2.0, 1.0), "none": (None, None)}
     told |= {"none, atlas": (None, 1.0)}
     suggestions = {name: Suggestion((1, 2, 3), r, "x", away) for name, (r, away) in told.items()}
-    order = sorted(suggestions, key=lambda name: suggestions[name].doubt, reverse=True)
+    order = sorted(suggestions, key=lambda name: suggestions[name].uncertainty, reverse=True)
     assert order == ["none, atlas", "none", "wide", "atlas", "radius"]

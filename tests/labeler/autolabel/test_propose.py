@@ -59,9 +59,9 @@ def test_a_turned_head_is_labelled_like_the_others():
 def test_the_radii_hold_and_the_doubtful_come_first():
     truth = small_head(7, turn=TURN)[1]
     radii = [guess.radius_95 for guess in proposed().guesses]
-    doubts = [guess.doubt for guess in proposed().guesses]  # the atlas doubts such heads too
-    assert doubts == sorted(doubts, reverse=True)
-    assert all(doubt >= radius for doubt, radius in zip(doubts, radii, strict=True))
+    uncertain = [guess.uncertainty for guess in proposed().guesses]  # the atlas contradicts such heads too
+    assert uncertain == sorted(uncertain, reverse=True)
+    assert all(mm >= radius for mm, radius in zip(uncertain, radii, strict=True))
     held = [np.linalg.norm(g.position - truth[g.name]) <= g.radius_95 for g in proposed().guesses]
     assert sum(held) >= 7
     assert max(radii) < 3.0  # and not by being huge

@@ -74,7 +74,9 @@ def test_suggestions_arrive_the_least_certain_first_and_placed_points_stay(works
     assert not made.document.landmarks(Side.RIGHT).suggested
 
 
-def test_the_atlas_in_use_is_asked_and_what_it_doubts_is_looked_at_first(workspace, labelled, monkeypatch):
+def test_the_atlas_in_use_is_asked_and_what_it_contradicts_is_looked_at_first(
+    workspace, labelled, monkeypatch
+):
     made, calls = workspace
     atlas, asked = Atlas.published(), []
     made.atlas.use(atlas)

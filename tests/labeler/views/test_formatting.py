@@ -43,5 +43,5 @@ def test_lengths_angles_and_positions_write_their_numbers_so() -> None:
         ),
     ],
 )
-def test_a_suggestion_says_who_suggests_it_and_who_doubts_it(suggestion, text) -> None:
+def test_a_suggestion_says_who_suggests_it_and_who_contradicts_it(suggestion, text) -> None:
     assert suggestion_text(suggestion) == text
