@@ -11,8 +11,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from psygnal import Signal
-
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.landmarks.scan_evidence import ScanEvidence
@@ -21,6 +19,7 @@ from gp_labeler.document.edits import Edit
 from gp_labeler.document.history import History
 from gp_labeler.document.opening import LoadedSpecimen, new_specimen, open_specimen, recover_specimen
 from gp_labeler.document.recovery import Recovery
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_file import SUFFIX
 from gp_labeler.document.state import How, Provenance, SpecimenState, changed_points, measured
 from gp_labeler.document.store import SpecimenStore

@@ -16,9 +16,8 @@ from concurrent.futures import ThreadPoolExecutor
 from enum import Enum
 from typing import Any, Generic, Protocol, TypeVar
 
-from psygnal import Signal
-
 from gp_core.errors import GpError
+from gp_labeler.document.signals import Signal
 from gp_labeler.imaging.progress import Cancelled
 
 __all__ = ["Cancelled", "Dispatcher", "Job", "Jobs", "Progress", "QueueDispatcher", "Task", "TaskState"]

@@ -7,9 +7,8 @@ from os import PathLike
 from pathlib import Path
 from typing import Any, Protocol
 
-from psygnal import Signal
-
 from gp_core.errors import GpError
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.imaging.mesh_files import read_mesh
 from gp_labeler.jobs.mesh import ReadMesh

@@ -9,8 +9,6 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from psygnal import Signal
-
 from gp_core.atlas.atlas import Atlas
 from gp_core.atlas.label_check import check_side
 from gp_core.atlas.labelling_error import LabellingError
@@ -20,6 +18,7 @@ from gp_core.landmarks.sets import Specimen
 from gp_labeler.document.animals import Animals
 from gp_labeler.document.atlas_memory import AtlasMemory, AtlasSource
 from gp_labeler.document.labelling_error_memory import LabellingErrorMemory
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.jobs.atlas import (
     FEWEST_ANIMALS,

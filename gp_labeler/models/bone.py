@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
 from gp_core.validation import FloatArray
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.imaging.refined_pick import refined_hit
 from gp_labeler.imaging.surface import SMALLEST_PART_MM, Surface, SurfaceHit, box_around

@@ -8,12 +8,11 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from psygnal import Signal
-
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_labeler.autolabel.labelled_scan import flat_points
 from gp_labeler.document.edits import SuggestPoints, point_text
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How
 from gp_labeler.jobs.first_labels import FirstLabels, SuggestFromScans, templates_folder

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -18,6 +17,7 @@ from gp_core.validation import FloatArray, check_option
 from gp_labeler.document.edits import as_position, point_text
 from gp_labeler.document.head_edits import ClearHeadFrame, ConfirmLeft, SetHeadFrame
 from gp_labeler.document.head_frame import HeadFrame
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import Position
 from gp_labeler.head_pose import HeadPose

@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Protocol
 
 import numpy as np
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side, feature
 from gp_core.validation import FloatArray
 from gp_labeler.document.edits import point_text, require_free
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How, Landmark, point_key
 from gp_labeler.models.labels import LabelsModel

@@ -7,7 +7,6 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike
-from psygnal import Signal
 
 from gp_core.atlas.label_check import Deviation, Finding, SideCheck
 from gp_core.errors import GpError
@@ -26,6 +25,7 @@ from gp_labeler.document.edits import (
     as_position,
     point_text,
 )
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import How, point_key
 from gp_labeler.jobs.runner import Jobs

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.io import read_measurements
@@ -23,6 +22,7 @@ from gp_labeler.document.measurement_edits import (
     RenameMeasurement,
 )
 from gp_labeler.document.measurement_export import export_measurements
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import Position
 from gp_labeler.models.interaction import InteractionModel

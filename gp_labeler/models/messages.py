@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from psygnal import Signal
-
 from gp_core.terminal import printable
+from gp_labeler.document.signals import Signal
 
 __all__ = ["Messages"]
 

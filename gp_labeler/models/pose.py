@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.frames import RigidTransform
@@ -22,6 +21,7 @@ from gp_core.pose.mixture import Hypothesis
 from gp_core.pose.next_touch import TouchGain, gains
 from gp_labeler.document import touching
 from gp_labeler.document.edits import Edit
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_edits import RecordPoseCheck
 from gp_labeler.document.state import PoseCheck

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from psygnal import Signal
-
 from gp_core.pose.cochlea_pose import CochleaPose
 from gp_core.pose.gate import GateReason, PoseGate
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.state import SpecimenState
 from gp_labeler.models.estimate import SideEstimate, verdict_on
 from gp_labeler.tracker import PoseMessage, PoseSender

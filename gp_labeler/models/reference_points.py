@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.io import LabelledPoint, read_points
 from gp_core.validation import FloatArray
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.models.messages import Messages
 from gp_labeler.models.scan import ScanModel

@@ -8,13 +8,13 @@ from os import PathLike
 from pathlib import Path
 
 import numpy as np
-from psygnal import Signal
 
 from gp_core.atlas.labelling_error import LabellingError
 from gp_core.disk import write_text
 from gp_core.errors import GpError
 from gp_core.study.reliability import Disagreement, ReliabilityReport
 from gp_labeler.document.labelling_edits import OpenLabelling
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.state import point_key
 from gp_labeler.jobs.reliability import MeasuredReliability, MeasureReliability

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from psygnal import Signal
 
 from gp_core.landmarks.scan_evidence import ScanEvidence
 from gp_core.landmarks.sets import LandmarkSet, Specimen
 from gp_core.validation import FloatArray
 from gp_labeler.document.opening import tidy_name
 from gp_labeler.document.recent_files import RecentFiles
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument, VolumeChangedError
 from gp_labeler.document.specimen_edits import RenameSpecimen, SetThreshold
 from gp_labeler.document.state import SpecimenState

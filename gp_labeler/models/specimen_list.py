@@ -7,12 +7,11 @@ from collections.abc import Iterable, Mapping
 from os import PathLike
 from pathlib import Path
 
-from psygnal import Signal
-
 from gp_core.disk import read_json, write_text
 from gp_core.errors import GpError
 from gp_core.validation import check_option
 from gp_labeler.document.paths import absolute_path
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.specimen_list import ListedSpecimen, progress_text
 from gp_labeler.jobs.contact_sheet import MakeContactSheets, SheetsMade

@@ -10,7 +10,6 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.landmarks.features import Side
@@ -18,6 +17,7 @@ from gp_core.pose.gate import PoseGate
 from gp_core.registration.pivot import PivotCalibration
 from gp_core.validation import FloatArray
 from gp_labeler.document import touching
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.document.touches import Touch, TouchHow
 from gp_labeler.models.messages import Messages

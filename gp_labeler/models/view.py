@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from psygnal import Signal
 
 from gp_core.errors import GpError
 from gp_core.validation import FloatArray, check_option
 from gp_labeler.document.edits import as_position
 from gp_labeler.document.head_frame import HeadFrame
+from gp_labeler.document.signals import Signal
 from gp_labeler.document.specimen_document import SpecimenDocument
 from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame
 from gp_labeler.imaging.slab import DENOISERS, Slab

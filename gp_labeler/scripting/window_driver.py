@@ -24,6 +24,7 @@ from gp_labeler.models.workflow import Active
 from gp_labeler.scene.planes import Plane
 from gp_labeler.scripting.events import click
 from gp_labeler.scripting.prompts import ScriptPrompts
+from gp_labeler.views.panels.table import fault_text
 
 if TYPE_CHECKING:
     from gp_labeler.scripting.steps.pose import Estimated
@@ -222,8 +223,7 @@ class WindowDriver:
         """Return what went wrong while a step was done, as the window said it; empty where nothing did."""
         errors = [text for text, level in self.messages[since:] if level == "error"]
         asked = [f"the window asks: {text}" for text in self.prompts.unanswered]
-        faults = [f"{type(fault).__name__}: {fault}" for fault in self.faults]
-        return " ".join([*errors, *asked, *faults])
+        return " ".join([*errors, *asked, *map(fault_text, self.faults)])
 
     def warnings(self, since: int) -> Sequence[str]:
         """Return what the window warned of since so many messages."""

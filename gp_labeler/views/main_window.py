@@ -211,14 +211,15 @@ class MainWindow(QMainWindow):
             self.workspace.say(text, "warning")
 
     def leave_out_panel(self, name: str, error: BaseException) -> None:
-        """Take away the panel of an installed package that failed, and name it."""
+        """Take away the panel of an installed package that failed, and name it, once."""
         panel = self.steps.pop(name, None)
-        if panel is not None:
-            if self.rail.step == name:
-                self.set_step("label" if self.workspace.scan.volume is not None else "scan")
-            self.rail.remove_step(name)
-            self.panels.removeWidget(panel)
-            panel.deleteLater()
+        if panel is None:  # it fails again before it is gone
+            return
+        if self.rail.step == name:
+            self.set_step("label" if self.workspace.scan.volume is not None else "scan")
+        self.rail.remove_step(name)
+        self.panels.removeWidget(panel)
+        panel.deleteLater()
         reason = f"{PANELS.described(name)} is left out ({type(error).__name__}: {error})"
         self.workspace.say(f"{reason[0].upper()}{reason[1:]}. Your labels are kept.", "error")
 

@@ -17,7 +17,7 @@ from gp_labeler.views.panels.label.panel import LabelPanel
 from gp_labeler.views.panels.pose.panel import PosePanel
 from gp_labeler.views.panels.scan.panel import ScanPanel
 
-__all__ = ["PANELS", "added_panels", "panel_at_fault"]
+__all__ = ["PANELS", "added_panels", "fault_text", "panel_at_fault"]
 
 PANELS: Extensions[Callable[[Workspace, Actions], QWidget]] = Extensions(
     "gp_labeler.panels", {"scan": ScanPanel, "label": LabelPanel, "atlas": AtlasPanel, "pose": PosePanel}
@@ -57,3 +57,11 @@ def panel_at_fault(error: BaseException) -> str | None:
                 return packages[package]
         cause = cause.__cause__ or cause.__context__
     return None
+
+
+def fault_text(error: BaseException) -> str:
+    """Say what went wrong in the program; the panel of an installed package that is at fault is named."""
+    panel = panel_at_fault(error)
+    if panel is None or not isinstance(error, Exception):
+        return f"{type(error).__name__}: {error}"
+    return str(PANELS.failure(panel, error))
