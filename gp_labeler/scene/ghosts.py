@@ -23,7 +23,8 @@ RADIUS_95 = CHI2_3_95**0.5
 """95 % radius of a three-dimensional Gaussian, in standard deviations."""
 
 _FILL = 0.16
-_CORNERS = 65
+_TURN = np.linspace(0.0, 2 * np.pi, 65)
+_CIRCLE = np.stack([np.cos(_TURN), np.sin(_TURN)], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +65,7 @@ def ellipse(centre: ArrayLike, covariance: ArrayLike, radius: float = RADIUS_95)
         In standard deviations.
     """
     values, axes = np.linalg.eigh(np.asarray(covariance, dtype=np.float64))
-    turn = np.linspace(0.0, 2 * np.pi, _CORNERS)
-    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
-    outline: FloatArray = np.asarray(centre) + radius * (circle * np.sqrt(values.clip(0))) @ axes.T
+    outline: FloatArray = np.asarray(centre) + radius * (_CIRCLE * np.sqrt(values.clip(0))) @ axes.T
     return outline
 
 

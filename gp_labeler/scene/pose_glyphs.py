@@ -97,11 +97,11 @@ class SolidActor:
         """Return points, normals, colours and triangles of all solids of one shape."""
         solid, size, turn = solid_mesh(shape), sizes[chosen][:, None], turns[chosen].transpose(0, 2, 1)
         points = (solid.points * size) @ turn + places[chosen][:, None]
-        normals = solid.point_normals / size
+        normals = solid.normals / size
         normals /= np.linalg.norm(normals, axis=2, keepdims=True)
         normals = normals @ turn
         n, k = points.shape[:2]
-        triangles = solid.regular_faces[None] + k * np.arange(n)[:, None, None]
+        triangles = solid.triangles[None] + k * np.arange(n)[:, None, None]
         paint = np.repeat(colours[chosen], k, axis=0)
         return points.reshape(-1, 3), normals.reshape(-1, 3), paint, triangles.reshape(-1, 3)
 

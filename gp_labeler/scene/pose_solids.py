@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from gp_core.validation import FloatArray
 
 if TYPE_CHECKING:
     import pyvista as pv
 
-__all__ = ["BALL", "CUBE", "DIAMOND", "HEAD", "ROD", "solid_mesh"]
+__all__ = ["BALL", "CUBE", "DIAMOND", "HEAD", "ROD", "SolidMesh", "solid_mesh"]
 
 ROD, HEAD, BALL, DIAMOND, CUBE = range(5)
 """A rod begins at its place and a head ends there; the others lie about theirs."""
@@ -18,8 +23,16 @@ _SHARP_DEG = 45.0
 """Edges sharper than this are drawn as edges, others smoothly."""
 
 
+class SolidMesh(NamedTuple):
+    """Points (N, 3) and outward normals (N, 3), and the (T, 3) corners of triangles."""
+
+    points: FloatArray
+    normals: FloatArray
+    triangles: NDArray[np.int64]
+
+
 @cache
-def solid_mesh(shape: int) -> pv.PolyData:
+def solid_mesh(shape: int) -> SolidMesh:
     """Return triangles with outward normals, a corner repeated for each flat face that meets there.
 
     Parameters
@@ -41,4 +54,5 @@ def solid_mesh(shape: int) -> pv.PolyData:
     smooth: pv.PolyData = mesh.compute_normals(
         cell_normals=False, split_vertices=True, feature_angle=_SHARP_DEG, auto_orient_normals=True
     )
-    return smooth
+    points, normals = (np.array(values, dtype=np.float64) for values in (smooth.points, smooth.point_normals))
+    return SolidMesh(points, normals, np.array(smooth.regular_faces))

@@ -16,7 +16,7 @@ from gp_labeler.scene.measurements import DrawnMeasurement
 from gp_labeler.scene.scene3d import Scene3D
 from gp_labeler.scene.slice_viewport import SliceViewport
 from gp_labeler.views.painting.name_tags import NameTag
-from gp_labeler.views.painting.pose_strokes import polygon
+from gp_labeler.views.painting.qt_paths import polygon
 from gp_labeler.views.painting.slice_lines import near_part
 
 __all__ = ["Strokes", "paint_strokes", "strokes_in_scene", "strokes_on_slice", "tags_of_strokes"]

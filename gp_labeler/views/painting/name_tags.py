@@ -86,9 +86,14 @@ def place_names(
     edge = 2 * ratio  # of the halo
     high, step = metrics.capHeight() + 2 * edge, metrics.lineSpacing()
     lines = [lines_within(tag.text, size[0] - 8 * ratio, metrics.horizontalAdvance) for tag in tags]
+
+    def size_of(words: list[str]) -> tuple[float, float]:
+        wide = max(map(metrics.horizontalAdvance, words))
+        return (wide + 2 * edge, high + step * (len(words) - 1)) if wide else (0.0, 0.0)
+
     corners, shown = place_labels(
         [tag.pixel for tag in tags],
-        [(max(map(metrics.horizontalAdvance, of)) + 2 * edge, high + step * (len(of) - 1)) for of in lines],
+        [size_of(words) for words in lines],
         size,
         gaps=[tag.gap * ratio for tag in tags],
         ranks=[tag.rank for tag in tags],

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from qtpy.QtGui import QPainter
@@ -51,6 +52,14 @@ def region_section(pose: DrawnPose, shown: SliceViewport) -> FloatArray | None:
     return ellipse(middle, within / shown.mm_per_pixel**2, float(np.sqrt(left)))
 
 
+class _Near(NamedTuple):
+    """Which of some places lies near the slice, its (2,) painter's coordinates, and whether it lies on it."""
+
+    number: int
+    pixel: FloatArray
+    on_slice: bool
+
+
 class SlicePen:
     """Draws on one slice.
 
@@ -83,10 +92,8 @@ class SlicePen:
             self._truth(truth)
         for pose in seen.poses if scene.shows("estimate") else ():
             self._axis(pose)
-        for vector in seen.vectors:
-            self._vector(vector)
-        for feature in seen.features:
-            self._feature(feature)
+        self._vectors([vector for vector in seen.vectors if vector.length >= 1e-6])
+        self._features(seen.features)
         self._touches(seen.touches)
         if seen.tip is not None:
             self._tip(seen.tip)
@@ -143,35 +150,33 @@ class SlicePen:
         line(self._painter, np.stack([tail, tip]), colour, 1.7 * self._ratio)
         marker(self._painter, origin, "square", 4.2 * self._ratio, colour, full=off < _NEAR_MM)
 
-    def _near(self, point: FloatArray, reach: float = REACH_MM) -> bool:
-        """Whether a point is drawn; sets how strongly."""
-        off = self._off(point)
-        self._fade_by(off, reach)
-        return off <= reach
+    def _near(self, places: Sequence[FloatArray] | FloatArray, reach: float = REACH_MM) -> Iterator[_Near]:
+        """Yield those of the (3,) places that are drawn, the painter's opacity set for each."""
+        scan = np.asarray(places, dtype=np.float64).reshape(-1, 3)
+        offs = np.abs(self._shown.off_slice(scan))
+        near = np.flatnonzero(offs <= reach)
+        for n, pixel, off in zip(
+            near.tolist(), self._shown.scan_to_pixel(scan[near]) + 0.5, offs[near].tolist(), strict=True
+        ):
+            self._fade(1.0 if off < _NEAR_MM else 1.0 - 0.6 * off / reach)
+            yield _Near(n, pixel, off < _NEAR_MM)
 
-    def _fade_by(self, off: float, reach: float = REACH_MM) -> None:
-        self._fade(1.0 if off < _NEAR_MM else 1.0 - 0.6 * min(off / reach, 1.0))
+    def _vectors(self, vectors: Sequence[DrawnVector]) -> None:
+        for n, _, _ in self._near([(vector.start + vector.end) / 2 for vector in vectors]):
+            vector, colour = vectors[n], colour_of(vectors[n].role)
+            start, end = self._pixels(vector.start, vector.end)
+            width = (2.4 if vector.is_long else 1.4) * self._ratio
+            line(self._painter, np.stack([start, end]), colour, width)
+            head = min(4.0 * width, 0.7 * float(np.linalg.norm(end - start)))
+            arrow(self._painter, start, end, head, colour)
 
-    def _vector(self, vector: DrawnVector) -> None:
-        if not self._near((vector.start + vector.end) / 2) or vector.length < 1e-6:
-            return
-        start, end = self._pixels(vector.start, vector.end)
-        width = (2.4 if vector.is_long else 1.4) * self._ratio
-        line(self._painter, np.stack([start, end]), colour_of(vector.role), width)
-        head = min(4.0 * width, 0.7 * float(np.linalg.norm(end - start)))
-        arrow(self._painter, start, end, head, colour_of(vector.role))
-
-    def _feature(self, feature: DrawnFeature) -> None:
-        if self._near(feature.position):
-            pixel = self._pixels(feature.position)[0]
-            marker(self._painter, pixel, "diamond", 2.8 * self._ratio, colour_of(feature.role))
+    def _features(self, features: Sequence[DrawnFeature]) -> None:
+        for n, pixel, _ in self._near([feature.position for feature in features]):
+            marker(self._painter, pixel, "diamond", 2.8 * self._ratio, colour_of(features[n].role))
 
     def _touches(self, touches: Sequence[DrawnTouch]) -> None:
-        places = np.array([touch.position for touch in touches]).reshape(-1, 3)
-        offs = np.abs(self._shown.off_slice(places))
-        for n in np.flatnonzero(offs <= REACH_MM).tolist():
-            self._fade_by(float(offs[n]))
-            self._touch(touches[n], self._pixels(places[n])[0], full=bool(offs[n] < _NEAR_MM))
+        for n, pixel, on_slice in self._near([touch.position for touch in touches]):
+            self._touch(touches[n], pixel, full=on_slice)
 
     def _touch(self, touch: DrawnTouch, pixel: FloatArray, *, full: bool) -> None:
         role = "doubtful" if touch.suspect else "touch" if touch.used else "unseen"
@@ -193,10 +198,9 @@ class SlicePen:
 
     def _tip(self, tip: DrawnTip) -> None:
         colour = colour_of("touch" if tip.visible else "unseen")
-        for n, place in enumerate(tip.trail[-_TRAIL_AT_MOST:]):
-            if self._near(place, 2 * REACH_MM):
-                size = 0.8 + 1.4 * n / _TRAIL_AT_MOST
-                marker(self._painter, self._pixels(place)[0], "ball", size * self._ratio, colour)
+        for n, pixel, _ in self._near(tip.trail[-_TRAIL_AT_MOST:], 2 * REACH_MM):
+            size = 0.8 + 1.4 * n / _TRAIL_AT_MOST
+            marker(self._painter, pixel, "ball", size * self._ratio, colour)
         off = self._off(tip.position)
         self._fade(1.0 if off < _FADE_MM else _FAINT)
         if tip.handle is not None:

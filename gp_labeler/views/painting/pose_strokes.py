@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from qtpy.QtCore import QPointF, Qt
-from qtpy.QtGui import QColor, QPainter, QPainterPath, QPen, QPolygonF
+from qtpy.QtCore import Qt
+from qtpy.QtGui import QColor, QPainter, QPainterPath, QPen
 
 from gp_core.validation import FloatArray
 from gp_labeler.scene.colours import DARK
 from gp_labeler.views.painting.marker_pictures import marker_picture
+from gp_labeler.views.painting.qt_paths import polygon
 
-__all__ = ["area", "arrow", "colour_of", "hull", "line", "marker", "polygon"]
+__all__ = ["area", "arrow", "colour_of", "hull", "line", "marker"]
 
 _Corner = tuple[float, float]
 
@@ -75,11 +76,6 @@ def arrow(painter: QPainter, start: FloatArray, end: FloatArray, length: float, 
     path.closeSubpath()
     painter.strokePath(path, QPen(_HALO, 0.25 * length))
     painter.fillPath(path, colour)
-
-
-def polygon(points: FloatArray) -> QPolygonF:
-    """Return (N, 2) pixels as Qt has them."""
-    return QPolygonF([QPointF(x, y) for x, y in points.tolist()])
 
 
 def hull(points: FloatArray) -> FloatArray:

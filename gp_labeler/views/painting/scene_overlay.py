@@ -32,7 +32,7 @@ from gp_labeler.views.painting.measurement_strokes import (
     tags_of_strokes,
 )
 from gp_labeler.views.painting.name_tags import NameTag, PlacedWord, paint_words, place_names, pose_tags
-from gp_labeler.views.painting.pose_strokes import polygon
+from gp_labeler.views.painting.qt_paths import polygon
 from gp_labeler.views.painting.scale_bar import paint_scale_bar
 from gp_labeler.views.theme import theme_of
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from qtpy.QtCore import QPointF, QRectF, Qt
-from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap, QPolygonF
+from qtpy.QtGui import QColor, QImage, QPainter, QPainterPath, QPen, QPixmap
 
 from gp_core.validation import FloatArray
 from gp_labeler.imaging.anatomical_frame import AnatomicalFrame
@@ -28,7 +28,7 @@ from gp_labeler.views.filter_words import filter_words
 from gp_labeler.views.fonts import TEXT, text_scale
 from gp_labeler.views.painting.marks import ACTIVE_GROWTH, paint_mark
 from gp_labeler.views.painting.name_tags import NameTag, paint_words, place_names
-from gp_labeler.views.painting.qt_paths import segments_path
+from gp_labeler.views.painting.qt_paths import polygon, segments_path
 from gp_labeler.views.painting.scale_bar import paint_scale_bar
 from gp_labeler.views.painting.slice_lines import paint_lines
 from gp_labeler.views.painting.word_pictures import word_picture
@@ -316,7 +316,7 @@ class SlicePainter:
             centre = shown.scan_to_pixel(ghost.mean[None])[0] + 0.5
             covariance = axes @ ghost.covariance @ axes.T / shown.mm_per_pixel**2
             corners = ellipse(centre, covariance)
-            ring = QPolygonF([QPointF(*corner) for corner in corners])
+            ring = polygon(corners)
             painter.setBrush(QColor(colour.red(), colour.green(), colour.blue(), 26))
             painter.setPen(QPen(colour, 1.8 * ratio))
             painter.drawPolygon(ring)

@@ -19,6 +19,8 @@ from gp_labeler.scene.target import RenderTarget
 from gp_labeler.views.painting.label_layout import place_labels
 from gp_labeler.views.painting.marker_pictures import marker_picture
 from gp_labeler.views.painting.marks import place_marks, tags_of
+from gp_labeler.views.painting.name_tags import NameTag, place_names
+from gp_labeler.views.painting.qt_paths import polygon
 from gp_labeler.views.painting.scene_overlay import SceneOverlay
 
 pytestmark = pytest.mark.any_binding
@@ -120,6 +122,22 @@ def test_what_must_be_said_is_not_cut_off_by_the_edge(x: float) -> None:
     assert (corners + size <= [200, 300]).all()
     too_long, _ = place_labels([[x, 2.0]], [[400.0, 14.0]], (200, 300), gaps=[10], ranks=[1])
     assert too_long[0, 0] == 0, "its beginning can be read"
+
+
+def test_pixels_kept_free_are_no_names_and_take_no_more_room(qapp) -> None:
+    place = np.array([100.0, 100.0])
+    free = [NameTag("", place + np.array([30.0 * n, 0.0]), DARK.text, 4.0, -2.0) for n in range(3)]
+    minor = NameTag("OS", place + np.array([12.0, 0.0]), DARK.text, 6.0, -3.0)
+    (word,) = place_names([*free, minor], (400, 200), ratio=1.0, text=12.0, halo=DARK.halo)
+    (alone,) = place_names([minor], (400, 200), ratio=1.0, text=12.0, halo=DARK.halo)
+    assert word.text == "OS"
+    assert (word.x, word.y) == (alone.x, alone.y)
+
+
+@pytest.mark.parametrize("n", [0, 1, 3, 70])
+def test_pixels_become_the_polygon_of_the_same_corners(n: int) -> None:
+    points = np.random.default_rng(n).normal(0, 1e3, (n, 2))
+    assert [(corner.x(), corner.y()) for corner in polygon(points)] == list(map(tuple, points.tolist()))
 
 
 def test_names_are_written_beside_their_marks(scene: Scene3D) -> None:
