@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from qtpy.QtCore import QPoint, Qt
+from qtpy.QtCore import QCoreApplication, QEvent, QPoint, Qt
 from qtpy.QtTest import QTest
 from window_cases import BALL_MM, MIDDLE, wait_until_idle
 
@@ -70,15 +70,20 @@ def test_a_typed_position_is_brought_into_every_view(window) -> None:
         assert np.allclose(view.crosshair, there)
 
 
-def test_one_view_alone_is_reset(window) -> None:
+@pytest.mark.parametrize("pointer_over", [None, "axial", "coronal"])
+def test_one_view_alone_is_reset_that_under_the_pointer_else_the_focused_one(window, pointer_over) -> None:
     axial, coronal = (window.grid.slice_views[plane] for plane in (Plane.AXIAL, Plane.CORONAL))
+    for frame in window.grid.frames.values():  # on a real display the pointer lies somewhere
+        over = frame.name == pointer_over
+        QCoreApplication.sendEvent(frame, QEvent(QEvent.Type.Enter if over else QEvent.Type.Leave))
     for shown in (axial, coronal):
         shown.zoom_to(MIDDLE, 2.0)
-    close = coronal.shown.mm_per_pixel
+    before = {view: view.shown.mm_per_pixel for view in (axial, coronal)}
     axial.setFocus()
     QTest.keyClick(axial, Qt.Key.Key_R, Qt.KeyboardModifier.ControlModifier)
-    assert axial.shown.mm_per_pixel > 3 * close
-    assert coronal.shown.mm_per_pixel == close
+    reset, other = (coronal, axial) if pointer_over == "coronal" else (axial, coronal)
+    assert reset.shown.mm_per_pixel > 3 * before[reset]
+    assert other.shown.mm_per_pixel == before[other]
 
 
 @pytest.mark.parametrize("code", ["CA", "MH", "CC", "RWA"])  # coronal, sagittal, axial, 3D
