@@ -17,7 +17,7 @@ class _ReachesAll(psygnal.SignalInstance):
     recorder of scripts, must not miss the edit at which it failed.
     """
 
-    def _run_emit_loop_immediate(self) -> None:  # psygnal's own stops at the first error, and cannot be told
+    def _run_emit_loop_immediate(self) -> None:  # psygnal's own stops at the first error
         args = self._emit_queue.popleft()
         for listener in tuple(self._slots):
             if listener.dereference() is None:  # it was let go by one before it
