@@ -260,7 +260,7 @@ class LandmarkSet:
 
     def __contains__(self, code: object) -> bool:
         """Whether a feature has a position."""
-        return isinstance(code, str) and bool(np.isfinite(self[code]).all())
+        return isinstance(code, str) and not np.isnan(self.points[index_of(code), 0])
 
     def __iter__(self) -> Iterator[str]:
         """Go through the features that have a position, as through the keys of a mapping."""

@@ -304,10 +304,7 @@ class SpecimenState:
                 remedy="For example GP-014.",
             )
         kept = {key: mark for key, mark in self.landmarks.items() if mark != TO_DO}
-        sets = {
-            side: replace(_landmark_set(kept, side), scan_evidence=self.scan_evidence.get(side))
-            for side in Side
-        }
+        sets = {side: _landmark_set(kept, side, self.scan_evidence.get(side)) for side in Side}
         if self.threshold is not None:
             object.__setattr__(self, "threshold", freeze(float(self.threshold), "threshold"))
         _check_round(self.round)
@@ -458,7 +455,9 @@ def changed_points(old: SpecimenState, new: SpecimenState) -> frozenset[tuple[Si
     return frozenset(changed)
 
 
-def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> LandmarkSet:
+def _landmark_set(
+    landmarks: Mapping[PointKey, Landmark], side: Side, evidence: ScanEvidence | None = None
+) -> LandmarkSet:
     positions, unseen, suggested = {}, set(), {}
     for row in FEATURES:
         mark = TO_DO if row.computed else landmarks.get(point_key(side, row.code), TO_DO)
@@ -469,8 +468,10 @@ def _landmark_set(landmarks: Mapping[PointKey, Landmark], side: Side) -> Landmar
         elif mark.suggestion is not None:
             _plausible(mark.suggestion.position, row.code)
             suggested[row.code] = mark.suggestion
-    placed = replace(LandmarkSet.from_mapping(positions, side), unseen=frozenset(unseen))
-    return with_cochlea_origin(placed).with_suggestions(suggested)
+    placed = with_cochlea_origin(LandmarkSet.from_mapping(positions, side))
+    if not (unseen or suggested or evidence):  # each copy is checked as a whole
+        return placed
+    return replace(placed, unseen=frozenset(unseen), suggested=suggested, scan_evidence=evidence)
 
 
 def _check_touches(touches: Mapping[TouchKey, Touch]) -> None:

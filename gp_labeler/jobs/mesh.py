@@ -64,7 +64,8 @@ class MeshFirst:
     def run(self, progress: Progress) -> Meshes:
         """Mesh few voxels; nothing, where so coarse a look shows no bone."""
         stride = overview_stride(self.volume, FIRST_LOOK_VOXELS)
-        return Meshes(tuple(part.prepare() for part in _mesh_if_any(self, progress, stride=stride)))
+        parts = tuple(part.prepare() for part in _mesh_if_any(self, progress, stride=stride))
+        return Meshes(parts, _previews(parts))
 
 
 @dataclass(frozen=True)
@@ -84,10 +85,8 @@ class MeshOverview:
         """Mesh all of it, and a preview mesh of few triangles."""
         stride = overview_stride(self.volume)
         whole = _mesh(self, progress, end=0.8, stride=stride).prepare()
-        if whole.n_triangles <= QUICK_TRIANGLES:
-            return Meshes((whole,))
         progress(0.9)
-        return Meshes((whole,), (coarse_surface(whole, QUICK_TRIANGLES),))
+        return Meshes((whole,), _previews((whole,)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +170,13 @@ def _mesh_if_any(job: _Meshing, progress: Progress, **how: Any) -> tuple[Surface
         return (_mesh(job, progress, **how),)
     except GpError:
         return ()
+
+
+def _previews(parts: tuple[Surface, ...]) -> tuple[Surface, ...]:
+    """Return a coarse mesh to draw while the camera moves; none where the mesh itself is small."""
+    if sum(part.n_triangles for part in parts) <= QUICK_TRIANGLES:
+        return ()
+    return (coarse_surface(parts, QUICK_TRIANGLES),)
 
 
 @dataclass(frozen=True)

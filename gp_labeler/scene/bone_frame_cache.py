@@ -87,6 +87,8 @@ class BoneFrameCache:
         self._kept, self._next = "bone", "bone to be"
         self._shown: RenderKey | None = None
         self._fine = False
+        self._is_empty = self._next_is_empty = True
+        """Whether no mesh is in the picture that is kept, and in the one under way."""
         self._work: Iterator[None] | None = None
         self._work_for: RenderKey | None = None
         self._coarseness = 1
@@ -98,9 +100,17 @@ class BoneFrameCache:
         """Whether the picture that is kept shows just that, finely."""
         return self._fine and self._shown == key
 
-    def differs_only_in_mesh(self, key: RenderKey) -> bool:
-        """Whether the picture that is kept may stand until the fine one is there: only meshes are newer."""
-        return self._shown is not None and self._fine and replace(self._shown, mesh=key.mesh) == key
+    def may_stay(self, key: RenderKey) -> bool:
+        """Whether the picture that is kept may stay until the fine one is there.
+
+        It may where only meshes are newer, or where they are the first: the camera has turned to them, but
+        there was nothing to see before.
+        """
+        shown = self._shown
+        if shown is None or not self._fine:
+            return False
+        is_first = self._is_empty and shown.mesh != key.mesh and shown.size == key.size
+        return is_first or replace(shown, mesh=key.mesh) == key
 
     def draw_quickly(self, key: RenderKey, direction: FloatArray) -> None:
         """Draw the coarse preview mesh and keep the picture; without a preview mesh, draw the bone itself."""
@@ -114,7 +124,7 @@ class BoneFrameCache:
         self._target.keep(self._kept, part=part)
         self._target.restore(self._kept)
         self._add_cube(self._kept)
-        self._shown, self._fine = key, False
+        self._shown, self._fine, self._is_empty = key, False, False
         self.n_drawn += 1
         self._adapt(time.perf_counter() - start)
 
@@ -144,7 +154,7 @@ class BoneFrameCache:
         self._target.keep(self._next)
         self._add_cube(self._next)
         self._kept, self._next = self._next, self._kept
-        self._shown, self._fine = key, True
+        self._shown, self._fine, self._is_empty = key, True, self._next_is_empty
         self._work = self._work_for = None
         self.n_drawn += 1
         return True
@@ -170,12 +180,12 @@ class BoneFrameCache:
             self._warm = key.mesh
             yield
         groups = self._bone.groups(direction, at_once=bool(self._layers.bone.GetUseSSAO()))
-        drawn = bool(groups or self._added.names)
+        self._next_is_empty = not (groups or self._added.names)
         for n, actors in enumerate(self._batches(groups)):
             self._layers.bone.SetErase(n == 0)
             self._draw(actors)
             yield
-        n_strips = max(1, round(key.size[0] * key.size[1] / _STRIP_PIXELS)) if drawn else 0
+        n_strips = max(1, round(key.size[0] * key.size[1] / _STRIP_PIXELS)) if not self._next_is_empty else 0
         for n in range(n_strips):
             self._smoother.SetViewport(0.0, n / n_strips, 1.0, (n + 1) / n_strips)
             self._target.draw(self._smoother)

@@ -194,7 +194,7 @@ class Scene3D:
         key = self._render_key()
         if not quick:
             self._advance(key)
-        elif not (self._bone_frames.is_fine(key) or self._bone_frames.differs_only_in_mesh(key)):
+        elif not (self._bone_frames.is_fine(key) or self._bone_frames.may_stay(key)):
             self._refresh_cube()
             self._bone_frames.draw_quickly(key, self.camera.direction)
         self._draw_over_bone()

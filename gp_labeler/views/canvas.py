@@ -6,10 +6,11 @@ from contextlib import AbstractContextManager, nullcontext
 from typing import Protocol
 
 from qtpy.QtCore import QPointF, QTimer
-from qtpy.QtGui import QImage, QPainter
+from qtpy.QtGui import QColor, QImage, QPainter
 from qtpy.QtWidgets import QWidget
 
 from gp_labeler.scene.target import RenderTarget
+from gp_labeler.views.theme import theme_of
 
 __all__ = ["Canvas", "CanvasView", "PaintedCanvas"]
 
@@ -47,8 +48,11 @@ class Canvas(Protocol):
     """Whether it paints in widgets of its own, which have their frame drawn each time they are painted."""
 
     @property
-    def has_frame(self) -> bool:
-        """Whether a frame of the view's size has been drawn."""
+    def may_stay(self) -> bool:
+        """Whether what is shown may stay until the next frame is drawn in an event of its own.
+
+        It is of the view's size, or nothing has ever been drawn.
+        """
         ...
 
     @property
@@ -106,14 +110,15 @@ class PaintedCanvas:
         self._contents: CanvasView = view  # type: ignore[assignment]
         self._frame: QImage | None = None
         self._painted: QImage | None = None
+        self._has_painted = False
         self._timer = QTimer(view, interval=0, singleShot=True)
         self._timer.timeout.connect(self._draw)
 
     @property
-    def has_frame(self) -> bool:
-        """Whether there is a picture of the view's size."""
+    def may_stay(self) -> bool:
+        """Whether there is a picture of the view's size, or none yet."""
         frame = self._frame
-        return frame is not None and (frame.width(), frame.height()) == self._contents.pixels
+        return frame is None or (frame.width(), frame.height()) == self._contents.pixels
 
     @property
     def is_shown(self) -> bool:
@@ -122,7 +127,7 @@ class PaintedCanvas:
 
     def ask(self) -> None:
         """Draw in an event of its own: other views are painted first, this one once it is drawn."""
-        if self.has_frame:
+        if self._has_painted and self.may_stay:
             self._timer.start()
         else:
             self._view.update()
@@ -152,10 +157,13 @@ class PaintedCanvas:
         self._frame = frame
 
     def paint(self, painter: QPainter) -> None:
-        """Paint the picture and what lies over it."""
-        if self._frame is not None:
-            painter.drawImage(QPointF(0, 0), self._frame)
-            self._painted = self._frame
+        """Paint the picture and what lies over it; before there is one, its background."""
+        self._has_painted = True
+        if self._frame is None:
+            painter.fillRect(self._view.rect(), QColor(theme_of(self._view).scene.bottom))
+            return
+        painter.drawImage(QPointF(0, 0), self._frame)
+        self._painted = self._frame
         self._contents.paint_pointer(painter)
 
     def resize(self) -> None:

@@ -23,6 +23,7 @@ How to write a widget whose words are never cut
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 from qtpy.QtCore import QEvent, QObject, Qt
@@ -148,7 +149,7 @@ def font_of(widget: QWidget | None, size: float = TEXT, *, bold: bool = False) -
     bold : bool
     """
     font = base_font()
-    font.setPixelSize(max(round(size * text_scale(widget)), 1))
+    font.setPixelSize(_height(widget, size))
     font.setBold(bold)
     return font
 
@@ -160,7 +161,21 @@ def pixels(widget: QWidget | None, size: float) -> int:
 
 def text_width(widget: QWidget | None, *texts: str, size: float = TEXT, bold: bool = False) -> int:
     """Return the width of the longest of some texts, logical pixels, rounded up."""
-    metrics = QFontMetricsF(font_of(widget, size, bold=bold))
+    _load()
+    return _text_width(texts, family(), _height(widget, size), bold)
+
+
+def _height(widget: QWidget | None, size: float) -> int:
+    return max(round(size * text_scale(widget)), 1)
+
+
+@lru_cache(4096)
+def _text_width(texts: tuple[str, ...], _: str, height: int, bold: bool) -> int:
+    """Measure once what is painted again and again: codes, headings, states."""
+    font = base_font()
+    font.setPixelSize(height)
+    font.setBold(bold)
+    metrics = QFontMetricsF(font)
     return int(max((metrics.horizontalAdvance(text) for text in texts), default=0.0) + 1)
 
 

@@ -46,9 +46,9 @@ class NativeCanvas:
         self._size = (0, 0)
 
     @property
-    def has_frame(self) -> bool:
-        """Whether a frame of the view's size has been drawn."""
-        return self._size == self._contents.pixels
+    def may_stay(self) -> bool:
+        """Whether a frame of the view's size has been drawn, or none yet."""
+        return self._size in ((0, 0), self._contents.pixels)
 
     @property
     def is_shown(self) -> bool:

@@ -66,6 +66,9 @@ _FINE_AFTER_MS = 180
 _SLICE_SECONDS = 0.02
 """How long bone is drawn finely before the window answers again."""
 
+_WARM_AFTER_MS = 150
+"""The window has been painted by then, and nothing is open in it yet."""
+
 _FIRST_LOOK = (-0.45, 0.75, -0.48)
 """Direction of the first look: from the front, the left and above."""
 
@@ -131,6 +134,9 @@ class SceneView(QWidget):
         self._dragging = self._on_target = False
         self._fine_timer = QTimer(self, interval=_FINE_AFTER_MS, singleShot=True)
         self._fine_timer.timeout.connect(self._refine)
+        self._warm_timer = QTimer(self, interval=_WARM_AFTER_MS, singleShot=True)
+        self._warm_timer.timeout.connect(self._warm_up)
+        self._warm_timer.start()
         self.scene.camera.look(_FIRST_LOOK, (0, 0, 1))
         self._listen()
         self.take_theme()
@@ -386,15 +392,15 @@ class SceneView(QWidget):
 
     def paintEvent(self, _: QPaintEvent) -> None:  # noqa: D102, N802
         painter = QPainter(self)
-        if not self._is_screen(painter):
+        is_screen = self._is_screen(painter)
+        if not is_screen:
             self.finish()
-        elif self._stale:
-            if self.canvas.paints_itself or self.canvas.has_frame:
-                self.canvas.ask()  # drawn by itself: other views are painted in the same breath as this one
-            else:
-                self.draw_frame()
+        elif self._stale and not (self.canvas.paints_itself or self.canvas.may_stay):
+            self.draw_frame()
         self.canvas.paint(painter)
         painter.end()
+        if is_screen and self._stale:
+            self.canvas.ask()  # drawn by itself: other views are painted in the same breath as this one
 
     def paint_overlay(self, painter: QPainter) -> None:
         """Paint what lies over the frame and changes only with it."""
@@ -473,6 +479,11 @@ class SceneView(QWidget):
         elif not self._finished:
             self._stale = True
             self.canvas.ask()
+
+    def _warm_up(self) -> None:
+        """Draw once before there is anything to see: OpenGL takes its time to prepare the first frame."""
+        if self.scene.n_bone_frames == 0 and self.scene.target.is_ready and not self.canvas.paints_itself:
+            self.scene.render()
 
     # Mouse and keys
 

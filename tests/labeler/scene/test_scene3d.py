@@ -436,3 +436,23 @@ def test_a_camera_that_moves_while_bone_is_drawn_begins_again(
     while not scene.advance(0.0):
         pass
     np.testing.assert_array_equal(scene.image(), wanted)
+
+
+def test_the_first_bone_is_drawn_behind_the_empty_scene_and_later_turns_are_answered_at_once(
+    scene: Scene3D, ball: Surface, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("gp_labeler.scene.mesh_chunks.chunks_of.__defaults__", (ball.n_triangles // 5,))
+    scene.render(quick=True)
+    empty, n_drawn = scene.target.pixels(), scene.n_bone_frames
+    scene.bone.show([ball])
+    scene.fit()
+    scene.render(quick=True)
+    assert (scene.n_bone_frames, scene.is_fine) == (n_drawn, False)
+    np.testing.assert_array_equal(scene.target.pixels(), empty)
+    while not scene.advance(0.0):
+        pass
+    scene.render(quick=True)
+    assert _unlike_background(scene.target.pixels()).any()
+    scene.camera.rotate(40, 0)
+    scene.render(quick=True)
+    assert scene.n_bone_frames == n_drawn + 2

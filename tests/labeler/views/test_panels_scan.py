@@ -105,6 +105,19 @@ def test_a_typed_threshold_is_taken_and_nonsense_is_not(workspace, panel, qtbot)
     assert workspace.document.state.threshold == 95.5
 
 
+def test_grey_values_are_counted_when_somebody_looks(workspace, panel):
+    before = panel.bone.slider.x_of(110.0)
+    panel.hide()
+    volume = grey_volume()
+    brighter = Volume.from_parts(volume.array.astype(np.int16) * 10, (1.5,) * 3, (0, 0, 0), name="GP-015")
+    workspace.scan.begin(brighter)
+    assert panel.bone.slider.x_of(1100.0) == panel.bone.slider.x_of(0.0)
+    panel.show()
+    assert panel.bone.slider.x_of(1100.0) == pytest.approx(before, abs=2)
+    workspace.scan.begin(volume)
+    assert panel.bone.slider.x_of(110.0) == pytest.approx(before, abs=2)
+
+
 def test_undo_brings_the_slider_back(workspace, panel):
     workspace.scan.set_threshold(140.0)
     assert panel.bone.slider.value == 140.0

@@ -89,8 +89,9 @@ class TouchTable(QTableView):
 
     def set_roomy(self, roomy: bool) -> None:
         """Make the rows higher, where there is room."""
-        self._roomy = roomy
-        self._fit()
+        if roomy != self._roomy:
+            self._roomy = roomy
+            self._fit()
 
     def edit_position(self, name: str) -> None:
         """Let a position be typed."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from qtpy.QtGui import QShowEvent
 from qtpy.QtWidgets import QHBoxLayout, QPushButton, QWidget
 
 from gp_labeler.imaging.histogram import histogram_of
+from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.scan import ProposeThreshold
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.panels.number_field import NumberField
@@ -27,6 +29,8 @@ class BoneCard(Card):
     def __init__(self, workspace: Workspace, parent: QWidget | None = None) -> None:
         super().__init__("Bone threshold", parent)
         self._workspace = workspace
+        self._counted: Volume | None = None
+        """The scan whose grey values are shown."""
         self.slider = HistogramSlider()
         self.slider.previewed.connect(self._on_previewed)
         self.slider.chosen.connect(self._choose)
@@ -79,11 +83,23 @@ class BoneCard(Card):
 
     def _on_volume(self, *_: object) -> None:
         volume = self._workspace.scan.volume
+        if volume is None or self.isVisible():
+            self._count(volume)
+        self.refresh()
+
+    def _count(self, volume: Volume | None) -> None:
+        """Count the grey values, not before somebody looks: it takes some 10 ms."""
         histogram = None if volume is None else histogram_of(volume)
+        self._counted = volume
         self.slider.set_histogram(histogram)
         if histogram is not None:
             self.box.step = histogram.step
-        self.refresh()
+
+    def showEvent(self, event: QShowEvent) -> None:  # noqa: D102, N802 - Qt's name
+        volume = self._workspace.scan.volume
+        if self._counted is not volume:
+            self._count(volume)
+        super().showEvent(event)
 
     def _on_previewed(self, value: float) -> None:
         self.box.set_value(value)
