@@ -54,6 +54,8 @@ class Side(str, Enum):
         FeatureError
             Something else was given.
         """
+        if isinstance(text, cls):
+            return text
         word = str(getattr(text, "value", text)).strip().lower()
         for side in cls:
             if word in (side.value.lower(), side.word):
@@ -191,6 +193,8 @@ def index_of(code: str) -> int:
     FeatureError
         No such feature; the message suggests similar codes.
     """
+    if isinstance(code, str) and code in _INDEX:  # nearly always, and asked for thousands of times
+        return _INDEX[code]
     if not isinstance(code, str):
         raise FeatureError(f"a feature is named by its code, such as RWA, got {type(code).__name__}")
     key = code.strip().upper()

@@ -20,10 +20,13 @@ from gp_labeler.imaging.anatomical_frame import SCAN_FRAME, AnatomicalFrame
 from gp_labeler.imaging.slab import DENOISERS, Slab
 from gp_labeler.imaging.slice_plane import SlicePlane
 
-__all__ = ["CUTS", "LAYOUTS", "Camera", "Cut", "ViewModel", "ViewState"]
+__all__ = ["CUTS", "GREY_WINDOW", "LAYOUTS", "Camera", "Cut", "ViewModel", "ViewState"]
 
 LAYOUTS = ("four-up", "two-up", "3d", "axial", "sagittal", "coronal")
 """``two-up`` is the 3D view beside the slice view in which the active feature is best seen."""
+
+GREY_WINDOW = frozenset({"level", "width"})
+"""Fields of `ViewState` that a drag on a slice changes with every movement."""
 
 CUTS = ("axial", "sagittal", "coronal", "view")
 """By which planes bone can be cut open; ``view`` is across the line of sight."""

@@ -10,6 +10,7 @@ from qtpy.QtGui import QAction, QKeySequence
 from qtpy.QtWidgets import QMenu, QMenuBar, QWidget
 
 from gp_labeler.commands.actions import ACTIONS, MENUS, Action, InWindow, run
+from gp_labeler.models.view import GREY_WINDOW
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.views.shortcuts_sheet import keys_text
 from gp_labeler.views.signals import follow
@@ -80,7 +81,6 @@ class Commands(QObject):
             workspace.labels.active_changed,
             workspace.labels.ghosts_changed,
             workspace.document.history_changed,  # after every edit
-            workspace.view.changed,
             workspace.view.planes_changed,
             workspace.head.changed,
             workspace.scan.opened,
@@ -101,6 +101,7 @@ class Commands(QObject):
             workspace.jobs.cancelled,
         ):
             follow(self, signal, self._refresh_soon)
+        follow(self, workspace.view.changed, self._on_view_changed)
         self.refresh()
 
     def fill(self, bar: QMenuBar) -> None:
@@ -127,6 +128,10 @@ class Commands(QObject):
         """Refresh once for all that is announced in one turn of the event loop."""
         if not self._soon.isActive():
             self._soon.start()
+
+    def _on_view_changed(self, changed: frozenset[str]) -> None:
+        if not changed <= GREY_WINDOW:  # no command depends on it, and a drag changes it all the time
+            self._refresh_soon()
 
     def flush(self) -> None:
         """Refresh now if anything was announced since: a key or a menu asks what can be done."""

@@ -14,6 +14,7 @@ from gp_core.validation import FloatArray
 from gp_labeler.document.state import How
 from gp_labeler.imaging.slice_plane import SlicePlane
 from gp_labeler.imaging.volume import Volume
+from gp_labeler.models.view import GREY_WINDOW
 from gp_labeler.models.workspace import Workspace
 from gp_labeler.scene.bone_edge import BoneEdge
 from gp_labeler.scene.gestures import Button, Modifier, SliceControl
@@ -183,11 +184,11 @@ class SliceView(QWidget):
             workspace.labels.problems_changed,
             workspace.scan.threshold_changed,
             workspace.scan.threshold_previewed,
-            workspace.view.changed,
             workspace.interaction.dragged,
             workspace.pose.overlay_changed,
         ):
             follow(self, signal, self._repaint)
+        follow(self, workspace.view.changed, self._on_view_changed)
 
     def _take(self, shown: SliceViewport) -> None:
         """Show another part of the scan, and tell what now lies under the pointer, which may rest."""
@@ -200,6 +201,13 @@ class SliceView(QWidget):
         self.slice_painter.forget_points()
         self._painted = None
         self.update()
+
+    def _on_view_changed(self, changed: frozenset[str]) -> None:
+        if changed <= GREY_WINDOW:  # a drag changes it with every movement: the points stay as they are
+            self._painted = None
+            self.update()
+        else:
+            self._repaint()
 
     def _on_volume(self, volume: Volume) -> None:
         self.source = VolumeSlicer(volume)

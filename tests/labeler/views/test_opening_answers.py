@@ -5,11 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from qtpy.QtWidgets import QApplication
-from window_cases import wait_until_idle
+from window_cases import MIDDLE, wait_until_idle
 
+from gp_core.landmarks.features import Side
 from gp_labeler.imaging.volume import Volume
 from gp_labeler.jobs.mesh import QUICK_TRIANGLES, MeshFirst
 from gp_labeler.jobs.runner import Progress
+from gp_labeler.scene.planes import Plane
 
 
 def test_the_first_3d_frame_is_drawn_in_an_event_of_its_own(qtbot, make_window, ball) -> None:
@@ -55,3 +57,20 @@ def test_a_first_look_of_many_triangles_has_few_to_turn(n) -> None:
     assert (n_fine > QUICK_TRIANGLES) is (n == 72)
     assert n_quick <= QUICK_TRIANGLES
     assert (n_quick > 0) is (n == 72)
+
+
+def test_a_drag_of_the_grey_window_paints_slices_again_and_asks_for_nothing_else(qtbot, window) -> None:
+    workspace, view = window.workspace, window.grid.slice_views[Plane.AXIAL]
+    workspace.labels.place(MIDDLE, side=Side.LEFT, code="CA")
+    wait_until_idle(qtbot, window)
+    points, before, refreshed = view.slice_painter.points, view.grab().toImage(), []
+    window.commands.refresh = lambda: refreshed.append(True)
+    workspace.view.update(level=1200.0, width=300.0)
+    window.commands.flush()
+    qtbot.waitUntil(lambda: view.is_up_to_date)
+    assert view.grab().toImage() != before
+    assert view.slice_painter.points is points
+    assert not refreshed
+    workspace.view.update(glyph_mm=2.0)
+    qtbot.waitUntil(lambda: view.is_up_to_date)
+    assert view.slice_painter.points is not points
