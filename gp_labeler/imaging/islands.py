@@ -26,19 +26,19 @@ def _parts(triangles: Any, part: Any) -> int:
     """Write the number of its part for each point, and return how many parts there are.
 
     Union-find over the corners of each triangle; the root of a part is its smallest point number, so that one
-    pass upwards leads from roots to numbers.
+    pass upwards leads from roots to numbers. Most triangles join nothing new, which three numbers tell.
     """
     for i in range(len(part)):
         part[i] = i
     for t in range(len(triangles)):
-        a = _find(part, triangles[t, 0])
-        for corner in (1, 2):
-            b = _find(part, triangles[t, corner])
-            if a < b:
-                part[b] = a
-            elif b < a:
-                part[a] = b
-                a = b
+        i, j, k = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        a, b, c = part[i], part[j], part[k]
+        if a == b and b == c:
+            continue
+        a, b, c = _find(part, a), _find(part, b), _find(part, c)
+        root = min(a, b, c)
+        part[a] = part[b] = part[c] = root
+        part[i] = part[j] = part[k] = root
     n_parts = 0
     for i in range(len(part)):
         if part[i] == i:
@@ -50,17 +50,24 @@ def _parts(triangles: Any, part: Any) -> int:
 
 
 @njit(nogil=True, cache=True)
-def _extents(points: Any, part: Any, n_parts: int) -> Any:
-    """Return the bounding box of each part as (P, 2, 3)."""
+def _reach(points: Any, part: Any, n_parts: int, length: float) -> Any:
+    """Return which parts have a bounding box with a diagonal of `length` or more."""
     box = np.empty((n_parts, 2, 3))
     box[:, 0] = np.inf
     box[:, 1] = -np.inf
-    for i in range(points.shape[0]):
+    reaches = np.zeros(n_parts, np.bool_)
+    for i in range(len(points)):
+        p = part[i]
+        if reaches[p]:  # the rest of it need not be looked at
+            continue
+        squared = 0.0
         for axis in range(3):
             value = points[i, axis]
-            box[part[i], 0, axis] = min(value, box[part[i], 0, axis])
-            box[part[i], 1, axis] = max(value, box[part[i], 1, axis])
-    return box
+            box[p, 0, axis] = min(value, box[p, 0, axis])
+            box[p, 1, axis] = max(value, box[p, 1, axis])
+            squared += (box[p, 1, axis] - box[p, 0, axis]) ** 2
+        reaches[p] = squared >= length * length
+    return reaches
 
 
 @njit(nogil=True, cache=True)
@@ -83,9 +90,11 @@ def _move(points: Any, normals: Any, triangles: Any, kept: Any, number: Any, out
     for i in range(len(points)):
         if kept[i]:
             number[i] = n_points
-            out_points[n_points] = points[i]
+            for axis in range(3):  # ten times as fast as to copy rows, which numba makes arrays of
+                out_points[n_points, axis] = points[i, axis]
             if len(normals):
-                out_normals[n_points] = normals[i]
+                for axis in range(3):
+                    out_normals[n_points, axis] = normals[i, axis]
             n_points += 1
     n_triangles = 0
     for t in range(len(triangles)):
@@ -147,8 +156,7 @@ def kept_points(
     """
     part = np.empty(len(points), np.int32)
     n_parts = _parts(triangles, part)
-    box = _extents(points, part, n_parts)
-    kept = np.linalg.norm(box[:, 1] - box[:, 0], axis=1) >= smallest_mm
+    kept = _reach(points, part, n_parts, smallest_mm)
     if largest is not None:
         size = _n_triangles(triangles, part, n_parts) * kept
         kept[np.argsort(-size, kind="stable")[largest:]] = False
